@@ -1,0 +1,73 @@
+# What every SmartMill package shares: the language level, the warnings, and the lines of a library,
+# a program and a test.
+
+include(GNUInstallDirs)
+
+# smartmill_compile_options(TARGET): C++17 and the project's warnings.
+function(smartmill_compile_options target)
+  target_compile_features(${target} PUBLIC cxx_std_17)
+  set_target_properties(${target} PROPERTIES CXX_EXTENSIONS OFF)
+  target_compile_options(${target} PRIVATE -Wall -Wextra -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual)
+  target_include_directories(${target} PRIVATE ${CMAKE_CURRENT_SOURCE_DIR}/include)
+  target_include_directories(${target} SYSTEM PRIVATE ${catkin_INCLUDE_DIRS})
+  if(catkin_EXPORTED_TARGETS)
+    add_dependencies(${target} ${catkin_EXPORTED_TARGETS})
+  endif()
+endfunction()
+
+# smartmill_library(NAME SOURCES a.cpp ... LIBRARIES x ...): a library, installed with its headers.
+function(smartmill_library name)
+  cmake_parse_arguments(arg "" "" "SOURCES;LIBRARIES" ${ARGN})
+  add_library(${name} ${arg_SOURCES})
+  smartmill_compile_options(${name})
+  target_link_libraries(${name} ${catkin_LIBRARIES} ${arg_LIBRARIES})
+  install(TARGETS ${name} LIBRARY DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}
+    ARCHIVE DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION})
+  if(EXISTS ${CMAKE_CURRENT_SOURCE_DIR}/include/${PROJECT_NAME})
+    install(DIRECTORY include/${PROJECT_NAME}/ DESTINATION ${CATKIN_PACKAGE_INCLUDE_DESTINATION})
+  endif()
+endfunction()
+
+# smartmill_executable(NAME [TARGET target] SOURCES a.cpp ... LIBRARIES x ...): a program that rosrun finds as NAME.
+# TARGET names the cmake target where NAME would collide with another package's (default PACKAGE_NAME).
+function(smartmill_executable name)
+  cmake_parse_arguments(arg "" "TARGET" "SOURCES;LIBRARIES" ${ARGN})
+  if(NOT arg_TARGET)
+    set(arg_TARGET ${PROJECT_NAME}_${name})
+  endif()
+  add_executable(${arg_TARGET} ${arg_SOURCES})
+  set_target_properties(${arg_TARGET} PROPERTIES OUTPUT_NAME ${name})
+  smartmill_compile_options(${arg_TARGET})
+  target_link_libraries(${arg_TARGET} ${catkin_LIBRARIES} ${arg_LIBRARIES})
+  install(TARGETS ${arg_TARGET} RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
+endfunction()
+
+# smartmill_gtest(NAME SOURCES a.cpp ... LIBRARIES x ...): a unit test without ROS master.
+function(smartmill_gtest name)
+  if(NOT CATKIN_ENABLE_TESTING)
+    return()
+  endif()
+  cmake_parse_arguments(arg "" "" "SOURCES;LIBRARIES" ${ARGN})
+  find_package(GTest REQUIRED)
+  catkin_add_gtest(${PROJECT_NAME}_${name} ${arg_SOURCES} WORKING_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR})
+  smartmill_compile_options(${PROJECT_NAME}_${name})
+  target_link_libraries(${PROJECT_NAME}_${name} ${catkin_LIBRARIES} ${arg_LIBRARIES} GTest::gtest_main)
+endfunction()
+
+# smartmill_rostest(LAUNCH_FILE NAME SOURCES a.cpp ... LIBRARIES x ... NODES t ...): a gtest node run by rostest.
+# NODES are targets that the launch file starts.
+function(smartmill_rostest launch name)
+  if(NOT CATKIN_ENABLE_TESTING)
+    return()
+  endif()
+  cmake_parse_arguments(arg "" "" "SOURCES;LIBRARIES;NODES" ${ARGN})
+  find_package(rostest REQUIRED)
+  find_package(GTest REQUIRED)
+  add_rostest_gtest(${PROJECT_NAME}_${name} ${launch} ${arg_SOURCES})
+  smartmill_compile_options(${PROJECT_NAME}_${name})
+  target_link_libraries(${PROJECT_NAME}_${name} ${catkin_LIBRARIES} ${arg_LIBRARIES} GTest::gtest)
+  add_dependencies(tests ${PROJECT_NAME}_${name})
+  if(arg_NODES)
+    add_dependencies(${PROJECT_NAME}_${name} ${arg_NODES})
+  endif()
+endfunction()

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "smartmill_core/campaign/campaign.h"
+
+namespace smartmill {
+
+/// One measured record: named columns over time. Column names as in formats.md without the unit; values as in the file
+/// (tool_x, tool_y in um there become m here).
+struct Record {
+  std::vector<std::string> names;            ///< without time; e.g. spindle_angle fx fy fz load_meter hammer tool_x
+  std::vector<std::vector<double>> columns;  ///< SI; columns[c][i]
+  std::vector<double> time;                  ///< [s]
+
+  std::size_t size() const { return time.size(); }
+  bool has(const std::string& name) const;
+  /// @throws Error "FILE: column NAME is missing".
+  const std::vector<double>& column(const std::string& name) const;
+  std::vector<double>& add(const std::string& name);
+  std::string file;  ///< for messages
+};
+
+/// Reads a test's record in the campaign's folder, smartmill CSV or Kistler DynoWare export. Columns in any order.
+/// @throws Error naming file, line and column: missing column, wrong unit, NaN or text for a number, uneven time, no samples.
+Record readRecord(const Campaign& campaign, const CampaignTest& test);
+Record readCsv(const std::string& file);
+Record readDynoware(const std::string& file, const std::map<std::string, std::string>& channels);
+
+/// Writes name[unit] columns of formats.md, six significant digits (time: nine). @throws Error.
+void writeCsv(const Record& record, const std::string& file);
+
+}  // namespace smartmill

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "smartmill_core/modal/modal_model.h"
+
+namespace smartmill {
+
+/// Course of the input between samples.
+enum class Hold { zero_order, first_order };
+
+/// Response of a ModalModel to a sampled input, exact for inputs that are constant (zero order) or linear
+/// (first order) between samples: closed matrix exponential of each 2x2 mode, started at rest. No allocation in step().
+class ModalFilter {
+ public:
+  /// @param sample_rate [Hz] > 0. @throws Error on a mode with frequency <= 0 or damping outside (0, 1).
+  ModalFilter(const ModalModel& model, double sample_rate, Hold hold);
+
+  /// Output [unit x unit of input] at this sample. First order: the input runs linearly from the last sample's to this one's.
+  /// Zero order: the output at this sample knows the inputs of the samples before (the direct share also this one's).
+  double step(double input);
+
+  /// At rest, or in the static state of a constant input.
+  void reset(double constant_input = 0.0);
+
+ private:
+  struct Section {
+    double a11, a12, a21, a22;  // state transition: output [unit], its rate [unit/s]
+    double b1, b2;              // share of the input before
+    double c1, c2;              // share of this input (first order hold)
+    double gain;
+    double x, v;
+  };
+  std::vector<Section> sections_;
+  double direct_;
+  double last_input_ = 0.0;
+};
+
+}  // namespace smartmill

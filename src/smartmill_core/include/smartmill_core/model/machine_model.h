@@ -1,0 +1,121 @@
+#pragma once
+
+#include <array>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "smartmill_core/cutting/tool.h"
+#include "smartmill_core/modal/modal_model.h"
+
+namespace smartmill {
+
+using Axes3 = std::array<double, 3>;
+
+/// Modes of the tool tip, receptance [m/N]; an axis that the file leaves out is rigid.
+struct ToolTip {
+  ModalModel x, y;
+};
+
+/// Force sensor: measured over applied force, static gain 1 (direct = 1 - sum of gains); an axis left out is ideal.
+struct ForceSensor {
+  std::array<ModalModel, 3> axis;
+  std::optional<Axes3> noise_rms;    ///< [N]
+  bool measures_workpiece = false;   ///< the reaction on the workpiece; turned where samples enter
+};
+
+/// Spindle friction, load meter and limits.
+struct Spindle {
+  double viscous = 0.0;               ///< [N m s/rad]
+  double coulomb = 0.0;               ///< [N m], any sign
+  double load_meter_gain = 0.0;       ///< [V/W]
+  double load_meter_bandwidth = 0.0;  ///< [Hz] first order
+  double load_meter_resolution = 0.0; ///< [V]
+  double friction_zero_below = 0.0;   ///< [rad/s]
+  // What the controller and the chart need beyond the contract's keys (all optional in the file).
+  std::optional<double> load_meter_full_scale;  ///< [V] shown as 100 %
+  std::optional<double> max_speed;              ///< [rad/s]
+  std::optional<double> rated_torque;           ///< [N m]
+  std::optional<double> rated_power;            ///< [W]
+  std::optional<double> acceleration;           ///< [rad/s2]
+};
+
+/// Linear axes of the machine.
+struct MachineAxes {
+  std::array<std::array<double, 2>, 3> travel{};  ///< [m] min, max of x, y, z
+  double rapid = 0.0;         ///< [m/s]
+  double acceleration = 0.0;  ///< [m/s2]
+  Axes3 home{{0, 0, 0}};      ///< [m]
+};
+
+/// Hammer station: solenoid hammer above a capacitive displacement sensor, on the table (Dunwoody fig. 4.1).
+struct HammerStation {
+  double offset = 0.0;             ///< [m] hammer's height above the displacement sensor
+  double peak_force = 0.0;         ///< [N]
+  double contact_time = 0.0;       ///< [s] of the half-sine hit
+  double force_noise_rms = 0.0;    ///< [N]
+  double gap_at_zero_volt = 0.0;   ///< [m] sensor: V = gain_volt (gap_at_zero_volt / gap - 1), clipped to +-range_volt
+  double gain_volt = 0.0;          ///< [V]
+  double range_volt = 0.0;         ///< [V]
+  double voltage_noise_rms = 0.0;  ///< [V]
+  double flute_depth = 0.0;        ///< [m] how far the tool's surface falls back between two flutes
+  /// Tool centre (tip) in machine coordinates at which the sensor of that direction faces the tool at about twice
+  /// gap_at_zero_volt when a flute points at it. The tool nears the sensor in the direction's positive sense.
+  std::map<std::string, Axes3> position;  ///< "x", "y" [m]
+};
+
+/// Stock on the table (on the force sensor).
+struct Workpiece {
+  std::string material;
+  Axes3 low{{0, 0, 0}}, high{{0, 0, 0}};  ///< [m] corners in machine coordinates of the tool tip
+};
+
+/// One entry of effects: a name and keys of effects.md with their values as in the file (shop units);
+/// lists (pitch_deg) and modes (tool_flexibility) beside the numbers.
+struct EffectEntry {
+  std::string name;
+  std::map<std::string, double> numbers;
+  std::map<std::string, double> std_devs;  ///< of keys with _std beside them
+  std::map<std::string, std::string> words;  ///< channel, axis
+  std::vector<double> pitch_deg;
+  ToolTip flexibility;
+};
+
+/// How well the nominal values are known, one standard deviation [percent].
+struct Uncertainty {
+  double cutting = 3.0, frequency = 0.5, damping = 10.0, stiffness = 5.0, spindle = 3.0;
+};
+
+/// smartmill-model/1: what is believed of one machine, tool and material (formats.md). SI; optional sections are empty when
+/// the file lacks them.
+struct MachineModel {
+  std::string file;  ///< for messages
+  std::optional<ToolGeometry> tool;
+  std::optional<double> stickout;  ///< [m]
+  std::optional<CuttingCoefficients> cutting;
+  ToolTip tool_tip;
+  ForceSensor force_sensor;
+  std::optional<Spindle> spindle;
+  std::optional<MachineAxes> axes;
+  std::optional<HammerStation> hammer;
+  std::optional<Workpiece> workpiece;
+  std::vector<EffectEntry> effects;
+  Uncertainty uncertainty;
+
+  /// What a tool needs, or Error "FILE: NAME is missing (needed to WHY)".
+  const ToolGeometry& needTool(const std::string& why) const;
+  const CuttingCoefficients& needCutting(const std::string& why) const;
+  const Spindle& needSpindle(const std::string& why) const;
+  const MachineAxes& needAxes(const std::string& why) const;
+  const HammerStation& needHammer(const std::string& why) const;
+  const Workpiece& needWorkpiece(const std::string& why) const;
+};
+
+/// @throws Error of one line that names the file, the key and the value: unknown key, missing key, wrong type, NaN, out of range.
+MachineModel readMachineModel(const std::string& file);
+
+/// Writes the model with the same keys, ten significant digits. @throws Error when the file cannot be written.
+void writeMachineModel(const MachineModel& model, const std::string& file);
+
+}  // namespace smartmill
