@@ -47,6 +47,14 @@ struct LoadMeter {
   std::vector<double> speed;  ///< [rpm] spindles only
 };
 
+/// Data of one reply of Client::exchange. @throws WireError when it is too short.
+Status decodeStatus(Reader& reader);
+/// Names of four bytes; empty when the reply is an error. Bounded by at_most: surplus entries of a reply are
+/// garbage.
+std::vector<std::string> decodeNames(const SubReply& reply, std::size_t at_most);
+/// Value8s as numbers (NaN: vacant); empty when the reply is an error.
+std::vector<double> decodeValues(const SubReply& reply, std::size_t at_most);
+
 /// FOCAS client: a stream circuit for DNC and a data circuit for everything else. Not thread-safe: one thread
 /// at a time. Calls throw FocasError when the controller refuses, ConnectionError when the connection is lost
 /// or a reply takes longer than the timeout (the connection is closed then: a late reply must not answer the

@@ -66,6 +66,10 @@ class ControllerInterface {
   virtual std::vector<double> spindleLoad() const = 0;       ///< [percent] of the load meter, of each spindle
   virtual std::vector<double> spindleMaxSpeed() const = 0;   ///< [rpm]
   virtual std::vector<double> servoLoad() const = 0;         ///< [percent] of rated load, of each axis
+  virtual std::vector<double> servoLoopGain() const { return {}; }  ///< [0.01/s] of each axis; empty: EW_FUNC
+  virtual std::vector<double> servoSpeed() const {
+    return {};
+  }  ///< [rpm] of each axis' motor; empty: EW_FUNC
 
   /// EW_OK and the value (nothing: vacant), or EW_NUMBER.
   virtual EwCode readMacro(int number, std::optional<double>* value) const = 0;

@@ -1,0 +1,36 @@
+#pragma once
+
+#include "smartmill_focas/server.h"
+
+namespace smartmill::focas {
+
+/// Answers the requests of data PDUs from a controller.
+class DataCalls {
+ public:
+  explicit DataCalls(ControllerInterface& controller)
+      : controller_(controller), info_(controller.sysInfo()) {}
+
+  const SysInfo& sysInfo() const { return info_; }
+  /// Never throws: what the controller does not know is EW_FUNC, malformed arguments EW_LENGTH, EW_NUMBER,
+  /// EW_ATTRIB.
+  SubReply answer(const SubRequest& request);
+
+ private:
+  int call(const SubRequest& request, Writer& out);
+  int position(const SubRequest& request, Writer& out) const;
+  int spindle(const SubRequest& request, Writer& out) const;
+  int servo(const SubRequest& request, Writer& out) const;
+  int readMacros(const SubRequest& request, Writer& out) const;
+  int writeMacro(const SubRequest& request);
+  int readMacroDoubles(const SubRequest& request, Writer& out) const;
+  int writeMacroDoubles(const SubRequest& request);
+  int alarmMessages(const SubRequest& request, Writer& out) const;
+  void status(const Status& status, Writer& out) const;
+  void axisNames(const SubRequest& request, Writer& out) const;
+  void units(const SubRequest& request, Writer& out) const;
+
+  ControllerInterface& controller_;
+  SysInfo info_;
+};
+
+}  // namespace smartmill::focas

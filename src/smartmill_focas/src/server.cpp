@@ -1,0 +1,390 @@
+#include "smartmill_focas/server.h"
+
+#include <arpa/inet.h>
+#include <fcntl.h>
+#include <netinet/in.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cerrno>
+#include <deque>
+#include <list>
+#include <stdexcept>
+#include <thread>
+
+#include "data_calls.h"
+#include "socket.h"
+
+namespace smartmill::focas {
+namespace {
+
+constexpr std::size_t READ_STEP = 8192;  // [byte] most read from one connection before its frames are served
+constexpr std::size_t MAX_UNSENT =
+    1 << 18;  // [byte] replies a client leaves unread before it is not served any more
+constexpr int IDLE_POLL_MS = 200;
+constexpr int SESSION_POLL_MS = 5;  // the machine is asked for an abort this often
+constexpr int BLOCKED_POLL_MS = 2;  // text that the machine's buffer did not take is offered this often
+constexpr int LISTEN_BACKLOG = 16;
+
+enum class Dnc { none, open, aborted };
+
+struct Connection {
+  Descriptor socket;
+  FrameReader reader;
+  std::deque<Frame> frames;    // read, not yet served
+  std::size_t text_taken = 0;  // [byte] of the front frame's DNC text that the machine has
+  Bytes unsent;
+  int circuit = 0;  // 0: not opened
+  Dnc dnc = Dnc::none;
+  int abort_code = EW_OK;
+  bool blocked = false;  // the machine's buffer is full
+  bool peer_closed = false;
+  bool close_when_sent = false;
+  bool dead = false;
+};
+
+}  // namespace
+
+class Server::Impl {
+ public:
+  Impl(const ServerOptions& options, ControllerInterface& controller)
+      : options_(options), controller_(controller), calls_(controller) {
+    listen();
+    int ends[2];
+    if (::pipe(ends) != 0) {
+      throw std::runtime_error("FOCAS server: no pipe: " + errorText(errno));
+    }
+    wake_read_ = Descriptor(ends[0]);
+    wake_write_ = Descriptor(ends[1]);
+    for (int end : ends) {
+      ::fcntl(end, F_SETFD, FD_CLOEXEC);
+    }
+    thread_ = std::thread([this] { run(); });
+  }
+
+  ~Impl() { stop(); }
+
+  void stop() {
+    if (!thread_.joinable()) {
+      return;
+    }
+    stopping_ = true;
+    const char byte = 0;
+    if (::write(wake_write_.get(), &byte, 1) < 0) {
+      // The poll's own period ends the thread then.
+    }
+    thread_.join();
+  }
+
+  std::uint16_t port() const { return port_; }
+  int connections() const { return open_count_; }
+
+ private:
+  void listen() {
+    const std::string where = options_.bind_address + ":" + std::to_string(options_.port);
+    const auto fail = [&](const std::string& why) {
+      throw std::runtime_error("FOCAS server: cannot listen on " + where + ": " + why);
+    };
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(options_.port);
+    if (::inet_pton(AF_INET, options_.bind_address.c_str(), &address.sin_addr) != 1) {
+      fail("not an IPv4 address");
+    }
+    listener_ = Descriptor(::socket(AF_INET, SOCK_STREAM, 0));
+    if (!listener_.valid()) {
+      fail(errorText(errno));
+    }
+    const int on = 1;
+    ::setsockopt(listener_.get(), SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
+    // Set before listen(), so that accepted connections advertise the small window from the first packet on.
+    ::setsockopt(listener_.get(), SOL_SOCKET, SO_RCVBUF, &options_.receive_buffer,
+                 sizeof options_.receive_buffer);
+    prepareSocket(listener_.get());
+    if (::bind(listener_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
+        ::listen(listener_.get(), LISTEN_BACKLOG) != 0) {
+      fail(errorText(errno));
+    }
+    socklen_t size = sizeof address;
+    ::getsockname(listener_.get(), reinterpret_cast<sockaddr*>(&address), &size);
+    port_ = ntohs(address.sin_port);
+  }
+
+  void run() {
+    std::vector<pollfd> waits;
+    while (!stopping_) {
+      waits.clear();
+      waits.push_back({wake_read_.get(), POLLIN, 0});
+      waits.push_back({listener_.get(), POLLIN, 0});
+      int timeout = IDLE_POLL_MS;
+      for (const Connection& c : connections_) {
+        short events = 0;
+        if (!c.peer_closed) {
+          // While text waits for the machine's buffer nothing is read, so that TCP stops the client; its
+          // going away is still seen.
+          events =
+              static_cast<short>(c.blocked || c.unsent.size() > MAX_UNSENT ? POLLRDHUP : POLLIN | POLLRDHUP);
+        }
+        if (!c.unsent.empty()) {
+          events = static_cast<short>(events | POLLOUT);
+        }
+        // A closed peer would end every poll at once.
+        waits.push_back({c.peer_closed ? -1 : c.socket.get(), events, 0});
+        if (c.blocked) {
+          timeout = std::min(timeout, BLOCKED_POLL_MS);
+        } else if (c.dnc == Dnc::open) {
+          timeout = std::min(timeout, SESSION_POLL_MS);
+        }
+      }
+      ::poll(waits.data(), waits.size(), timeout);
+      std::size_t i = 2;
+      for (Connection& c : connections_) {
+        serve(c, waits[i++].revents);
+      }
+      connections_.remove_if([](const Connection& c) { return c.dead; });
+      if ((waits[1].revents & POLLIN) != 0) {
+        accept();
+      }
+      open_count_ = static_cast<int>(std::count_if(connections_.begin(), connections_.end(),
+                                                   [](const Connection& c) { return c.circuit != 0; }));
+    }
+    for (Connection& c : connections_) {
+      drop(c);
+    }
+    connections_.clear();
+    listener_.reset();
+    open_count_ = 0;
+  }
+
+  void accept() {
+    for (;;) {
+      Descriptor socket(::accept(listener_.get(), nullptr, nullptr));
+      if (!socket.valid()) {
+        return;
+      }
+      prepareSocket(socket.get());
+      connections_.emplace_back();
+      connections_.back().socket = std::move(socket);
+    }
+  }
+
+  void drop(Connection& c) {
+    if (c.dnc == Dnc::open) {
+      c.dnc = Dnc::none;
+      controller_.dncDisconnected();
+    }
+    c.dead = true;
+  }
+
+  void serve(Connection& c, short events) {
+    try {
+      if ((events & (POLLERR | POLLNVAL)) != 0) {
+        drop(c);
+        return;
+      }
+      if (c.dnc == Dnc::open) {
+        const int code = controller_.dncAbort();
+        if (code != EW_OK) {
+          c.dnc = Dnc::aborted;
+          c.abort_code = code;
+          sendError(c, FRAME_DNC_DATA, code);
+        }
+      }
+      if ((events & (POLLIN | POLLRDHUP | POLLHUP)) != 0 && !c.peer_closed) {
+        // A client that has gone sends no more: what is left of it is at most one receive buffer, read at
+        // once so that its end is known even while text waits.
+        const bool leaving = (events & (POLLRDHUP | POLLHUP)) != 0;
+        if (readSome(c.socket.get(), c.reader, leaving ? SIZE_MAX : READ_STEP) == Transfer::closed) {
+          c.peer_closed = true;
+        }
+        while (std::optional<Frame> frame = c.reader.next()) {
+          c.frames.push_back(std::move(*frame));
+        }
+      }
+      if (c.peer_closed && c.dnc == Dnc::open && !endWaits(c)) {
+        drop(c);
+        return;
+      }
+      serveFrames(c);
+      if (!c.unsent.empty() && writeSome(c.socket.get(), c.unsent) == Transfer::closed) {
+        drop(c);
+        return;
+      }
+      const bool all_sent = c.unsent.empty();
+      if ((c.peer_closed && c.frames.empty() && !c.blocked) || (c.close_when_sent && all_sent)) {
+        drop(c);
+      }
+    } catch (const std::exception&) {
+      // Not FOCAS: the connection cannot be understood any further.
+      drop(c);
+    }
+  }
+
+  static bool endWaits(const Connection& c) {
+    return std::any_of(c.frames.begin(), c.frames.end(), [](const Frame& frame) {
+      return frame.type == FRAME_DNC_END || frame.type == FRAME_DNC_CANCEL;
+    });
+  }
+
+  void serveFrames(Connection& c) {
+    c.blocked = false;
+    while (!c.frames.empty() && !c.close_when_sent && c.unsent.size() <= MAX_UNSENT) {
+      if (!serveFrame(c, c.frames.front())) {
+        c.blocked = true;
+        return;
+      }
+      c.frames.pop_front();
+      c.text_taken = 0;
+    }
+  }
+
+  /// False when the frame must wait for the machine's buffer.
+  bool serveFrame(Connection& c, const Frame& frame) {
+    const std::uint8_t type = frame.type;
+    if (frame.is(FRAME_OPEN, DIR_REQUEST)) {
+      open(c, frame);
+    } else if (frame.is(FRAME_CLOSE, DIR_REQUEST)) {
+      if (c.dnc == Dnc::open) {
+        controller_.dncDisconnected();
+      }
+      c.dnc = Dnc::none;
+      c.circuit = 0;
+      send(c, FRAME_CLOSE, DIR_REPLY, {});
+    } else if (c.circuit == 0) {
+      if (frame.direction == DIR_REQUEST) {
+        sendError(c, type, EW_HANDLE);
+      }
+    } else if (frame.is(FRAME_DATA, DIR_REQUEST)) {
+      data(c, frame);
+    } else if (frame.is(FRAME_DNC_START, DIR_REQUEST)) {
+      dncStart(c);
+    } else if (frame.is(FRAME_DNC_DATA, DIR_STREAM)) {
+      if (c.dnc == Dnc::open) {
+        const char* text = reinterpret_cast<const char*>(frame.body.data()) + c.text_taken;
+        const std::size_t size = frame.body.size() - c.text_taken;
+        c.text_taken += std::min(size, controller_.dncData(text, size));
+        return c.text_taken == frame.body.size();
+      }
+    } else if (frame.is(FRAME_DNC_END, DIR_REQUEST)) {
+      dncEnd(c);
+    } else if (frame.is(FRAME_DNC_CANCEL, DIR_STREAM)) {
+      if (c.dnc == Dnc::open) {
+        int result = DNC_CANCEL;
+        if (frame.body.size() >= 4) {
+          Reader reader(frame.body);
+          result = reader.skip(2).i16();
+        }
+        controller_.dncCancel(result);
+      }
+      c.dnc = Dnc::none;
+    } else if (frame.direction == DIR_REQUEST) {
+      sendError(c, type, EW_FUNC);
+    }
+    return true;
+  }
+
+  void open(Connection& c, const Frame& frame) {
+    const int circuit = frame.body.size() >= 2 ? Reader(frame.body).u16() : 0;
+    const auto same = std::count_if(connections_.begin(), connections_.end(), [&](const Connection& other) {
+      return &other != &c && other.circuit == circuit;
+    });
+    if ((circuit != STREAM_CIRCUIT && circuit != DATA_CIRCUIT) || same >= options_.max_sessions) {
+      // The refusal seen on a live 31i carries code 2 for its sixth session.
+      sendError(c, FRAME_OPEN, 2);
+      c.close_when_sent = true;
+      return;
+    }
+    c.circuit = circuit;
+    OpenReply reply;
+    const SysInfo info = calls_.sysInfo();
+    reply.axes = static_cast<int>(info.axes.size());
+    reply.spindles = static_cast<int>(info.spindles.size());
+    send(c, FRAME_OPEN, DIR_REPLY, encodeOpenReply(reply));
+  }
+
+  void data(Connection& c, const Frame& frame) {
+    Bytes body;
+    try {
+      std::vector<SubReply> replies;
+      for (const SubRequest& request : decodeRequests(frame.body)) {
+        replies.push_back(calls_.answer(request));
+      }
+      body = encodeReplies(replies);
+    } catch (const WireError&) {
+      sendError(c, FRAME_DATA, EW_LENGTH);
+      return;
+    }
+    send(c, FRAME_DATA, DIR_REPLY, body);
+  }
+
+  void dncStart(Connection& c) {
+    if (c.circuit != STREAM_CIRCUIT) {
+      sendError(c, FRAME_DNC_START, EW_FUNC);
+      return;
+    }
+    const bool taken = std::any_of(connections_.begin(), connections_.end(),
+                                   [](const Connection& other) { return other.dnc == Dnc::open; });
+    const int code = taken ? EW_BUSY : controller_.dncStart();
+    if (code != EW_OK) {
+      sendError(c, FRAME_DNC_START, code);
+      return;
+    }
+    c.dnc = Dnc::open;
+    send(c, FRAME_DNC_START, DIR_REPLY, {});
+  }
+
+  void dncEnd(Connection& c) {
+    int code = EW_FUNC;
+    if (c.dnc == Dnc::open) {
+      code = controller_.dncEnd();
+    } else if (c.dnc == Dnc::aborted) {
+      code = c.abort_code;
+    }
+    c.dnc = Dnc::none;
+    if (code == EW_OK) {
+      send(c, FRAME_DNC_END, DIR_REPLY, {});
+    } else {
+      sendError(c, FRAME_DNC_END, code);
+    }
+  }
+
+  static void send(Connection& c, std::uint8_t type, std::uint8_t direction, const Bytes& body) {
+    const Bytes frame = encodeFrame(type, direction, body, REPLY_VERSION);
+    c.unsent.insert(c.unsent.end(), frame.begin(), frame.end());
+  }
+
+  static void sendError(Connection& c, std::uint8_t type, int code) {
+    ErrorBody error;
+    error.code = static_cast<std::int16_t>(code);
+    send(c, type, DIR_ERROR, encodeErrorBody(error));
+  }
+
+  ServerOptions options_;
+  ControllerInterface& controller_;
+  DataCalls calls_;
+  Descriptor listener_, wake_read_, wake_write_;
+  std::uint16_t port_ = 0;
+  std::list<Connection> connections_;  // touched by the thread only
+  std::atomic<bool> stopping_{false};
+  std::atomic<int> open_count_{0};
+  std::thread thread_;
+};
+
+Server::Server(const ServerOptions& options, ControllerInterface& controller)
+    : impl_(std::make_unique<Impl>(options, controller)) {
+}
+Server::~Server() = default;
+std::uint16_t Server::port() const {
+  return impl_->port();
+}
+void Server::stop() {
+  impl_->stop();
+}
+int Server::connections() const {
+  return impl_->connections();
+}
+
+}  // namespace smartmill::focas
