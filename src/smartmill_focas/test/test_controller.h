@@ -1,0 +1,129 @@
+#pragma once
+
+#include <map>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "smartmill_focas/server.h"
+
+namespace smartmill::focas {
+
+/// A controller with settable values and a DNC buffer that empties only when a test says so.
+class TestController : public ControllerInterface {
+ public:
+  mutable std::mutex mutex;
+  SysInfo info;
+  Status state;
+  std::vector<double> machine{-1.5, 2.25, 300.125}, absolute{10.5, -20.25, 30.0}, relative{1.0, 2.0, 3.0},
+      distance{0.0, 0.001, -4.5};
+  double feed = 1234.0;
+  std::vector<double> speed{5000.0}, load{12.34}, servo{5.5, 6.25, -7.75};
+  std::map<int, std::optional<double>> macros{
+      {100, std::nullopt}, {500, 2.5}, {501, std::nullopt}, {502, -7.0}};
+  std::uint32_t alarm_bits = 0;
+  std::vector<AlarmMessage> alarms;
+  bool session = false;
+  std::size_t room = 1 << 30;  ///< [byte] that the buffer still takes
+  std::string text;            ///< all that was taken
+  int starts = 0, ends = 0, cancels = 0, disconnects = 0, cancel_result = 0;
+  EwCode abort_code = EW_OK;
+  EwCode refuse_start = EW_OK;
+
+  SysInfo sysInfo() const override { return info; }
+  Status status() const override { return locked(state); }
+  std::vector<double> machinePosition() const override { return locked(machine); }
+  std::vector<double> absolutePosition() const override { return locked(absolute); }
+  std::vector<double> relativePosition() const override { return locked(relative); }
+  std::vector<double> distanceToGo() const override { return locked(distance); }
+  double actualFeed() const override { return locked(feed); }
+  std::vector<double> spindleSpeed() const override { return locked(speed); }
+  std::vector<double> spindleLoad() const override { return locked(load); }
+  std::vector<double> spindleMaxSpeed() const override { return {12000.0}; }
+  std::vector<double> servoLoad() const override { return locked(servo); }
+  EwCode readMacro(int number, std::optional<double>* value) const override {
+    const std::lock_guard<std::mutex> lock(mutex);
+    const auto found = macros.find(number);
+    if (found == macros.end()) {
+      return EW_NUMBER;
+    }
+    *value = found->second;
+    return EW_OK;
+  }
+  EwCode writeMacro(int number, std::optional<double> value) override {
+    const std::lock_guard<std::mutex> lock(mutex);
+    if (macros.count(number) == 0) {
+      return EW_NUMBER;
+    }
+    macros[number] = value;
+    return EW_OK;
+  }
+  std::uint32_t alarmBits() const override { return locked(alarm_bits); }
+  std::vector<AlarmMessage> alarmMessages() const override { return locked(alarms); }
+  int runningProgram() const override { return 1234; }
+  int mainProgram() const override { return 4321; }
+  int sequenceNumber() const override { return 77; }
+  int blockCount() const override { return 88; }
+  std::string programPath() const override { return "//CNC_MEM/USER/O4321"; }
+  std::string executingBlock() const override { return "N77 G1 X10 F600"; }
+  EwCode dncStart() override {
+    const std::lock_guard<std::mutex> lock(mutex);
+    if (refuse_start != EW_OK) {
+      return refuse_start;
+    }
+    if (state.aut != AUT_REMOTE) {
+      return EW_MODE;
+    }
+    if (session) {
+      return EW_BUSY;
+    }
+    session = true;
+    abort_code = EW_OK;
+    ++starts;
+    return EW_OK;
+  }
+  std::size_t dncData(const char* data, std::size_t size) override {
+    const std::lock_guard<std::mutex> lock(mutex);
+    const std::size_t taken = std::min(size, room);
+    room -= taken;
+    text.append(data, taken);
+    return taken;
+  }
+  EwCode dncEnd() override {
+    const std::lock_guard<std::mutex> lock(mutex);
+    session = false;
+    ++ends;
+    return EW_OK;
+  }
+  void dncCancel(int result) override {
+    const std::lock_guard<std::mutex> lock(mutex);
+    session = false;
+    ++cancels;
+    cancel_result = result;
+  }
+  void dncDisconnected() override {
+    const std::lock_guard<std::mutex> lock(mutex);
+    session = false;
+    ++disconnects;
+  }
+  EwCode dncAbort() override {
+    const std::lock_guard<std::mutex> lock(mutex);
+    if (abort_code != EW_OK) {
+      session = false;
+    }
+    return abort_code;
+  }
+
+  template <class T>
+  T locked(const T& value) const {
+    const std::lock_guard<std::mutex> lock(mutex);
+    return value;
+  }
+  template <class F>
+  void change(F&& f) {
+    const std::lock_guard<std::mutex> lock(mutex);
+    f(*this);
+  }
+};
+
+}  // namespace smartmill::focas

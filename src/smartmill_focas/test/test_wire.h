@@ -1,0 +1,161 @@
+#pragma once
+
+#include <arpa/inet.h>
+#include <netinet/in.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <functional>
+#include <stdexcept>
+#include <string>
+#include <thread>
+
+#include "smartmill_focas/codec.h"
+
+namespace smartmill::focas {
+
+/// "a0a0 0001 ..." to bytes; blanks are skipped, text in quotes is taken as it is, Zn stands for n zero
+/// bytes.
+inline Bytes hex(const std::string& text) {
+  Bytes bytes;
+  for (std::size_t i = 0; i < text.size();) {
+    if (text[i] == ' ') {
+      ++i;
+    } else if (text[i] == '"') {
+      for (++i; text[i] != '"'; ++i) {
+        bytes.push_back(static_cast<std::uint8_t>(text[i]));
+      }
+      ++i;
+    } else if (text[i] == 'Z') {
+      std::size_t used = 0;
+      const int count = std::stoi(text.substr(i + 1), &used);
+      bytes.insert(bytes.end(), static_cast<std::size_t>(count), 0);
+      i += 1 + used;
+    } else {
+      bytes.push_back(static_cast<std::uint8_t>(std::stoi(text.substr(i, 2), nullptr, 16)));
+      i += 2;
+    }
+  }
+  return bytes;
+}
+
+inline std::string show(const Bytes& bytes) {
+  static const char* const DIGITS = "0123456789abcdef";
+  std::string text;
+  for (std::uint8_t byte : bytes) {
+    text += DIGITS[byte >> 4];
+    text += DIGITS[byte & 15];
+  }
+  return text;
+}
+
+/// Waits until a condition holds; generous, so that a slow computer passes too.
+inline bool eventually(const std::function<bool()>& condition, double seconds = 10.0) {
+  const auto deadline = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
+  while (!condition()) {
+    if (std::chrono::steady_clock::now() > deadline) {
+      return false;
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  return true;
+}
+
+/// A blocking TCP socket that knows nothing of FOCAS.
+class RawSocket {
+ public:
+  explicit RawSocket(int fd) : fd_(fd) {}
+  RawSocket(const RawSocket&) = delete;
+  ~RawSocket() { close(); }
+  static int connectTo(std::uint16_t port) {
+    const int fd = ::socket(AF_INET, SOCK_STREAM, 0);
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_port = htons(port);
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    if (::connect(fd, reinterpret_cast<sockaddr*>(&address), sizeof address) != 0) {
+      throw std::runtime_error("test cannot connect");
+    }
+    return fd;
+  }
+  bool send(const Bytes& bytes) {
+    std::size_t sent = 0;
+    while (sent < bytes.size()) {
+      const ssize_t put = ::send(fd_, bytes.data() + sent, bytes.size() - sent, MSG_NOSIGNAL);
+      if (put <= 0) {
+        return false;
+      }
+      sent += static_cast<std::size_t>(put);
+    }
+    return true;
+  }
+  /// That many bytes, fewer when the peer closes or 10 s pass.
+  Bytes receive(std::size_t count, int timeout_ms = 10000) {
+    Bytes bytes;
+    while (bytes.size() < count) {
+      pollfd wait{fd_, POLLIN, 0};
+      if (::poll(&wait, 1, timeout_ms) <= 0) {
+        break;
+      }
+      std::uint8_t buffer[4096];
+      const ssize_t got = ::recv(fd_, buffer, std::min(sizeof buffer, count - bytes.size()), 0);
+      if (got <= 0) {
+        break;
+      }
+      bytes.insert(bytes.end(), buffer, buffer + got);
+    }
+    return bytes;
+  }
+  /// What is there, at most a few kilobytes; waits for it no longer than the timeout.
+  Bytes receiveSome(int timeout_ms) {
+    pollfd wait{fd_, POLLIN, 0};
+    std::uint8_t buffer[4096];
+    const ssize_t got = ::poll(&wait, 1, timeout_ms) > 0 ? ::recv(fd_, buffer, sizeof buffer, 0) : 0;
+    return Bytes(buffer, buffer + (got > 0 ? got : 0));
+  }
+  /// True when the peer has closed (nothing more comes).
+  bool closedByPeer() { return receive(1).empty(); }
+  void shutdownSend() { ::shutdown(fd_, SHUT_WR); }
+  void close() {
+    if (fd_ >= 0) {
+      ::close(fd_);
+      fd_ = -1;
+    }
+  }
+
+ private:
+  int fd_;
+};
+
+/// Listens on a free port of loopback.
+class RawListener {
+ public:
+  RawListener() : fd_(::socket(AF_INET, SOCK_STREAM, 0)) {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    socklen_t size = sizeof address;
+    if (::bind(fd_, reinterpret_cast<sockaddr*>(&address), size) != 0 || ::listen(fd_, 8) != 0) {
+      throw std::runtime_error("test cannot listen");
+    }
+    ::getsockname(fd_, reinterpret_cast<sockaddr*>(&address), &size);
+    port_ = ntohs(address.sin_port);
+  }
+  ~RawListener() { close(); }
+  std::uint16_t port() const { return port_; }
+  int accept() { return ::accept(fd_, nullptr, nullptr); }
+  void close() {
+    if (fd_ >= 0) {
+      ::close(fd_);
+      fd_ = -1;
+    }
+  }
+
+ private:
+  int fd_;
+  std::uint16_t port_ = 0;
+};
+
+}  // namespace smartmill::focas
