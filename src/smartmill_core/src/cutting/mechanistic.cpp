@@ -1,0 +1,167 @@
+#include "smartmill_core/cutting/mechanistic.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <string>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/units.h"
+
+namespace smartmill {
+
+namespace {
+
+using units::PI;
+using units::TWO_PI;
+
+[[noreturn]] void refuse(const char* what, double value, const char* unit, const char* due) {
+  char text[200];
+  std::snprintf(text, sizeof text, "%s: %g %s is out of range (%s)", what, value, unit, due);
+  throw Error(text);
+}
+
+double sinc(double x) {
+  return std::abs(x) < 1e-6 ? 1.0 - x * x / 6.0 : std::sin(x) / x;
+}
+
+/// Integrals over the immersion angle, or means over a piece of edge.
+struct Shares {
+  double one = 0.0, s = 0.0, c = 0.0, ss = 0.0, sc = 0.0;
+};
+
+// Over an interval of width d around middle, divided by d: sums of sines become products, so that nothing
+// cancels when the interval is short (zero helix is the limit).
+Shares meanOver(double middle, double d) {
+  const double half = sinc(0.5 * d), full = sinc(d);
+  return {1.0, half * std::sin(middle), half * std::cos(middle), 0.5 - 0.5 * full * std::cos(2.0 * middle),
+          0.5 * full * std::sin(2.0 * middle)};
+}
+
+// Where the chip is not positive there is no force: only 0..pi of the engagement counts.
+double firstCut(const Engagement& e) {
+  return std::max(e.entry, 0.0);
+}
+double lastCut(const Engagement& e) {
+  return std::min(e.exit, PI);
+}
+
+}  // namespace
+
+CuttingForce toolForce(double ft, double fr, double fa, double immersion_angle, double radius) {
+  const double s = std::sin(immersion_angle), c = std::cos(immersion_angle);
+  return {-ft * c - fr * s, ft * s - fr * c, fa, ft * radius};
+}
+
+void validate(const ToolGeometry& tool) {
+  if (tool.teeth < 1 || tool.teeth > 20) refuse("tool teeth", tool.teeth, "", "1..20");
+  if (!(tool.diameter > 0.0) || !std::isfinite(tool.diameter)) {
+    refuse("tool diameter", tool.diameter, "m", "> 0");
+  }
+  if (!(tool.helix >= 0.0 && tool.helix < units::radFromDeg(80.0))) {
+    refuse("tool helix", tool.helix, "rad", "0 <= helix < 80 deg");
+  }
+  if (tool.pitch.empty()) return;
+  if (tool.pitch.size() != static_cast<std::size_t>(tool.teeth)) {
+    refuse("tool pitch", static_cast<double>(tool.pitch.size()), "values", "one a tooth");
+  }
+  double sum = 0.0;
+  for (const double p : tool.pitch) {
+    if (!(p > 0.0)) refuse("tool pitch", p, "rad", "> 0");
+    sum += p;
+  }
+  // Pitches are written with a few digits in degrees.
+  if (std::abs(sum - TWO_PI) > 1e-4) refuse("tool pitch", sum, "rad in all", "sum 2 pi");
+}
+
+void validate(const Engagement& engagement) {
+  if (!(engagement.entry >= 0.0 && engagement.entry <= TWO_PI)) {
+    refuse("entry angle", engagement.entry, "rad", "0..2 pi");
+  }
+  if (!(engagement.exit > engagement.entry && engagement.exit <= TWO_PI + 1e-12)) {
+    refuse("exit angle", engagement.exit, "rad", "entry < exit <= 2 pi");
+  }
+  if (!(engagement.axial_depth > 0.0) || !std::isfinite(engagement.axial_depth)) {
+    refuse("axial depth", engagement.axial_depth, "m", "> 0");
+  }
+  if (!(engagement.feed_per_tooth >= 0.0) || !std::isfinite(engagement.feed_per_tooth)) {
+    refuse("feed per tooth", engagement.feed_per_tooth, "m", ">= 0");
+  }
+}
+
+MechanisticForce::MechanisticForce(const ToolGeometry& tool, const CuttingCoefficients& coefficients,
+                                   const Engagement& engagement)
+    : tool_(tool), coefficients_(coefficients), engagement_(engagement) {
+  validate(tool);
+  validate(engagement);
+  const std::pair<const char*, double> values[] = {
+      {"cutting coefficient Ktc", coefficients.ktc}, {"cutting coefficient Krc", coefficients.krc},
+      {"cutting coefficient Kac", coefficients.kac}, {"edge coefficient Kte", coefficients.kte},
+      {"edge coefficient Kre", coefficients.kre},    {"edge coefficient Kae", coefficients.kae}};
+  for (const auto& [name, value] : values) {
+    if (!std::isfinite(value)) refuse(name, value, "", "finite");
+  }
+}
+
+CuttingForce MechanisticForce::at(double spindle_angle) const {
+  CuttingForce sum;
+  const double lag = tool_.lag(), depth = engagement_.axial_depth;
+  const double entry = firstCut(engagement_), exit = lastCut(engagement_);
+  if (exit <= entry || engagement_.feed_per_tooth <= 0.0) return sum;
+  const CuttingCoefficients& k = coefficients_;
+  for (int tooth = 0; tooth < tool_.teeth; ++tooth) {
+    const double chip = engagement_.feed_per_tooth * tool_.teeth * tool_.pitchOf(tooth) / TWO_PI;
+    double tip = std::fmod(spindle_angle + tool_.toothAngle(tooth), TWO_PI);
+    if (tip < 0.0) tip += TWO_PI;
+    // The edge spans the immersion angles tip - lag depth .. tip: whole turns of it may be in cut.
+    for (; tip - lag * depth < exit; tip += TWO_PI) {
+      if (tip < entry) continue;
+      double low = 0.0, high = depth;
+      if (lag > 0.0) {
+        low = std::max(0.0, (tip - exit) / lag);
+        high = std::min(depth, (tip - entry) / lag);
+      } else if (tip >= exit) {
+        break;
+      }
+      if (high <= low) continue;
+      const double length = high - low;
+      const Shares m = meanOver(tip - 0.5 * lag * (low + high), lag * length);
+      const double c = chip * length;
+      sum.fx += -(k.ktc * c * m.sc + k.kte * length * m.c) - (k.krc * c * m.ss + k.kre * length * m.s);
+      sum.fy += (k.ktc * c * m.ss + k.kte * length * m.s) - (k.krc * c * m.sc + k.kre * length * m.c);
+      sum.fz += k.kac * c * m.s + k.kae * length;
+      sum.torque += tool_.radius() * (k.ktc * c * m.s + k.kte * length);
+    }
+  }
+  return sum;
+}
+
+CuttingForce MechanisticForce::mean() const {
+  const auto matrix = meanForceMatrix(tool_, engagement_);
+  const CuttingCoefficients& k = coefficients_;
+  const std::array<double, 6> values{k.ktc, k.krc, k.kac, k.kte, k.kre, k.kae};
+  std::array<double, 4> mean{};
+  for (std::size_t r = 0; r < 4; ++r) {
+    for (std::size_t c = 0; c < 6; ++c) mean[r] += matrix[r][c] * values[c];
+  }
+  return {mean[0], mean[1], mean[2], mean[3]};
+}
+
+std::array<std::array<double, 6>, 4> meanForceMatrix(const ToolGeometry& tool, const Engagement& engagement) {
+  validate(tool);
+  validate(engagement);
+  const double entry = firstCut(engagement), exit = lastCut(engagement);
+  if (exit <= entry || engagement.feed_per_tooth <= 0.0) return {};
+  const double arc = exit - entry;
+  const Shares m = meanOver(0.5 * (entry + exit), arc);
+  // Every element of the edge is in cut for arc of 2 pi; the teeth's chips add up to the feed a revolution.
+  const double edge = tool.teeth * engagement.axial_depth * arc / TWO_PI;
+  const double chip = edge * engagement.feed_per_tooth;
+  const double r = tool.radius();
+  return {{{-chip * m.sc, -chip * m.ss, 0.0, -edge * m.c, -edge * m.s, 0.0},
+           {chip * m.ss, -chip * m.sc, 0.0, edge * m.s, -edge * m.c, 0.0},
+           {0.0, 0.0, chip * m.s, 0.0, 0.0, edge},
+           {r * chip * m.s, 0.0, 0.0, r * edge, 0.0, 0.0}}};
+}
+
+}  // namespace smartmill

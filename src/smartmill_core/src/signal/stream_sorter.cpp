@@ -1,0 +1,90 @@
+#include "smartmill_core/signal/stream_sorter.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "smartmill_core/error.h"
+
+namespace smartmill {
+
+namespace {
+
+constexpr double NEVER = -std::numeric_limits<double>::infinity();
+
+}  // namespace
+
+StreamSorter::StreamSorter(double hold_back) : hold_back_(hold_back), delivered_(NEVER) {
+  if (!std::isfinite(hold_back) || hold_back < 0.0) {
+    throw Error("stream sorter: hold_back " + std::to_string(hold_back) + " s is below zero or not finite");
+  }
+}
+
+StreamSorter::Stream StreamSorter::addRegular(std::string name) {
+  sources_.push_back({std::move(name), true, NEVER});
+  return sources_.size() - 1;
+}
+
+StreamSorter::Stream StreamSorter::addEvents(std::string name) {
+  sources_.push_back({std::move(name), false, NEVER});
+  return sources_.size() - 1;
+}
+
+void StreamSorter::push(Stream stream, double stamp, Deliver deliver) {
+  Source& source = sources_.at(stream);
+  if (!std::isfinite(stamp)) throw Error("stream " + source.name + ": stamp is not a finite number");
+  source.newest = std::max(source.newest, stamp);
+  if (stamp < delivered_) {
+    ++late_;
+    deliver();
+    return;
+  }
+  waiting_.emplace(Key{{stamp, stream}, arrivals_++}, std::move(deliver));
+  release(passed());
+}
+
+void StreamSorter::flush() {
+  release(std::numeric_limits<double>::infinity());
+}
+
+void StreamSorter::reset() {
+  waiting_.clear();
+  for (Source& source : sources_) source.newest = NEVER;
+  delivered_ = NEVER;
+  late_ = 0;
+}
+
+std::string StreamSorter::waitingFor() const {
+  if (waiting_.empty()) return {};
+  const Source* slowest = nullptr;
+  for (const Source& source : sources_) {
+    if (source.regular && (!slowest || source.newest < slowest->newest)) slowest = &source;
+  }
+  return slowest ? slowest->name : std::string();
+}
+
+// The item is taken out before it runs: it may throw, or push further items.
+void StreamSorter::release(double up_to) {
+  while (!waiting_.empty() && waiting_.begin()->first.first.first + hold_back_ < up_to) {
+    auto item = waiting_.extract(waiting_.begin());
+    delivered_ = item.key().first.first;
+    item.mapped()();
+  }
+}
+
+// Strictly past: an item of the same stamp may still come on the stream that is there already. Without
+// regular streams the newest event counts.
+double StreamSorter::passed() const {
+  double slowest = std::numeric_limits<double>::infinity();
+  double newest = NEVER;
+  bool any_regular = false;
+  for (const Source& source : sources_) {
+    newest = std::max(newest, source.newest);
+    if (!source.regular) continue;
+    any_regular = true;
+    slowest = std::min(slowest, source.newest);
+  }
+  return any_regular ? slowest : newest;
+}
+
+}  // namespace smartmill

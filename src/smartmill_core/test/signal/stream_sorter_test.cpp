@@ -1,0 +1,169 @@
+#include "smartmill_core/signal/stream_sorter.h"
+
+#include <algorithm>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/signal/streams.h"
+
+namespace smartmill {
+namespace {
+
+TEST(StreamSorter, holdsBackUntilEveryRegularStreamHasPassed) {
+  StreamSorter sorter(0.05);
+  const auto a = sorter.addRegular("a"), b = sorter.addRegular("b");
+  std::string got;
+  sorter.push(a, 1.00, [&] { got += "a"; });
+  sorter.push(a, 1.10, [&] { got += "A"; });
+  EXPECT_EQ(got, "");
+  EXPECT_EQ(sorter.waitingFor(), "b");
+  sorter.push(b, 1.04, [&] { got += "b"; });
+  EXPECT_EQ(got, "");  // b has not passed 1.00 + 0.05
+  sorter.push(b, 1.08, [&] { got += "B"; });
+  EXPECT_EQ(got, "a");
+  sorter.flush();
+  EXPECT_EQ(got, "abBA");
+  EXPECT_EQ(sorter.waitingFor(), "");
+  EXPECT_EQ(sorter.late(), 0u);
+}
+
+TEST(StreamSorter, equalStampsGoInTheOrderOfTheStreamsThenOfArrival) {
+  StreamSorter sorter(0.0);
+  const auto a = sorter.addRegular("a"), b = sorter.addRegular("b");
+  const auto events = sorter.addEvents("goal");
+  std::string got;
+  sorter.push(events, 1.0, [&] { got += "e"; });
+  sorter.push(b, 1.0, [&] { got += "b"; });
+  sorter.push(a, 1.0, [&] { got += "1"; });
+  sorter.push(a, 1.0, [&] { got += "2"; });
+  EXPECT_EQ(got, "");  // another of stamp 1 may still come
+  sorter.push(a, 2.0, [] {});
+  sorter.push(b, 2.0, [] {});
+  EXPECT_EQ(got, "12be");
+}
+
+TEST(StreamSorter, anEventWithinTheHoldBackIsInOrderAndALaterOneIsCounted) {
+  StreamSorter sorter(0.05);
+  const auto a = sorter.addRegular("a"), events = sorter.addEvents("goal");
+  std::string got;
+  sorter.push(a, 1.00, [&] { got += "1"; });
+  sorter.push(a, 1.04, [&] { got += "2"; });
+  sorter.push(events, 0.99, [&] { got += "e"; });
+  sorter.push(a, 1.06, [&] { got += "3"; });
+  EXPECT_EQ(got, "e1");
+  sorter.push(events, 0.995, [&] { got += "L"; });
+  EXPECT_EQ(got, "e1L");
+  EXPECT_EQ(sorter.late(), 1u);
+}
+
+TEST(StreamSorter, resetForgetsStampsAndItems) {
+  StreamSorter sorter(0.0);
+  const auto a = sorter.addRegular("a");
+  std::string got;
+  sorter.push(a, 100.0, [&] { got += "x"; });
+  sorter.push(a, 101.0, [&] { got += "y"; });
+  sorter.reset();
+  sorter.push(a, 1.0, [&] { got += "1"; });
+  sorter.push(a, 2.0, [&] { got += "2"; });
+  sorter.flush();
+  EXPECT_EQ(got, "x12");
+  EXPECT_EQ(sorter.late(), 0u);
+}
+
+TEST(StreamSorter, eventsAloneAreSortedByTheHoldBack) {
+  StreamSorter sorter(0.1);
+  const auto events = sorter.addEvents("goal");
+  std::string got;
+  sorter.push(events, 1.02, [&] { got += "2"; });
+  sorter.push(events, 1.00, [&] { got += "1"; });
+  sorter.push(events, 1.20, [&] { got += "3"; });
+  EXPECT_EQ(got, "12");
+}
+
+TEST(StreamSorter, anItemMayThrowOrPushWithoutHarm) {
+  StreamSorter sorter(0.0);
+  const auto a = sorter.addRegular("a");
+  std::string got;
+  sorter.push(a, 1.0, [&] { sorter.push(a, 1.5, [&] { got += "n"; }); });
+  sorter.push(a, 2.0, [&] { throw Error("bad"); });
+  EXPECT_THROW(sorter.push(a, 3.0, [&] { got += "3"; }), Error);
+  sorter.flush();
+  EXPECT_EQ(got, "n3");
+}
+
+TEST(StreamSorter, refusesAStampThatIsNotANumber) {
+  StreamSorter sorter(0.0);
+  const auto a = sorter.addRegular("daq/hammer");
+  try {
+    sorter.push(a, NOT_A_NUMBER, [] {});
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("daq/hammer"), std::string::npos);
+  }
+  EXPECT_THROW(StreamSorter(-1.0), Error);
+}
+
+// Two streams of 3,000 messages each and a hundred goals, every message delayed by up to 40 ms against the
+// others as roscpp does it: the order handed out is the order of the stamps, whatever the order of arrival.
+TEST(StreamSorter, sixThousandShuffledMessagesComeOutInOrder) {
+  struct Item {
+    double stamp, arrival;
+    std::size_t stream;
+  };
+  std::vector<double> reference;
+  for (unsigned seed = 1; seed <= 5; ++seed) {
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> delay(0.0, 0.04);
+    std::vector<Item> items;
+    for (int i = 0; i < 3000; ++i) {
+      items.push_back({0.01 * i, 0.0, 0});
+      items.push_back({0.01 * i + (i % 3 ? 0.003 : 0.0), 0.0, 1});
+      if (i % 30 == 0) items.push_back({0.01 * i + 0.005, 0.0, 2});
+    }
+    for (Item& item : items) item.arrival = item.stamp + delay(random);
+    std::stable_sort(items.begin(), items.end(),
+                     [](const Item& l, const Item& r) { return l.arrival < r.arrival; });
+    StreamSorter sorter(0.05);
+    sorter.addRegular("hammer");
+    sorter.addRegular("state");
+    sorter.addEvents("goal");
+    std::vector<double> got;
+    for (const Item& item : items) {
+      sorter.push(item.stream, item.stamp, [&got, item] { got.push_back(10.0 * item.stamp + item.stream); });
+    }
+    sorter.flush();
+    EXPECT_EQ(sorter.late(), 0u);
+    EXPECT_EQ(got.size(), items.size());
+    if (reference.empty()) {
+      reference = got;
+      std::vector<Item> due = items;
+      std::stable_sort(due.begin(), due.end(), [](const Item& l, const Item& r) {
+        return std::make_pair(l.stamp, l.stream) < std::make_pair(r.stamp, r.stream);
+      });
+      for (std::size_t i = 0; i < due.size(); ++i) EXPECT_EQ(got[i], 10.0 * due[i].stamp + due[i].stream);
+    }
+    EXPECT_EQ(got, reference);
+  }
+}
+
+TEST(SampleBlock, findsChannelsByName) {
+  SampleBlock block;
+  block.stamp = 2.0;
+  block.sample_rate = 100.0;
+  block.channels = {"fx", "fy"};
+  block.samples = {1, 2, 3, 4, 5, 6};
+  EXPECT_EQ(block.size(), 3u);
+  EXPECT_EQ(block.column("fy"), (std::vector<double>{2, 4, 6}));
+  EXPECT_DOUBLE_EQ(block.timeOf(2), 2.02);
+  try {
+    block.channel("gap");
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("'gap' is missing (present: fx fy)"), std::string::npos);
+  }
+}
+
+}  // namespace
+}  // namespace smartmill
