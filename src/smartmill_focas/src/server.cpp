@@ -27,7 +27,7 @@ constexpr std::size_t MAX_UNSENT =
 constexpr int IDLE_POLL_MS = 200;
 constexpr int SESSION_POLL_MS = 5;  // the machine is asked for an abort this often
 constexpr int BLOCKED_POLL_MS = 2;  // text that the machine's buffer did not take is offered this often
-constexpr int LISTEN_BACKLOG = 16;
+constexpr int LISTEN_BACKLOG = 64;
 
 enum class Dnc { none, open, aborted };
 

@@ -1,0 +1,405 @@
+#include "smartmill_cnc/nc_program.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <optional>
+#include <sstream>
+#include <utility>
+#include <vector>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/units.h"
+
+namespace smartmill::cnc {
+namespace {
+
+constexpr const char* AXES = "XYZ";
+constexpr int ORIENT_STEPS = 4096;  // of one turn
+constexpr std::size_t MAX_BLOCK = 200;
+constexpr double POSITION_TOLERANCE = 1e-9;  // [m] rounding of decimal input
+
+struct Word {
+  char letter;
+  double value;
+  std::string digits;
+};
+
+/// A block that cannot be sent; kept inside this file, the caller gets an NcCheck.
+struct Refusal {
+  NcVerdict verdict;
+  std::string message;
+};
+
+[[noreturn]] void notUnderstood(const std::string& message) {
+  throw Refusal{NcVerdict::not_understood, message};
+}
+[[noreturn]] void outside(const std::string& message) {
+  throw Refusal{NcVerdict::outside_limits, message};
+}
+
+std::string shown(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.6g", value);
+  return text;
+}
+
+std::string withoutComments(const std::string& line) {
+  std::string text;
+  bool comment = false;
+  for (char c : line) {
+    if (c == '(') {
+      if (comment) {
+        notUnderstood("comment within a comment");
+      }
+      comment = true;
+    } else if (c == ')') {
+      if (!comment) {
+        notUnderstood("')' without '('");
+      }
+      comment = false;
+    } else if (!comment && c != ' ' && c != '\t' && c != '\r') {
+      text += static_cast<char>(c >= 'a' && c <= 'z' ? c - 'a' + 'A' : c);
+    }
+  }
+  if (comment) {
+    notUnderstood("comment is not closed");
+  }
+  return text;
+}
+
+/// Digits with at most one point and a sign, no exponent: what a control reads.
+std::string number(const std::string& text, std::size_t& at) {
+  const std::size_t start = at;
+  if (at < text.size() && (text[at] == '+' || text[at] == '-')) {
+    ++at;
+  }
+  int digits = 0, points = 0;
+  while (at < text.size() && ((text[at] >= '0' && text[at] <= '9') || text[at] == '.')) {
+    (text[at] == '.' ? points : digits) += 1;
+    ++at;
+  }
+  if (digits == 0 || points > 1 || digits > 12) {
+    notUnderstood("'" + text.substr(start, std::max<std::size_t>(at - start, 1)) + "' is no number");
+  }
+  return text.substr(start, at - start);
+}
+
+std::vector<Word> wordsOf(const std::string& text) {
+  std::vector<Word> words;
+  std::size_t at = 0;
+  while (at < text.size()) {
+    const char letter = text[at++];
+    if (letter < 'A' || letter > 'Z') {
+      notUnderstood("'" + text.substr(at - 1) + "' is not understood");
+    }
+    std::string digits = number(text, at);
+    words.push_back({letter, std::strtod(digits.c_str(), nullptr), std::move(digits)});
+  }
+  return words;
+}
+
+/// Follows a program block by block.
+class Follower {
+ public:
+  Follower(const StartPosition& start, const MotionLimits& limits, const DialectOptions& options)
+      : limits_(limits), options_(options), position_(start.machine) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      offset_[i] = start.machine[i] - start.absolute[i];
+    }
+    text_ = "G90\n";
+  }
+
+  void block(const std::string& line) {
+    const std::string content = withoutComments(line);
+    if (content.empty()) {
+      return;
+    }
+    if (ended_) {
+      notUnderstood("a block after the end of the program");
+    }
+    if (content.size() > MAX_BLOCK) {
+      notUnderstood("block is longer than " + std::to_string(MAX_BLOCK) + " characters");
+    }
+    if (content[0] == '#') {
+      assignment(content);
+    } else {
+      words(wordsOf(content));
+    }
+  }
+
+  const std::string& text() const { return text_; }
+  const std::array<double, 3>& position() const { return position_; }
+
+ private:
+  void assignment(const std::string& content) {
+    const std::size_t equals = content.find('=');
+    std::size_t at = 1;
+    const std::string name = number(content, at);
+    if (equals == std::string::npos || at != equals ||
+        name.find_first_not_of("0123456789") != std::string::npos) {
+      notUnderstood("'" + content + "' is not understood: #n=value is due");
+    }
+    ++at;
+    const std::string value = number(content, at);
+    if (at != content.size()) {
+      notUnderstood("'" + content + "' is not understood: #n=value is due");
+    }
+    if (std::atoi(name.c_str()) == options_.marker_macro) {
+      notUnderstood("#" + name + " is the bridge's own variable");
+    }
+    text_ += "#" + name + "=" + value + "\n";
+  }
+
+  void words(const std::vector<Word>& words) {
+    std::array<std::optional<double>, 3> axis;
+    std::optional<double> dwell_p, feed, speed;
+    std::optional<int> m_code;
+    bool dwell = false;
+    std::string seen;
+    std::string head;
+    for (const Word& word : words) {
+      if (word.letter != 'G') {
+        if (seen.find(word.letter) != std::string::npos) {
+          notUnderstood(std::string("two words ") + word.letter + " in one block");
+        }
+        seen += word.letter;
+      }
+      switch (word.letter) {
+        case 'N':
+          head = "N" + std::to_string(whole(word, 99999)) + " " + head;
+          break;
+        case 'G':
+          gCode(word, dwell, head);
+          break;
+        case 'X':
+        case 'Y':
+        case 'Z':
+          axis[static_cast<std::size_t>(word.letter - 'X')] = word.value;
+          break;
+        case 'P':
+          dwell_p = whole(word, 99999999);
+          break;
+        case 'F':
+          feed = word.value;
+          break;
+        case 'S':
+          speed = word.value;
+          break;
+        case 'M':
+          m_code = whole(word, 999);
+          break;
+        default:
+          notUnderstood(std::string("word ") + word.letter + word.digits + " is not understood");
+      }
+    }
+    std::string out = head;
+    if (dwell) {
+      out += dwellWords(axis, dwell_p);
+    } else if (dwell_p) {
+      notUnderstood("P without G4");
+    }
+    if (feed) {
+      out += feedWord(*feed);
+    }
+    if (speed) {
+      out += speedWord(*speed, words);
+    }
+    if (!dwell) {
+      out += move(axis);
+    }
+    if (m_code) {
+      out += mCode(*m_code);
+    }
+    while (!out.empty() && out.back() == ' ') {
+      out.pop_back();
+    }
+    if (!out.empty()) {
+      text_ += out + "\n";
+    }
+  }
+
+  static int whole(const Word& word, int most) {
+    if (word.value < 0.0 || word.value > most || word.value != std::floor(word.value)) {
+      notUnderstood(std::string("word ") + word.letter + word.digits + ": a whole number from 0 to " +
+                    std::to_string(most) + " is due");
+    }
+    return static_cast<int>(word.value);
+  }
+
+  void gCode(const Word& word, bool& dwell, std::string& head) {
+    const int code = whole(word, 999);
+    switch (code) {
+      case 0:
+      case 1:
+        motion_ = code;
+        break;
+      case 4:
+        dwell = true;
+        break;
+      case 90:
+      case 91:
+        relative_ = code == 91;
+        break;
+      default:
+        notUnderstood("G" + std::to_string(code) + " is not understood");
+    }
+    head += "G" + std::to_string(code) + " ";
+  }
+
+  std::string dwellWords(const std::array<std::optional<double>, 3>& axis, std::optional<double> p) const {
+    if (axis[1] || axis[2] || (axis[0].has_value() == p.has_value())) {
+      notUnderstood("G4 needs P in ms or X in s, alone");
+    }
+    const double seconds = p ? *p * 1e-3 : *axis[0];
+    if (seconds < 0.0) {
+      notUnderstood("G4 with a negative time");
+    }
+    if (seconds > limits_.max_dwell) {
+      outside("dwell of " + shown(seconds) + " s, at most " + shown(limits_.max_dwell) + " s");
+    }
+    return p ? "P" + std::to_string(static_cast<long>(*p)) + " " : "X" + fixedDecimals(*axis[0], 3) + " ";
+  }
+
+  std::string feedWord(double feed) {
+    if (feed <= 0.0) {
+      notUnderstood("F" + shown(feed) + ": a feed above 0 is due");
+    }
+    const double most = limits_.max_feed / units::MM * 60.0;
+    if (feed > most * (1.0 + 1e-9)) {
+      outside("F" + shown(feed) + " mm/min, at most " + shown(most) + " mm/min");
+    }
+    feed_known_ = true;
+    return "F" + fixedDecimals(feed, options_.decimals) + " ";
+  }
+
+  std::string speedWord(double speed, const std::vector<Word>& words) const {
+    if (speed < 0.0) {
+      notUnderstood("S" + shown(speed) + ": a speed of 0 or more is due");
+    }
+    const double most = units::rpmFromRadPerSec(limits_.max_spindle_speed);
+    if (speed > most * (1.0 + 1e-9)) {
+      outside("S" + shown(speed) + " rpm, at most " + shown(most) + " rpm");
+    }
+    const auto word = std::find_if(words.begin(), words.end(), [](const Word& w) { return w.letter == 'S'; });
+    return "S" + word->digits + " ";
+  }
+
+  std::string move(const std::array<std::optional<double>, 3>& axis) {
+    if (!axis[0] && !axis[1] && !axis[2]) {
+      return {};
+    }
+    if (motion_ < 0) {
+      notUnderstood("an axis word before G0 or G1");
+    }
+    if (motion_ == 1 && !feed_known_) {
+      notUnderstood("G1 before F");
+    }
+    std::string out;
+    for (std::size_t i = 0; i < 3; ++i) {
+      if (!axis[i]) {
+        continue;
+      }
+      const double length = *axis[i] * units::MM;
+      position_[i] = relative_ ? position_[i] + length : length + offset_[i];
+      const std::array<double, 2>& travel = limits_.travel[i];
+      if (position_[i] < travel[0] - POSITION_TOLERANCE || position_[i] > travel[1] + POSITION_TOLERANCE) {
+        outside(std::string(1, AXES[i]) + " would go to " + shown(position_[i] / units::MM) + " mm, limits " +
+                shown(travel[0] / units::MM) + " to " + shown(travel[1] / units::MM) + " mm (machine)");
+      }
+      out += AXES[i] + fixedDecimals(*axis[i], options_.decimals) + " ";
+    }
+    return out;
+  }
+
+  std::string mCode(int code) {
+    switch (code) {
+      case 2:
+      case 30:
+        ended_ = true;
+        return "M5";
+      case 3:
+      case 5:
+      case 119:
+        return "M" + std::to_string(code);
+      default:
+        notUnderstood("M" + std::to_string(code) + " is not understood");
+    }
+  }
+
+  const MotionLimits& limits_;
+  const DialectOptions& options_;
+  std::array<double, 3> position_;  // [m] machine
+  std::array<double, 3> offset_{{0, 0, 0}};
+  bool relative_ = false;
+  int motion_ = -1;  // 0 or 1 once stated
+  bool feed_known_ = false;
+  bool ended_ = false;
+  std::string text_;
+};
+
+}  // namespace
+
+void MotionLimits::validate() const {
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (!(travel[i][0] < travel[i][1])) {
+      throw Error(std::string("travel_") + "xyz"[i] + ": [" + shown(travel[i][0]) + ", " +
+                  shown(travel[i][1]) + "] m: the lower limit comes first");
+    }
+  }
+  const auto positive = [](const char* key, double value) {
+    if (!(value > 0.0) || !std::isfinite(value)) {
+      throw Error(std::string(key) + ": " + shown(value) + " is not above 0");
+    }
+  };
+  positive("max_feed", max_feed);
+  positive("max_spindle_speed", max_spindle_speed);
+  positive("max_dwell", max_dwell);
+}
+
+NcCheck checkProgram(const std::string& program, const StartPosition& start, const MotionLimits& limits,
+                     const DialectOptions& options) {
+  NcCheck check;
+  Follower follower(start, limits, options);
+  std::istringstream lines(program);
+  std::string line;
+  for (int count = 1; std::getline(lines, line); ++count) {
+    try {
+      follower.block(line);
+    } catch (const Refusal& refusal) {
+      check.verdict = refusal.verdict;
+      check.message = "line " + std::to_string(count) + ": " + refusal.message;
+      check.end = start.machine;
+      return check;
+    }
+  }
+  check.text = follower.text();
+  check.end = follower.position();
+  return check;
+}
+
+std::string jogProgram(int axis, double distance, double feed, int decimals) {
+  const std::string word = AXES[axis] + fixedDecimals(distance / units::MM, decimals);
+  if (feed == 0.0) {
+    return "G91 G0 " + word + "\n";
+  }
+  return "G91 G1 F" + fixedDecimals(feed / units::MM * 60.0, decimals) + " " + word + "\n";
+}
+
+std::string orientProgram(double angle, int macro) {
+  const long steps = std::lround(std::fmod(angle, units::TWO_PI) / units::TWO_PI * ORIENT_STEPS);
+  return "#" + std::to_string(macro) + "=" +
+         std::to_string((steps % ORIENT_STEPS + ORIENT_STEPS) % ORIENT_STEPS) + "\nM119\n";
+}
+
+std::string fixedDecimals(double value, int decimals) {
+  char text[64];
+  std::snprintf(text, sizeof text, "%.*f", decimals, value);
+  if (text[0] == '-' && std::string(text).find_first_not_of("-0.") == std::string::npos) {
+    return text + 1;
+  }
+  return text;
+}
+
+}  // namespace smartmill::cnc

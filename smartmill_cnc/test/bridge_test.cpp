@@ -1,0 +1,423 @@
+// The bridge against a machine on the real wire; the machine's time is the test's own.
+#include "smartmill_cnc/bridge.h"
+
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <functional>
+#include <thread>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/units.h"
+#include "test_machine.h"
+
+namespace smartmill::cnc {
+namespace {
+
+constexpr double PERIOD = 0.02;  // [s]
+
+class BridgeTest : public ::testing::Test {
+ protected:
+  BridgeTest() {
+    startServer(0);
+    bridge_ = std::make_unique<Bridge>(parameters());
+  }
+
+  void startServer(std::uint16_t port) {
+    focas::ServerOptions options;
+    options.port = port;
+    server_ = std::make_unique<focas::Server>(options, machine_);
+    port_ = server_->port();
+  }
+
+  BridgeParameters parameters() const {
+    BridgeParameters p;
+    p.port = port_;
+    p.reply_timeout = 10.0;
+    p.limits.travel = {{{-0.2, 0.2}, {-0.2, 0.2}, {-0.2, 0.2}}};
+    p.limits.max_feed = 0.5;
+    p.limits.max_spindle_speed = units::radPerSecFromRpm(12000.0);
+    return p;
+  }
+
+  void cycle() {
+    bridge_->fetch(now_);
+    bridge_->step(now_);
+    for (Note& note : bridge_->takeNotes()) {
+      notes_.push_back(note.text);
+    }
+    machine_.advance(PERIOD);
+    now_ += PERIOD;
+    // Text travels while the test's time stands: the server's thread gets the processor.
+    std::this_thread::sleep_for(std::chrono::microseconds(200));
+  }
+
+  bool cycleUntil(const std::function<bool()>& condition, int most = 20000) {
+    for (int i = 0; i < most; ++i) {
+      if (condition()) {
+        return true;
+      }
+      cycle();
+    }
+    return false;
+  }
+
+  Outcome finish() {
+    std::optional<Outcome> outcome;
+    EXPECT_TRUE(cycleUntil([&] { return (outcome = bridge_->takeOutcome()).has_value(); }));
+    return outcome.value_or(Outcome{MotionCode::busy, "no outcome"});
+  }
+
+  void arm() {
+    cycle();
+    ASSERT_TRUE(bridge_->state().connected);
+    const Answer<ArmCode> answer = bridge_->arm(true);
+    ASSERT_EQ(answer.code, ArmCode::ok) << answer.message;
+    ASSERT_TRUE(bridge_->state().armed);
+  }
+
+  bool noted(const std::string& part) const {
+    return std::any_of(notes_.begin(), notes_.end(),
+                       [&](const std::string& note) { return note.find(part) != std::string::npos; });
+  }
+
+  TestMachine machine_;
+  std::unique_ptr<focas::Server> server_;
+  std::uint16_t port_ = 0;
+  std::unique_ptr<Bridge> bridge_;
+  double now_ = 100.0;  // [s]
+  std::vector<std::string> notes_;
+};
+
+TEST_F(BridgeTest, StateAndLoadInSi) {
+  machine_.change([](TestMachine& m) {
+    m.position = {{10.5, -20.25, 0.001}};
+    m.speed = 6000.0;
+  });
+  cycle();
+  const CncState& state = bridge_->state();
+  EXPECT_TRUE(state.connected);
+  EXPECT_FALSE(state.armed);
+  EXPECT_EQ(state.stamp, 100.0);
+  EXPECT_EQ(state.mode, CncMode::dnc);
+  EXPECT_EQ(state.axes, (std::vector<std::string>{"X", "Y", "Z"}));
+  EXPECT_DOUBLE_EQ(state.position[0], 0.0105);
+  EXPECT_DOUBLE_EQ(state.position[1], -0.02025);
+  EXPECT_DOUBLE_EQ(state.position[2], 1e-6);
+  EXPECT_DOUBLE_EQ(state.spindle_speed, 200.0 * units::PI);
+  EXPECT_EQ(state.program, 7);
+  EXPECT_DOUBLE_EQ(bridge_->positionIncrement(), 1e-6);
+  ASSERT_TRUE(bridge_->load());
+  EXPECT_DOUBLE_EQ(bridge_->load()->spindle_load, 0.1234);
+  EXPECT_DOUBLE_EQ(bridge_->load()->spindle_speed, 200.0 * units::PI);
+  EXPECT_EQ(bridge_->load()->axis_load, (std::vector<double>{0.015, 0.025, 0.035}));
+  EXPECT_TRUE(noted("connected to the controller 127.0.0.1:"));
+}
+
+TEST_F(BridgeTest, ProgramRunsToItsEnd) {
+  arm();
+  CuttingCondition condition;
+  condition.kind = CuttingCondition::Kind::cut;
+  condition.name = "slot_1";
+  const double start = now_;
+  ASSERT_FALSE(
+      bridge_->runProgram("slot", "S3000 M3\nN10 G0 X10\nN20 G1 X40 F1200\nG4 P500\nM30\n", condition));
+  EXPECT_TRUE(bridge_->busy());
+  std::optional<Outcome> outcome;
+  double most_feed = 0.0, most_speed = 0.0;
+  bool went = false;
+  ASSERT_TRUE(cycleUntil([&] {
+    most_feed = std::max(most_feed, bridge_->state().feed);
+    most_speed = std::max(most_speed, bridge_->state().spindle_speed);
+    went = went || bridge_->state().distance_to_go[0] > 0.01;
+    outcome = bridge_->takeOutcome();
+    return outcome.has_value();
+  }));
+  EXPECT_EQ(outcome->code, MotionCode::ok) << outcome->message;
+  EXPECT_DOUBLE_EQ(bridge_->state().position[0], 0.040);
+  EXPECT_NEAR(most_feed, 0.02, 1e-12);
+  EXPECT_NEAR(most_speed, 100.0 * units::PI, 1e-9);
+  EXPECT_TRUE(went);
+  EXPECT_EQ(bridge_->state().spindle_speed, 0.0);
+  // 30 mm at 20 mm/s and a dwell of 0.5 s cannot be faster.
+  EXPECT_GT(now_ - start, 2.0);
+  const std::vector<CuttingCondition> conditions = bridge_->takeConditions();
+  ASSERT_EQ(conditions.size(), 2u);
+  EXPECT_EQ(conditions[0].name, "slot_1");
+  EXPECT_GE(conditions[0].stamp, start);
+  EXPECT_LT(conditions[0].stamp, start + 0.1);
+  EXPECT_EQ(conditions[1].kind, CuttingCondition::Kind::none);
+  EXPECT_GT(conditions[1].stamp, conditions[0].stamp + 2.0);
+  EXPECT_FALSE(bridge_->busy());
+}
+
+TEST_F(BridgeTest, LongProgramThroughASmallBuffer) {
+  arm();
+  std::string program = "G91 G1 F30000\n";
+  for (int i = 0; i < 3000; ++i) {
+    program += i % 2 == 0 ? "X0.5\n" : "X-0.5\n";
+  }
+  machine_.change([](TestMachine& m) { m.all_text.clear(); });
+  ASSERT_FALSE(bridge_->runProgram("zigzag", program, {}));
+  cycle();
+  cycle();
+  // Far from all of it is on its way while the machine is busy with the first blocks.
+  EXPECT_LT(bridge_->progress().bytes_sent, bridge_->progress().bytes_total);
+  EXPECT_EQ(bridge_->progress().stage, "sending");
+  EXPECT_EQ(finish().code, MotionCode::ok);
+  const std::string text = machine_.get(machine_.all_text);
+  EXPECT_EQ(std::count(text.begin(), text.end(), 'X'), 3000);
+  EXPECT_NEAR(bridge_->state().position[0], 0.0, 1e-9);
+}
+
+TEST_F(BridgeTest, JogAndOrient) {
+  arm();
+  ASSERT_FALSE(bridge_->jog("z", -0.00873, 0.01));
+  cycleUntil([&] { return bridge_->progress().distance_to_go < -0.001; });
+  EXPECT_EQ(finish().code, MotionCode::ok);
+  EXPECT_NEAR(bridge_->state().position[2], -0.00873, 1e-9);
+  ASSERT_FALSE(bridge_->jog("X", 0.05, 0.0));
+  EXPECT_EQ(finish().code, MotionCode::ok);
+  EXPECT_NEAR(bridge_->state().position[0], 0.05, 1e-9);
+  machine_.change([](TestMachine& m) { m.speed = 500.0; });
+  ASSERT_FALSE(bridge_->orient(units::PI / 2.0));
+  EXPECT_EQ(finish().code, MotionCode::ok);
+  EXPECT_EQ(machine_.get(machine_.macros)[1133], 1024.0);
+  EXPECT_EQ(bridge_->state().spindle_speed, 0.0);
+  // One session for all of them.
+  EXPECT_EQ(machine_.get(machine_.starts), 1);
+  EXPECT_EQ(bridge_->jog("w", 0.1, 0.0)->code, MotionCode::bad_goal);
+  EXPECT_EQ(bridge_->jog("x", 0.1, -1.0)->code, MotionCode::bad_goal);
+  EXPECT_EQ(bridge_->jog("x", NAN, 0.0)->code, MotionCode::bad_goal);
+  EXPECT_EQ(bridge_->orient(NAN)->code, MotionCode::bad_goal);
+}
+
+TEST_F(BridgeTest, RefusalsSendNothing) {
+  EXPECT_EQ(bridge_->jog("x", 0.01, 0.0)->code, MotionCode::not_connected);
+  EXPECT_EQ(bridge_->arm(true).code, ArmCode::not_connected);
+  cycle();
+  EXPECT_EQ(bridge_->jog("x", 0.01, 0.0)->code, MotionCode::not_armed);
+  machine_.change([](TestMachine& m) { m.state.aut = focas::AUT_MEM; });
+  cycle();
+  EXPECT_EQ(bridge_->arm(true).code, ArmCode::wrong_mode);
+  EXPECT_EQ(bridge_->jog("x", 0.01, 0.0)->code, MotionCode::wrong_mode);
+  machine_.change([](TestMachine& m) {
+    m.state.aut = focas::AUT_REMOTE;
+    m.state.emergency = 1;
+  });
+  cycle();
+  EXPECT_EQ(bridge_->arm(true).code, ArmCode::alarm);
+  EXPECT_EQ(bridge_->jog("x", 0.01, 0.0)->code, MotionCode::alarm);
+  machine_.change([](TestMachine& m) {
+    m.state.emergency = 0;
+    m.refuse_start = focas::EW_REJECT;
+  });
+  cycle();
+  const Answer<ArmCode> rejected = bridge_->arm(true);
+  EXPECT_EQ(rejected.code, ArmCode::wrong_mode);
+  EXPECT_NE(rejected.message.find("CYCLE START"), std::string::npos);
+  machine_.change([](TestMachine& m) { m.refuse_start = focas::EW_OK; });
+  arm();
+  const std::optional<Outcome> limit = bridge_->runProgram("far", "G0 X100\nX250\n", {});
+  ASSERT_TRUE(limit);
+  EXPECT_EQ(limit->code, MotionCode::limit);
+  EXPECT_EQ(limit->message, "program far: line 2: X would go to 250 mm, limits -200 to 200 mm (machine)");
+  EXPECT_EQ(bridge_->runProgram("bad", "G2 X1 Y1\n", {})->code, MotionCode::bad_goal);
+  EXPECT_EQ(machine_.get(machine_.all_text), "");
+  ASSERT_FALSE(bridge_->jog("x", 0.01, 0.001));
+  EXPECT_EQ(bridge_->orient(0.0)->code, MotionCode::busy);
+  EXPECT_EQ(finish().code, MotionCode::ok);
+}
+
+TEST_F(BridgeTest, WorkpieceZeroIsTakenIntoAccount) {
+  machine_.change([](TestMachine& m) { m.offset = {{150.0, 0.0, 0.0}}; });
+  arm();
+  EXPECT_EQ(bridge_->runProgram("", "G0 X60\n", {})->code, MotionCode::limit);
+  ASSERT_FALSE(bridge_->runProgram("", "G0 X-160\n", {}));
+  EXPECT_EQ(finish().code, MotionCode::ok);
+  EXPECT_NEAR(bridge_->state().position[0], -0.010, 1e-9);
+}
+
+TEST_F(BridgeTest, CancelStopsAndTheNextMotionWorks) {
+  for (const bool reset_works : {true, false}) {
+    machine_.change([&](TestMachine& m) { m.reset_works = reset_works; });
+    if (!bridge_->state().armed) {
+      arm();
+    }
+    const double from = machine_.get(machine_.position)[0];
+    ASSERT_FALSE(bridge_->runProgram("slow", "G91 G1 X50 F600\n", CuttingCondition{}));
+    ASSERT_TRUE(cycleUntil(
+        [&] { return bridge_->state().motion && machine_.get(machine_.position)[0] > from + 5.0; }));
+    bridge_->cancel();
+    const Outcome outcome = finish();
+    EXPECT_EQ(outcome.code, MotionCode::cancelled);
+    EXPECT_NE(outcome.message.find("program slow: cancelled; stopped at X"), std::string::npos)
+        << outcome.message;
+    const double stopped = machine_.get(machine_.position)[0];
+    EXPECT_LT(stopped, from + 10.0);
+    EXPECT_TRUE(bridge_->state().armed);
+    ASSERT_FALSE(bridge_->jog("z", 0.001, 0.1));
+    EXPECT_EQ(finish().code, MotionCode::ok);
+    EXPECT_EQ(machine_.get(machine_.position)[0], stopped);
+  }
+  EXPECT_EQ(machine_.get(machine_.resets), 1);
+}
+
+TEST_F(BridgeTest, CancelIsQuickEvenWithTextUnderWay) {
+  arm();
+  std::string program = "G91 G1 F60\n";
+  for (int i = 0; i < 5000; ++i) {
+    program += "X0.01\n";
+  }
+  ASSERT_FALSE(bridge_->runProgram("long", program, {}));
+  for (int i = 0; i < 10; ++i) {
+    cycle();
+  }
+  const double before = now_;
+  bridge_->cancel();
+  EXPECT_EQ(finish().code, MotionCode::cancelled);
+  EXPECT_LT(now_ - before, 0.5);
+  const double stopped = machine_.get(machine_.position)[0];
+  ASSERT_FALSE(bridge_->jog("z", 0.001, 0.1));
+  EXPECT_EQ(finish().code, MotionCode::ok);
+  EXPECT_EQ(machine_.get(machine_.position)[0], stopped);
+}
+
+TEST_F(BridgeTest, AlarmResetAndModeEndTheMotion) {
+  arm();
+  ASSERT_FALSE(bridge_->jog("x", 0.05, 0.01));
+  cycleUntil([&] { return bridge_->state().motion; });
+  machine_.change([](TestMachine& m) {
+    m.alarm_bits = 1 << 6;
+    m.state.alarm = 1;
+    m.alarms = {{430, 6, 1, "X AXIS OVERHEAT"}};
+  });
+  Outcome outcome = finish();
+  EXPECT_EQ(outcome.code, MotionCode::alarm);
+  EXPECT_EQ(outcome.message, "jog x: alarm: 430 X AXIS OVERHEAT");
+  EXPECT_FALSE(bridge_->state().armed);
+  EXPECT_EQ(bridge_->state().alarm_text, "430 X AXIS OVERHEAT");
+  machine_.change([](TestMachine& m) {
+    m.alarm_bits = 0;
+    m.state.alarm = 0;
+    m.alarms.clear();
+  });
+  arm();
+  EXPECT_EQ(bridge_->state().alarm_text, "");
+  ASSERT_FALSE(bridge_->jog("x", 0.05, 0.01));
+  cycleUntil([&] { return bridge_->state().motion; });
+  machine_.resetKey();
+  outcome = finish();
+  EXPECT_EQ(outcome.code, MotionCode::cancelled);
+  EXPECT_EQ(outcome.message, "jog x: the controller was reset");
+  EXPECT_FALSE(bridge_->state().armed);
+  arm();
+  ASSERT_FALSE(bridge_->jog("x", 0.05, 0.01));
+  cycleUntil([&] { return bridge_->state().motion; });
+  machine_.change([](TestMachine& m) { m.state.aut = focas::AUT_JOG; });
+  EXPECT_EQ(finish().code, MotionCode::wrong_mode);
+  EXPECT_FALSE(bridge_->state().armed);
+}
+
+TEST_F(BridgeTest, LostInMidProgramAndBackAgain) {
+  arm();
+  CuttingCondition condition;
+  condition.kind = CuttingCondition::Kind::air;
+  ASSERT_FALSE(bridge_->runProgram("long", "G91 G1 X50 F60\n", condition));
+  cycleUntil([&] { return bridge_->state().motion; });
+  server_.reset();
+  const Outcome outcome = finish();
+  EXPECT_EQ(outcome.code, MotionCode::lost);
+  EXPECT_EQ(outcome.message.find("program long: connection to the controller 127.0.0.1"), std::string::npos);
+  EXPECT_NE(outcome.message.find("lost"), std::string::npos) << outcome.message;
+  EXPECT_FALSE(bridge_->state().connected);
+  EXPECT_FALSE(bridge_->state().armed);
+  EXPECT_FALSE(bridge_->load());
+  EXPECT_EQ(bridge_->takeConditions().size(), 2u);
+  // The line is said once, not every period.
+  notes_.clear();
+  for (int i = 0; i < 200; ++i) {
+    cycle();
+  }
+  EXPECT_LE(notes_.size(), 1u);
+  startServer(port_);
+  EXPECT_TRUE(cycleUntil([&] { return bridge_->state().connected; }));
+  EXPECT_EQ(bridge_->jog("x", 0.01, 0.0)->code, MotionCode::not_armed);
+  arm();
+  ASSERT_FALSE(bridge_->jog("x", 0.01, 0.0));
+  EXPECT_EQ(finish().code, MotionCode::ok);
+}
+
+TEST_F(BridgeTest, Macros) {
+  EXPECT_EQ(bridge_->setMacro(500, 1.0).code, MacroCode::not_connected);
+  cycle();
+  EXPECT_EQ(bridge_->setMacro(500, 1.25).code, MacroCode::ok);
+  EXPECT_EQ(machine_.get(machine_.macros)[500], 1.25);
+  EXPECT_EQ(bridge_->setMacro(99999, 1.0).code, MacroCode::refused);
+  EXPECT_EQ(bridge_->setMacro(100, 1.0).code, MacroCode::refused);
+  EXPECT_EQ(bridge_->setMacro(500, NAN).code, MacroCode::refused);
+}
+
+TEST_F(BridgeTest, DisarmEndsTheSessionProperly) {
+  arm();
+  ASSERT_FALSE(bridge_->jog("x", 0.001, 0.1));
+  EXPECT_EQ(finish().code, MotionCode::ok);
+  EXPECT_EQ(bridge_->arm(false).code, ArmCode::ok);
+  EXPECT_FALSE(bridge_->state().armed);
+  EXPECT_EQ(machine_.get(machine_.ends), 1);
+  arm();
+  EXPECT_EQ(machine_.get(machine_.starts), 2);
+  ASSERT_FALSE(bridge_->jog("x", 0.05, 0.001));
+  cycleUntil([&] { return bridge_->state().motion; });
+  bridge_->arm(false);
+  EXPECT_EQ(finish().code, MotionCode::cancelled);
+  bridge_->shutdown();
+  EXPECT_EQ(machine_.get(machine_.disconnects), 0);
+}
+
+TEST_F(BridgeTest, StallEndsTheMotion) {
+  arm();
+  // Text without end of block: the machine waits for ever.
+  machine_.change([](TestMachine& m) { m.buffer_size = 3; });
+  ASSERT_FALSE(bridge_->jog("x", 0.05, 0.001));
+  const Outcome outcome = finish();
+  EXPECT_EQ(outcome.code, MotionCode::cancelled);
+  EXPECT_NE(outcome.message.find("nothing has moved for 60 s"), std::string::npos) << outcome.message;
+}
+
+TEST(BridgeParameters, AreChecked) {
+  BridgeParameters p;
+  p.limits.travel = {{{-1, 1}, {-1, 1}, {-1, 1}}};
+  p.limits.max_feed = 1.0;
+  p.limits.max_spindle_speed = 1000.0;
+  EXPECT_NO_THROW(p.validate());
+  p.port = 70000;
+  EXPECT_THROW(p.validate(), Error);
+  p.port = 8193;
+  p.settle_time = NAN;
+  EXPECT_THROW(p.validate(), Error);
+}
+
+TEST(BridgeConnect, ClosedPortIsOneLine) {
+  BridgeParameters p;
+  p.port = 1;
+  p.limits.travel = {{{-1, 1}, {-1, 1}, {-1, 1}}};
+  p.limits.max_feed = 1.0;
+  p.limits.max_spindle_speed = 1000.0;
+  Bridge bridge(p);
+  std::vector<Note> notes;
+  for (int i = 0; i < 500; ++i) {
+    bridge.fetch(i * 0.02);
+    bridge.step(i * 0.02);
+    EXPECT_FALSE(bridge.state().connected);
+    for (const Note& note : bridge.takeNotes()) {
+      notes.push_back(note);
+    }
+  }
+  ASSERT_EQ(notes.size(), 1u);
+  EXPECT_EQ(notes[0].text,
+            "cannot connect to the controller at 127.0.0.1:1: Connection refused; trying again every 1.0 s");
+}
+
+}  // namespace
+}  // namespace smartmill::cnc
