@@ -20,12 +20,15 @@ struct Record {
   /// @throws Error "FILE: column NAME is missing".
   const std::vector<double>& column(const std::string& name) const;
   std::vector<double>& add(const std::string& name);
-  std::string file;  ///< for messages
+  std::string file;                ///< for messages
+  std::vector<std::string> notes;  ///< what was left unread, one line each
 };
 
 /// Reads a test's record in the campaign's folder, smartmill CSV or Kistler DynoWare export. Columns in any order.
 /// @throws Error naming file, line and column: missing column, wrong unit, NaN or text for a number, uneven time, no samples.
 Record readRecord(const Campaign& campaign, const CampaignTest& test);
+/// The same, with the forces turned to those on the tool where the model says that its sensor shows the reaction.
+Record readRecord(const Campaign& campaign, const CampaignTest& test, const MachineModel& model);
 Record readCsv(const std::string& file);
 Record readDynoware(const std::string& file, const std::map<std::string, std::string>& channels);
 

@@ -20,6 +20,9 @@ struct ToolTip {
 
 /// Force sensor: measured over applied force, static gain 1 (direct = 1 - sum of gains); an axis left out is ideal.
 struct ForceSensor {
+  ForceSensor() {
+    for (ModalModel& a : axis) a.direct = 1.0;
+  }
   std::array<ModalModel, 3> axis;
   std::optional<Axes3> noise_rms;    ///< [N]
   bool measures_workpiece = false;   ///< the reaction on the workpiece; turned where samples enter
@@ -93,7 +96,8 @@ struct MachineModel {
   std::string file;  ///< for messages
   std::optional<ToolGeometry> tool;
   std::optional<double> stickout;  ///< [m]
-  std::optional<CuttingCoefficients> cutting;
+  std::optional<CuttingCoefficients> cutting;      ///< NaN: the file lacks that key; needCutting() refuses it
+  std::optional<CuttingCoefficients> cutting_std;  ///< NaN: no _std key beside it; empty: none at all
   ToolTip tool_tip;
   ForceSensor force_sensor;
   std::optional<Spindle> spindle;
@@ -114,6 +118,17 @@ struct MachineModel {
 
 /// @throws Error of one line that names the file, the key and the value: unknown key, missing key, wrong type, NaN, out of range.
 MachineModel readMachineModel(const std::string& file);
+
+/// A key of the section `cutting` and the coefficient it holds, in the order of the file.
+struct CuttingKey {
+  const char* key;
+  double CuttingCoefficients::*coefficient;
+  double unit;  ///< [N/m2] or [N/m] of one in the file
+};
+const std::array<CuttingKey, 6>& cuttingKeys();
+
+/// The section `cutting:` with its standard deviations; values that are NaN are left out.
+std::string cuttingSection(const CuttingCoefficients& value, const CuttingCoefficients& std_dev);
 
 /// Writes the model with the same keys, ten significant digits. @throws Error when the file cannot be written.
 void writeMachineModel(const MachineModel& model, const std::string& file);

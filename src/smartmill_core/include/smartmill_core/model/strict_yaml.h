@@ -1,0 +1,71 @@
+#pragma once
+
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace smartmill {
+
+/// Numbers that a key may take. Infinite bounds are open.
+struct Range {
+  double low = -std::numeric_limits<double>::infinity();
+  double high = std::numeric_limits<double>::infinity();
+  bool low_open = false;   ///< low itself is not allowed
+  bool high_open = false;  ///< high itself is not allowed
+
+  bool contains(double value) const;
+  std::string text() const;  ///< e.g. "> 0", "0 <= value < 80"; "finite" without bounds
+
+  static Range positive() { return {0.0, std::numeric_limits<double>::infinity(), true, false}; }
+  static Range notNegative() { return {0.0, std::numeric_limits<double>::infinity(), false, false}; }
+};
+
+/// One map of a YAML file, read strictly: every key at most once, every value of the type and range asked
+/// for, every key read before finish(). Errors are one line "FILE: key.path: what", with the value.
+class StrictYaml {
+ public:
+  /// @throws Error when the file cannot be read, is no YAML, is not a map or has a key twice.
+  static StrictYaml fromFile(const std::string& file);
+
+  bool has(const std::string& key) const;
+  std::vector<std::string> keys() const;
+
+  /// Required values. @throws Error: missing, wrong type, NaN, out of range.
+  double number(const std::string& key, const Range& range = {}) const;
+  int integer(const std::string& key, int low, int high) const;
+  std::string word(const std::string& key) const;
+  /// A word that must be one of these.
+  std::string oneOf(const std::string& key, const std::vector<std::string>& words) const;
+  /// @param count how many are due; 0: any number but none.
+  std::vector<double> numbers(const std::string& key, std::size_t count, const Range& range = {}) const;
+  StrictYaml map(const std::string& key) const;
+  std::vector<StrictYaml> maps(const std::string& key) const;
+
+  /// Values that may be absent.
+  std::optional<double> optionalNumber(const std::string& key, const Range& range = {}) const;
+  std::optional<StrictYaml> optionalMap(const std::string& key) const;
+
+  /// @throws Error naming the first key that nobody has read.
+  void finish() const;
+
+  /// @throws Error "FILE: path.key: what".
+  [[noreturn]] void fail(const std::string& key, const std::string& what) const;
+
+  const std::string& file() const;
+  std::string path(const std::string& key) const;  ///< e.g. tool.diameter_mm
+
+ private:
+  struct Impl;
+  explicit StrictYaml(std::shared_ptr<Impl> impl) : impl_(std::move(impl)) {}
+  std::shared_ptr<Impl> impl_;
+};
+
+/// Number for a YAML file that every reader takes for a number (1.0e-05, not 1e-05).
+std::string yamlNumber(double value, int digits = 10);
+
+/// Word for a YAML file, quoted where it must be.
+std::string yamlWord(const std::string& word);
+
+}  // namespace smartmill

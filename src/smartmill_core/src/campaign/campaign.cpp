@@ -1,0 +1,157 @@
+#include "smartmill_core/campaign/campaign.h"
+
+#include <filesystem>
+#include <fstream>
+#include <set>
+#include <sstream>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/model/strict_yaml.h"
+#include "smartmill_core/units.h"
+
+namespace smartmill {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* FORMAT = "smartmill-campaign/1";
+
+const Range POSITIVE = Range::positive();
+const Range NOT_NEGATIVE = Range::notNegative();
+const Range TURN_DEG{0.0, 360.0, false, false};
+
+bool insideFolder(const std::string& file) {
+  const fs::path path(file);
+  if (path.is_absolute()) return false;
+  for (const fs::path& part : path) {
+    if (part == "..") return false;
+  }
+  return true;
+}
+
+std::string fileInside(const StrictYaml& map) {
+  const std::string file = map.word("file");
+  if (!insideFolder(file)) map.fail("file", "'" + file + "' lies outside the campaign's folder");
+  return file;
+}
+
+CampaignTest readTest(const StrictYaml& map) {
+  CampaignTest test;
+  test.name = map.word("name");
+  const std::string kind = map.oneOf("kind", {"cut", "air", "tap"});
+  test.kind = kind == "cut" ? TestKind::cut : kind == "air" ? TestKind::air : TestKind::tap;
+  test.file = fileInside(map);
+  test.sample_rate = map.number("sample_rate_hz", POSITIVE);
+  if (map.has("file_format")) {
+    test.file_format = map.oneOf("file_format", {"dynoware"});
+    const StrictYaml channels = map.map("channels");
+    for (const std::string& key : channels.keys()) {
+      if (key == "fx" || key == "fy" || key == "fz") test.channels[key] = channels.word(key);
+    }
+    channels.finish();
+    if (test.channels.empty()) map.fail("channels", "names no channel");
+  }
+  if (test.kind == TestKind::tap) {
+    test.spindle_speed =
+        units::radPerSecFromRpm(map.optionalNumber("spindle_speed_rpm", NOT_NEGATIVE).value_or(0.0));
+    test.direction = map.oneOf("direction", {"x", "y", "z"});
+  } else {
+    test.spindle_speed = units::radPerSecFromRpm(map.number("spindle_speed_rpm", POSITIVE));
+  }
+  if (test.kind == TestKind::cut) {
+    Engagement e;
+    e.feed_per_tooth = map.number("feed_per_tooth_mm", POSITIVE) * units::MM;
+    e.axial_depth = map.number("axial_depth_mm", POSITIVE) * units::MM;
+    const double entry = map.number("entry_deg", TURN_DEG), exit = map.number("exit_deg", TURN_DEG);
+    if (!(exit > entry)) {
+      map.fail("exit_deg", yamlNumber(exit) + " is out of range (> entry_deg " + yamlNumber(entry) + ")");
+    }
+    e.entry = units::radFromDeg(entry);
+    e.exit = units::radFromDeg(exit);
+    test.engagement = e;
+    test.engage_time = map.optionalNumber("engage_time_s", NOT_NEGATIVE);
+  }
+  test.start_time = map.optionalNumber("start_time_s", NOT_NEGATIVE);
+  test.cut_time_before = map.optionalNumber("cut_time_before_s", NOT_NEGATIVE);
+  map.finish();
+  return test;
+}
+
+const char* nameOf(TestKind kind) {
+  switch (kind) {
+    case TestKind::cut:
+      return "cut";
+    case TestKind::air:
+      return "air";
+    default:
+      return "tap";
+  }
+}
+
+}  // namespace
+
+std::string Campaign::pathOf(const CampaignTest& test) const {
+  return (fs::path(folder) / test.file).string();
+}
+
+std::string Campaign::modelPath() const {
+  return (fs::path(folder) / model_file).string();
+}
+
+Campaign readCampaign(const std::string& path) {
+  const fs::path file = fs::is_directory(path) ? fs::path(path) / "campaign.yaml" : fs::path(path);
+  const StrictYaml root = StrictYaml::fromFile(file.string());
+  Campaign campaign;
+  campaign.folder = file.has_parent_path() ? file.parent_path().string() : ".";
+  root.oneOf("format", {FORMAT});
+  campaign.model_file = root.word("model");
+  std::set<std::string> names;
+  for (const StrictYaml& map : root.maps("tests")) {
+    campaign.tests.push_back(readTest(map));
+    if (!names.insert(campaign.tests.back().name).second) {
+      map.fail("name", "'" + campaign.tests.back().name + "' names two tests");
+    }
+  }
+  root.finish();
+  return campaign;
+}
+
+void writeCampaign(const Campaign& campaign, const std::string& folder) {
+  std::ostringstream out;
+  out << "format: " << FORMAT << "\nmodel: " << yamlWord(campaign.model_file) << "\n";
+  out << "tests:" << (campaign.tests.empty() ? " []" : "") << "\n";
+  const auto number = [&out](const char* key, double value) {
+    out << "  " << key << ": " << yamlNumber(value) << "\n";
+  };
+  for (const CampaignTest& test : campaign.tests) {
+    out << "- name: " << yamlWord(test.name) << "\n  kind: " << nameOf(test.kind) << "\n";
+    out << "  file: " << yamlWord(test.file) << "\n";
+    if (!test.file_format.empty()) {
+      out << "  file_format: " << test.file_format << "\n  channels:\n";
+      for (const auto& [name, channel] : test.channels)
+        out << "    " << name << ": " << yamlWord(channel) << "\n";
+    }
+    number("sample_rate_hz", test.sample_rate);
+    number("spindle_speed_rpm", units::rpmFromRadPerSec(test.spindle_speed));
+    if (test.engagement) {
+      number("feed_per_tooth_mm", test.engagement->feed_per_tooth / units::MM);
+      number("axial_depth_mm", test.engagement->axial_depth / units::MM);
+      number("entry_deg", units::degFromRad(test.engagement->entry));
+      number("exit_deg", units::degFromRad(test.engagement->exit));
+    }
+    if (test.engage_time) number("engage_time_s", *test.engage_time);
+    if (test.start_time) number("start_time_s", *test.start_time);
+    if (test.cut_time_before) number("cut_time_before_s", *test.cut_time_before);
+    if (!test.direction.empty()) out << "  direction: " << test.direction << "\n";
+  }
+  std::error_code ignored;
+  fs::create_directories(folder, ignored);
+  const std::string file = (fs::path(folder) / "campaign.yaml").string();
+  std::ofstream stream(file);
+  stream << out.str();
+  stream.close();
+  if (!stream) throw Error(file + ": cannot be written");
+}
+
+}  // namespace smartmill

@@ -1,0 +1,342 @@
+#include "smartmill_core/campaign/record.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <string_view>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/units.h"
+
+namespace smartmill {
+
+namespace {
+
+struct ColumnKind {
+  const char* name;
+  const char* unit;  // in the file
+  double si;         // SI value of one in the file
+};
+
+constexpr ColumnKind COLUMNS[] = {{"time", "s", 1.0},
+                                  {"spindle_angle", "rad", 1.0},
+                                  {"fx", "N", 1.0},
+                                  {"fy", "N", 1.0},
+                                  {"fz", "N", 1.0},
+                                  {"load_meter", "V", 1.0},
+                                  {"hammer", "N", 1.0},
+                                  {"tool_x", "um", units::UM},
+                                  {"tool_y", "um", units::UM},
+                                  {"displacement", "m", 1.0},
+                                  {"acceleration", "m/s2", 1.0}};
+
+const ColumnKind* kindOf(std::string_view name) {
+  for (const ColumnKind& kind : COLUMNS) {
+    if (name == kind.name) return &kind;
+  }
+  return nullptr;
+}
+
+std::string_view trimmed(std::string_view text) {
+  while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) text.remove_prefix(1);
+  while (!text.empty() && (text.back() == ' ' || text.back() == '\t' || text.back() == '\r'))
+    text.remove_suffix(1);
+  return text;
+}
+
+std::vector<std::string_view> split(std::string_view line, char separator) {
+  std::vector<std::string_view> parts;
+  for (;;) {
+    const std::size_t end = line.find(separator);
+    parts.push_back(trimmed(line.substr(0, end)));
+    if (end == std::string_view::npos) return parts;
+    line.remove_prefix(end + 1);
+  }
+}
+
+/// A text file, line by line, with the number of the line for messages.
+class Lines {
+ public:
+  explicit Lines(const std::string& file) : file_(file) {
+    std::ifstream stream(file, std::ios::binary | std::ios::ate);
+    if (!stream) throw Error(file + ": cannot be read");
+    const std::streamoff size = stream.tellg();
+    if (size < 0) throw Error(file + ": cannot be read");
+    text_.resize(static_cast<std::size_t>(size));
+    stream.seekg(0);
+    stream.read(text_.data(), size);
+    if (!stream) throw Error(file + ": cannot be read");
+    rest_ = text_;
+    if (rest_.substr(0, 3) == "\xEF\xBB\xBF") rest_.remove_prefix(3);
+  }
+
+  bool next(std::string_view* line) {
+    if (rest_.empty()) return false;
+    const std::size_t end = rest_.find('\n');
+    *line = trimmed(rest_.substr(0, end));
+    rest_.remove_prefix(end == std::string_view::npos ? rest_.size() : end + 1);
+    ++number_;
+    return true;
+  }
+
+  [[noreturn]] void fail(const std::string& what) const {
+    throw Error(file_ + ": line " + std::to_string(number_) + ": " + what);
+  }
+
+  bool restIsBlank() const { return rest_.find_first_not_of(" \t\r\n") == std::string_view::npos; }
+
+ private:
+  std::string file_;
+  std::string text_;
+  std::string_view rest_;
+  int number_ = 0;
+};
+
+/// Where a column of the file goes; nullptr: it is left out.
+struct Target {
+  std::string name;
+  std::vector<double>* values;
+  double si;
+};
+
+// The rows below the header.
+void readRows(Lines& lines, char separator, const std::vector<Target>& targets) {
+  std::string_view line;
+  while (lines.next(&line)) {
+    if (line.empty()) {
+      if (lines.restIsBlank()) break;
+      lines.fail("is empty");
+    }
+    const char* p = line.data();
+    const char* const end = p + line.size();
+    for (std::size_t c = 0; c < targets.size(); ++c) {
+      const char* stop = std::find(p, end, separator);
+      if (const Target& t = targets[c]; t.values) {
+        const std::string_view cell = trimmed(std::string_view(p, static_cast<std::size_t>(stop - p)));
+        const char* first = cell.data() + (!cell.empty() && cell.front() == '+');
+        const char* const last = cell.data() + cell.size();
+        double value = 0.0;
+        const auto [parsed, code] = std::from_chars(first, last, value);
+        if (code != std::errc() || parsed != last) {
+          lines.fail("column " + t.name + ": '" + std::string(cell) + "' is not a number");
+        }
+        if (!std::isfinite(value)) {
+          lines.fail("column " + t.name + ": '" + std::string(cell) + "' is not a finite number");
+        }
+        t.values->push_back(value * t.si);
+      }
+      const bool at_end = stop == end;
+      if (at_end != (c + 1 == targets.size())) {
+        const auto count = split(line, separator).size();
+        lines.fail(std::to_string(count) + " values, " + std::to_string(targets.size()) + " columns are due");
+      }
+      p = at_end ? end : stop + 1;
+    }
+  }
+}
+
+// Times are printed with a few digits: a sample may stand a quarter of a step beside its place on the even
+// grid, a lost one moves its neighbours by half a step or more.
+void checkTime(const Record& record, int first_line, double sample_rate) {
+  const std::vector<double>& t = record.time;
+  if (t.empty()) throw Error(record.file + ": no samples");
+  if (t.size() < 2) return;
+  const std::size_t n = t.size();
+  const double step = (t.back() - t.front()) / static_cast<double>(n - 1);
+  bool even = step > 0.0;
+  for (std::size_t i = 0; i < n && even; ++i) {
+    even = std::abs(t[i] - t.front() - static_cast<double>(i) * step) <= 0.25 * step;
+  }
+  if (!even) {
+    std::vector<double> steps(n - 1);
+    for (std::size_t i = 0; i + 1 < n; ++i) steps[i] = t[i + 1] - t[i];
+    std::vector<double> sorted = steps;
+    std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2),
+                     sorted.end());
+    const double usual = sorted[sorted.size() / 2];
+    const auto worst = std::max_element(steps.begin(), steps.end(), [usual](double l, double r) {
+      return std::abs(l - usual) < std::abs(r - usual);
+    });
+    char text[160];
+    std::snprintf(text, sizeof text, ": line %d: column time: a step of %g s, %g s are due",
+                  first_line + 1 + static_cast<int>(worst - steps.begin()), *worst, usual);
+    throw Error(record.file + text);
+  }
+  if (sample_rate > 0.0 && std::abs(step * sample_rate - 1.0) > 1e-3) {
+    char text[160];
+    std::snprintf(text, sizeof text, ": samples come at %.6g Hz, but the campaign's sample_rate_hz is %.6g",
+                  1.0 / step, sample_rate);
+    throw Error(record.file + text);
+  }
+}
+
+Record readCsvAt(const std::string& file, double sample_rate) {
+  Lines lines(file);
+  std::string_view header;
+  if (!lines.next(&header)) throw Error(file + ": is empty");
+  Record record;
+  record.file = file;
+  const std::vector<std::string_view> cells = split(header, ',');
+  std::vector<const ColumnKind*> kinds;
+  for (const std::string_view cell : cells) {
+    const std::size_t open = cell.find('[');
+    if (open == std::string_view::npos || cell.back() != ']') {
+      lines.fail("column '" + std::string(cell) + "' is not name[unit]");
+    }
+    const std::string_view name = trimmed(cell.substr(0, open));
+    const std::string_view unit = cell.substr(open + 1, cell.size() - open - 2);
+    const ColumnKind* kind = kindOf(name);
+    if (!kind) {
+      record.notes.push_back(file + ": column " + std::string(cell) + " is not used");
+    } else if (unit != kind->unit) {
+      lines.fail("column " + std::string(name) + ": the unit is '" + std::string(unit) + "', " + kind->unit +
+                 " is due");
+    } else if (std::find(kinds.begin(), kinds.end(), kind) != kinds.end()) {
+      lines.fail("column " + std::string(name) + " stands twice");
+    }
+    kinds.push_back(kind);
+  }
+  if (std::none_of(kinds.begin(), kinds.end(), [](const ColumnKind* k) { return k && k == &COLUMNS[0]; })) {
+    throw Error(file + ": column time is missing");
+  }
+  std::size_t used = 0;
+  for (const ColumnKind* kind : kinds) used += kind && kind != &COLUMNS[0] ? 1 : 0;
+  record.columns.resize(used);
+  std::vector<Target> targets;
+  for (const ColumnKind* kind : kinds) {
+    if (!kind) {
+      targets.push_back({"", nullptr, 1.0});
+    } else if (kind == &COLUMNS[0]) {
+      targets.push_back({"time", &record.time, 1.0});
+    } else {
+      targets.push_back({kind->name, &record.columns[record.names.size()], kind->si});
+      record.names.push_back(kind->name);
+    }
+  }
+  readRows(lines, ',', targets);
+  checkTime(record, 2, sample_rate);
+  return record;
+}
+
+Record readDynowareAt(const std::string& file, const std::map<std::string, std::string>& channels,
+                      double sample_rate) {
+  Lines lines(file);
+  std::string_view line;
+  if (!lines.next(&line) || line.substr(0, 8) != "DynoWare") {
+    throw Error(file + ": line 1: not a DynoWare export");
+  }
+  int number = 1;
+  do {
+    if (!lines.next(&line)) throw Error(file + ": the row of channel names (Time, ...) is missing");
+    ++number;
+  } while (line.substr(0, 4) != "Time" || line.size() < 5 || line[4] == ':');
+  const char separator = line[4];
+  const std::vector<std::string_view> names = split(line, separator);
+  std::string_view unit_line;
+  if (!lines.next(&unit_line)) throw Error(file + ": the row of units is missing");
+  ++number;
+  const std::vector<std::string_view> units_row = split(unit_line, separator);
+  if (units_row.size() != names.size()) lines.fail("a unit for every channel is due");
+
+  Record record;
+  record.file = file;
+  record.columns.resize(channels.size());
+  std::vector<Target> targets(names.size(), {"", nullptr, 1.0});
+  const auto check = [&](std::size_t c, const char* unit) {
+    if (units_row[c] != unit) {
+      lines.fail("column " + std::string(names[c]) + ": the unit is '" + std::string(units_row[c]) + "', " +
+                 unit + " is due");
+    }
+  };
+  check(0, "s");
+  targets[0] = {"Time", &record.time, 1.0};
+  for (const auto& [name, channel] : channels) {
+    const auto at = std::find(names.begin(), names.end(), std::string_view(channel));
+    if (at == names.end()) throw Error(file + ": column " + channel + " is missing");
+    const ColumnKind* kind = kindOf(name);
+    if (!kind) throw Error(file + ": channels: '" + name + "' is no column name");
+    const std::size_t c = static_cast<std::size_t>(at - names.begin());
+    check(c, kind->unit);
+    if (targets[c].values) throw Error(file + ": channels: " + channel + " is named twice");
+    targets[c] = {channel, &record.columns[record.names.size()], kind->si};
+    record.names.push_back(name);
+  }
+  readRows(lines, separator, targets);
+  checkTime(record, number + 1, sample_rate);
+  return record;
+}
+
+}  // namespace
+
+bool Record::has(const std::string& name) const {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+const std::vector<double>& Record::column(const std::string& name) const {
+  const auto at = std::find(names.begin(), names.end(), name);
+  if (at == names.end()) throw Error(file + ": column " + name + " is missing");
+  return columns[static_cast<std::size_t>(at - names.begin())];
+}
+
+std::vector<double>& Record::add(const std::string& name) {
+  const auto at = std::find(names.begin(), names.end(), name);
+  if (at != names.end()) return columns[static_cast<std::size_t>(at - names.begin())];
+  names.push_back(name);
+  return columns.emplace_back();
+}
+
+Record readRecord(const Campaign& campaign, const CampaignTest& test) {
+  const std::string path = campaign.pathOf(test);
+  return test.file_format == "dynoware" ? readDynowareAt(path, test.channels, test.sample_rate)
+                                        : readCsvAt(path, test.sample_rate);
+}
+
+Record readRecord(const Campaign& campaign, const CampaignTest& test, const MachineModel& model) {
+  Record record = readRecord(campaign, test);
+  if (!model.force_sensor.measures_workpiece) return record;
+  for (const char* name : {"fx", "fy", "fz"}) {
+    if (!record.has(name)) continue;
+    for (double& value : record.add(name)) value = -value;
+  }
+  return record;
+}
+
+Record readCsv(const std::string& file) {
+  return readCsvAt(file, 0.0);
+}
+
+Record readDynoware(const std::string& file, const std::map<std::string, std::string>& channels) {
+  return readDynowareAt(file, channels, 0.0);
+}
+
+void writeCsv(const Record& record, const std::string& file) {
+  std::string text = "time[s]";
+  std::vector<double> si;
+  for (std::size_t c = 0; c < record.names.size(); ++c) {
+    const ColumnKind* kind = kindOf(record.names[c]);
+    if (!kind) throw Error(file + ": '" + record.names[c] + "' is no column name");
+    if (record.columns[c].size() != record.size())
+      throw Error(file + ": column " + record.names[c] + " is short");
+    text += "," + record.names[c] + "[" + kind->unit + "]";
+    si.push_back(kind->si);
+  }
+  text += "\n";
+  char number[40];
+  for (std::size_t i = 0; i < record.size(); ++i) {
+    std::snprintf(number, sizeof number, "%.9g", record.time[i]);
+    text += number;
+    for (std::size_t c = 0; c < si.size(); ++c) {
+      std::snprintf(number, sizeof number, ",%.6g", record.columns[c][i] / si[c]);
+      text += number;
+    }
+    text += "\n";
+  }
+  std::ofstream stream(file, std::ios::binary);
+  stream << text;
+  stream.close();
+  if (!stream) throw Error(file + ": cannot be written");
+}
+
+}  // namespace smartmill

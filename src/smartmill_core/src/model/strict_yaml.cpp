@@ -1,0 +1,264 @@
+#include "smartmill_core/model/strict_yaml.h"
+
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <set>
+#include <sstream>
+
+#include <yaml-cpp/yaml.h>
+
+#include "smartmill_core/error.h"
+
+namespace smartmill {
+
+namespace {
+
+std::string shortNumber(double value) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%.10g", value);
+  return text;
+}
+
+// The value as it stands in the file, in one line.
+std::string shown(const YAML::Node& node) {
+  switch (node.Type()) {
+    case YAML::NodeType::Scalar:
+      return "'" + node.Scalar() + "'";
+    case YAML::NodeType::Sequence:
+      return "a list of " + std::to_string(node.size());
+    case YAML::NodeType::Map:
+      return "a map";
+    default:
+      return "nothing";
+  }
+}
+
+bool quoted(const YAML::Node& node) {
+  return node.Tag() == "!";
+}
+
+// YAML's plain numbers; no hexadecimal, no words.
+bool parse(const YAML::Node& node, double* value) {
+  if (!node.IsScalar() || quoted(node)) return false;
+  const std::string& text = node.Scalar();
+  if (text == ".nan" || text == ".NaN" || text == ".NAN") {
+    *value = std::nan("");
+    return true;
+  }
+  const char* first = text.data();
+  const char* last = first + text.size();
+  if (first != last && *first == '+') ++first;
+  const auto [end, code] = std::from_chars(first, last, *value);
+  if (code == std::errc::result_out_of_range) *value = HUGE_VAL;
+  return first != last && end == last && (code == std::errc() || code == std::errc::result_out_of_range);
+}
+
+std::string lineOf(const std::string& text) {
+  const std::size_t end = text.find('\n');
+  return end == std::string::npos ? text : text.substr(0, end);
+}
+
+}  // namespace
+
+bool Range::contains(double value) const {
+  return std::isfinite(value) && (low_open ? value > low : value >= low) &&
+         (high_open ? value < high : value <= high);
+}
+
+std::string Range::text() const {
+  const bool has_low = std::isfinite(low), has_high = std::isfinite(high);
+  if (has_low && has_high) {
+    return shortNumber(low) + (low_open ? " < value " : " <= value ") + (high_open ? "< " : "<= ") +
+           shortNumber(high);
+  }
+  if (has_low) return (low_open ? "> " : ">= ") + shortNumber(low);
+  if (has_high) return (high_open ? "< " : "<= ") + shortNumber(high);
+  return "finite";
+}
+
+struct StrictYaml::Impl {
+  YAML::Node node;
+  std::string file;
+  std::string path;  // with a dot at the end, empty at the root
+  std::set<std::string> read;
+
+  static std::shared_ptr<Impl> make(const YAML::Node& node, const std::string& file,
+                                    const std::string& path) {
+    auto impl = std::make_shared<Impl>();
+    impl->node.reset(node);
+    impl->file = file;
+    impl->path = path;
+    std::set<std::string> seen;
+    for (const auto& entry : node) {
+      const std::string key = entry.first.IsScalar() ? entry.first.Scalar() : "?";
+      if (!seen.insert(key).second) throw Error(file + ": " + path + key + ": the key stands twice");
+    }
+    return impl;
+  }
+
+  // Const lookup: operator[] of a mutable node would add the key.
+  YAML::Node find(const std::string& key) const {
+    const YAML::Node& fixed = node;
+    const YAML::Node found = fixed[key];
+    return found.IsDefined() ? found : YAML::Node(YAML::NodeType::Undefined);
+  }
+};
+
+StrictYaml StrictYaml::fromFile(const std::string& file) {
+  YAML::Node root;
+  try {
+    root = YAML::LoadFile(file);
+  } catch (const YAML::BadFile&) {
+    throw Error(file + ": cannot be read");
+  } catch (const YAML::Exception& error) {
+    throw Error(file + ": not a YAML file: " + lineOf(error.what()));
+  }
+  if (!root.IsMap()) throw Error(file + ": keys are due, but it is " + shown(root));
+  return StrictYaml(Impl::make(root, file, ""));
+}
+
+bool StrictYaml::has(const std::string& key) const {
+  return impl_->find(key).IsDefined();
+}
+
+std::vector<std::string> StrictYaml::keys() const {
+  std::vector<std::string> names;
+  for (const auto& entry : impl_->node) names.push_back(entry.first.Scalar());
+  return names;
+}
+
+const std::string& StrictYaml::file() const {
+  return impl_->file;
+}
+
+std::string StrictYaml::path(const std::string& key) const {
+  return impl_->path + key;
+}
+
+void StrictYaml::fail(const std::string& key, const std::string& what) const {
+  throw Error(impl_->file + ": " + path(key) + ": " + what);
+}
+
+double StrictYaml::number(const std::string& key, const Range& range) const {
+  const YAML::Node node = impl_->find(key);
+  if (!node.IsDefined()) fail(key, "is missing");
+  impl_->read.insert(key);
+  double value = 0.0;
+  if (!parse(node, &value)) fail(key, shown(node) + " is not a number");
+  if (!std::isfinite(value)) fail(key, shown(node) + " is not a finite number");
+  if (!range.contains(value)) fail(key, shortNumber(value) + " is out of range (" + range.text() + ")");
+  return value;
+}
+
+int StrictYaml::integer(const std::string& key, int low, int high) const {
+  const double value = number(key, {static_cast<double>(low), static_cast<double>(high), false, false});
+  if (value != std::floor(value)) fail(key, shortNumber(value) + " is not a whole number");
+  return static_cast<int>(value);
+}
+
+std::string StrictYaml::word(const std::string& key) const {
+  const YAML::Node node = impl_->find(key);
+  if (!node.IsDefined()) fail(key, "is missing");
+  impl_->read.insert(key);
+  if (!node.IsScalar()) fail(key, shown(node) + " is not a word");
+  if (node.Scalar().empty()) fail(key, "is empty");
+  return node.Scalar();
+}
+
+std::string StrictYaml::oneOf(const std::string& key, const std::vector<std::string>& words) const {
+  const std::string value = word(key);
+  std::string due;
+  for (const std::string& candidate : words) {
+    if (value == candidate) return value;
+    due += (due.empty() ? "" : " | ") + candidate;
+  }
+  fail(key, "'" + value + "' is not one of " + due);
+}
+
+std::vector<double> StrictYaml::numbers(const std::string& key, std::size_t count, const Range& range) const {
+  const YAML::Node node = impl_->find(key);
+  if (!node.IsDefined()) fail(key, "is missing");
+  impl_->read.insert(key);
+  if (!node.IsSequence()) fail(key, shown(node) + " is not a list of numbers");
+  if (count == 0 ? node.size() == 0 : node.size() != count) {
+    fail(key, "a list of " + std::to_string(node.size()) + ", " +
+                  (count ? std::to_string(count) : "one or more") + " numbers are due");
+  }
+  std::vector<double> values;
+  for (std::size_t i = 0; i < node.size(); ++i) {
+    const std::string place = key + "[" + std::to_string(i) + "]";
+    double value = 0.0;
+    if (!parse(node[i], &value)) fail(place, shown(node[i]) + " is not a number");
+    if (!std::isfinite(value)) fail(place, shown(node[i]) + " is not a finite number");
+    if (!range.contains(value)) fail(place, shortNumber(value) + " is out of range (" + range.text() + ")");
+    values.push_back(value);
+  }
+  return values;
+}
+
+StrictYaml StrictYaml::map(const std::string& key) const {
+  const YAML::Node node = impl_->find(key);
+  if (!node.IsDefined()) fail(key, "is missing");
+  impl_->read.insert(key);
+  if (!node.IsMap()) fail(key, shown(node) + " is not a map of keys");
+  return StrictYaml(Impl::make(node, impl_->file, impl_->path + key + "."));
+}
+
+std::vector<StrictYaml> StrictYaml::maps(const std::string& key) const {
+  const YAML::Node node = impl_->find(key);
+  if (!node.IsDefined()) fail(key, "is missing");
+  impl_->read.insert(key);
+  if (!node.IsSequence()) fail(key, shown(node) + " is not a list");
+  std::vector<StrictYaml> list;
+  for (std::size_t i = 0; i < node.size(); ++i) {
+    const std::string place = key + "[" + std::to_string(i) + "]";
+    if (!node[i].IsMap()) fail(place, shown(node[i]) + " is not a map of keys");
+    list.push_back(StrictYaml(Impl::make(node[i], impl_->file, impl_->path + place + ".")));
+  }
+  return list;
+}
+
+std::optional<double> StrictYaml::optionalNumber(const std::string& key, const Range& range) const {
+  if (!has(key)) return std::nullopt;
+  return number(key, range);
+}
+
+std::optional<StrictYaml> StrictYaml::optionalMap(const std::string& key) const {
+  if (!has(key)) return std::nullopt;
+  return map(key);
+}
+
+void StrictYaml::finish() const {
+  for (const auto& entry : impl_->node) {
+    const std::string key = entry.first.IsScalar() ? entry.first.Scalar() : "?";
+    if (!impl_->read.count(key)) fail(key, "unknown key (its value: " + shown(entry.second) + ")");
+  }
+}
+
+std::string yamlNumber(double value, int digits) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%.*g", digits, value);
+  std::string number = text;
+  if (number.find_first_of(".n") == std::string::npos) {
+    const std::size_t exponent = number.find('e');
+    number.insert(exponent == std::string::npos ? number.size() : exponent, ".0");
+  }
+  return number;
+}
+
+std::string yamlWord(const std::string& word) {
+  bool plain = !word.empty();
+  for (const char c : word) plain = plain && (std::isalnum(static_cast<unsigned char>(c)) || c == '_');
+  double unused = 0.0;
+  const auto parsed = std::from_chars(word.data(), word.data() + word.size(), unused);
+  for (const char* special : {"true", "false", "yes", "no", "on", "off", "null", "y", "n"}) {
+    plain = plain && word != special;
+  }
+  if (plain && parsed.ptr == word.data()) return word;
+  YAML::Emitter out;
+  out << YAML::DoubleQuoted << word;
+  return out.c_str();
+}
+
+}  // namespace smartmill

@@ -1,0 +1,241 @@
+#include "smartmill_core/campaign/campaign.h"
+
+#include <cmath>
+#include <cstdlib>
+#include <iostream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "../temporary_folder.h"
+#include "smartmill_core/campaign/record.h"
+#include "smartmill_core/cutting/regression.h"
+#include "smartmill_core/signal/statistics.h"
+#include "smartmill_core/units.h"
+
+namespace smartmill {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr const char* CAMPAIGN = R"(format: smartmill-campaign/1
+model: model.yaml
+tests:
+- name: slot
+  kind: cut
+  file: slot.csv
+  sample_rate_hz: 100
+  spindle_speed_rpm: 4500.0
+  feed_per_tooth_mm: 0.06
+  axial_depth_mm: 2.0
+  entry_deg: 0.0
+  exit_deg: 180.0
+  engage_time_s: 0.02
+  start_time_s: 405.0
+  cut_time_before_s: 20.0
+- {name: air, kind: air, file: air.csv, sample_rate_hz: 100, spindle_speed_rpm: 1000}
+- {name: tap, kind: tap, file: tap.csv, sample_rate_hz: 100, spindle_speed_rpm: 0, direction: z}
+)";
+
+std::string with(const std::string& from, const std::string& to) {
+  std::string text = CAMPAIGN;
+  const std::size_t at = text.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  return text.replace(at, from.size(), to);
+}
+
+void expectCampaign(const Campaign& c, const std::string& folder) {
+  ASSERT_EQ(c.tests.size(), 3u);
+  EXPECT_EQ(c.modelPath(), folder + "/model.yaml");
+  EXPECT_EQ(c.pathOf(c.tests[0]), folder + "/slot.csv");
+  EXPECT_EQ(c.tests[0].kind, TestKind::cut);
+  EXPECT_DOUBLE_EQ(c.tests[0].spindle_speed, 150.0 * units::PI);
+  EXPECT_DOUBLE_EQ(c.tests[0].engagement->feed_per_tooth, 6e-5);
+  EXPECT_DOUBLE_EQ(c.tests[0].engagement->exit, units::PI);
+  EXPECT_DOUBLE_EQ(*c.tests[0].engage_time, 0.02);
+  EXPECT_EQ(c.tests[1].kind, TestKind::air);
+  EXPECT_FALSE(c.tests[1].start_time);
+  EXPECT_EQ(c.tests[2].direction, "z");
+  EXPECT_EQ(c.tests[2].spindle_speed, 0.0);
+}
+
+TEST(Campaign, readsAndWritesEveryKey) {
+  const TemporaryFolder folder;
+  folder.write("campaign.yaml", CAMPAIGN);
+  const Campaign campaign = readCampaign(folder.file(""));
+  expectCampaign(readCampaign(folder.file("campaign.yaml")),
+                 folder.file("").substr(0, folder.file("").size() - 1));
+  writeCampaign(campaign, folder.file("copy"));
+  expectCampaign(readCampaign(folder.file("copy")), folder.file("copy"));
+}
+
+TEST(Campaign, refusesWithFileKeyAndValue) {
+  const TemporaryFolder folder;
+  const struct {
+    const char *from, *to, *message;
+  } cases[] = {
+      {"file: slot.csv", "file: ../slot.csv",
+       "tests[0].file: '../slot.csv' lies outside the campaign's folder"},
+      {"file: slot.csv", "file: /slot.csv", "tests[0].file: '/slot.csv' lies outside the campaign's folder"},
+      {"name: air", "name: slot", "tests[1].name: 'slot' names two tests"},
+      {"kind: air", "kind: ari", "tests[1].kind: 'ari' is not one of cut | air | tap"},
+      {"spindle_speed_rpm: 1000", "spindle_speed_rpm: 0",
+       "tests[1].spindle_speed_rpm: 0 is out of range (> 0)"},
+      {"exit_deg: 180.0", "exit_deg: 0", "tests[0].exit_deg: 0.0 is out of range (> entry_deg 0.0)"},
+      {"exit_deg: 180.0", "exit_deg: 361", "tests[0].exit_deg: 361 is out of range (0 <= value <= 360)"},
+      {"  axial_depth_mm: 2.0\n", "", "tests[0].axial_depth_mm: is missing"},
+      {"sample_rate_hz: 100", "sample_rate_hz: fast", "tests[0].sample_rate_hz: 'fast' is not a number"},
+      {"direction: z", "direction: u", "tests[2].direction: 'u' is not one of x | y | z"},
+      {"kind: air,", "kind: air, depth: 2,", "tests[1].depth: unknown key (its value: '2')"},
+      {"model: model.yaml\n", "", "model: is missing"},
+      {"tests:", "runs:", "tests: is missing"},
+  };
+  for (const auto& c : cases) {
+    const std::string file = folder.write("campaign.yaml", with(c.from, c.to));
+    EXPECT_EQ(errorOf([&] { readCampaign(file); }), file + ": " + c.message);
+  }
+}
+
+TEST(Record, readsColumnsInAnyOrderAndNotesTheUnknown) {
+  const TemporaryFolder folder;
+  const Record r = readCsv(folder.write(
+      "a.csv",
+      "\xEF\xBB\xBF"
+      "fy[N],temperature[C],time[s],tool_x[um],fx[N]\r\n-2,hot,0,5,1\r\n -4 ,cold,0.01,1e1,+3\r\n\r\n"));
+  EXPECT_EQ(r.size(), 2u);
+  EXPECT_EQ(r.column("fx"), (std::vector<double>{1, 3}));
+  EXPECT_EQ(r.column("fy"), (std::vector<double>{-2, -4}));
+  EXPECT_DOUBLE_EQ(r.column("tool_x")[1], 10e-6);
+  EXPECT_FALSE(r.has("fz"));
+  ASSERT_EQ(r.notes.size(), 1u);
+  EXPECT_THAT(r.notes[0], HasSubstr("column temperature[C] is not used"));
+  EXPECT_THAT(errorOf([&] { r.column("fz"); }), HasSubstr("a.csv: column fz is missing"));
+}
+
+TEST(Record, writesWhatItReads) {
+  const TemporaryFolder folder;
+  Record r;
+  for (int i = 0; i < 100; ++i) r.time.push_back(i / 25600.0);
+  for (const char* name : {"fx", "tool_y", "load_meter"}) {
+    std::vector<double>& column = r.add(name);
+    for (int i = 0; i < 100; ++i) column.push_back(1e-6 * std::sin(0.1 * i));
+  }
+  writeCsv(r, folder.file("r.csv"));
+  const Record back = readCsv(folder.file("r.csv"));
+  EXPECT_EQ(back.names, r.names);
+  for (std::size_t i = 0; i < 100; ++i) {
+    EXPECT_NEAR(back.time[i], r.time[i], 1e-9 * r.time[i]);                     // nine digits
+    EXPECT_NEAR(back.column("tool_y")[i], r.column("tool_y")[i], 1e-6 * 1e-6);  // six digits
+  }
+}
+
+TEST(Record, refusesWithLineAndColumn) {
+  const TemporaryFolder folder;
+  const struct {
+    const char *text, *message;
+  } cases[] = {
+      {"time[s],fx[N]\n0,1\n0.1,nan\n0.2,3\n", "line 3: column fx: 'nan' is not a finite number"},
+      {"time[s],fx[N]\n0,1\n0.1,x\n", "line 3: column fx: 'x' is not a number"},
+      {"time[s],fx[N]\n0,1\n0.1,\n", "line 3: column fx: '' is not a number"},
+      {"time[s],fx[N]\n0,1\n0.1\n", "line 3: 1 values, 2 columns are due"},
+      {"time[s],fx[N]\n0,1,2\n", "line 2: 3 values, 2 columns are due"},
+      {"time[s],fx[N]\n0,1\n\n0.1,2\n", "line 3: is empty"},
+      {"time[s],fx[kN]\n0,1\n", "line 1: column fx: the unit is 'kN', N is due"},
+      {"time[s],fx\n0,1\n", "line 1: column 'fx' is not name[unit]"},
+      {"time[s],fx[N],fx[N]\n0,1,1\n", "line 1: column fx stands twice"},
+      {"fx[N]\n1\n", "column time is missing"},
+      {"time[s],fx[N]\n", "no samples"},
+      {"", "is empty"},
+      {"time[s],fx[N]\n0,1\n0.1,1\n0.2,1\n0.4,1\n0.5,1\n",
+       "line 5: column time: a step of 0.2 s, 0.1 s are due"},
+      {"time[s],fx[N]\n0,1\n0.1,1\n0.05,1\n0.2,1\n0.3,1\n0.4,1\n",
+       "line 4: column time: a step of -0.05 s, 0.1 s are due"},
+  };
+  for (const auto& c : cases) {
+    const std::string file = folder.write("bad.csv", c.text);
+    EXPECT_EQ(errorOf([&] { readCsv(file); }), file + ": " + c.message);
+  }
+  EXPECT_THAT(errorOf([&] { readCsv(folder.file("none.csv")); }), HasSubstr("none.csv: cannot be read"));
+}
+
+TEST(Record, checksTheRateAndTurnsAReaction) {
+  const TemporaryFolder folder;
+  folder.write("campaign.yaml", CAMPAIGN);
+  folder.write("slot.csv", "time[s],fx[N]\n0,1\n0.01,2\n0.02,3\n");
+  const Campaign campaign = readCampaign(folder.file(""));
+  MachineModel model;
+  EXPECT_DOUBLE_EQ(readRecord(campaign, campaign.tests[0], model).column("fx")[2], 3.0);
+  model.force_sensor.measures_workpiece = true;
+  EXPECT_DOUBLE_EQ(readRecord(campaign, campaign.tests[0], model).column("fx")[2], -3.0);
+  folder.write("slot.csv", "time[s],fx[N]\n0,1\n0.02,2\n0.04,3\n");
+  EXPECT_THAT(errorOf([&] { readRecord(campaign, campaign.tests[0]); }),
+              HasSubstr("samples come at 50 Hz, but the campaign's sample_rate_hz is 100"));
+}
+
+TEST(Record, readsADynowareExport) {
+  const TemporaryFolder folder;
+  const std::string file = folder.write(
+      "d.csv",
+      "DynoWare,Version 2.5\nTime:, \nSampling rate [Hz]:,10\nTime,Fx,Fy,Fz\ns,N,N,N\n8,1,2,3\n8.1,4,5,6\n");
+  const Record r = readDynoware(file, {{"fx", "Fy"}, {"fz", "Fz"}});
+  EXPECT_EQ(r.column("fx"), (std::vector<double>{2, 5}));
+  EXPECT_EQ(r.column("fz"), (std::vector<double>{3, 6}));
+  EXPECT_THAT(errorOf([&] { readDynoware(file, {{"fx", "Mz"}}); }), HasSubstr("column Mz is missing"));
+  EXPECT_THAT(errorOf([&] {
+                readDynoware(folder.write("n.csv", "time[s]\n0\n"), {{"fx", "Fx"}});
+              }),
+              HasSubstr("n.csv: line 1: not a DynoWare export"));
+}
+
+std::string sharedFolder() {
+  const char* folder = std::getenv("SMARTMILL_SHARED");
+  return folder ? folder : SMARTMILL_SHARED_FOLDER;
+}
+
+// The published coefficients of the same records, to every printed digit: the mean over all samples,
+// unweighted.
+TEST(MeasuredSlots, regressionGivesThePublishedCoefficients) {
+  const std::string folder = sharedFolder() + "/measured/slot_6000";
+  if (!std::filesystem::exists(folder)) {
+    std::cout << folder << " absent, not checked\n";
+    return;
+  }
+  const Campaign campaign = readCampaign(folder);
+  const MachineModel model = readMachineModel(campaign.modelPath());
+  std::vector<MeanForceTest> tests;
+  for (const CampaignTest& test : campaign.tests) {
+    const Record record = readRecord(campaign, test, model);
+    EXPECT_EQ(record.size(), 10001u);
+    MeanForceTest t;
+    t.tool = *model.tool;
+    t.engagement = *test.engagement;
+    t.force = {mean(record.column("fx")), mean(record.column("fy")), mean(record.column("fz"))};
+    tests.push_back(t);
+  }
+  const CuttingCoefficients k = identifyFromForces(tests).value;
+  EXPECT_NEAR(k.ktc / 1e6, 958.8599, 5.1e-5);  // half a printed digit
+  EXPECT_NEAR(k.krc / 1e6, 250.8633, 5.1e-5);
+  EXPECT_NEAR(k.kac / 1e6, 146.3614, 5.1e-5);
+  EXPECT_NEAR(k.kte / 1e3, 15.7580, 5.1e-5);
+  EXPECT_NEAR(k.kre / 1e3, 19.4337, 5.1e-5);
+  EXPECT_NEAR(k.kae / 1e3, 18.2075, 5.1e-5);
+}
+
+TEST(ExampleCampaigns, areAllRead) {
+  const std::string folder = sharedFolder() + "/campaigns";
+  if (!std::filesystem::exists(folder)) {
+    std::cout << folder << " absent, not checked\n";
+    return;
+  }
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    if (!entry.is_directory()) continue;
+    const Campaign campaign = readCampaign(entry.path().string());
+    readMachineModel(campaign.modelPath());
+    EXPECT_GT(campaign.tests.size(), 10u) << entry.path();
+    const Record record = readRecord(campaign, campaign.tests.front());
+    EXPECT_TRUE(record.has("load_meter"));
+  }
+}
+
+}  // namespace
+}  // namespace smartmill

@@ -1,0 +1,236 @@
+#include "smartmill_core/model/machine_model.h"
+
+#include <cmath>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "../temporary_folder.h"
+#include "smartmill_core/model/effect_catalogue.h"
+#include "smartmill_core/model/strict_yaml.h"
+#include "smartmill_core/units.h"
+
+namespace smartmill {
+namespace {
+
+using ::testing::EndsWith;
+using ::testing::HasSubstr;
+
+constexpr const char* MODEL = R"(format: smartmill-model/1
+tool:
+  teeth: 4
+  diameter_mm: 19.05
+  helix_deg: 30.0
+  pitch_deg: [88, 92, 88, 92]
+  stickout_mm: 51.0
+cutting:
+  Ktc_n_per_mm2: 796.0
+  Krc_n_per_mm2: 168.0
+  Kac_n_per_mm2: 222.0
+  Kte_n_per_mm: 27.7
+  Kre_n_per_mm: 30.8
+  Kae_n_per_mm: 1.4
+  Ktc_n_per_mm2_std: 8.0
+tool_tip:
+  x: [{frequency_hz: 1210.0, damping_ratio: 0.031, stiffness_n_per_um: 28.0, stiffness_n_per_um_std: 1.4}]
+  y: [{frequency_hz: 1180.0, damping_ratio: 0.029, stiffness_n_per_um: 31.0}]
+force_sensor:
+  x: [{frequency_hz: 930.0, damping_ratio: 0.03, gain: 0.9}]
+  y: [{frequency_hz: 1080.0, damping_ratio: 0.03, gain: 0.9}]
+  noise_rms_n: [1.0, 1.0, 1.5]
+  measures: force_on_workpiece
+spindle:
+  viscous_nm_s_per_rad: 3.70e-4
+  coulomb_nm: -0.0647
+  load_meter_v_per_w: 3.88e-4
+  load_meter_bandwidth_hz: 7.0
+  load_meter_resolution_v: 3.0e-4
+  friction_zero_below_rpm: 2000
+  load_meter_full_scale_v: 8.0
+  max_speed_rpm: 20000
+  rated_torque_nm: 40
+  rated_power_w: 15000
+  acceleration_rpm_per_s: 8000
+axes:
+  x_travel_mm: [0, 500]
+  y_travel_mm: [0, 400]
+  z_travel_mm: [-300, 0]
+  rapid_mm_per_min: 30000
+  acceleration_mm_per_s2: 3000
+  home_mm: [10, 20, 0]
+hammer:
+  offset_mm: 12
+  peak_force_n: 150
+  contact_time_us: 300
+  force_noise_rms_n: 0.2
+  gap_at_zero_volt_um: 250
+  gain_v: 10
+  range_v: 10
+  voltage_noise_rms_v: 1.0e-3
+  flute_depth_mm: 2.0
+  position_mm: {x: [100, 50, -200], y: [120, 70, -200]}
+workpiece:
+  material: AL 7050-T7451
+  low_mm: [200, 100, -260]
+  high_mm: [400, 250, -210]
+effects:
+- {name: runout, offset_um: 8.1, offset_um_std: 0.2, angle_deg: 31.0}
+- {name: cross_talk, xy: 0.02}
+- {name: uneven_pitch, pitch_deg: [89, 91, 89, 91]}
+- {name: gain_error, channel: fy, gain: 1.05}
+- {name: mains_hum, frequency_hz: 50, amplitude_n: 2, y_ratio: -0.4}
+- {name: tool_flexibility, x: [{frequency_hz: 900, damping_ratio: 0.02, stiffness_n_per_um: 12}]}
+uncertainty_percent: {cutting: 4, damping: 12}
+)";
+
+/// MODEL with one piece of text replaced.
+std::string with(const std::string& from, const std::string& to) {
+  std::string text = MODEL;
+  const std::size_t at = text.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  return text.replace(at, from.size(), to);
+}
+
+void expectModel(const MachineModel& m) {
+  ASSERT_TRUE(m.tool && m.stickout && m.cutting && m.cutting_std && m.spindle && m.axes && m.hammer &&
+              m.workpiece);
+  EXPECT_EQ(m.tool->teeth, 4);
+  EXPECT_DOUBLE_EQ(m.tool->diameter, 0.01905);
+  EXPECT_DOUBLE_EQ(m.tool->pitch[1], units::radFromDeg(92.0));
+  EXPECT_DOUBLE_EQ(*m.stickout, 0.051);
+  EXPECT_DOUBLE_EQ(m.cutting->ktc, 796e6);
+  EXPECT_DOUBLE_EQ(m.cutting->kae, 1400.0);
+  EXPECT_DOUBLE_EQ(m.cutting_std->ktc, 8e6);
+  EXPECT_TRUE(std::isnan(m.cutting_std->krc));
+  EXPECT_DOUBLE_EQ(m.tool_tip.x.modes.at(0).gain, 1.0 / 28e6);
+  EXPECT_NEAR(m.tool_tip.x.modes.at(0).gain_std, 0.05 / 28e6, 1e-20);
+  EXPECT_TRUE(std::isnan(m.tool_tip.y.modes.at(0).gain_std));
+  EXPECT_DOUBLE_EQ(m.force_sensor.axis[0].direct, 0.1);
+  EXPECT_DOUBLE_EQ(m.force_sensor.axis[2].direct, 1.0);  // absent: ideal
+  EXPECT_DOUBLE_EQ(m.force_sensor.axis[2].response(100.0).real(), 1.0);
+  EXPECT_EQ(*m.force_sensor.noise_rms, (Axes3{1.0, 1.0, 1.5}));
+  EXPECT_TRUE(m.force_sensor.measures_workpiece);
+  EXPECT_DOUBLE_EQ(m.spindle->coulomb, -0.0647);
+  EXPECT_NEAR(m.spindle->friction_zero_below, 209.4, 0.1);  // Dunwoody eq. 3.11
+  EXPECT_DOUBLE_EQ(*m.spindle->load_meter_full_scale, 8.0);
+  EXPECT_DOUBLE_EQ(m.axes->travel[2][0], -0.3);
+  EXPECT_DOUBLE_EQ(m.axes->rapid, 0.5);
+  EXPECT_DOUBLE_EQ(m.axes->home[1], 0.02);
+  EXPECT_DOUBLE_EQ(m.hammer->contact_time, 3e-4);
+  EXPECT_DOUBLE_EQ(m.hammer->gap_at_zero_volt, 250e-6);
+  EXPECT_DOUBLE_EQ(m.hammer->position.at("y")[0], 0.12);
+  EXPECT_EQ(m.workpiece->material, "AL 7050-T7451");
+  EXPECT_DOUBLE_EQ(m.workpiece->high[2], -0.21);
+  ASSERT_EQ(m.effects.size(), 6u);
+  EXPECT_DOUBLE_EQ(m.effects[0].numbers.at("offset_um"), 8.1);
+  EXPECT_DOUBLE_EQ(m.effects[0].std_devs.at("offset_um"), 0.2);
+  EXPECT_DOUBLE_EQ(m.effects[1].numbers.at("xy"), 0.02);
+  EXPECT_DOUBLE_EQ(m.effects[1].numbers.at("zy"), 0.0);  // left out
+  EXPECT_EQ(m.effects[2].pitch_deg.size(), 4u);
+  EXPECT_EQ(m.effects[3].words.at("channel"), "fy");
+  EXPECT_DOUBLE_EQ(m.effects[5].flexibility.x.modes.at(0).frequency, 900.0);
+  EXPECT_DOUBLE_EQ(m.uncertainty.cutting, 4.0);
+  EXPECT_DOUBLE_EQ(m.uncertainty.frequency, 0.5);
+}
+
+TEST(MachineModel, readsAndWritesEveryKey) {
+  const TemporaryFolder folder;
+  const MachineModel model = readMachineModel(folder.write("a.yaml", MODEL));
+  expectModel(model);
+  writeMachineModel(model, folder.file("b.yaml"));
+  expectModel(readMachineModel(folder.file("b.yaml")));
+}
+
+TEST(MachineModel, anEmptyModelIsAModelAndToolsRefuseByName) {
+  const TemporaryFolder folder;
+  const MachineModel model = readMachineModel(folder.write("m.yaml", "format: smartmill-model/1\n"));
+  EXPECT_EQ(errorOf([&] { model.needTool("predict forces"); }),
+            folder.file("m.yaml") + ": tool is missing (needed to predict forces)");
+  EXPECT_EQ(errorOf([&] { model.needSpindle("read the load meter"); }),
+            folder.file("m.yaml") + ": spindle is missing (needed to read the load meter)");
+  const MachineModel part = readMachineModel(
+      folder.write("p.yaml", "format: smartmill-model/1\ncutting: {Ktc_n_per_mm2: 800, Kte_n_per_mm: 10}\n"));
+  EXPECT_EQ(errorOf([&] { part.needCutting("simulate a cut"); }),
+            folder.file("p.yaml") + ": cutting.Krc_n_per_mm2 is missing (needed to simulate a cut)");
+}
+
+TEST(MachineModel, refusesWithFileKeyAndValue) {
+  const TemporaryFolder folder;
+  const struct {
+    const char *from, *to, *message;
+  } cases[] = {
+      {"diameter_mm: 19.05", "diameter_mm: -19.05", "tool.diameter_mm: -19.05 is out of range (> 0)"},
+      {"diameter_mm: 19.05", "diameter_mm: .nan", "tool.diameter_mm: '.nan' is not a finite number"},
+      {"diameter_mm: 19.05", "diameter_mm: nan", "tool.diameter_mm: 'nan' is not a finite number"},
+      {"diameter_mm: 19.05", "diameter_mm: 1e999", "tool.diameter_mm: '1e999' is not a finite number"},
+      {"diameter_mm: 19.05", "diameter_mm: \"19\"", "tool.diameter_mm: '19' is not a number"},
+      {"diameter_mm: 19.05", "diameter_mm: wide", "tool.diameter_mm: 'wide' is not a number"},
+      {"diameter_mm: 19.05", "diameter_mm: [1]", "tool.diameter_mm: a list of 1 is not a number"},
+      {"diameter_mm: 19.05", "diameter: 19.05", "tool.diameter_mm: is missing"},
+      {"  stickout_mm: 51.0", "  stickout: 51.0", "tool.stickout: unknown key (its value: '51.0')"},
+      {"teeth: 4", "teeth: 21", "tool.teeth: 21 is out of range (1 <= value <= 20)"},
+      {"teeth: 4", "teeth: 3.5", "tool.teeth: 3.5 is not a whole number"},
+      {"helix_deg: 30.0", "helix_deg: 80", "tool.helix_deg: 80 is out of range (0 <= value < 80)"},
+      {"[88, 92, 88, 92]", "[88, 92, 88]", "tool.pitch_deg: a list of 3, 4 numbers are due"},
+      {"[88, 92, 88, 92]", "[88, 92, 88, 93]", "tool.pitch_deg: the pitches sum to 361.0, 360 is due"},
+      {"[88, 92, 88, 92]", "[88, -92, 88, 92]", "tool.pitch_deg[1]: -92 is out of range (> 0)"},
+      {"Kre_n_per_mm: 30.8", "Kre_n_per_mm: -1", "cutting.Kre_n_per_mm: -1 is out of range (>= 0)"},
+      {"damping_ratio: 0.031", "damping_ratio: 1.0",
+       "tool_tip.x[0].damping_ratio: 1 is out of range (0 < value < 1)"},
+      {"stiffness_n_per_um: 31.0", "stiffness: 31.0", "tool_tip.y[0].stiffness_n_per_um: is missing"},
+      {"gain: 0.9", "gain: 1.1", "force_sensor.x: the gains sum to 1.1, out of range (<= 1)"},
+      {"[1.0, 1.0, 1.5]", "[1.0, 1.0]", "force_sensor.noise_rms_n: a list of 2, 3 numbers are due"},
+      {"force_on_workpiece", "force_on_table",
+       "force_sensor.measures: 'force_on_table' is not one of force_on_tool | force_on_workpiece"},
+      {"viscous_nm_s_per_rad: 3.70e-4", "viscous_nm_s_per_rad: -1.0e-4",
+       "spindle.viscous_nm_s_per_rad: -0.0001 is out of range (>= 0)"},
+      {"x_travel_mm: [0, 500]", "x_travel_mm: [500, 0]",
+       "axes.x_travel_mm: 500.0..0.0 is out of range (min < max)"},
+      {"high_mm: [400, 250, -210]", "high_mm: [100, 250, -210]",
+       "workpiece.high_mm: lies not above low_mm in x"},
+      {"name: runout", "name: run_out", "effects[0].name: 'run_out' is no effect of the catalogue"},
+      {"offset_um: 8.1", "offset: 8.1", "effects[0].offset_um: is missing"},
+      {"xy: 0.02", "xx: 0.02", "effects[1].xx: unknown key (its value: '0.02')"},
+      {"channel: fy", "channel: fq",
+       "effects[3].channel: 'fq' is not one of fx | fy | fz | load_meter | tool_x | tool_y | displacement | "
+       "acceleration"},
+      {"frequency_hz: 50", "frequency_hz: 55", "effects[4].frequency_hz: 55.0 is out of range (50 or 60)"},
+      {"cutting: 4,", "cutting: -4,", "uncertainty_percent.cutting: -4 is out of range (>= 0)"},
+      {"smartmill-model/1", "smartmill-model/2",
+       "format: 'smartmill-model/2' is not one of smartmill-model/1"},
+      {"workpiece:", "work:", "work: unknown key (its value: a map)"},
+      {"spindle:\n", "tool:\n", "tool: the key stands twice"},
+      {"tool:\n", "tool: 4\ntools:\n", "tool: '4' is not a map of keys"},
+      {"effects:\n", "effects: {}\nmore:\n", "effects: a map is not a list"},
+  };
+  for (const auto& c : cases) {
+    const std::string file = folder.write("bad.yaml", with(c.from, c.to));
+    EXPECT_EQ(errorOf([&] { readMachineModel(file); }), file + ": " + c.message);
+  }
+  const std::string broken = folder.write("broken.yaml", "format: [smartmill\n");
+  const std::string message = errorOf([&] { readMachineModel(broken); });
+  EXPECT_THAT(message, HasSubstr(broken + ": not a YAML file: "));
+  EXPECT_EQ(message.find('\n'), std::string::npos);
+  EXPECT_THAT(errorOf([&] { readMachineModel(folder.file("none.yaml")); }),
+              EndsWith("none.yaml: cannot be read"));
+  EXPECT_THAT(errorOf([&] { writeMachineModel({}, "/nowhere/m.yaml"); }), HasSubstr("cannot be written"));
+}
+
+TEST(EffectCatalogue, holdsEveryEffectWithItsKeys) {
+  EXPECT_EQ(effectCatalogue().size(), 24u);
+  ASSERT_NE(findEffect("saturation"), nullptr);
+  EXPECT_EQ(findEffect("saturation")->parameters.at(0).unit, "N");
+  EXPECT_EQ(findEffect("magic"), nullptr);
+}
+
+TEST(StrictYaml, writesNumbersThatEveryReaderTakesForNumbers) {
+  EXPECT_EQ(yamlNumber(1e-5), "1.0e-05");
+  EXPECT_EQ(yamlNumber(0.1), "0.1");
+  EXPECT_EQ(yamlNumber(25600), "25600.0");
+  EXPECT_EQ(yamlWord("slot_1"), "slot_1");
+  EXPECT_EQ(yamlWord("1018"), "\"1018\"");
+  EXPECT_EQ(yamlWord("AL 7050: T"), "\"AL 7050: T\"");
+}
+
+}  // namespace
+}  // namespace smartmill
