@@ -1,0 +1,254 @@
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "smartmill_core/modal/results.h"
+#include "smartmill_core/model/machine_model.h"
+#include "smartmill_core/signal/streams.h"
+#include "smartmill_hammer/flute_search.h"
+#include "smartmill_hammer/hit_collector.h"
+#include "smartmill_hammer/impact_analysis.h"
+#include "smartmill_hammer/sensor_calibration.h"
+
+namespace smartmill {
+namespace hammer {
+
+/// What may be tuned; defaults are the thesis's where it gives one.
+struct HammerParameters {
+  // Flute search.
+  double start_angle = 0.0;            ///< [rad] of the spindle, where the search begins
+  double bracket_first_step = 0.0977;  ///< [rad] 5.6 deg, > 0
+  double bracket_max_step = 0.3927;    ///< [rad] 22.5 deg
+  double flute_tolerance = 0.02618;    ///< [rad] 1.5 deg
+  double noise_sigmas = 5.0;           ///< [1] of a mean voltage; a fall or rise counts above this
+  double least_rise = 0.005;           ///< [V]
+  // When a command is done.
+  double command_delay =
+      0.2;  ///< [s] before a command is judged: the controller begins late; > a block's length
+  double settle_time = 0.05;           ///< [s] from standstill to the voltage reading; > a block's length
+  double averaging_time = 0.01;        ///< [s] of voltage averaged
+  double angle_tolerance = 2.6e-3;     ///< [rad] spindle at its angle
+  double zero_speed = 0.02;            ///< [rad/s] spindle at rest below this
+  int rest_readings = 5;               ///< [1] of the spindle in a row
+  double position_tolerance = 2.0e-6;  ///< [m] axis at its place; of a small jog a quarter of its distance
+  double orient_timeout = 20.0;        ///< [s]
+  double motion_timeout = 60.0;        ///< [s]
+  // Paths.
+  double standoff = 5.0e-3;  ///< [m] sideways distance from the station while going down to it and up from it
+  double retract_height = 50.0e-3;  ///< [m] above the station's position: sideways motion is safe there
+  double approach_feed = 16.7e-3;   ///< [m/s]
+  double jog_feed = 1.0e-3;         ///< [m/s] thesis: 60 mm/min
+  // Sensor calibration.
+  double first_jog = 50.0e-6;  ///< [m]
+  double max_jog = 100.0e-6;   ///< [m]
+  double least_jog = 5.0e-6;   ///< [m]
+  double resolution = 1.0e-6;  ///< [m] of a commanded distance
+  double zero_volt = 0.1;      ///< [V]
+  double check_jog =
+      10.0e-6;  ///< [m] half width of the symmetric sensitivity measurement; 0: the thesis's way
+  double position_std = 0.1e-6;  ///< [m] of a distance moved
+  double min_gap_share = 0.4;    ///< [1] of gap_at_zero_volt: no nearer
+  double max_approach = 3.0e-3;  ///< [m]
+  // Hits.
+  double trigger_force = 10.0;    ///< [N]
+  double weak_force = 20.0;       ///< [N]
+  double second_hit_share = 0.1;  ///< [1]
+  double pre_trigger = 0.01;      ///< [s]
+  double record_length = 0.2;     ///< [s]
+  double rest_time = 0.1;         ///< [s] between a record's end and the next blow
+  double strike_timeout = 3.0;    ///< [s] from the command to the hit
+  int max_bad_hits = 5;           ///< [1] then it gives up
+  double exponential_time = 0.0;  ///< [s] time constant of an exponential window; 0: none
+  // FRF and fit.
+  double frf_high = 5000.0;  ///< [Hz] lines above are not handed out
+  double fit_low = 200.0;    ///< [Hz]
+  double fit_high = 3500.0;  ///< [Hz]
+  int max_modes = 6;         ///< [1] when the number is chosen by evidence
+
+  /// @throws Error naming the key and the value that is out of range.
+  void validate() const;
+};
+
+struct MeasureFrfGoal {
+  double stamp = 0.0;  ///< [s] sensor data before it are not used
+  std::string tool, point, direction;
+  int hits = 0;           ///< [1] to average
+  int modes = 0;          ///< [1] 0: by evidence
+  double stickout = 0.0;  ///< [m] 0: no offset correction
+  int teeth = 0;          ///< [1] 0: as the model says
+};
+
+/// Codes of the action MeasureFrf.
+enum class FrfCode : std::uint8_t {
+  ok = 0,
+  cancelled = 1,
+  no_flute = 2,
+  no_hit = 3,
+  motion_failed = 4,
+  bad_goal = 5,
+  bad_data = 6,
+  fit_failed = 7
+};
+
+struct MeasureFrfResult {
+  FrfCode code = FrfCode::ok;
+  std::string message;
+  MeasuredFrf frf;
+  MeasuredModes modes;
+  double sensitivity = NOT_A_NUMBER;      ///< [m/V] displacement towards the sensor per volt
+  double sensitivity_std = NOT_A_NUMBER;  ///< [m/V]
+  double flute_low = NOT_A_NUMBER;        ///< [rad] spindle angle with a flute at the sensor, at the tip
+  double flute_high = NOT_A_NUMBER;       ///< [rad] halfway up to the hammer
+  double flute_hammer = NOT_A_NUMBER;     ///< [rad] a flute at the hammer (eq. 4.1)
+};
+
+struct Waypoint {
+  Axes3 position{{0, 0, 0}};  ///< [m] machine
+  double feed = 0.0;          ///< [m/s] 0: rapid
+};
+
+/// What the machine is asked to do.
+struct Command {
+  enum class Kind { orient, jog, move, strike, stop };
+  Kind kind = Kind::stop;      ///< stop: give up the motion that is running
+  double stamp = 0.0;          ///< [s] of the input that caused it
+  double angle = 0.0;          ///< [rad] orient: 0..2 pi
+  std::string axis;            ///< jog: x, y or z
+  double distance = 0.0;       ///< [m] jog
+  double feed = 0.0;           ///< [m/s] jog
+  std::vector<Waypoint> path;  ///< move
+  std::string direction;       ///< strike
+};
+
+/// NC text of a move: absolute, one block a waypoint, mm and mm/min.
+std::string moveProgram(const std::vector<Waypoint>& path);
+
+struct Feedback {
+  std::string stage;
+  double progress = 0.0;  ///< [1]
+  int hits_done = 0;
+};
+
+/// The whole measurement of thesis chapter 4 as one class without a clock: inputs come in stamp order,
+/// commands, feedback and the result are drained. Whether a command is done is judged from the streams alone,
+/// so that recorded streams answer the same commands in replay: spindle at its angle and at rest, axes at
+/// their place with nothing to go, a hit in the record. An abort retracts the tool where the controller's
+/// state allows it and says so.
+///
+/// Sides: the sensor stands where the tool nears it in the direction's positive sense, the hammer above it
+/// strikes away from it; so a blow lowers the voltage, and displacement along the blow is -(V - V before) x
+/// sensitivity.
+class HammerSequence {
+ public:
+  /// @throws Error when the model lacks the hammer or the tool section, or a parameter is out of range.
+  HammerSequence(const HammerParameters& parameters, const MachineModel& model);
+
+  /// @return false when a measurement is running: the goal is refused and nothing changes.
+  bool handle(const MeasureFrfGoal& goal);
+  void handle(const SampleBlock& block);
+  void handle(const CncState& state);
+  void handle(const SpindleAngle& angle);
+  void cancel(double stamp);
+  void commandFailed(double stamp, const std::string& text);
+  /// An input stream has died, nothing further can be judged: ends at once, with a last stop and retract sent
+  /// blindly.
+  void lost(double stamp, const std::string& text);
+  /// Forgets everything: a bag was restarted.
+  void reset();
+
+  bool active() const { return stage_ != Stage::idle; }
+
+  std::vector<Command> takeCommands();
+  std::optional<Feedback> takeFeedback();
+  std::optional<MeasureFrfResult> takeResult();
+
+ private:
+  enum class Stage {
+    idle,
+    check,
+    orient_start,
+    to_station,
+    search_low,
+    to_height,
+    search_high,
+    to_tip,
+    orient_flute,
+    calibrate,
+    strike,
+    stopping,
+    retract
+  };
+  enum class Wait { nothing, position, angle, average, hit, rest, standstill };
+
+  void start(double now);
+  void orient(double now, double angle);
+  void jog(double now, const std::string& axis, double distance);
+  void move(double now, std::vector<Waypoint> path);
+  void strike(double now);
+  void average(double from);
+  void send(Command command, Wait wait, double timeout);
+
+  void reached(double now);
+  void measured(double now, double volt, double volt_std);
+  void search(double now);
+  void recorded(double now, HitCollector::Record record);
+  void badHit(double now, const std::string& why, bool bad_data);
+  void evaluate();
+
+  void abort(double now, FrfCode code, const std::string& why);
+  void retract(double now);
+  void finish();
+  bool late(double now);
+  void say(const std::string& stage, double progress);
+
+  bool readPosition(const CncState& state, Axes3& position, double& to_go) const;
+  bool safeToMove() const;
+  std::string unsafe(const CncState& state) const;
+  Axes3 stationPosition() const;
+  double safeHeight() const;
+
+  HammerParameters parameters_;
+  MachineModel model_;
+  HammerStation station_;
+  ToolGeometry tool_;
+
+  Stage stage_ = Stage::idle;
+  Wait wait_ = Wait::nothing;
+  MeasureFrfGoal goal_;
+  MeasureFrfResult result_;
+  std::optional<CncState> state_;
+  int direction_ = 0;  // 0, 1, 2 of x, y, z
+  double pitch_ = 0.0;
+  double sent_ = 0.0, deadline_ = 0.0;
+  double target_angle_ = 0.0, angle_sum_ = 0.0, reached_angle_ = 0.0;
+  int rest_count_ = 0;
+  Axes3 target_{{0, 0, 0}};
+  double target_tolerance_ = 0.0;
+  bool at_station_ = false;
+  bool retracting_after_abort_ = false;
+
+  double average_from_ = 0.0;
+  std::vector<double> average_;
+  std::uint64_t average_index_ = 0;
+  int bad_averages_ = 0;
+  double rest_until_ = 0.0;
+
+  std::optional<FluteSearch> search_;
+  double expected_angle_ = 0.0;
+  std::optional<SensorCalibration> calibration_;
+  HitCollector collector_;
+  std::vector<Hit> hits_;
+  int bad_hits_ = 0;
+
+  std::vector<Command> commands_;
+  std::optional<Feedback> feedback_;
+  std::optional<MeasureFrfResult> done_;
+};
+
+}  // namespace hammer
+}  // namespace smartmill

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <string>
+
+#include "smartmill_hammer/impact_analysis.h"
+
+namespace smartmill {
+namespace hammer {
+
+struct HitCollectorOptions {
+  double trigger_force = 10.0;  ///< [N] above the level before; > 0
+  double pre_trigger = 0.01;    ///< [s] kept before the trigger, > 0
+  double record_length = 0.2;   ///< [s] of a record, pre-trigger included, > pre_trigger
+};
+
+/// Cuts hits out of the running stream of hammer force and gap voltage, sample by sample. A record is
+/// complete when its last sample has come; missing or NaN samples inside it spoil it.
+class HitCollector {
+ public:
+  explicit HitCollector(const HitCollectorOptions& options);
+
+  /// From now on the next force above the trigger starts a record.
+  void arm();
+  void disarm();
+  bool armed() const { return armed_; }
+  bool recording() const { return recording_; }
+
+  /// One sample. @param time [s] @param index running index of the device @param rate [Hz]
+  /// @return a complete record, once.
+  struct Record {
+    Hit hit;
+    std::string fault;  ///< lost or NaN samples; empty: none
+  };
+  std::optional<Record> add(double time, std::uint64_t index, double rate, double force, double volt);
+
+  void reset();
+
+ private:
+  HitCollectorOptions options_;
+  bool armed_ = false, recording_ = false;
+  double rate_ = 0.0;
+  std::uint64_t next_index_ = 0;
+  std::deque<double> force_before_, volt_before_;
+  Hit hit_;
+  std::string fault_;
+};
+
+}  // namespace hammer
+}  // namespace smartmill

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <string>
+
+namespace smartmill {
+namespace hammer {
+
+/// Calibration of the displacement sensor in place (Dunwoody section 4.2). All distances [m] along the
+/// direction in which the tool nears the sensor.
+struct SensorCalibrationOptions {
+  double first_jog = 50e-6;  ///< [m] > 0
+  double max_jog = 100e-6;   ///< [m] >= first_jog
+  double least_jog = 5e-6;   ///< [m] > 0; below this the machine's resolution would spoil the sensitivity
+  double resolution = 1e-6;  ///< [m] of a commanded distance
+  double zero_volt = 0.1;    ///< [V] the sensor counts as zeroed below this
+  double check_jog = 10e-6;  ///< [m] half width of the last, symmetric measurement about zero; 0: the
+                             ///< thesis's way, the sensitivity of the last approach jog stands
+  double position_std = 0.1e-6;      ///< [m] of a distance moved (thesis: within 100 nm)
+  double range_volt = 10.0;          ///< [V] sensor clips at plus and minus this
+  double gain_volt = 10.0;           ///< [V] nominal curve V = gain_volt (gap_at_zero_volt / gap - 1)
+  double gap_at_zero_volt = 250e-6;  ///< [m]
+  double min_gap = 100e-6;           ///< [m] no jog to a nominal gap below this
+  double max_travel = 3e-3;          ///< [m] approach at most
+  int max_jogs = 100;                ///< [1]
+};
+
+/// Moves the tool towards the sensor in small jogs until its voltage is about zero, and measures its
+/// sensitivity there. Resumable: start(volt), then as long as state() is jogging: jog by next(), measure,
+/// give().
+class SensorCalibration {
+ public:
+  enum class State { jogging, done, failed };
+
+  explicit SensorCalibration(const SensorCalibrationOptions& options);
+
+  /// @param volt [V] mean before the first jog @param volt_std [V] standard deviation of that mean
+  void start(double volt, double volt_std);
+  void give(double volt, double volt_std);
+
+  State state() const { return state_; }
+  const std::string& reason() const { return reason_; }  ///< of a failure, one line
+  double next() const { return next_; }                  ///< [m] signed; positive towards the sensor
+  int jogs() const { return jogs_; }
+  double travelled() const { return travelled_; }  ///< [m] towards the sensor since start()
+
+  /// [m/V] > 0: displacement towards the sensor per volt; and its standard deviation.
+  double sensitivity() const { return sensitivity_; }
+  double sensitivityStd() const { return sensitivity_std_; }
+
+ private:
+  void plan();
+  void ask(double distance);
+  void fail(std::string reason);
+  bool clipped(double volt) const;
+  double nominalGap(double volt) const;
+
+  enum class Phase { approach, check_near, check_far, check_back };
+
+  SensorCalibrationOptions options_;
+  State state_ = State::jogging;
+  Phase phase_ = Phase::approach;
+  std::string reason_;
+  double next_ = 0.0, travelled_ = 0.0;
+  double volt_ = 0.0, volt_std_ = 0.0;  // last reading
+  double near_volt_ = 0.0, near_std_ = 0.0;
+  double sensitivity_ = 0.0, sensitivity_std_ = 0.0;
+  int jogs_ = 0;
+};
+
+}  // namespace hammer
+}  // namespace smartmill

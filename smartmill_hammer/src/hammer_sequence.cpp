@@ -1,0 +1,721 @@
+#include "smartmill_hammer/hammer_sequence.h"
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <cstdio>
+#include <utility>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/signal/statistics.h"
+#include "smartmill_core/units.h"
+
+namespace smartmill {
+namespace hammer {
+namespace {
+
+constexpr const char* AXIS_NAMES[] = {"x", "y", "z"};
+/// Sample and state stamps are rounded to nanoseconds; equal times must compare equal however a stream is cut
+/// into blocks.
+constexpr double SAME_TIME = 1e-6;
+/// Orders of M119: 0..4095 (thesis eq. 6.1).
+constexpr double COUNTS = 4096.0;
+constexpr int MAX_BAD_AVERAGES = 3;
+/// [s] for the axes to come to rest after a stop.
+constexpr double STOP_TIMEOUT = 10.0;
+/// Two tips of a fit band: share of the sensor's range that counts as its end.
+constexpr double RANGE_SHARE = 0.98;
+
+int axisIndex(const std::string& name) {
+  if (name.size() != 1) return -1;
+  const char c = static_cast<char>(std::tolower(static_cast<unsigned char>(name[0])));
+  return c >= 'x' && c <= 'z' ? c - 'x' : -1;
+}
+
+double roundTo(double value, double step) {
+  return std::round(value / step) * step;
+}
+
+std::string format(const char* pattern, double a, double b = 0.0, double c = 0.0) {
+  char line[200];
+  std::snprintf(line, sizeof line, pattern, a, b, c);
+  return line;
+}
+
+void need(bool good, const char* key, double value, const char* range) {
+  if (!good)
+    throw Error("hammer parameter " + std::string(key) + ": " + format("%g", value) + ", " + range +
+                " is due");
+}
+
+}  // namespace
+
+void HammerParameters::validate() const {
+  const auto positive = [](double value, const char* key) {
+    need(std::isfinite(value) && value > 0.0, key, value, "above 0");
+  };
+  const auto not_negative = [](double value, const char* key) {
+    need(std::isfinite(value) && value >= 0.0, key, value, "at least 0");
+  };
+  need(std::isfinite(start_angle), "start_angle", start_angle, "a finite angle");
+  positive(bracket_first_step, "bracket_first_step");
+  need(bracket_max_step >= bracket_first_step && bracket_max_step < units::PI, "bracket_max_step",
+       bracket_max_step, "bracket_first_step..pi");
+  positive(flute_tolerance, "flute_tolerance");
+  positive(noise_sigmas, "noise_sigmas");
+  not_negative(least_rise, "least_rise");
+  need(command_delay >= 0.02, "command_delay", command_delay, "at least 0.02 (a block)");
+  need(settle_time >= 0.02, "settle_time", settle_time, "at least 0.02 (a block)");
+  positive(averaging_time, "averaging_time");
+  positive(angle_tolerance, "angle_tolerance");
+  positive(zero_speed, "zero_speed");
+  need(rest_readings >= 1, "rest_readings", rest_readings, "at least 1");
+  positive(position_tolerance, "position_tolerance");
+  positive(orient_timeout, "orient_timeout");
+  positive(motion_timeout, "motion_timeout");
+  not_negative(standoff, "standoff");
+  positive(retract_height, "retract_height");
+  positive(approach_feed, "approach_feed");
+  positive(jog_feed, "jog_feed");
+  positive(resolution, "resolution");
+  need(least_jog >= 4.0 * resolution, "least_jog", least_jog, "at least 4 x resolution");
+  need(first_jog >= least_jog, "first_jog", first_jog, "at least least_jog");
+  need(max_jog >= first_jog && max_jog <= 1e-3, "max_jog", max_jog, "first_jog..1e-3");
+  positive(zero_volt, "zero_volt");
+  need(check_jog == 0.0 || check_jog >= least_jog, "check_jog", check_jog, "0 or at least least_jog");
+  not_negative(position_std, "position_std");
+  need(min_gap_share > 0.0 && min_gap_share < 1.0, "min_gap_share", min_gap_share, "0..1");
+  positive(max_approach, "max_approach");
+  positive(trigger_force, "trigger_force");
+  need(weak_force >= trigger_force, "weak_force", weak_force, "at least trigger_force");
+  need(second_hit_share > 0.0 && second_hit_share < 1.0, "second_hit_share", second_hit_share, "0..1");
+  positive(pre_trigger, "pre_trigger");
+  need(record_length > 2.0 * pre_trigger, "record_length", record_length, "above 2 x pre_trigger");
+  need(rest_time >= 0.0 && std::isfinite(rest_time), "rest_time", rest_time, "at least 0");
+  positive(strike_timeout, "strike_timeout");
+  need(max_bad_hits >= 0, "max_bad_hits", max_bad_hits, "at least 0");
+  not_negative(exponential_time, "exponential_time");
+  positive(frf_high, "frf_high");
+  not_negative(fit_low, "fit_low");
+  need(fit_high > fit_low, "fit_high", fit_high, "above fit_low");
+  need(max_modes >= 1 && max_modes <= 20, "max_modes", max_modes, "1..20");
+}
+
+std::string moveProgram(const std::vector<Waypoint>& path) {
+  std::string text = "G90\n";
+  char line[120];
+  for (const Waypoint& w : path) {
+    const double x = w.position[0] / units::MM, y = w.position[1] / units::MM, z = w.position[2] / units::MM;
+    if (w.feed > 0.0) {
+      std::snprintf(line, sizeof line, "G1 X%.4f Y%.4f Z%.4f F%.1f\n", x, y, z, w.feed / units::MM * 60.0);
+    } else {
+      std::snprintf(line, sizeof line, "G0 X%.4f Y%.4f Z%.4f\n", x, y, z);
+    }
+    text += line;
+  }
+  return text;
+}
+
+HammerSequence::HammerSequence(const HammerParameters& parameters, const MachineModel& model)
+    : parameters_(parameters),
+      model_(model),
+      station_(model.needHammer("measure the tool tip")),
+      tool_(model.needTool("find a flute")),
+      collector_({parameters.trigger_force, parameters.pre_trigger, parameters.record_length}) {
+  parameters_.validate();
+}
+
+void HammerSequence::reset() {
+  stage_ = Stage::idle;
+  wait_ = Wait::nothing;
+  state_.reset();
+  search_.reset();
+  calibration_.reset();
+  collector_.reset();
+  hits_.clear();
+  commands_.clear();
+  feedback_.reset();
+  done_.reset();
+}
+
+std::vector<Command> HammerSequence::takeCommands() {
+  return std::exchange(commands_, {});
+}
+std::optional<Feedback> HammerSequence::takeFeedback() {
+  return std::exchange(feedback_, std::nullopt);
+}
+std::optional<MeasureFrfResult> HammerSequence::takeResult() {
+  return std::exchange(done_, std::nullopt);
+}
+
+void HammerSequence::say(const std::string& stage, double progress) {
+  feedback_ = Feedback{stage, progress, static_cast<int>(hits_.size())};
+}
+
+// ---------------------------------------------------------------------------------------------- goal
+
+bool HammerSequence::handle(const MeasureFrfGoal& goal) {
+  if (active()) return false;
+  goal_ = goal;
+  result_ = MeasureFrfResult();
+  hits_.clear();
+  bad_hits_ = bad_averages_ = 0;
+  search_.reset();
+  calibration_.reset();
+  collector_.reset();
+  at_station_ = retracting_after_abort_ = false;
+  direction_ = axisIndex(goal.direction);
+  const int teeth = goal.teeth > 0 ? goal.teeth : tool_.teeth;
+  std::string fault;
+  if (goal.point != POINT_TOOL_TIP) {
+    fault = "point '" + goal.point + "': this node measures " + POINT_TOOL_TIP;
+  } else if (station_.position.count(goal.direction) == 0 || direction_ < 0 || direction_ > 1) {
+    fault = "direction '" + goal.direction + "': the model's hammer station has no such position";
+  } else if (goal.hits < 1 || goal.hits > 1000) {
+    fault = "hits " + std::to_string(goal.hits) + ": 1..1000 are due";
+  } else if (goal.modes < 0 || goal.modes > 20) {
+    fault = "modes " + std::to_string(goal.modes) + ": 0..20 are due";
+  } else if (teeth < 1 || teeth > 20) {
+    fault = "teeth " + std::to_string(teeth) + ": 1..20 are due";
+  } else if (!(goal.stickout == 0.0 || (goal.stickout > station_.offset && std::isfinite(goal.stickout)))) {
+    fault = format("stickout %.2f mm: 0 or more than the hammer's offset %.2f mm is due", 1e3 * goal.stickout,
+                   1e3 * station_.offset);
+  }
+  if (!fault.empty()) {
+    result_.code = FrfCode::bad_goal;
+    result_.message = fault;
+    finish();
+    return true;
+  }
+  pitch_ = units::TWO_PI / teeth;
+  if (teeth == tool_.teeth) {
+    for (const double p : tool_.pitch) pitch_ = std::min(pitch_, p);
+  }
+  stage_ = Stage::check;
+  wait_ = Wait::nothing;
+  deadline_ = goal.stamp + parameters_.motion_timeout;
+  say("waiting for the controller's state", 0.0);
+  return true;
+}
+
+Axes3 HammerSequence::stationPosition() const {
+  Axes3 p = station_.position.at(goal_.direction);
+  for (double& v : p) v = roundTo(v, parameters_.resolution);
+  return p;
+}
+
+double HammerSequence::safeHeight() const {
+  double height = stationPosition()[2] + parameters_.retract_height;
+  if (model_.axes && model_.axes->travel[2][1] > model_.axes->travel[2][0]) {
+    height = std::min(height, model_.axes->travel[2][1]);
+  }
+  return roundTo(height, parameters_.resolution);
+}
+
+void HammerSequence::start(double now) {
+  stage_ = Stage::orient_start;
+  say("stopping and orienting the spindle", 0.02);
+  orient(now, parameters_.start_angle);
+}
+
+// ---------------------------------------------------------------------------------------------- commands
+
+void HammerSequence::send(Command command, Wait wait, double timeout) {
+  sent_ = command.stamp;
+  deadline_ = command.stamp + timeout;
+  wait_ = wait;
+  rest_count_ = 0;
+  commands_.push_back(std::move(command));
+}
+
+void HammerSequence::orient(double now, double angle) {
+  Command c;
+  c.kind = Command::Kind::orient;
+  c.stamp = now;
+  const double counts = std::round(angle / units::TWO_PI * COUNTS);
+  c.angle = (counts - COUNTS * std::floor(counts / COUNTS)) * units::TWO_PI / COUNTS;
+  target_angle_ = c.angle;
+  angle_sum_ = 0.0;
+  send(std::move(c), Wait::angle, parameters_.orient_timeout);
+}
+
+void HammerSequence::jog(double now, const std::string& axis, double distance) {
+  Command c;
+  c.kind = Command::Kind::jog;
+  c.stamp = now;
+  c.axis = axis;
+  c.distance = distance;
+  c.feed = parameters_.jog_feed;
+  // From the commanded place, not from the displayed one, so that the display's rounding does not add up.
+  target_[static_cast<std::size_t>(axisIndex(axis))] += distance;
+  target_tolerance_ = std::min(parameters_.position_tolerance, 0.25 * std::abs(distance));
+  send(std::move(c), Wait::position, parameters_.motion_timeout);
+}
+
+void HammerSequence::move(double now, std::vector<Waypoint> path) {
+  Command c;
+  c.kind = Command::Kind::move;
+  c.stamp = now;
+  target_ = path.back().position;
+  target_tolerance_ = parameters_.position_tolerance;
+  c.path = std::move(path);
+  send(std::move(c), Wait::position, parameters_.motion_timeout);
+}
+
+void HammerSequence::strike(double now) {
+  Command c;
+  c.kind = Command::Kind::strike;
+  c.stamp = now;
+  c.direction = goal_.direction;
+  collector_.arm();
+  send(std::move(c), Wait::hit, parameters_.strike_timeout);
+}
+
+void HammerSequence::average(double from) {
+  average_from_ = from;
+  average_.clear();
+  wait_ = Wait::average;
+  deadline_ = from + 1.0;
+}
+
+// ---------------------------------------------------------------------------------------------- inputs
+
+bool HammerSequence::late(double now) {
+  if (stage_ == Stage::idle || wait_ == Wait::rest || now <= deadline_) return false;
+  if (stage_ == Stage::check) {
+    result_.code = FrfCode::motion_failed;
+    result_.message = "no controller state has come";
+    finish();
+    return true;
+  }
+  if (stage_ == Stage::stopping || stage_ == Stage::retract) {
+    result_.message += stage_ == Stage::stopping ? "; not retracted: the machine does not come to rest"
+                                                 : "; not retracted within the time allowed";
+    if (result_.code == FrfCode::ok) result_.code = FrfCode::motion_failed;
+    finish();
+    return true;
+  }
+  const double waited = now - sent_;
+  switch (wait_) {
+    case Wait::angle:
+      abort(now, FrfCode::motion_failed,
+            format("the spindle did not come to %.2f deg within %.1f s", units::degFromRad(target_angle_),
+                   waited));
+      return true;
+    case Wait::position:
+      abort(now, FrfCode::motion_failed,
+            format("the axes did not come to their place within %.1f s", waited));
+      return true;
+    case Wait::average:
+      abort(now, FrfCode::bad_data, "no sound voltage of the displacement sensor");
+      return true;
+    case Wait::hit:
+      if (collector_.recording()) return false;
+      collector_.disarm();
+      badHit(now, format("no hit seen within %.1f s of the command", parameters_.strike_timeout), false);
+      return true;
+    default:
+      return false;
+  }
+}
+
+std::string HammerSequence::unsafe(const CncState& state) const {
+  if (!state.connected) return "the connection to the controller is lost";
+  if (state.emergency) return "emergency stop";
+  if (state.alarm) return "alarm" + (state.alarm_text.empty() ? std::string() : " " + state.alarm_text);
+  if (!state.armed) return "motion is not armed";
+  return {};
+}
+
+bool HammerSequence::safeToMove() const {
+  return state_ && unsafe(*state_).empty();
+}
+
+bool HammerSequence::readPosition(const CncState& state, Axes3& position, double& to_go) const {
+  bool found[3] = {false, false, false};
+  to_go = 0.0;
+  for (std::size_t i = 0; i < state.axes.size() && i < state.position.size(); ++i) {
+    const int axis = axisIndex(state.axes[i]);
+    if (axis < 0) continue;
+    position[static_cast<std::size_t>(axis)] = state.position[i];
+    found[axis] = true;
+    if (i < state.distance_to_go.size()) to_go = std::max(to_go, std::abs(state.distance_to_go[i]));
+  }
+  return found[0] && found[1] && found[2];
+}
+
+void HammerSequence::handle(const CncState& state) {
+  state_ = state;
+  if (!active()) return;
+  const double now = state.stamp;
+  const std::string trouble = unsafe(state);
+  if (!trouble.empty()) return abort(now, FrfCode::motion_failed, trouble);
+  if (stage_ == Stage::check) {
+    if (now >= goal_.stamp) start(now);
+    return;
+  }
+  Axes3 position{};
+  double to_go = 0.0;
+  if (!readPosition(state, position, to_go)) {
+    return abort(now, FrfCode::motion_failed, "cnc/state does not show the axes x, y and z");
+  }
+  const bool judged = now > sent_ + parameters_.command_delay + SAME_TIME;
+  if (judged && wait_ == Wait::position) {
+    bool there = !state.motion && to_go <= target_tolerance_;
+    for (std::size_t i = 0; i < 3; ++i)
+      there = there && std::abs(position[i] - target_[i]) <= target_tolerance_;
+    // Twice in a row: distance to go is zero between two blocks too.
+    rest_count_ = there ? rest_count_ + 1 : 0;
+    if (rest_count_ >= 2) return reached(now);
+  } else if (judged && wait_ == Wait::standstill) {
+    rest_count_ = !state.motion && to_go == 0.0 ? rest_count_ + 1 : 0;
+    if (rest_count_ >= 2) return retract(now);
+  }
+  late(now);
+}
+
+void HammerSequence::handle(const SpindleAngle& angle) {
+  if (!active()) return;
+  const double now = angle.stamp;
+  if (wait_ == Wait::angle && now > sent_ + parameters_.command_delay + SAME_TIME) {
+    const double off = nearAngle(angle.angle, target_angle_) - target_angle_;
+    if (std::abs(off) <= parameters_.angle_tolerance && std::abs(angle.speed) <= parameters_.zero_speed) {
+      angle_sum_ = rest_count_ == 0 ? off : angle_sum_ + off;
+      if (++rest_count_ >= parameters_.rest_readings) {
+        reached_angle_ = target_angle_ + angle_sum_ / rest_count_;
+        return reached(now);
+      }
+    } else {
+      rest_count_ = 0;
+    }
+  }
+  late(now);
+}
+
+void HammerSequence::handle(const SampleBlock& block) {
+  if (!active()) return;
+  std::size_t force_channel = 0, gap_channel = 0;
+  try {
+    force_channel = block.channel("hammer");
+    gap_channel = block.channel("gap");
+  } catch (const Error& error) {
+    return abort(block.stamp, FrfCode::bad_data, error.what());
+  }
+  for (std::size_t i = 0; i < block.size() && active(); ++i) {
+    const double t = block.timeOf(i);
+    if (t < goal_.stamp - SAME_TIME) continue;
+    const std::uint64_t index = block.first_index + i;
+    const double force = block.at(i, force_channel), volt = block.at(i, gap_channel);
+    auto record = collector_.add(t, index, block.sample_rate, force, volt);
+    if (record && wait_ == Wait::hit) {
+      recorded(t, std::move(*record));
+    } else if (wait_ == Wait::rest && t >= rest_until_ - SAME_TIME) {
+      strike(t);
+    } else if (wait_ == Wait::average && t >= average_from_ - SAME_TIME) {
+      const bool gap = !average_.empty() && index != average_index_ + 1;
+      average_index_ = index;
+      if (gap || !std::isfinite(volt)) {
+        average_.clear();
+        if (++bad_averages_ > MAX_BAD_AVERAGES) {
+          abort(t, FrfCode::bad_data,
+                gap ? "daq/hammer loses samples"
+                    : "daq/hammer: sample " + std::to_string(index) + " of gap is not a number");
+        }
+        continue;
+      }
+      average_.push_back(volt);
+      const auto due =
+          static_cast<std::size_t>(std::max(2L, std::lround(parameters_.averaging_time * block.sample_rate)));
+      if (average_.size() >= due) {
+        const std::vector<double> values = std::exchange(average_, {});
+        wait_ = Wait::nothing;
+        measured(t, mean(values), standardDeviation(values) / std::sqrt(static_cast<double>(values.size())));
+      }
+    }
+  }
+  if (active() && block.size() > 0) late(block.timeOf(block.size() - 1));
+}
+
+// ---------------------------------------------------------------------------------------------- steps
+
+void HammerSequence::reached(double now) {
+  wait_ = Wait::nothing;
+  const Axes3 station = stationPosition();
+  const auto d = static_cast<std::size_t>(direction_);
+  FluteSearchOptions options = FluteSearchOptions::forPitch(pitch_);
+  const double scale = options.first_step / FluteSearchOptions().first_step;
+  options.first_step = scale * parameters_.bracket_first_step;
+  options.max_step = std::max(options.first_step, std::min(parameters_.bracket_max_step, 0.25 * pitch_));
+  options.tolerance = scale * parameters_.flute_tolerance;
+  options.range_volt = station_.range_volt;
+  options.noise_sigmas = parameters_.noise_sigmas;
+  options.least_rise = parameters_.least_rise;
+  switch (stage_) {
+    case Stage::orient_start: {
+      stage_ = Stage::to_station;
+      say("moving to the hammer station " + goal_.direction, 0.05);
+      Axes3 here{};
+      double to_go = 0.0;
+      readPosition(*state_, here, to_go);
+      Axes3 above = station;
+      above[d] -= parameters_.standoff;
+      above[2] = std::max(safeHeight(), here[2]);
+      Axes3 up = here, beside = above;
+      up[2] = above[2];
+      beside[2] = station[2];
+      at_station_ = true;
+      return move(now, {{up, 0.0},
+                        {above, 0.0},
+                        {beside, parameters_.approach_feed},
+                        {station, parameters_.approach_feed}});
+    }
+    case Stage::to_station:
+      stage_ = Stage::search_low;
+      say("searching a flute at the tip", 0.1);
+      search_.emplace(parameters_.start_angle, options);
+      return orient(now, search_->next());
+    case Stage::search_low:
+    case Stage::search_high:
+    case Stage::calibrate:
+      return average(now + parameters_.settle_time);
+    case Stage::to_height:
+      stage_ = Stage::search_high;
+      say("searching the flute halfway up to the hammer", 0.3);
+      // A right-hand helix lags with height: the spindle must turn on by the lag.
+      expected_angle_ = result_.flute_low + tool_.lag() * 0.5 * station_.offset;
+      search_.emplace(expected_angle_, options);
+      return orient(now, search_->next());
+    case Stage::to_tip:
+      stage_ = Stage::orient_flute;
+      say("turning the flute to the hammer", 0.5);
+      return orient(now, result_.flute_hammer);
+    case Stage::orient_flute:
+      stage_ = Stage::calibrate;
+      say("calibrating the displacement sensor", 0.55);
+      return average(now + parameters_.settle_time);
+    case Stage::retract:
+      return finish();
+    default:
+      return;
+  }
+}
+
+void HammerSequence::measured(double now, double volt, double volt_std) {
+  if (stage_ == Stage::calibrate) {
+    if (!calibration_) {
+      SensorCalibrationOptions o;
+      o.first_jog = parameters_.first_jog;
+      o.max_jog = parameters_.max_jog;
+      o.least_jog = parameters_.least_jog;
+      o.resolution = parameters_.resolution;
+      o.zero_volt = parameters_.zero_volt;
+      o.check_jog = parameters_.check_jog;
+      o.position_std = parameters_.position_std;
+      o.range_volt = station_.range_volt;
+      o.gain_volt = station_.gain_volt;
+      o.gap_at_zero_volt = station_.gap_at_zero_volt;
+      o.min_gap = parameters_.min_gap_share * station_.gap_at_zero_volt;
+      o.max_travel = parameters_.max_approach;
+      calibration_.emplace(o);
+      calibration_->start(volt, volt_std);
+    } else {
+      calibration_->give(volt, volt_std);
+    }
+    switch (calibration_->state()) {
+      case SensorCalibration::State::jogging:
+        return jog(now, goal_.direction, calibration_->next());
+      case SensorCalibration::State::failed:
+        return abort(now, FrfCode::bad_data, "sensor calibration: " + calibration_->reason());
+      case SensorCalibration::State::done:
+        result_.sensitivity = calibration_->sensitivity();
+        result_.sensitivity_std = calibration_->sensitivityStd();
+        stage_ = Stage::strike;
+        say(format("sensor calibrated: %.3f +- %.3f um/V", 1e6 * result_.sensitivity,
+                   1e6 * result_.sensitivity_std),
+            0.7);
+        return strike(now);
+    }
+  }
+  search_->give(reached_angle_, volt, volt_std);
+  if (search_->state() == FluteSearch::State::searching) return orient(now, search_->next());
+  if (search_->state() == FluteSearch::State::no_flute) {
+    return abort(now, FrfCode::no_flute, search_->reason());
+  }
+  if (search_->volt() > RANGE_SHARE * station_.range_volt) {
+    return abort(
+        now, FrfCode::no_flute,
+        format("the flute is too near to the sensor: %.2f V is the end of its range", search_->volt()));
+  }
+  const double half = roundTo(0.5 * station_.offset, parameters_.resolution);
+  if (stage_ == Stage::search_low) {
+    result_.flute_low = search_->angle();
+    stage_ = Stage::to_height;
+    say("lowering the tool to find the flute halfway up to the hammer", 0.28);
+    return jog(now, "z", -half);
+  }
+  // Another flute may have been nearer to the walk: the one meant is within half a pitch of where the helix
+  // puts it.
+  result_.flute_high = search_->angle();
+  const double full_pitch = units::TWO_PI / (goal_.teeth > 0 ? goal_.teeth : tool_.teeth);
+  result_.flute_high -= full_pitch * std::round((result_.flute_high - expected_angle_) / full_pitch);
+  result_.flute_hammer = 2.0 * result_.flute_high - result_.flute_low;  // eq. 4.1
+  stage_ = Stage::to_tip;
+  say(format("flute at %.2f deg at the tip, %.2f deg halfway up, %.2f deg at the hammer",
+             units::degFromRad(result_.flute_low), units::degFromRad(result_.flute_high),
+             units::degFromRad(result_.flute_hammer)),
+      0.48);
+  jog(now, "z", half);
+}
+
+void HammerSequence::recorded(double now, HitCollector::Record record) {
+  HitFault fault{record.fault, true};
+  if (fault.text.empty()) {
+    fault = hitFault(record.hit, {parameters_.weak_force, parameters_.second_hit_share,
+                                  RANGE_SHARE * station_.range_volt});
+  }
+  if (!fault.text.empty()) return badHit(now, fault.text, fault.bad_data);
+  hits_.push_back(std::move(record.hit));
+  say("hit " + std::to_string(hits_.size()) + " of " + std::to_string(goal_.hits),
+      0.7 + 0.25 * static_cast<double>(hits_.size()) / goal_.hits);
+  if (static_cast<int>(hits_.size()) >= goal_.hits) {
+    evaluate();
+    return retract(now);
+  }
+  wait_ = Wait::rest;
+  rest_until_ = now + parameters_.rest_time;
+}
+
+void HammerSequence::badHit(double now, const std::string& why, bool bad_data) {
+  if (++bad_hits_ > parameters_.max_bad_hits) {
+    return abort(now, bad_data ? FrfCode::bad_data : FrfCode::no_hit,
+                 std::to_string(bad_hits_) + " useless hits, the last: " + why);
+  }
+  say("hit thrown away: " + why, 0.7 + 0.25 * static_cast<double>(hits_.size()) / goal_.hits);
+  wait_ = Wait::rest;
+  rest_until_ = now + parameters_.rest_time;
+}
+
+void HammerSequence::evaluate() {
+  ImpactOptions options;
+  options.exponential_time = parameters_.exponential_time;
+  // The blow drives the tool away from the sensor: the voltage falls.
+  const double factor = goal_.stickout > 0.0 ? offsetFactor(goal_.stickout, station_.offset) : 1.0;
+  options.response_scale = -result_.sensitivity * factor;
+  const double relative = result_.sensitivity_std / result_.sensitivity;
+  result_.frf.stamp = result_.modes.stamp = hits_.back().stamp;
+  result_.frf.tool = result_.modes.tool = goal_.tool;
+  result_.frf.point = result_.modes.point = goal_.point;
+  result_.frf.direction = result_.modes.direction = goal_.direction;
+  result_.modes.unit = options.unit;
+  try {
+    ImpactAnalysis analysis(options);
+    for (const Hit& hit : hits_) analysis.add(hit);
+    // The line at zero is the drift of the sensor.
+    FrequencyResponse frf = analysis.frf().band(1e-3, parameters_.frf_high);
+    ModalFitOptions fit_options;
+    fit_options.low = parameters_.fit_low;
+    fit_options.high = parameters_.fit_high;
+    fit_options.modes = goal_.modes;
+    fit_options.max_modes = parameters_.max_modes;
+    // The sensitivity's error is common to all lines: it takes no part in the fit and is added after it.
+    result_.frf.frf = frf;
+    for (std::size_t k = 0; k < frf.size(); ++k) {
+      result_.frf.frf.std_dev[k] = std::hypot(frf.std_dev[k], relative * std::abs(frf.value[k]));
+    }
+    const ModalFit fit = fitModes(frf, fit_options);
+    result_.modes.model = fit.model;
+    result_.modes.relative_error = fit.relative_error;
+    for (Mode& mode : result_.modes.model.modes)
+      mode.gain_std = std::hypot(mode.gain_std, relative * mode.gain);
+    result_.modes.model.direct_std =
+        std::hypot(result_.modes.model.direct_std, relative * result_.modes.model.direct);
+    analysis.removeWindowDamping(result_.modes.model);
+    result_.message = std::to_string(hits_.size()) + " hits, " +
+                      std::to_string(result_.modes.model.modes.size()) + " modes" +
+                      (goal_.stickout > 0.0 ? format(", offset correction %.3f", factor) : std::string());
+  } catch (const Error& error) {
+    result_.code = FrfCode::fit_failed;
+    result_.message = error.what();
+  }
+}
+
+// ---------------------------------------------------------------------------------------------- ends
+
+void HammerSequence::cancel(double stamp) {
+  if (active() && stage_ != Stage::retract && stage_ != Stage::stopping)
+    abort(stamp, FrfCode::cancelled, "cancelled");
+}
+
+void HammerSequence::commandFailed(double stamp, const std::string& text) {
+  if (!active()) return;
+  abort(stamp, wait_ == Wait::hit ? FrfCode::no_hit : FrfCode::motion_failed, text);
+}
+
+void HammerSequence::lost(double stamp, const std::string& text) {
+  if (!active()) return;
+  if (stage_ != Stage::stopping && stage_ != Stage::retract) {
+    const bool moving = at_station_ && safeToMove();
+    abort(stamp, FrfCode::bad_data, text);
+    if (!active()) return;
+    if (moving) retract(stamp);
+    result_.message += "; a retract was sent, unseen";
+  } else {
+    if (result_.code == FrfCode::ok) result_.code = FrfCode::bad_data;
+    result_.message += "; " + text + " during the retract";
+  }
+  finish();
+}
+
+void HammerSequence::abort(double now, FrfCode code, const std::string& why) {
+  if (!active()) return;
+  collector_.disarm();
+  if (stage_ == Stage::stopping || stage_ == Stage::retract) {
+    // Already on the way out: what failed is the retract.
+    if (result_.code == FrfCode::ok) result_.code = code;
+    result_.message += "; not retracted: " + why;
+    return finish();
+  }
+  result_.code = code;
+  result_.message = why;
+  const bool commanded = stage_ != Stage::check;
+  if (commanded) {
+    Command stop;
+    stop.kind = Command::Kind::stop;
+    stop.stamp = now;
+    send(std::move(stop), Wait::standstill, STOP_TIMEOUT);
+  }
+  if (!at_station_) return finish();
+  if (!safeToMove()) {
+    result_.message += "; the tool stays at the station, retract it by hand";
+    return finish();
+  }
+  stage_ = Stage::stopping;
+  say("stopping: " + why, 0.95);
+}
+
+void HammerSequence::retract(double now) {
+  stage_ = Stage::retract;
+  say("retracting from the station", 0.97);
+  Axes3 here{};
+  double to_go = 0.0;
+  readPosition(*state_, here, to_go);
+  const auto d = static_cast<std::size_t>(direction_);
+  for (double& v : here) v = roundTo(v, parameters_.resolution);
+  Axes3 beside = here;
+  // Away from the sensor only, never towards it.
+  beside[d] = roundTo(std::min(here[d], stationPosition()[d] - parameters_.standoff), parameters_.resolution);
+  Axes3 up = beside;
+  up[2] = std::max(here[2], safeHeight());
+  move(now, {{beside, parameters_.approach_feed}, {up, 0.0}});
+}
+
+void HammerSequence::finish() {
+  stage_ = Stage::idle;
+  wait_ = Wait::nothing;
+  collector_.disarm();
+  done_ = std::move(result_);
+  result_ = MeasureFrfResult();
+}
+
+}  // namespace hammer
+}  // namespace smartmill
