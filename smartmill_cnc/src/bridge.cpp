@@ -405,17 +405,19 @@ class Bridge::Impl {
   void noteLost() {
     const bool was_connected = std::exchange(state_.connected, false);
     session_ = false;
+    state_.armed = false;
     if (phase_ != Phase::idle) {
-      finish({MotionCode::lost, piece_.name + ": " + last_error_});
+      last_error_ = piece_.name + ": " + last_error_;
+      finish({MotionCode::lost, last_error_});
     }
-    if (state_.armed) {
-      state_.armed = false;
-    }
-    if (was_connected || last_error_ != noted_error_) {
+    // That nothing can be reached after a loss is no news; a refusal of another kind is.
+    const bool expected = lost_noted_ && !was_connected;
+    if (was_connected || (last_error_ != noted_error_ && !expected)) {
       note(Note::Level::error,
            last_error_ + "; trying again every " + fixedDecimals(parameters_.reconnect_period, 1) + " s");
-      noted_error_ = last_error_;
     }
+    lost_noted_ = was_connected || (lost_noted_ && last_error_ == noted_error_);
+    noted_error_ = last_error_;
   }
 
   void noteConnected() {
@@ -830,7 +832,7 @@ class Bridge::Impl {
       none.stamp = now_;
       conditions_.push_back(none);
     }
-    if (outcome.code != MotionCode::ok) {
+    if (outcome.code != MotionCode::ok && outcome.code != MotionCode::lost) {
       note(Note::Level::warning, outcome.message);
     }
     outcome_ = outcome;
@@ -844,6 +846,7 @@ class Bridge::Impl {
   bool asked_ = false, answered_ = false;
   std::vector<SubReply> replies_;
   double next_connect_ = -std::numeric_limits<double>::infinity();  // [s]
+  bool lost_noted_ = false;
   std::string last_error_ = "not connected yet", noted_error_ = "not connected yet";
 
   double now_ = 0.0;  // [s]

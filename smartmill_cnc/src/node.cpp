@@ -1,0 +1,300 @@
+#include "node.h"
+
+#include <geometry_msgs/TransformStamped.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <future>
+#include <utility>
+
+#include "smartmill_msgs/CncState.h"
+#include "smartmill_msgs/CuttingCondition.h"
+#include "smartmill_msgs/LoadSample.h"
+#include "smartmill_ros/conversions.h"
+#include "smartmill_ros/frames.h"
+
+namespace smartmill::cnc {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr int QUEUE = 100;
+constexpr int FEEDBACK_EVERY = 5;  // periods
+constexpr std::chrono::seconds LONGEST_WAIT{4};
+
+double steadySeconds() {
+  return std::chrono::duration<double>(Clock::now().time_since_epoch()).count();
+}
+
+/// Empty when the condition can be published.
+std::string conditionFault(const smartmill_msgs::CuttingCondition& c) {
+  if (c.kind > smartmill_msgs::CuttingCondition::CUT) {
+    return "condition.kind " + std::to_string(c.kind) + " is unknown";
+  }
+  if (c.kind == smartmill_msgs::CuttingCondition::NONE) {
+    return {};
+  }
+  if (!(c.spindle_speed > 0.0)) {
+    return "condition.spindle_speed is not above 0";
+  }
+  if (c.kind == smartmill_msgs::CuttingCondition::CUT &&
+      !(c.teeth > 0 && c.diameter > 0.0 && c.feed_per_tooth > 0.0 && c.axial_depth > 0.0 &&
+        c.exit_angle > c.entry_angle)) {
+    return "condition: teeth, diameter, feed_per_tooth, axial_depth above 0 and exit_angle above entry_angle "
+           "are due";
+  }
+  return {};
+}
+
+}  // namespace
+
+CncNode::CncNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
+    : parameters_([&] {
+        ParameterReader reader = ParameterReader::fromServer(private_nh);
+        return readParameters(reader);
+      }()),
+      bridge_(parameters_.bridge),
+      diagnostics_(ros::NodeHandle(), private_nh) {
+  state_publisher_ = nh.advertise<smartmill_msgs::CncState>("cnc/state", QUEUE);
+  load_publisher_ = nh.advertise<smartmill_msgs::LoadSample>("cnc/load", QUEUE);
+  condition_publisher_ = nh.advertise<smartmill_msgs::CuttingCondition>("cut/condition", QUEUE, true);
+  CuttingCondition none;
+  none.stamp = ros::Time::now().toSec();
+  condition_publisher_.publish(toMsg(none));
+
+  run_program_ = serve<smartmill_msgs::RunProgramAction>(
+      nh, "cnc/run_program",
+      [this](const smartmill_msgs::RunProgramGoal& goal) -> std::optional<Outcome> {
+        const std::string fault = conditionFault(goal.condition);
+        if (!fault.empty()) {
+          return Outcome{MotionCode::bad_goal, "program " + goal.name + ": " + fault};
+        }
+        return bridge_.runProgram(goal.name, goal.program, fromMsg(goal.condition));
+      },
+      [this] {
+        smartmill_msgs::RunProgramFeedback feedback;
+        const Progress progress = bridge_.progress();
+        feedback.bytes_sent = static_cast<std::uint32_t>(progress.bytes_sent);
+        feedback.bytes_total = static_cast<std::uint32_t>(progress.bytes_total);
+        feedback.stage = progress.stage;
+        return feedback;
+      });
+  jog_ = serve<smartmill_msgs::JogAction>(
+      nh, "cnc/jog",
+      [this](const smartmill_msgs::JogGoal& goal) {
+        return bridge_.jog(goal.axis, goal.distance, goal.feed);
+      },
+      [this] {
+        smartmill_msgs::JogFeedback feedback;
+        feedback.distance_to_go = bridge_.progress().distance_to_go;
+        return feedback;
+      });
+  orient_ = serve<smartmill_msgs::OrientSpindleAction>(
+      nh, "cnc/orient_spindle",
+      [this](const smartmill_msgs::OrientSpindleGoal& goal) { return bridge_.orient(goal.angle); },
+      [this] {
+        smartmill_msgs::OrientSpindleFeedback feedback;
+        feedback.spindle_speed = bridge_.state().spindle_speed;
+        return feedback;
+      });
+
+  arm_service_ = nh.advertiseService("cnc/arm_motion", &CncNode::armMotion, this);
+  macro_service_ = nh.advertiseService("cnc/set_macro", &CncNode::setMacro, this);
+  diagnostics_.setHardwareID("controller " + parameters_.bridge.host + ":" +
+                             std::to_string(parameters_.bridge.port));
+  diagnostics_.add("controller", this, &CncNode::diagnose);
+  // The updater publishes once a second, when it is asked to.
+  diagnostics_timer_ = nh.createWallTimer(ros::WallDuration(0.2),
+                                          [this](const ros::WallTimerEvent&) { diagnostics_.update(); });
+  thread_ = std::thread([this] { run(); });
+}
+
+CncNode::~CncNode() {
+  stopping_ = true;
+  thread_.join();
+}
+
+void CncNode::run() {
+  const auto period =
+      std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(1.0 / parameters_.rate));
+  Clock::time_point due = Clock::now();
+  for (int count = 0; !stopping_; ++count) {
+    std::vector<Job> jobs;
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      jobs.swap(jobs_);
+    }
+    for (const Job& job : jobs) {
+      job();
+    }
+    bridge_.fetch(steadySeconds());
+    const ros::Time stamp = ros::Time::now();
+    bridge_.step(stamp.toSec());
+    publish(stamp);
+    publishConditions();
+    log();
+    if (active_ && count % FEEDBACK_EVERY == 0) {
+      active_->feedback();
+    }
+    if (const std::optional<Outcome> outcome = bridge_.takeOutcome()) {
+      if (const std::optional<Active> ended = std::exchange(active_, std::nullopt)) {
+        ended->finish(*outcome);
+      }
+    }
+    due = std::max(due + period, Clock::now() - period);
+    std::this_thread::sleep_until(due);
+  }
+  bridge_.shutdown();
+  publishConditions();
+  log();
+}
+
+void CncNode::post(Job job) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  jobs_.push_back(std::move(job));
+}
+
+template <class Result>
+std::optional<Result> CncNode::ask(std::function<Result()> question) {
+  const auto answer = std::make_shared<std::promise<Result>>();
+  std::future<Result> future = answer->get_future();
+  post([answer, question] { answer->set_value(question()); });
+  if (future.wait_for(LONGEST_WAIT) != std::future_status::ready) {
+    return std::nullopt;
+  }
+  return future.get();
+}
+
+template <class Action, class Start, class Feedback>
+std::unique_ptr<CncNode::Server<Action>> CncNode::serve(ros::NodeHandle& nh, const std::string& name,
+                                                        Start start, Feedback feedback) {
+  using Handle = typename Server<Action>::GoalHandle;
+  using Result = typename Server<Action>::Result;
+  const auto goal = [this, start, feedback](Handle handle) {
+    handle.setAccepted();
+    post([this, handle, start, feedback]() mutable {
+      const std::function<void(const Outcome&)> finish = [handle](const Outcome& outcome) mutable {
+        Result result;
+        result.code = static_cast<std::uint8_t>(outcome.code);
+        result.message = outcome.message;
+        if (outcome.code == MotionCode::ok) {
+          handle.setSucceeded(result, outcome.message);
+        } else if (handle.getGoalStatus().status == actionlib_msgs::GoalStatus::PREEMPTING) {
+          handle.setCanceled(result, outcome.message);
+        } else {
+          handle.setAborted(result, outcome.message);
+        }
+      };
+      if (const std::optional<Outcome> refusal = start(*handle.getGoal())) {
+        ROS_WARN_STREAM(refusal->message);
+        finish(*refusal);
+        return;
+      }
+      active_ = Active{handle.getGoalID().id, finish,
+                       [handle, feedback]() mutable { handle.publishFeedback(feedback()); }};
+    });
+  };
+  const auto cancel = [this](Handle handle) {
+    const std::string id = handle.getGoalID().id;
+    post([this, id] {
+      if (active_ && active_->id == id) {
+        bridge_.cancel();
+      }
+    });
+  };
+  auto server = std::make_unique<Server<Action>>(nh, name, boost::function<void(Handle)>(goal),
+                                                 boost::function<void(Handle)>(cancel), false);
+  server->start();
+  return server;
+}
+
+void CncNode::publish(const ros::Time& stamp) {
+  const CncState& state = bridge_.state();
+  state_publisher_.publish(toMsg(state));
+  if (const std::optional<LoadSample>& load = bridge_.load()) {
+    load_publisher_.publish(toMsg(*load));
+  }
+  if (state.connected) {
+    geometry_msgs::TransformStamped transform;
+    transform.header.stamp = stamp;
+    transform.header.frame_id = frames::MACHINE;
+    transform.child_frame_id = frames::SPINDLE;
+    transform.transform.rotation.w = 1.0;
+    double* const components[] = {&transform.transform.translation.x, &transform.transform.translation.y,
+                                  &transform.transform.translation.z};
+    for (std::size_t i = 0; i < state.axes.size() && i < state.position.size(); ++i) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        if (state.axes[i] == std::string(1, "XYZ"[k])) {
+          *components[k] = state.position[i];
+        }
+      }
+    }
+    broadcaster_.sendTransform(transform);
+  }
+  const std::lock_guard<std::mutex> lock(mutex_);
+  seen_ = state;
+}
+
+void CncNode::publishConditions() {
+  for (const CuttingCondition& condition : bridge_.takeConditions()) {
+    condition_publisher_.publish(toMsg(condition));
+  }
+}
+
+void CncNode::log() {
+  for (const Note& note : bridge_.takeNotes()) {
+    switch (note.level) {
+      case Note::Level::info:
+        ROS_INFO_STREAM(note.text);
+        break;
+      case Note::Level::warning:
+        ROS_WARN_STREAM(note.text);
+        break;
+      case Note::Level::error:
+        ROS_ERROR_STREAM(note.text);
+        break;
+    }
+    const std::lock_guard<std::mutex> lock(mutex_);
+    seen_note_ = note.text;
+  }
+}
+
+bool CncNode::armMotion(smartmill_msgs::ArmMotion::Request& request,
+                        smartmill_msgs::ArmMotion::Response& response) {
+  const bool on = request.arm != 0;
+  const auto answer = ask<Answer<ArmCode>>([this, on] { return bridge_.arm(on); });
+  response.code = static_cast<std::uint8_t>(answer ? answer->code : ArmCode::not_connected);
+  response.message = answer ? answer->message : "the controller does not answer";
+  return true;
+}
+
+bool CncNode::setMacro(smartmill_msgs::SetMacro::Request& request,
+                       smartmill_msgs::SetMacro::Response& response) {
+  const int number = request.number;
+  const double value = request.value;
+  const auto answer =
+      ask<Answer<MacroCode>>([this, number, value] { return bridge_.setMacro(number, value); });
+  response.code = static_cast<std::uint8_t>(answer ? answer->code : MacroCode::not_connected);
+  response.message = answer ? answer->message : "the controller does not answer";
+  return true;
+}
+
+void CncNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
+  using Status = diagnostic_msgs::DiagnosticStatus;
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (!seen_.connected) {
+    status.summary(Status::ERROR, seen_note_.empty() ? "not connected" : seen_note_);
+  } else if (seen_.emergency || seen_.alarm) {
+    status.summary(Status::ERROR, seen_.emergency ? "emergency stop" : "alarm " + seen_.alarm_text);
+  } else if (seen_.mode != CncMode::dnc) {
+    status.summary(Status::WARN, "connected; not in DNC mode, nothing can be moved");
+  } else {
+    status.summary(Status::OK, seen_.armed ? "connected, motion armed" : "connected, motion disarmed");
+  }
+  status.add("mode", static_cast<int>(seen_.mode));
+  status.add("armed", seen_.armed);
+  status.add("alarm", seen_.alarm_text);
+}
+
+}  // namespace smartmill::cnc

@@ -1,0 +1,85 @@
+#pragma once
+
+#include <actionlib/server/action_server.h>
+#include <diagnostic_updater/diagnostic_updater.h>
+#include <ros/ros.h>
+#include <tf2_ros/transform_broadcaster.h>
+
+#include <atomic>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+#include "parameters_ros.h"
+#include "smartmill_cnc/bridge.h"
+#include "smartmill_msgs/ArmMotion.h"
+#include "smartmill_msgs/JogAction.h"
+#include "smartmill_msgs/OrientSpindleAction.h"
+#include "smartmill_msgs/RunProgramAction.h"
+#include "smartmill_msgs/SetMacro.h"
+
+namespace smartmill::cnc {
+
+/// Shell of the Bridge: its thread alone talks to the controller; callbacks hand it their wishes.
+class CncNode {
+ public:
+  /// @throws Error naming the parameter that is wrong.
+  CncNode(ros::NodeHandle nh, ros::NodeHandle private_nh);
+  /// Stops a running motion, says goodbye to the controller.
+  ~CncNode();
+
+ private:
+  using Job = std::function<void()>;
+  template <class Action>
+  using Server = actionlib::ActionServer<Action>;
+
+  /// The goal that has the machine now, whichever its action is.
+  struct Active {
+    std::string id;
+    std::function<void(const Outcome&)> finish;
+    std::function<void()> feedback;
+  };
+
+  void run();
+  void post(Job job);
+  /// Runs in the bridge's thread; nothing when that takes longer than a caller should wait.
+  template <class Result>
+  std::optional<Result> ask(std::function<Result()> question);
+
+  template <class Action, class Start, class Feedback>
+  std::unique_ptr<Server<Action>> serve(ros::NodeHandle& nh, const std::string& name, Start start,
+                                        Feedback feedback);
+
+  void publish(const ros::Time& stamp);
+  void publishConditions();
+  void log();
+  bool armMotion(smartmill_msgs::ArmMotion::Request& request, smartmill_msgs::ArmMotion::Response& response);
+  bool setMacro(smartmill_msgs::SetMacro::Request& request, smartmill_msgs::SetMacro::Response& response);
+  void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
+
+  const NodeParameters parameters_;
+  Bridge bridge_;                 // the bridge's thread only
+  std::optional<Active> active_;  // the bridge's thread only
+  std::string last_note_;         // the bridge's thread only
+
+  ros::Publisher state_publisher_, load_publisher_, condition_publisher_;
+  tf2_ros::TransformBroadcaster broadcaster_;
+  ros::ServiceServer arm_service_, macro_service_;
+  std::unique_ptr<Server<smartmill_msgs::RunProgramAction>> run_program_;
+  std::unique_ptr<Server<smartmill_msgs::JogAction>> jog_;
+  std::unique_ptr<Server<smartmill_msgs::OrientSpindleAction>> orient_;
+  diagnostic_updater::Updater diagnostics_;
+  ros::WallTimer diagnostics_timer_;
+
+  std::mutex mutex_;  // of what follows
+  std::vector<Job> jobs_;
+  CncState seen_;  // for diagnostics
+  std::string seen_note_;
+
+  std::atomic<bool> stopping_{false};
+  std::thread thread_;
+};
+
+}  // namespace smartmill::cnc
