@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <utility>
 
@@ -63,10 +64,20 @@ class Questions {
     std::vector<SubReply> replies;
     for (std::size_t i = 0; i < starts_.size(); ++i) {
       const std::size_t end = i + 1 < starts_.size() ? starts_[i + 1] : requests_.size();
-      std::vector<SubReply> part =
-          client.exchange({requests_.begin() + static_cast<std::ptrdiff_t>(starts_[i]),
-                           requests_.begin() + static_cast<std::ptrdiff_t>(end)});
-      std::move(part.begin(), part.end(), std::back_inserter(replies));
+      const std::vector<SubRequest> part(requests_.begin() + static_cast<std::ptrdiff_t>(starts_[i]),
+                                         requests_.begin() + static_cast<std::ptrdiff_t>(end));
+      try {
+        std::vector<SubReply> answers = client.exchange(part);
+        std::move(answers.begin(), answers.end(), std::back_inserter(replies));
+      } catch (const FocasError& e) {
+        if (!client.connected() || starts_.size() == 1) {
+          throw;
+        }
+        // One refused question leaves the others standing.
+        SubReply refused;
+        refused.code = static_cast<std::int16_t>(e.code());
+        replies.insert(replies.end(), part.size(), refused);
+      }
     }
     return replies;
   }
@@ -570,6 +581,7 @@ class Bridge::Impl {
   void openSession() {
     client_.dncStart();
     session_ = true;
+    first_piece_ = true;
     // A marker left from before must not end the first piece.
     client_.writeMacro(parameters_.marker_macro, 0.0);
     next_marker_ = 1;
@@ -737,6 +749,10 @@ class Bridge::Impl {
         return;
       }
     }
+    if (std::exchange(first_piece_, false)) {
+      // A control skips what comes before the first end of block.
+      piece_.text.insert(0, "\n");
+    }
     piece_.marker = next_marker_;
     next_marker_ = next_marker_ >= MAX_MARKER ? 1 : next_marker_ + 1;
     piece_.text +=
@@ -858,7 +874,7 @@ class Bridge::Impl {
   std::uint32_t alarm_bits_ = 0;
   int decimals_ = DEFAULT_DECIMALS;
 
-  bool session_ = false;
+  bool session_ = false, first_piece_ = false;
   int next_marker_ = 1;
   Phase phase_ = Phase::idle;
   Piece piece_;

@@ -1,10 +1,17 @@
 // The bridge against a machine on the real wire; the machine's time is the test's own.
 #include "smartmill_cnc/bridge.h"
 
+#include <arpa/inet.h>
 #include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
+#include <atomic>
 #include <chrono>
 #include <functional>
+#include <list>
 #include <thread>
 
 #include "smartmill_core/error.h"
@@ -386,6 +393,133 @@ TEST_F(BridgeTest, StallEndsTheMotion) {
   const Outcome outcome = finish();
   EXPECT_EQ(outcome.code, MotionCode::cancelled);
   EXPECT_NE(outcome.message.find("nothing has moved for 60 s"), std::string::npos) << outcome.message;
+}
+
+/// Stands between bridge and server and does not like large questions: refuses them, or hangs up.
+class NarrowController {
+ public:
+  NarrowController(std::uint16_t target, std::size_t most, bool hang_up)
+      : target_(target), most_(most), hang_up_(hang_up) {
+    listener_ = ::socket(AF_INET, SOCK_STREAM, 0);
+    sockaddr_in address = loopback(0);
+    socklen_t size = sizeof address;
+    EXPECT_EQ(::bind(listener_, reinterpret_cast<sockaddr*>(&address), size), 0);
+    EXPECT_EQ(::listen(listener_, 8), 0);
+    ::getsockname(listener_, reinterpret_cast<sockaddr*>(&address), &size);
+    port = ntohs(address.sin_port);
+    thread_ = std::thread([this] { run(); });
+  }
+  ~NarrowController() {
+    done_ = true;
+    thread_.join();
+    ::close(listener_);
+  }
+  std::uint16_t port = 0;
+
+ private:
+  struct Pair {
+    int client, server;
+    focas::FrameReader reader;
+  };
+  static sockaddr_in loopback(std::uint16_t port) {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    address.sin_port = htons(port);
+    return address;
+  }
+  static bool move(int from, const std::function<void(const std::uint8_t*, std::size_t)>& take) {
+    pollfd wait{from, POLLIN, 0};
+    if (::poll(&wait, 1, 0) <= 0) {
+      return true;
+    }
+    std::uint8_t buffer[4096];
+    const ssize_t got = ::recv(from, buffer, sizeof buffer, 0);
+    if (got > 0) {
+      take(buffer, static_cast<std::size_t>(got));
+    }
+    return got > 0;
+  }
+  static void put(int to, const focas::Bytes& bytes) {
+    EXPECT_EQ(::send(to, bytes.data(), bytes.size(), MSG_NOSIGNAL), static_cast<ssize_t>(bytes.size()));
+  }
+  bool serve(Pair& pair) {
+    bool alive = move(pair.server, [&](const std::uint8_t* data, std::size_t size) {
+      put(pair.client, focas::Bytes(data, data + size));
+    });
+    alive = move(pair.client,
+                 [&](const std::uint8_t* data, std::size_t size) { pair.reader.append(data, size); }) &&
+            alive;
+    while (const std::optional<focas::Frame> frame = pair.reader.next()) {
+      if (frame->type == focas::FRAME_DATA && focas::decodeRequests(frame->body).size() > most_) {
+        if (hang_up_) {
+          return false;
+        }
+        focas::ErrorBody error;
+        error.code = focas::EW_LENGTH;
+        put(pair.client,
+            focas::encodeFrame(focas::FRAME_DATA, focas::DIR_ERROR, focas::encodeErrorBody(error), 3));
+      } else {
+        put(pair.server, focas::encodeFrame(frame->type, frame->direction, frame->body, frame->version));
+      }
+    }
+    return alive;
+  }
+  void run() {
+    std::list<Pair> pairs;
+    while (!done_) {
+      pollfd wait{listener_, POLLIN, 0};
+      if (::poll(&wait, 1, 0) > 0) {
+        const sockaddr_in address = loopback(target_);
+        pairs.push_back({::accept(listener_, nullptr, nullptr), ::socket(AF_INET, SOCK_STREAM, 0), {}});
+        EXPECT_EQ(::connect(pairs.back().server, reinterpret_cast<const sockaddr*>(&address), sizeof address),
+                  0);
+      }
+      pairs.remove_if([&](Pair& pair) {
+        if (serve(pair)) {
+          return false;
+        }
+        ::close(pair.client);
+        ::close(pair.server);
+        return true;
+      });
+      std::this_thread::sleep_for(std::chrono::microseconds(50));
+    }
+    for (const Pair& pair : pairs) {
+      ::close(pair.client);
+      ::close(pair.server);
+    }
+  }
+
+  std::uint16_t target_;
+  std::size_t most_;
+  bool hang_up_;
+  int listener_ = -1;
+  std::atomic<bool> done_{false};
+  std::thread thread_;
+};
+
+TEST_F(BridgeTest, SmallQuestionsForANarrowController) {
+  for (const bool hang_up : {false, true}) {
+    NarrowController narrow(port_, 5, hang_up);
+    BridgeParameters p = parameters();
+    p.port = narrow.port;
+    bridge_ = std::make_unique<Bridge>(p);
+    ASSERT_TRUE(cycleUntil([&] { return bridge_->state().connected; }, 1000));
+    ASSERT_TRUE(bridge_->load());
+    EXPECT_DOUBLE_EQ(bridge_->load()->spindle_load, 0.1234);
+    arm();
+    ASSERT_FALSE(bridge_->jog("x", 0.001, 0.01));
+    EXPECT_EQ(finish().code, MotionCode::ok);
+  }
+  // So narrow that the load meters are refused altogether: the rest works.
+  NarrowController narrow(port_, 3, false);
+  BridgeParameters p = parameters();
+  p.port = narrow.port;
+  bridge_ = std::make_unique<Bridge>(p);
+  ASSERT_TRUE(cycleUntil([&] { return bridge_->state().connected; }, 1000));
+  EXPECT_FALSE(bridge_->load());
+  EXPECT_EQ(bridge_->state().axes.size(), 3u);
 }
 
 TEST(BridgeParameters, AreChecked) {
