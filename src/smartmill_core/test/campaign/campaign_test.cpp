@@ -7,10 +7,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "../temporary_folder.h"
 #include "smartmill_core/campaign/record.h"
 #include "smartmill_core/cutting/regression.h"
 #include "smartmill_core/signal/statistics.h"
+#include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill {

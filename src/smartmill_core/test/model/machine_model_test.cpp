@@ -5,9 +5,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "../temporary_folder.h"
 #include "smartmill_core/model/effect_catalogue.h"
 #include "smartmill_core/model/strict_yaml.h"
+#include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill {

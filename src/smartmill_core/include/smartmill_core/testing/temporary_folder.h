@@ -9,7 +9,7 @@
 
 namespace smartmill {
 
-/// A folder of its own for a test's files, removed with it.
+/// For tests of any package. A folder of its own for a test's files, removed with it.
 class TemporaryFolder {
  public:
   TemporaryFolder() {

@@ -1,0 +1,296 @@
+#include "smartmill_loadmeter/identification.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+
+#include "smartmill_core/cutting/regression.h"
+#include "smartmill_core/error.h"
+#include "smartmill_core/units.h"
+
+namespace smartmill::loadmeter {
+
+namespace {
+
+void require(bool good, const char* key, double value, const char* due) {
+  if (good) return;
+  char text[160];
+  std::snprintf(text, sizeof text, "%s: %g is out of range (%s)", key, value, due);
+  throw Error(text);
+}
+
+// Step of the readings: the model's resolution, or a coarser one that the readings show (a controller may
+// round again).
+double stepOf(const std::vector<double>& readings, double resolution) {
+  std::vector<double> sorted = readings;
+  std::sort(sorted.begin(), sorted.end());
+  double smallest = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 1; i < sorted.size(); ++i) {
+    const double difference = sorted[i] - sorted[i - 1];
+    if (difference > 1e-9 * std::abs(sorted[i])) smallest = std::min(smallest, difference);
+  }
+  return std::isfinite(smallest) ? std::max(smallest, resolution) : resolution;
+}
+
+std::string countOf(std::size_t n, const char* what) {
+  return std::to_string(n) + " " + what + (n == 1 ? "" : "s");
+}
+
+}  // namespace
+
+void IdentificationParameters::validate() const {
+  require(speed_tolerance > 0.0 && speed_tolerance < 0.5, "speed_tolerance", speed_tolerance,
+          "0 < value < 0.5");
+  require(settle_time_constants >= 5.0 && settle_time_constants <= 1000.0, "settle_time_constants",
+          settle_time_constants, "5 <= value <= 1000");
+  require(guard_time >= 0.0 && guard_time <= 10.0, "guard_time", guard_time, "0 <= value <= 10");
+  require(path_tolerance > 0.0 && path_tolerance <= 1.0, "path_tolerance", path_tolerance, "0 < value <= 1");
+  require(minimum_readings >= 2, "minimum_readings", minimum_readings, ">= 2");
+  require(maximum_gap > 0.0 && maximum_gap <= 60.0, "maximum_gap", maximum_gap, "0 < value <= 60");
+}
+
+LoadMeterIdentification::LoadMeterIdentification(const MachineModel& model,
+                                                 const IdentificationParameters& parameters)
+    : file_(model.file),
+      spindle_(model.needSpindle("read the load meter")),
+      spindle_uncertainty_(model.uncertainty.spindle),
+      parameters_(parameters) {
+  parameters.validate();
+  if (!spindle_.load_meter_full_scale) {
+    throw Error(model.file + ": spindle.load_meter_full_scale_v is missing (needed to read the load meter)");
+  }
+}
+
+void LoadMeterIdentification::reset() {
+  condition_.reset();
+  speed_since_.reset();
+  path_since_.reset();
+  last_reading_ = last_state_ = 0.0;
+  readings_.clear();
+  air_cuts_.clear();
+  cuts_.clear();
+  dropped_.clear();
+  bad_data_.clear();
+}
+
+bool LoadMeterIdentification::onPath(const CncState& state) const {
+  if (!condition_ || !state.connected || !state.motion || state.position.size() < 3) return false;
+  double length2 = 0.0, along = 0.0, distance2 = 0.0;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double step = condition_->steady_to[a] - condition_->steady_from[a];
+    const double at = state.position[a] - condition_->steady_from[a];
+    length2 += step * step;
+    along += step * at;
+    distance2 += at * at;
+  }
+  if (!(length2 > 0.0) || along < 0.0 || along > length2) return false;
+  return distance2 - along * along / length2 <= parameters_.path_tolerance * parameters_.path_tolerance;
+}
+
+void LoadMeterIdentification::handle(const CncState& state) {
+  const bool gap = state.stamp - last_state_ > parameters_.maximum_gap;
+  last_state_ = state.stamp;
+  if (!condition_ || condition_->kind != CuttingCondition::Kind::cut) return;
+  const bool on_path = onPath(state);
+  if (path_since_ && (!on_path || gap)) {
+    dropAfter(state.stamp - parameters_.guard_time);
+    path_since_.reset();
+  }
+  if (on_path && !path_since_) path_since_ = state.stamp;
+}
+
+void LoadMeterIdentification::handle(const LoadSample& sample) {
+  const bool gap = sample.stamp - last_reading_ > parameters_.maximum_gap;
+  last_reading_ = sample.stamp;
+  if (!condition_ || condition_->kind == CuttingCondition::Kind::none) return;
+  if (!std::isfinite(sample.spindle_load) || !std::isfinite(sample.spindle_speed)) {
+    if (bad_data_.empty()) {
+      char text[200];
+      std::snprintf(text, sizeof text, "test '%s': the load sample at %.3f s is not a finite number",
+                    condition_->name.c_str(), sample.stamp);
+      bad_data_ = text;
+    }
+    return;
+  }
+  const bool steady = std::abs(sample.spindle_speed - condition_->spindle_speed) <=
+                      parameters_.speed_tolerance * condition_->spindle_speed;
+  if (speed_since_ && (!steady || gap)) {
+    dropAfter(sample.stamp - parameters_.guard_time);
+    speed_since_.reset();
+  }
+  if (!steady) return;
+  if (!speed_since_) speed_since_ = sample.stamp;
+  double since = *speed_since_;
+  if (condition_->kind == CuttingCondition::Kind::cut) {
+    if (!path_since_ || sample.stamp - last_state_ > parameters_.maximum_gap) return;
+    since = std::max(since, *path_since_);
+  }
+  const double settle = parameters_.settle_time_constants * timeConstant(spindle_.load_meter_bandwidth);
+  if (sample.stamp < since + settle) return;
+  readings_.push_back(
+      {sample.stamp, sample.spindle_load * *spindle_.load_meter_full_scale, sample.spindle_speed});
+}
+
+void LoadMeterIdentification::handle(const CuttingCondition& condition) {
+  // A latched condition comes again when a subscriber connects anew.
+  if (condition_ && condition_->stamp == condition.stamp && condition_->name == condition.name) return;
+  closeTest();
+  condition_ = condition;
+  speed_since_.reset();
+  path_since_.reset();
+}
+
+void LoadMeterIdentification::dropAfter(double stamp) {
+  while (!readings_.empty() && readings_.back().stamp > stamp) readings_.pop_back();
+}
+
+void LoadMeterIdentification::closeTest() {
+  if (condition_ && condition_->kind != CuttingCondition::Kind::none) {
+    dropAfter(last_reading_ - parameters_.guard_time);
+    const std::size_t n = readings_.size();
+    if (n < static_cast<std::size_t>(parameters_.minimum_readings)) {
+      dropped_.push_back("'" + condition_->name + "' has " + countOf(n, "steady reading") + ", " +
+                         std::to_string(parameters_.minimum_readings) + " are due");
+    } else {
+      LoadTest test;
+      test.condition = *condition_;
+      std::vector<double> voltages;
+      for (const Reading& r : readings_) {
+        voltages.push_back(r.voltage);
+        test.speed += r.speed / static_cast<double>(n);
+      }
+      double speed2 = 0.0;
+      for (const Reading& r : readings_) speed2 += (r.speed - test.speed) * (r.speed - test.speed);
+      test.speed_std = std::sqrt(speed2 / static_cast<double>(n * (n - 1)));
+      const double interval = (readings_.back().stamp - readings_.front().stamp) / static_cast<double>(n - 1);
+      test.voltage = meanVoltage(voltages, interval, timeConstant(spindle_.load_meter_bandwidth),
+                                 stepOf(voltages, spindle_.load_meter_resolution));
+      test.readings = static_cast<int>(n);
+      test.stamp = readings_.back().stamp;
+      (condition_->kind == CuttingCondition::Kind::air ? air_cuts_ : cuts_).push_back(test);
+      if (test_) test_(test);
+    }
+  }
+  readings_.clear();
+}
+
+void LoadMeterIdentification::handle(const IdentifyGoal& goal) {
+  if (goal.reset) {
+    // The condition that holds stays: its test begins anew.
+    readings_.clear();
+    air_cuts_.clear();
+    cuts_.clear();
+    dropped_.clear();
+    bad_data_.clear();
+    IdentifyResult result;
+    result.reset = true;
+    result.id = goal.id;
+    result.message = "earlier tests are forgotten";
+    result.coefficients.stamp = goal.stamp;
+    result.coefficients.value = result.coefficients.std_dev = {NOT_A_NUMBER, NOT_A_NUMBER, NOT_A_NUMBER,
+                                                               NOT_A_NUMBER, NOT_A_NUMBER, NOT_A_NUMBER};
+    if (result_) result_(result);
+    return;
+  }
+  closeTest();
+  condition_.reset();
+  if (result_) result_(identify(goal));
+}
+
+IdentifyResult LoadMeterIdentification::identify(const IdentifyGoal& goal) const {
+  IdentifyResult result;
+  result.id = goal.id;
+  result.coefficients.value = result.coefficients.std_dev = {NOT_A_NUMBER, NOT_A_NUMBER, NOT_A_NUMBER,
+                                                             NOT_A_NUMBER, NOT_A_NUMBER, NOT_A_NUMBER};
+  result.coefficients.stamp = goal.stamp;
+  if (!bad_data_.empty()) {
+    result.code = IdentifyResult::Code::bad_data;
+    result.message = bad_data_;
+    return result;
+  }
+  std::vector<LoadTest> cuts;
+  for (const LoadTest& test : cuts_) {
+    if ((goal.tool.empty() || test.condition.tool_name == goal.tool) &&
+        (goal.material.empty() || test.condition.material == goal.material)) {
+      cuts.push_back(test);
+    }
+  }
+  std::string aside;
+  if (cuts.size() < cuts_.size()) {
+    aside += "; " + countOf(cuts_.size() - cuts.size(), "cut") + " with another tool or material left out";
+  }
+  for (const std::string& reason : dropped_) aside += "; " + reason;
+  try {
+    result.coefficients = identifyFromTests(air_cuts_, cuts, spindle_, spindle_uncertainty_);
+  } catch (const Error& error) {
+    result.code = IdentifyResult::Code::too_few_tests;
+    result.message = error.what() + aside;
+    return result;
+  }
+  CoefficientSet& k = result.coefficients;
+  if (!goal.tool.empty()) k.tool = goal.tool;
+  if (!goal.material.empty()) k.material = goal.material;
+  char text[200];
+  std::snprintf(
+      text, sizeof text, "Ktc %.1f +- %.1f N/mm2, Kte %.2f +- %.2f N/mm from %zu air cuts and %zu cuts",
+      k.value.ktc / units::N_PER_MM2, k.std_dev.ktc / units::N_PER_MM2, k.value.kte / units::N_PER_MM,
+      k.std_dev.kte / units::N_PER_MM, air_cuts_.size(), cuts.size());
+  result.message = text + aside;
+  return result;
+}
+
+// T = V / (K omega): the shares of both add up.
+double LoadTest::torqueStdAsVoltage() const {
+  return std::hypot(voltage.std_dev, voltage.mean * speed_std / speed);
+}
+
+CoefficientSet identifyFromTests(const std::vector<LoadTest>& air_cuts, const std::vector<LoadTest>& cuts,
+                                 const Spindle& spindle, double spindle_uncertainty_percent) {
+  CoefficientSet result;
+  Friction friction = modelFriction(spindle, spindle_uncertainty_percent);
+  if (!air_cuts.empty()) {
+    std::vector<AirCut> air;
+    for (const LoadTest& test : air_cuts)
+      air.push_back({test.speed, test.voltage.mean, test.torqueStdAsVoltage()});
+    friction = fitFriction(air, spindle.load_meter_gain, spindle.friction_zero_below);
+    result.friction_viscous = friction.viscous;
+    result.friction_coulomb = friction.coulomb;
+  }
+  std::vector<MeanTorqueTest> torques;
+  std::array<std::vector<MeanTorqueTest>, 2> by_friction;  // torque that one unit of each friction term takes
+  for (const LoadTest& test : cuts) {
+    MeanTorqueTest t;
+    t.tool = test.condition.tool;
+    t.engagement = test.condition.engagement;
+    t.torque = cuttingTorque(test.voltage.mean, test.speed, spindle.load_meter_gain, friction);
+    t.torque_std = test.torqueStdAsVoltage() / (spindle.load_meter_gain * test.speed);
+    torques.push_back(t);
+    const std::array<double, 2> gradient = friction.gradient(test.speed);
+    for (std::size_t i = 0; i < 2; ++i) {
+      t.torque = -gradient[i];
+      by_friction[i].push_back(t);
+    }
+    result.stamp = std::max(result.stamp, test.stamp);
+    result.tool = test.condition.tool_name;
+    result.material = test.condition.material;
+  }
+  const IdentifiedCoefficients found = identifyFromTorque(torques);
+  result.value = found.value;
+  result.std_dev = found.std_dev;
+  // The estimate is linear in the torques: the regression of a friction term's torque is how the coefficients
+  // follow it.
+  const CuttingCoefficients per_viscous = identifyFromTorque(by_friction[0]).value;
+  const CuttingCoefficients per_coulomb = identifyFromTorque(by_friction[1]).value;
+  const auto shared = [&](double v, double c) {
+    return v * v * friction.covariance[0] + 2.0 * v * c * friction.covariance[1] +
+           c * c * friction.covariance[3];
+  };
+  result.std_dev.ktc = std::sqrt(found.covariance(0, 0) + shared(per_viscous.ktc, per_coulomb.ktc));
+  result.std_dev.kte = std::sqrt(found.covariance(3, 3) + shared(per_viscous.kte, per_coulomb.kte));
+  result.source = "load_meter";
+  result.tests = static_cast<int>(cuts.size());
+  return result;
+}
+
+}  // namespace smartmill::loadmeter
