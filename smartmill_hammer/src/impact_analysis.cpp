@@ -21,6 +21,8 @@ constexpr std::size_t CLIPPED_RUN = 3;
 /// Lines on each side over which the scatter's variance is averaged: a few hits alone give a variance that is
 /// itself scattered, and lines that happen to agree would get far too much weight in a fit.
 constexpr std::size_t SMOOTH_LINES = 8;
+/// Samples before the hit that give a baseline and a noise worth having.
+constexpr std::size_t LEAST_QUIET = 48;
 
 std::string text(const char* format, double a, double b) {
   char line[160];
@@ -38,8 +40,9 @@ std::size_t runAtMaximum(const std::vector<double>& values) {
   return longest;
 }
 
-std::vector<double> before(const std::vector<double>& values, std::size_t n) {
-  return {values.begin(), values.begin() + static_cast<std::ptrdiff_t>(n)};
+std::vector<double> part(const std::vector<double>& values, std::size_t from, std::size_t to) {
+  return {values.begin() + static_cast<std::ptrdiff_t>(from),
+          values.begin() + static_cast<std::ptrdiff_t>(to)};
 }
 
 }  // namespace
@@ -66,8 +69,8 @@ HitFault hitFault(const Hit& hit, const HitLimits& limits) {
     }
   }
   std::vector<double> force = hit.force;
-  if (hit.pre_trigger > 1) {
-    const double base = mean(before(force, hit.pre_trigger));
+  if (hit.pre_trigger >= LEAST_QUIET) {
+    const double base = mean(part(force, 0, hit.pre_trigger));
     for (double& f : force) f -= base;
   }
   if (hasSecondHit(force, limits.second_hit_share)) {
@@ -104,16 +107,21 @@ void ImpactAnalysis::add(const Hit& hit) {
   }
   std::vector<double> force = hit.force, response = hit.response;
   double force_noise = 0.0, response_noise = 0.0;
-  // The last quarter before the trigger may hold the foot of the hit.
+  // The last quarter before the trigger may hold the foot of the hit. A record that begins with the hit shows
+  // its noise at its end, and has no baseline.
   const std::size_t quiet_samples = hit.pre_trigger - hit.pre_trigger / 4;
-  if (quiet_samples > 2) {
-    const std::vector<double> quiet_force = before(force, quiet_samples);
-    const std::vector<double> quiet = before(response, quiet_samples);
+  if (quiet_samples >= LEAST_QUIET) {
+    const std::vector<double> quiet_force = part(force, 0, quiet_samples);
+    const std::vector<double> quiet = part(response, 0, quiet_samples);
     const double force_base = mean(quiet_force), base = mean(quiet);
     force_noise = standardDeviation(quiet_force);
     response_noise = std::abs(options_.response_scale) * standardDeviation(quiet);
     for (double& f : force) f -= force_base;
     for (double& r : response) r -= base;
+  } else if (samples_ >= 10 * LEAST_QUIET) {
+    force_noise = standardDeviation(part(force, samples_ - samples_ / 10, samples_));
+    response_noise = std::abs(options_.response_scale) *
+                     standardDeviation(part(response, samples_ - samples_ / 10, samples_));
   }
   double share = 1.0;
   if (options_.window_force) {

@@ -127,6 +127,8 @@ class ClosedFormMachine {
            std::abs(position[2] - p[2]) < 0.03 && p[d] - position[d] < 4e-3;
   }
 
+  bool still() const { return path.empty() && !orienting; }
+
   /// The next 10 ms of all streams.
   void block(SampleBlock& samples, SpindleAngle& angle, CncState& state) {
     if (each_block) each_block(*this);

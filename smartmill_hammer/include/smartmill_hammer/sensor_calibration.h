@@ -8,16 +8,16 @@ namespace hammer {
 /// Calibration of the displacement sensor in place (Dunwoody section 4.2). All distances [m] along the
 /// direction in which the tool nears the sensor.
 struct SensorCalibrationOptions {
-  double first_jog = 50e-6;  ///< [m] > 0
-  double max_jog = 100e-6;   ///< [m] >= first_jog
-  double least_jog = 5e-6;   ///< [m] > 0; below this the machine's resolution would spoil the sensitivity
-  double resolution = 1e-6;  ///< [m] of a commanded distance
-  double zero_volt = 0.1;    ///< [V] the sensor counts as zeroed below this
-  double check_jog = 10e-6;  ///< [m] half width of the last, symmetric measurement about zero; 0: the
-                             ///< thesis's way, the sensitivity of the last approach jog stands
-  double position_std = 0.1e-6;      ///< [m] of a distance moved (thesis: within 100 nm)
-  double range_volt = 10.0;          ///< [V] sensor clips at plus and minus this
-  double gain_volt = 10.0;           ///< [V] nominal curve V = gain_volt (gap_at_zero_volt / gap - 1)
+  double first_jog = 50e-6;      ///< [m] > 0
+  double max_jog = 100e-6;       ///< [m] >= first_jog
+  double least_jog = 5e-6;       ///< [m] > 0; below this the machine's resolution would spoil the sensitivity
+  double resolution = 1e-6;      ///< [m] of a commanded distance
+  double zero_volt = 0.1;        ///< [V] the sensor counts as zeroed below this
+  double check_jog = 10e-6;      ///< [m] half width of the last, symmetric measurement about zero; 0: the
+                                 ///< thesis's way, the sensitivity of the last approach jog stands
+  double position_std = 0.1e-6;  ///< [m] of a distance moved (thesis: within 100 nm)
+  double range_volt = 10.0;      ///< [V] sensor clips at plus and minus this
+  double gain_volt = 10.0;       ///< [V] nominal curve V = gain_volt (gap_at_zero_volt / gap - 1)
   double gap_at_zero_volt = 250e-6;  ///< [m]
   double min_gap = 100e-6;           ///< [m] no jog to a nominal gap below this
   double max_travel = 3e-3;          ///< [m] approach at most

@@ -1,0 +1,214 @@
+// rosrun smartmill_hammer frf: FRF and modes from bags, hammer records and FRF files.
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "bag_replay.h"
+#include "smartmill_core/error.h"
+#include "smartmill_core/units.h"
+#include "smartmill_hammer/tap_records.h"
+
+namespace smartmill {
+namespace hammer {
+namespace {
+
+struct Options {
+  std::vector<std::string> inputs;
+  std::string out = "frf", format = "auto", model, parameters;
+  double low = 500.0, high = 3500.0, peak_share = 0.02, weak_force = 20.0, second_hit_share = 0.1,
+         exponential_time = 0.0;
+  int modes = 0, max_modes = 8;
+  bool mass_line = false, no_picture = false;
+};
+
+const std::map<std::string, TapFormat> FORMATS = {{"auto", TapFormat::automatic},
+                                                  {"bag", TapFormat::bag},
+                                                  {"csv", TapFormat::csv},
+                                                  {"text", TapFormat::text},
+                                                  {"frf", TapFormat::frf}};
+
+/// A row's plus-minus, where it is known.
+std::string pm(const char* format, double value, double std) {
+  char text[80];
+  std::snprintf(text, sizeof text, format, value, std);
+  return text;
+}
+
+void printModes(const ModalModel& model, const FrequencyResponse& receptance) {
+  std::printf("  %-22s %-22s %-24s %s\n", "frequency [Hz]", "damping ratio [%]", "stiffness [N/um]",
+              "Im receptance [um/N]");
+  for (const ModeReading& row : readModes(model, receptance)) {
+    const Mode& m = row.mode;
+    const double stiffness = 1.0 / m.gain / units::N_PER_UM;
+    std::printf("  %-22s %-22s %-24s %.4f\n", pm("%.2f +- %.2f", m.frequency, m.frequency_std).c_str(),
+                pm("%.3f +- %.3f", 100.0 * m.damping_ratio, 100.0 * m.damping_ratio_std).c_str(),
+                pm("%.3f +- %.3f", stiffness, std::abs(stiffness * m.gain_std / m.gain)).c_str(),
+                row.receptance.imag() / units::UM);
+  }
+}
+
+void write(const Options& options, const std::string& suffix, const std::string& title,
+           const FrequencyResponse& receptance, const ModalModel& model, double low, double high) {
+  std::filesystem::create_directories(options.out);
+  const std::string stem = options.out + "/frf" + suffix;
+  writeFrfCsv(receptance, model, stem + ".csv");
+  writeModesCsv(model, options.out + "/modes" + suffix + ".csv");
+  std::printf("  written: %s.csv, %s/modes%s.csv", stem.c_str(), options.out.c_str(), suffix.c_str());
+  if (!options.no_picture) {
+    const bool coherent = receptance.averages > 1 && !receptance.coherence.empty();
+    plotFrf(stem + ".csv", stem + ".png", title, low, high, coherent);
+    std::printf(", %s.png", stem.c_str());
+  }
+  std::printf("\n");
+}
+
+void runTaps(const Options& options, TapFormat format) {
+  FrequencyResponse receptance, peaks_of;
+  std::string title;
+  if (format == TapFormat::frf) {
+    if (options.inputs.size() != 1) throw Error(options.inputs[1] + ": one FRF file at a time");
+    receptance = peaks_of = readFrfText(options.inputs[0]);
+    title = std::filesystem::path(options.inputs[0]).filename().string();
+  } else {
+    std::vector<TapRecord> taps;
+    for (const std::string& file : options.inputs) {
+      std::cerr << "reading " << file << "\n";
+      taps.push_back(format == TapFormat::csv ? readTapCsv(file) : readTapText(file));
+    }
+    const TapFrf frf =
+        averageTaps(taps, {options.weak_force, options.second_hit_share, 0.0}, options.exponential_time);
+    for (const std::string& note : frf.notes) std::cerr << "frf: " << note << "\n";
+    receptance = frf.receptance;
+    peaks_of = frf.measured;
+    title = std::to_string(receptance.averages) + (receptance.averages == 1 ? " hit" : " hits");
+  }
+  std::printf("%s\n", title.c_str());
+  std::printf("peaks of %s, %g..%g Hz (prominence above %g of the largest):\n",
+              peaks_of.unit == "m/N" ? "the receptance" : "the accelerance", options.low, options.high,
+              options.peak_share);
+  std::vector<double> peaks = findPeaks(peaks_of, options.low, options.high, options.peak_share);
+  std::sort(peaks.begin(), peaks.end());
+  for (const double f : peaks) {
+    const auto r = receptance.at(f);
+    std::printf("  %9.2f Hz  |H| %11.5g %s   Im receptance %9.4f um/N\n", f, std::abs(peaks_of.at(f)),
+                peaks_of.unit.c_str(), r.imag() / units::UM);
+  }
+  ModalFitOptions fit_options;
+  fit_options.low = options.low;
+  fit_options.high = options.high;
+  fit_options.modes = options.modes;
+  fit_options.max_modes = options.max_modes;
+  fit_options.fit_mass_line = options.mass_line;
+  std::cerr << "fitting modes\n";
+  ModalFit fit = fitModes(receptance, fit_options);
+  if (options.exponential_time > 0.0) {
+    ImpactOptions window;
+    window.exponential_time = options.exponential_time;
+    ImpactAnalysis(window).removeWindowDamping(fit.model);
+  }
+  std::printf("fitted modes (error of the fit %.1f %% of the receptance in the band):\n",
+              100.0 * fit.relative_error);
+  printModes(fit.model, receptance);
+  write(options, "", title, receptance, fit.model, options.low, options.high);
+}
+
+void runBag(const Options& options) {
+  if (options.inputs.size() != 1) throw Error(options.inputs[1] + ": one bag at a time");
+  if (options.model.empty()) throw Error("--model: a bag needs the machine model that the session ran with");
+  const BagReplay replay = replayBag(options.inputs[0], options.model, options.parameters);
+  if (replay.results.empty()) throw Error(options.inputs[0] + ": holds no goal of hammer/measure_frf");
+  int good = 0;
+  for (const MeasureFrfResult& result : replay.results) {
+    std::printf("%s %s: %s\n", result.frf.tool.c_str(), result.frf.direction.c_str(), result.message.c_str());
+    if (result.code != FrfCode::ok) continue;
+    ++good;
+    std::printf("  sensitivity %.4f +- %.4f um/V, flute at the hammer %.2f deg\n",
+                result.sensitivity / units::UM, result.sensitivity_std / units::UM,
+                units::degFromRad(result.flute_hammer));
+    printModes(result.modes.model, result.frf.frf);
+    write(options, "_" + result.frf.direction,
+          "tool tip " + result.frf.direction + ", " + std::to_string(result.frf.frf.averages) + " hits",
+          result.frf.frf, result.modes.model, replay.fit_low, replay.fit_high);
+  }
+  if (good == 0)
+    throw Error(options.inputs[0] +
+                ": no measurement came to its end; the last: " + replay.results.back().message);
+}
+
+void run(const Options& options) {
+  TapFormat format = FORMATS.at(options.format);
+  if (format == TapFormat::automatic) {
+    format = detectFormat(options.inputs.front());
+    for (const std::string& file : options.inputs) {
+      if (detectFormat(file) != format)
+        throw Error(file + ": another kind of file than " + options.inputs.front());
+    }
+  }
+  if (!(options.high > options.low))
+    throw Error("--high: " + std::to_string(options.high) + " is not above --low");
+  if (format == TapFormat::bag) {
+    runBag(options);
+  } else {
+    runTaps(options, format);
+  }
+}
+
+}  // namespace
+}  // namespace hammer
+}  // namespace smartmill
+
+int main(int argc, char** argv) {
+  using smartmill::hammer::FORMATS;
+  smartmill::hammer::Options o;
+  CLI::App app(
+      "Frequency response and modes from hammer tests: a recorded session (bag), hammer records of one point "
+      "(CSV with "
+      "time[s],hammer[N],acceleration[m/s2] or displacement[m]; or three columns without header), or a "
+      "measured receptance "
+      "(three columns Hz, Re, Im in m/N).",
+      "frf");
+  app.add_option("input", o.inputs, "files; several hammer records are averaged as hits of one point")
+      ->required();
+  app.add_option("-o,--out", o.out, "folder for frf.csv, modes.csv and frf.png")->capture_default_str();
+  app.add_option("--format", o.format, "auto (by content), bag, csv, text or frf")
+      ->check(CLI::IsMember({"auto", "bag", "csv", "text", "frf"}))
+      ->capture_default_str();
+  app.add_option("--low", o.low, "fit from here [Hz] (bags: fit_low of --params)")->capture_default_str();
+  app.add_option("--high", o.high, "to here [Hz]")->capture_default_str();
+  app.add_option("--modes", o.modes, "modes to fit; 0: as many as the data prove")->check(CLI::Range(0, 20));
+  app.add_option("--max-modes", o.max_modes, "at most, when the data decide")
+      ->check(CLI::Range(1, 20))
+      ->capture_default_str();
+  app.add_flag("--mass-line", o.mass_line, "free structure: fit a rigid-body mass line too");
+  app.add_option("--peak-share", o.peak_share, "least prominence of a listed peak, of the largest")
+      ->capture_default_str();
+  app.add_option("--weak-force", o.weak_force, "hits below this are left out [N]")->capture_default_str();
+  app.add_option("--second-hit-share", o.second_hit_share, "double hit above this share of the peak")
+      ->capture_default_str();
+  app.add_option("--exponential-time", o.exponential_time,
+                 "time constant of an exponential window [s]; 0: none");
+  app.add_option("--model", o.model, "machine model (bags)");
+  app.add_option("--params", o.parameters, "parameters of the hammer node, YAML (bags)");
+  app.add_flag("--no-picture", o.no_picture, "no PNG");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  try {
+    smartmill::hammer::run(o);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "frf: %s\n", error.what());
+    return 1;
+  }
+  return 0;
+}

@@ -1,0 +1,153 @@
+// Wiring of hammer_node: one measurement against the closed-form machine, its bag through the offline class,
+// a cancel.
+
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include <actionlib/client/simple_action_client.h>
+#include <gtest/gtest.h>
+#include <ros/ros.h>
+#include <rosbag/bag.h>
+#include <smartmill_msgs/CncState.h>
+#include <smartmill_msgs/Frf.h>
+#include <smartmill_msgs/MeasureFrfAction.h>
+#include <smartmill_msgs/ModalModel.h>
+#include <smartmill_msgs/SampleBlock.h>
+#include <smartmill_msgs/SpindleAngle.h>
+
+#include "../src/bag_replay.h"
+#include "closed_form_machine.h"
+
+namespace smartmill {
+namespace hammer {
+namespace {
+
+using Client = actionlib::SimpleActionClient<smartmill_msgs::MeasureFrfAction>;
+
+class HammerNode : public testing::Test {
+ protected:
+  HammerNode() : client("hammer/measure_frf", true), spinner(2) { spinner.start(); }
+
+  smartmill_msgs::MeasureFrfGoal goal() const {
+    smartmill_msgs::MeasureFrfGoal g;
+    g.header.stamp = ros::Time::now();
+    g.tool = "mill";
+    g.point = "tool_tip";
+    g.direction = "x";
+    g.hits = 3;
+    g.modes = 2;
+    g.stickout = 51e-3;
+    g.teeth = 4;
+    return g;
+  }
+
+  template <class Message>
+  void record(const std::string& topic) {
+    boost::function<void(const boost::shared_ptr<const Message>&)> write =
+        [this, topic](const boost::shared_ptr<const Message>& m) {
+          const std::lock_guard<std::mutex> lock(mutex);
+          if (bag.isOpen()) bag.write("/smartmill/" + topic, ros::Time::now(), *m);
+        };
+    recorders.push_back(nh.subscribe<Message>(topic, 10000, write));
+  }
+
+  ros::NodeHandle nh;
+  Client client;
+  ros::AsyncSpinner spinner;
+  std::mutex mutex;
+  rosbag::Bag bag;
+  std::vector<ros::Subscriber> recorders;
+};
+
+TEST_F(HammerNode, MeasuresRecordsAndReplaysToTheLastDigit) {
+  ASSERT_TRUE(client.waitForServer(ros::Duration(20.0)));
+  const std::string folder = testing::TempDir();
+  const std::string bag_file = folder + "smartmill_hammer_node_test.bag";
+  bag.open(bag_file, rosbag::bagmode::Write);
+  record<smartmill_msgs::SampleBlock>("daq/hammer");
+  record<smartmill_msgs::CncState>("cnc/state");
+  record<smartmill_msgs::SpindleAngle>("spindle/angle");
+  record<smartmill_msgs::MeasureFrfActionGoal>("hammer/measure_frf/goal");
+  ros::WallDuration(1.0).sleep();
+  client.sendGoal(goal());
+  ASSERT_TRUE(client.waitForResult(ros::Duration(90.0)));
+  const auto result = client.getResult();
+  ASSERT_TRUE(result);
+  ASSERT_EQ(result->code, smartmill_msgs::MeasureFrfResult::OK) << result->message;
+  EXPECT_EQ(client.getState(), actionlib::SimpleClientGoalState::SUCCEEDED);
+  const ClosedFormMachine truth(42);
+  ASSERT_EQ(result->modes.modes.size(), 2u);
+  for (std::size_t k = 0; k < 2; ++k) {
+    EXPECT_NEAR(result->modes.modes[k].frequency, truth.tip[0].modes[k].frequency,
+                0.005 * truth.tip[0].modes[k].frequency);
+    EXPECT_NEAR(result->modes.modes[k].gain, truth.tip[0].modes[k].gain, 0.05 * truth.tip[0].modes[k].gain);
+  }
+
+  // Subscribers that come late get it too.
+  smartmill_msgs::FrfConstPtr frf;
+  smartmill_msgs::ModalModelConstPtr modes;
+  frf = ros::topic::waitForMessage<smartmill_msgs::Frf>("tool/frf", nh, ros::Duration(5.0));
+  modes = ros::topic::waitForMessage<smartmill_msgs::ModalModel>("tool/modes", nh, ros::Duration(5.0));
+  ASSERT_TRUE(frf && modes);
+  EXPECT_EQ(frf->real, result->frf.real);
+  EXPECT_EQ(modes->direction, "x");
+
+  // The bag through the offline class: every digit.
+  ros::WallDuration(0.3).sleep();
+  {
+    const std::lock_guard<std::mutex> lock(mutex);
+    bag.close();
+  }
+  std::string model;
+  ASSERT_TRUE(nh.getParam("hammer/model", model));
+  const BagReplay replay = replayBag(bag_file, model, "");
+  ASSERT_EQ(replay.results.size(), 1u);
+  const MeasureFrfResult& again = replay.results[0];
+  ASSERT_EQ(again.code, FrfCode::ok) << again.message;
+  EXPECT_EQ(again.sensitivity, result->sensitivity);
+  ASSERT_EQ(again.frf.frf.size(), result->frf.real.size());
+  for (std::size_t k = 0; k < again.frf.frf.size(); ++k) {
+    ASSERT_EQ(again.frf.frf.value[k].real(), result->frf.real[k]);
+    ASSERT_EQ(again.frf.frf.value[k].imag(), result->frf.imag[k]);
+  }
+  for (std::size_t k = 0; k < 2; ++k) {
+    EXPECT_EQ(again.modes.model.modes[k].frequency, result->modes.modes[k].frequency);
+    EXPECT_EQ(again.modes.model.modes[k].gain, result->modes.modes[k].gain);
+    EXPECT_EQ(again.modes.model.modes[k].gain_std, result->modes.modes[k].gain_std);
+  }
+  std::filesystem::remove(bag_file);
+}
+
+TEST_F(HammerNode, CancelEndsIt) {
+  ASSERT_TRUE(client.waitForServer(ros::Duration(20.0)));
+  client.sendGoal(goal());
+  ros::WallDuration(3.0).sleep();
+  client.cancelGoal();
+  ASSERT_TRUE(client.waitForResult(ros::Duration(20.0)));
+  EXPECT_EQ(client.getState(), actionlib::SimpleClientGoalState::PREEMPTED);
+  EXPECT_EQ(client.getResult()->code, smartmill_msgs::MeasureFrfResult::CANCELLED)
+      << client.getResult()->message;
+}
+
+TEST_F(HammerNode, RefusesABadGoalInOneLine) {
+  ASSERT_TRUE(client.waitForServer(ros::Duration(20.0)));
+  auto bad = goal();
+  bad.direction = "z";
+  client.sendGoal(bad);
+  ASSERT_TRUE(client.waitForResult(ros::Duration(20.0)));
+  EXPECT_EQ(client.getResult()->code, smartmill_msgs::MeasureFrfResult::BAD_GOAL);
+  EXPECT_NE(client.getResult()->message.find("'z'"), std::string::npos) << client.getResult()->message;
+}
+
+}  // namespace
+}  // namespace hammer
+}  // namespace smartmill
+
+int main(int argc, char** argv) {
+  testing::InitGoogleTest(&argc, argv);
+  ros::init(argc, argv, "hammer_node_test");
+  return RUN_ALL_TESTS();
+}

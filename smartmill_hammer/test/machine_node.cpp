@@ -1,0 +1,140 @@
+// The closed-form machine as a ROS node, in the place of the CNC bridge and the sensors' driver, for the
+// wiring test.
+
+#include <cstdio>
+#include <optional>
+#include <sstream>
+#include <string>
+
+#include <actionlib/server/simple_action_server.h>
+#include <ros/ros.h>
+#include <smartmill_msgs/CncState.h>
+#include <smartmill_msgs/JogAction.h>
+#include <smartmill_msgs/OrientSpindleAction.h>
+#include <smartmill_msgs/RunProgramAction.h>
+#include <smartmill_msgs/SampleBlock.h>
+#include <smartmill_msgs/SpindleAngle.h>
+#include <smartmill_msgs/Strike.h>
+
+#include "closed_form_machine.h"
+#include "smartmill_ros/conversions.h"
+
+namespace smartmill {
+namespace hammer {
+namespace {
+
+std::vector<Waypoint> parse(const std::string& program) {
+  std::vector<Waypoint> path;
+  std::istringstream lines(program);
+  for (std::string line; std::getline(lines, line);) {
+    double x = 0.0, y = 0.0, z = 0.0, f = 0.0;
+    int g = 0;
+    if (std::sscanf(line.c_str(), "G%d X%lf Y%lf Z%lf F%lf", &g, &x, &y, &z, &f) >= 4) {
+      path.push_back({{x * units::MM, y * units::MM, z * units::MM}, g == 1 ? f * units::MM / 60.0 : 0.0});
+    }
+  }
+  return path;
+}
+
+/// One action of the bridge: obeys, succeeds when the machine stands still.
+template <class Action, class Result>
+class Motion {
+ public:
+  using Goal = typename actionlib::SimpleActionServer<Action>::GoalConstPtr;
+  Motion(ros::NodeHandle nh, const std::string& name, ClosedFormMachine& machine,
+         std::function<Command(const Goal&)> command)
+      : machine_(machine), command_(std::move(command)), server_(nh, name, false) {
+    server_.registerGoalCallback([this] {
+      machine_.obey(command_(server_.acceptNewGoal()));
+      accepted_ = machine_.time;
+    });
+    server_.registerPreemptCallback([this] {
+      Command stop;
+      stop.kind = Command::Kind::stop;
+      machine_.obey(stop);
+      Result result;
+      result.code = smartmill_msgs::RunProgramResult::CANCELLED;
+      result.message = "cancelled";
+      server_.setPreempted(result, result.message);
+    });
+    server_.start();
+  }
+  void update() {
+    if (server_.isActive() && machine_.still() && machine_.time > accepted_ + 0.1)
+      server_.setSucceeded(Result());
+  }
+
+ private:
+  ClosedFormMachine& machine_;
+  std::function<Command(const Goal&)> command_;
+  actionlib::SimpleActionServer<Action> server_;
+  double accepted_ = 0.0;
+};
+
+void run() {
+  ros::NodeHandle nh;
+  ClosedFormMachine machine(42);
+  machine.time = toSec(ros::Time::now());
+  auto blocks = nh.advertise<smartmill_msgs::SampleBlock>("daq/hammer", 100);
+  auto angles = nh.advertise<smartmill_msgs::SpindleAngle>("spindle/angle", 100);
+  auto states = nh.advertise<smartmill_msgs::CncState>("cnc/state", 100);
+  Motion<smartmill_msgs::JogAction, smartmill_msgs::JogResult> jog(
+      nh, "cnc/jog", machine, [](const smartmill_msgs::JogGoalConstPtr& goal) {
+        Command c;
+        c.kind = Command::Kind::jog;
+        c.axis = goal->axis;
+        c.distance = goal->distance;
+        c.feed = goal->feed;
+        return c;
+      });
+  Motion<smartmill_msgs::OrientSpindleAction, smartmill_msgs::OrientSpindleResult> orient(
+      nh, "cnc/orient_spindle", machine, [](const smartmill_msgs::OrientSpindleGoalConstPtr& goal) {
+        Command c;
+        c.kind = Command::Kind::orient;
+        c.angle = goal->angle;
+        return c;
+      });
+  Motion<smartmill_msgs::RunProgramAction, smartmill_msgs::RunProgramResult> program(
+      nh, "cnc/run_program", machine, [](const smartmill_msgs::RunProgramGoalConstPtr& goal) {
+        Command c;
+        c.kind = Command::Kind::move;
+        c.path = parse(goal->program);
+        return c;
+      });
+  boost::function<bool(smartmill_msgs::Strike::Request&, smartmill_msgs::Strike::Response&)> strike =
+      [&](smartmill_msgs::Strike::Request& request, smartmill_msgs::Strike::Response& response) {
+        Command c;
+        c.kind = Command::Kind::strike;
+        c.direction = request.direction;
+        machine.obey(c);
+        response.code = smartmill_msgs::Strike::Response::OK;
+        return true;
+      };
+  const auto service = nh.advertiseService("daq/strike", strike);
+  bool every_other = false;
+  const auto timer = nh.createWallTimer(ros::WallDuration(0.005), [&](const ros::WallTimerEvent&) {
+    while (machine.time < toSec(ros::Time::now())) {
+      SampleBlock block;
+      SpindleAngle angle;
+      CncState state;
+      machine.block(block, angle, state);
+      blocks.publish(toMsg(block));
+      angles.publish(toMsg(angle));
+      if ((every_other = !every_other)) states.publish(toMsg(state));
+    }
+    jog.update();
+    orient.update();
+    program.update();
+  });
+  ros::spin();
+}
+
+}  // namespace
+}  // namespace hammer
+}  // namespace smartmill
+
+int main(int argc, char** argv) {
+  ros::init(argc, argv, "machine");
+  smartmill::hammer::run();
+  return 0;
+}
