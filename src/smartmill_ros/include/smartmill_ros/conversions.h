@@ -1,0 +1,48 @@
+#pragma once
+
+#include <ros/time.h>
+
+#include <smartmill_msgs/CncState.h>
+#include <smartmill_msgs/CuttingCoefficients.h>
+#include <smartmill_msgs/CuttingCondition.h>
+#include <smartmill_msgs/ForceBlock.h>
+#include <smartmill_msgs/Frf.h>
+#include <smartmill_msgs/LoadSample.h>
+#include <smartmill_msgs/ModalModel.h>
+#include <smartmill_msgs/SampleBlock.h>
+#include <smartmill_msgs/SpindleAngle.h>
+
+#include "smartmill_core/cutting/coefficient_set.h"
+#include "smartmill_core/modal/results.h"
+#include "smartmill_core/signal/streams.h"
+
+namespace smartmill {
+
+/// Seconds of a message stamp. A double near 1.8e9 s resolves 0.24 us: the same message gives the same double wherever
+/// it is read, and fromSec(toSec(t)) is stable from the first conversion on.
+double toSec(const ros::Time& stamp);
+/// Nearest nanosecond. @throws Error when not finite or negative.
+ros::Time fromSec(double stamp);
+
+// Both ways without loss. fromMsg throws Error naming the field when the content contradicts itself (sample count, rate,
+// unequal lengths, unknown enumerators); NaN samples pass, the estimators decide about them.
+SampleBlock fromMsg(const smartmill_msgs::SampleBlock& message);
+smartmill_msgs::SampleBlock toMsg(const SampleBlock& block, const std::string& frame_id = "");
+SpindleAngle fromMsg(const smartmill_msgs::SpindleAngle& message);
+smartmill_msgs::SpindleAngle toMsg(const SpindleAngle& angle);
+CncState fromMsg(const smartmill_msgs::CncState& message);
+smartmill_msgs::CncState toMsg(const CncState& state);
+LoadSample fromMsg(const smartmill_msgs::LoadSample& message);
+smartmill_msgs::LoadSample toMsg(const LoadSample& load);
+CuttingCondition fromMsg(const smartmill_msgs::CuttingCondition& message);
+smartmill_msgs::CuttingCondition toMsg(const CuttingCondition& condition);
+ForceBlock fromMsg(const smartmill_msgs::ForceBlock& message);
+smartmill_msgs::ForceBlock toMsg(const ForceBlock& block, const std::string& frame_id);
+MeasuredFrf fromMsg(const smartmill_msgs::Frf& message);
+smartmill_msgs::Frf toMsg(const MeasuredFrf& measured);
+MeasuredModes fromMsg(const smartmill_msgs::ModalModel& message);
+smartmill_msgs::ModalModel toMsg(const MeasuredModes& measured);
+CoefficientSet fromMsg(const smartmill_msgs::CuttingCoefficients& message);
+smartmill_msgs::CuttingCoefficients toMsg(const CoefficientSet& set);
+
+}  // namespace smartmill

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <array>
+
+#include <geometry_msgs/Quaternion.h>
+
+namespace smartmill::frames {
+
+// tf2 frames: machine -> spindle -> tool_tip; machine -> table -> dynamometer; machine -> hammer.
+constexpr const char* MACHINE = "machine";
+constexpr const char* SPINDLE = "spindle";
+constexpr const char* TOOL_TIP = "tool_tip";
+constexpr const char* TABLE = "table";
+constexpr const char* DYNAMOMETER = "dynamometer";
+constexpr const char* HAMMER = "hammer";
+
+/// Row-major rotation matrix of a unit quaternion: v_target = R v_source for the rotation part of a tf2 transform
+/// from source to target. @throws Error when the quaternion is not of unit length.
+std::array<double, 9> rotationMatrix(const geometry_msgs::Quaternion& q);
+
+/// Rotates a vector (unit kept) by a row-major matrix.
+std::array<double, 3> rotate(const std::array<double, 9>& matrix, const std::array<double, 3>& v);
+
+}  // namespace smartmill::frames

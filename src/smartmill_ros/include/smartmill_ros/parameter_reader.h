@@ -1,0 +1,50 @@
+#pragma once
+
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <XmlRpcValue.h>
+#include <ros/node_handle.h>
+
+namespace smartmill {
+
+/// Strict reading of a node's parameters: a wrong type or an unknown key is refused with one line, never silently replaced by a
+/// default. The same rules for the parameter server and for a YAML file that an offline tool reads.
+class ParameterReader {
+ public:
+  /// All parameters below a private node handle. @throws Error when the namespace holds no table.
+  static ParameterReader fromServer(const ros::NodeHandle& private_nh);
+  /// A flat YAML table; scalars get the types roslaunch would give them (`1e-2` is a string). @throws Error.
+  static ParameterReader fromFile(const std::string& file);
+
+  /// Reads a parameter when it is there, else leaves value as it is. An int serves where a double is due, not the reverse.
+  /// @throws Error naming the parameter and its value: wrong type, NaN or infinite number.
+  void read(const std::string& key, double& value);
+  void read(const std::string& key, int& value);
+  void read(const std::string& key, bool& value);
+  void read(const std::string& key, std::string& value);
+  void read(const std::string& key, std::vector<double>& value);
+
+  /// As read(), but the parameter must be there. @throws Error "parameter X is missing".
+  template <class T>
+  void require(const std::string& key, T& value) {
+    need(key);
+    read(key, value);
+  }
+
+  /// @throws Error on parameters that nobody read, naming one.
+  void finish() const;
+
+ private:
+  explicit ParameterReader(std::string prefix) : prefix_(std::move(prefix)) {}
+  void need(const std::string& key) const;
+  XmlRpc::XmlRpcValue* find(const std::string& key);
+
+  std::string prefix_;
+  std::map<std::string, XmlRpc::XmlRpcValue> values_;
+  std::set<std::string> read_;
+};
+
+}  // namespace smartmill
