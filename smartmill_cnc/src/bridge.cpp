@@ -114,6 +114,26 @@ std::int32_t firstInteger(const SubReply& reply) {
   return reply.code == focas::EW_OK && reply.data.size() >= 4 ? focas::Reader(reply.data).i32() : 0;
 }
 
+/// Teaching counts as the mode it happens in; what has no name must not pass for DNC.
+CncMode modeOf(int aut) {
+  switch (aut) {
+    case focas::AUT_MEM:
+    case focas::AUT_EDIT:
+    case focas::AUT_HANDLE:
+    case focas::AUT_JOG:
+    case focas::AUT_INC:
+    case focas::AUT_REF:
+    case focas::AUT_REMOTE:
+      return static_cast<CncMode>(aut);
+    case 6:
+      return CncMode::jog;
+    case 7:
+      return CncMode::handle;
+    default:
+      return CncMode::mdi;
+  }
+}
+
 double firstValue(const SubReply& reply) {
   const std::vector<double> values = focas::decodeValues(reply, 1);
   return values.empty() || std::isnan(values.front()) ? 0.0 : values.front();
@@ -451,8 +471,9 @@ class Bridge::Impl {
     const std::size_t axes = static_cast<std::size_t>(client_.info().axes);
     focas::Reader reader(replies_[q.status].data);
     status_ = focas::decodeStatus(reader);
-    state_.mode = static_cast<CncMode>(status_.aut);
-    state_.run = static_cast<CncRun>(std::min<std::int16_t>(status_.run, focas::RUN_START));
+    state_.mode = modeOf(status_.aut);
+    state_.run =
+        static_cast<CncRun>(std::clamp<std::int16_t>(status_.run, focas::RUN_RESET, focas::RUN_START));
     state_.motion = status_.motion == focas::MOTION_MOVES;
     state_.emergency = status_.emergency != 0;
     state_.alarm = status_.alarm == 1;

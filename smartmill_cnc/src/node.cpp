@@ -8,6 +8,7 @@
 #include <future>
 #include <utility>
 
+#include "smartmill_core/error.h"
 #include "smartmill_msgs/CncState.h"
 #include "smartmill_msgs/CuttingCondition.h"
 #include "smartmill_msgs/LoadSample.h"
@@ -70,7 +71,11 @@ CncNode::CncNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
         if (!fault.empty()) {
           return Outcome{MotionCode::bad_goal, "program " + goal.name + ": " + fault};
         }
-        return bridge_.runProgram(goal.name, goal.program, fromMsg(goal.condition));
+        try {
+          return bridge_.runProgram(goal.name, goal.program, fromMsg(goal.condition));
+        } catch (const Error& e) {
+          return Outcome{MotionCode::bad_goal, "program " + goal.name + ": " + e.what()};
+        }
       },
       [this] {
         smartmill_msgs::RunProgramFeedback feedback;

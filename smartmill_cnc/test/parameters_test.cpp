@@ -1,0 +1,66 @@
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <fstream>
+#include <string>
+
+#include "../src/parameters_ros.h"
+#include "smartmill_core/error.h"
+
+namespace smartmill::cnc {
+namespace {
+
+const char* const SHIPPED = "../launch/config/cnc.yaml";  // tests run in the package's folder
+
+std::string refusal(const std::string& yaml) {
+  const std::string file = ::testing::TempDir() + "cnc_parameters_test.yaml";
+  std::ofstream(file) << yaml;
+  std::string message;
+  try {
+    ParameterReader reader = ParameterReader::fromFile(file);
+    readParameters(reader);
+  } catch (const Error& e) {
+    message = e.what();
+  }
+  std::remove(file.c_str());
+  return message;
+}
+
+std::string good() {
+  return "travel_x: [-0.2, 0.2]\ntravel_y: [-0.1, 0.1]\ntravel_z: [-0.3, 0.0]\nmax_feed: 0.25\n"
+         "max_spindle_speed: 1256\n";
+}
+
+TEST(Parameters, ShippedFileIsKnownAndLeavesTheLimitsToTheModel) {
+  ParameterReader reader = ParameterReader::fromFile(SHIPPED);
+  try {
+    readParameters(reader);
+    FAIL();
+  } catch (const Error& e) {
+    EXPECT_NE(std::string(e.what()).find("travel_x"), std::string::npos) << e.what();
+  }
+}
+
+TEST(Parameters, GoodOnesAreTaken) {
+  EXPECT_EQ(refusal(good()), "");
+}
+
+TEST(Parameters, BadOnesAreNamed) {
+  struct Case {
+    const char* line;
+    const char* key;
+  };
+  for (const Case& c :
+       {Case{"settle_time: 1e-2\n", "settle_time"}, Case{"settle_time: -1.0\n", "settle_time"},
+        Case{"port: 0\n", "port"}, Case{"port: 8193.5\n", "port"}, Case{"rate: 1000.0\n", "rate"},
+        Case{"hots: localhost\n", "hots"}, Case{"host: 5\n", "host"},
+        Case{"orient_macro: 100\n", "marker_macro"}}) {
+    const std::string message = refusal(good() + c.line);
+    EXPECT_NE(message.find(c.key), std::string::npos) << c.line << " gives '" << message << "'";
+    EXPECT_EQ(message.find('\n'), std::string::npos);
+  }
+  EXPECT_NE(refusal("travel_x: [0.2, -0.2]\n" + good().substr(22)).find("travel_x"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace smartmill::cnc
