@@ -1,6 +1,7 @@
 #include "smartmill_loadmeter/identification.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <limits>
@@ -75,11 +76,15 @@ void LoadMeterIdentification::reset() {
 }
 
 bool LoadMeterIdentification::onPath(const CncState& state) const {
-  if (!condition_ || !state.connected || !state.motion || state.position.size() < 3) return false;
+  if (!condition_ || !state.connected || !state.motion) return false;
+  const std::array<const char*, 3> names{"X", "Y", "Z"};
   double length2 = 0.0, along = 0.0, distance2 = 0.0;
   for (std::size_t a = 0; a < 3; ++a) {
+    const auto axis = std::find(state.axes.begin(), state.axes.end(), names[a]);
+    const auto index = static_cast<std::size_t>(axis - state.axes.begin());
+    if (index >= state.position.size()) return false;
     const double step = condition_->steady_to[a] - condition_->steady_from[a];
-    const double at = state.position[a] - condition_->steady_from[a];
+    const double at = state.position[index] - condition_->steady_from[a];
     length2 += step * step;
     along += step * at;
     distance2 += at * at;

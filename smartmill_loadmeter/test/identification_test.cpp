@@ -1,5 +1,6 @@
 #include "smartmill_loadmeter/identification.h"
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <random>
@@ -7,133 +8,18 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "smartmill_core/cutting/mechanistic.h"
+#include "session.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/signal/stream_sorter.h"
-#include "smartmill_core/units.h"
-#include "smartmill_loadmeter/campaign_identification.h"
 
 namespace smartmill::loadmeter {
 namespace {
 
 using ::testing::HasSubstr;
-using units::radPerSecFromRpm;
-
-const CuttingCoefficients TRUTH{953e6, 0, 0, 17.3e3, 0, 0};
-constexpr double VISCOUS = 4.743e-4, COULOMB = 0.0671, RATE = 50.0;
-
-MachineModel model() {
-  MachineModel m;
-  m.file = "model.yaml";
-  Spindle s;
-  s.viscous = 9e-4;  // wrong: air cuts decide
-  s.coulomb = 0.5;
-  s.load_meter_gain = 3.88e-4;
-  s.load_meter_bandwidth = 7.0;
-  s.load_meter_resolution = 3e-4;
-  s.load_meter_full_scale = 8.0;
-  m.spindle = s;
-  return m;
-}
-
-/// A machine that goes through air cuts and slots; everything it says is handed over in stamp order.
-class Session {
- public:
-  Session(unsigned seed, double noise) : random_(seed), noise_(noise) {}
-
-  std::function<void(const CncState&)> state = [](const CncState&) {};
-  std::function<void(const LoadSample&)> load = [](const LoadSample&) {};
-  std::function<void(const CuttingCondition&)> condition = [](const CuttingCondition&) {};
-
-  void air(double rpm, double seconds) {
-    announce(CuttingCondition::Kind::air, rpm, 0.0, "air_" + std::to_string(static_cast<int>(rpm)));
-    turnTo(rpm);
-    run(seconds, 0.0, 0.0);
-    announce(CuttingCondition::Kind::none, 0.0, 0.0, "");
-    run(0.1, 0.0, 0.0);  // two conditions of one stamp would have no order
-  }
-
-  void slot(double rpm, double feed, double seconds) {
-    announce(CuttingCondition::Kind::cut, rpm, feed, "slot_" + std::to_string(feed));
-    turnTo(rpm);
-    const double speed = radPerSecFromRpm(rpm) / units::TWO_PI * 3 * feed;  // [m/s]
-    position_ = 0.1 - 0.3 * speed;
-    run(0.3, speed, 0.0);  // in air, then at once in full cut
-    const Engagement e{0.0, units::PI, 0.002, feed};
-    run(seconds, speed, MechanisticForce(TOOL, TRUTH, e).mean().torque);
-    run(0.3, speed, 0.0);
-    announce(CuttingCondition::Kind::none, 0.0, 0.0, "");
-    run(0.1, 0.0, 0.0);
-  }
-
-  double now() const { return time_; }
-  double length = 0.0;
-  std::string tool = "endmill", material = "aluminium";
-
- private:
-  void announce(CuttingCondition::Kind kind, double rpm, double feed, const std::string& name) {
-    CuttingCondition c;
-    c.stamp = time_;
-    c.kind = kind;
-    c.name = name;
-    c.tool_name = tool;
-    c.material = material;
-    c.tool = TOOL;
-    c.engagement = {0.0, units::PI, 0.002, feed};
-    c.spindle_speed = radPerSecFromRpm(rpm);
-    c.steady_from = {0.1, 0.2, -0.1};
-    c.steady_to = {0.1 + 4.0 * radPerSecFromRpm(rpm) / units::TWO_PI * 3 * feed, 0.2, -0.1};
-    condition(c);
-  }
-
-  void turnTo(double rpm) {
-    const double goal = radPerSecFromRpm(rpm), step = 800.0 / RATE;
-    while (std::abs(goal - speed_) > step) {
-      speed_ += goal > speed_ ? step : -step;
-      tick(0.0, 5.0);  // accelerating takes torque
-    }
-    speed_ = goal;
-  }
-
-  void run(double seconds, double feed_speed, double torque) {
-    for (int i = 0; i < std::lround(seconds * RATE); ++i) tick(feed_speed, torque);
-  }
-
-  void tick(double feed_speed, double torque) {
-    time_ += 1.0 / RATE;
-    position_ += feed_speed / RATE;
-    const double power = (torque + VISCOUS * speed_ + COULOMB) * speed_;
-    const double a = std::exp(-1.0 / RATE / timeConstant(7.0));
-    lagged_ = a * lagged_ + (1.0 - a) * 3.88e-4 * power;
-    CncState s;
-    s.stamp = time_ - 0.004;
-    s.connected = true;
-    s.motion = feed_speed > 0.0;
-    s.position = {position_, 0.2, -0.1};
-    state(s);
-    LoadSample l;
-    l.stamp = time_;
-    l.spindle_speed = speed_ * (1.0 + 0.001 * normal_(random_));
-    l.spindle_load = 3e-4 * std::round((lagged_ + noise_ * normal_(random_)) / 3e-4) / 8.0;
-    load(l);
-  }
-
-  const ToolGeometry TOOL{3, 0.012, units::radFromDeg(35.0), {}};
-  std::mt19937 random_;
-  std::normal_distribution<double> normal_;
-  double noise_;
-  double time_ = 1000.0, position_ = 0.0, speed_ = 0.0, lagged_ = 0.0;
-};
-
 void connect(Session& session, LoadMeterIdentification& identification) {
   session.state = [&](const CncState& s) { identification.handle(s); };
   session.load = [&](const LoadSample& l) { identification.handle(l); };
   session.condition = [&](const CuttingCondition& c) { identification.handle(c); };
-}
-
-void takeThrough(Session& session) {
-  for (const double rpm : {2000.0, 6000.0, 12000.0}) session.air(rpm, 3.0);
-  for (const double feed : {3e-5, 6e-5, 1e-4}) session.slot(6000.0, feed, 4.0);
 }
 
 IdentifyResult ask(LoadMeterIdentification& identification, const IdentifyGoal& goal) {

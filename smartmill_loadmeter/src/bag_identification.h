@@ -1,0 +1,22 @@
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "parameters_ros.h"
+#include "smartmill_core/model/machine_model.h"
+
+namespace smartmill::loadmeter {
+
+/// Runs a recorded bag through the class that the node runs: cnc/state, cnc/load, cut/condition and the
+/// action's goals.
+/// @param progress called now and then with the share read, 0..1.
+/// @return the answer to each goal in the bag that asked for coefficients; to one at its end when there is
+/// none.
+/// @throws Error on a bad bag.
+std::vector<IdentifyResult> identifyFromBag(const std::string& path, const MachineModel& model,
+                                            const NodeParameters& parameters,
+                                            const std::function<void(double)>& progress);
+
+}  // namespace smartmill::loadmeter

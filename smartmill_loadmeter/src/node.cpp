@@ -1,0 +1,182 @@
+#include "node.h"
+
+#include <boost/function.hpp>
+
+#include "smartmill_core/error.h"
+#include "smartmill_msgs/CncState.h"
+#include "smartmill_msgs/CuttingCoefficients.h"
+#include "smartmill_msgs/CuttingCondition.h"
+#include "smartmill_msgs/LoadSample.h"
+#include "smartmill_ros/conversions.h"
+
+namespace smartmill::loadmeter {
+
+namespace {
+
+constexpr int QUEUE = 1000;  // 20 s of controller state
+
+MachineModel modelOf(const NodeParameters& parameters) {
+  if (parameters.model.empty()) throw Error("model: the path of a smartmill-model/1 file is due");
+  return readMachineModel(parameters.model);
+}
+
+}  // namespace
+
+LoadMeterNode::LoadMeterNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
+    : parameters_([&] {
+        ParameterReader reader = ParameterReader::fromServer(private_nh);
+        return readParameters(reader);
+      }()),
+      identification_(modelOf(parameters_), parameters_.identification, parameters_.hold_back),
+      database_(parameters_.database),
+      diagnostics_(ros::NodeHandle(), private_nh),
+      server_(
+          nh, "loadmeter/identify_coefficients", [this](Server::GoalHandle handle) { goal(handle); },
+          [this](Server::GoalHandle handle) { cancel(handle); }, false) {
+  identification_.identification().onResult([this](const IdentifyResult& result) { finish(result); });
+  identification_.identification().onTest([this](const LoadTest& test) {
+    ROS_INFO("test '%s': %.4f +- %.4f V at %.1f rad/s from %d readings", test.condition.name.c_str(),
+             test.voltage.mean, test.voltage.std_dev, test.speed, test.readings);
+    feedback();
+  });
+  publisher_ = nh.advertise<smartmill_msgs::CuttingCoefficients>("material/coefficients", 1, true);
+  const auto subscribe = [&](const char* topic, auto example) {
+    using Message = decltype(example);
+    const boost::function<void(const Message&)> callback = [this](const Message& m) { input(m); };
+    subscribers_.push_back(nh.subscribe<Message>(topic, QUEUE, callback, ros::VoidConstPtr(),
+                                                 ros::TransportHints().tcpNoDelay()));
+  };
+  subscribe("cnc/state", smartmill_msgs::CncState());
+  subscribe("cnc/load", smartmill_msgs::LoadSample());
+  subscribe("cut/condition", smartmill_msgs::CuttingCondition());
+  find_service_ = nh.advertiseService("loadmeter/find_coefficients", &LoadMeterNode::find, this);
+  diagnostics_.setHardwareID("spindle load meter");
+  diagnostics_.add("load meter", this, &LoadMeterNode::diagnose);
+  last_input_ = ros::WallTime::now();
+  timer_ = nh.createWallTimer(ros::WallDuration(0.2), [this](const ros::WallTimerEvent&) { watch(); });
+  server_.start();
+}
+
+template <typename Message>
+void LoadMeterNode::input(const Message& message) {
+  last_input_ = ros::WallTime::now();
+  any_input_ = true;
+  try {
+    identification_.push(fromMsg(message));
+  } catch (const Error& error) {
+    ROS_ERROR_THROTTLE(5.0, "%s", error.what());
+  }
+}
+
+void LoadMeterNode::goal(Server::GoalHandle handle) {
+  const auto request = handle.getGoal();
+  IdentifyGoal goal;
+  // A client that leaves the stamp open means the time at which it sent the goal.
+  const ros::Time stamp = request->header.stamp.isZero() ? handle.getGoalID().stamp : request->header.stamp;
+  goal.stamp = toSec(stamp);
+  goal.tool = request->tool;
+  goal.material = request->material;
+  goal.reset = request->reset;
+  goal.id = next_id_++;
+  handle.setAccepted();
+  waiting_[goal.id] = handle;
+  feedback();
+  identification_.push(goal);
+}
+
+void LoadMeterNode::cancel(Server::GoalHandle handle) {
+  for (auto waiting = waiting_.begin(); waiting != waiting_.end(); ++waiting) {
+    if (!(waiting->second == handle)) continue;
+    smartmill_msgs::IdentifyCoefficientsResult result;
+    result.code = smartmill_msgs::IdentifyCoefficientsResult::CANCELLED;
+    result.message = "cancelled";
+    handle.setCanceled(result, result.message);
+    waiting_.erase(waiting);
+    return;
+  }
+}
+
+void LoadMeterNode::finish(const IdentifyResult& result) {
+  const bool found = result.code == IdentifyResult::Code::ok && !result.reset;
+  smartmill_msgs::IdentifyCoefficientsResult message;
+  message.code = static_cast<std::uint8_t>(result.code);
+  message.message = result.message;
+  message.coefficients = toMsg(result.coefficients);
+  last_message_ = result.message;
+  if (result.code == IdentifyResult::Code::ok) {
+    ROS_INFO("%s", result.message.c_str());
+  } else {
+    ROS_WARN("%s", result.message.c_str());
+  }
+  if (found) {
+    publisher_.publish(message.coefficients);
+    try {
+      database_.add(result.coefficients);
+    } catch (const Error& error) {
+      ROS_ERROR("database: %s", error.what());
+      message.message += "; not kept: " + std::string(error.what());
+    }
+  }
+  const auto waiting = waiting_.find(result.id);
+  if (waiting == waiting_.end()) return;
+  if (result.code == IdentifyResult::Code::ok) {
+    waiting->second.setSucceeded(message, message.message);
+  } else {
+    waiting->second.setAborted(message, message.message);
+  }
+  waiting_.erase(waiting);
+}
+
+void LoadMeterNode::feedback() {
+  smartmill_msgs::IdentifyCoefficientsFeedback message;
+  message.stage = "collecting";
+  message.air_cuts = static_cast<std::uint32_t>(identification_.identification().airCuts().size());
+  message.cuts = static_cast<std::uint32_t>(identification_.identification().cuts().size());
+  for (auto& [id, handle] : waiting_) handle.publishFeedback(message);
+}
+
+bool LoadMeterNode::find(smartmill_msgs::FindCoefficients::Request& request,
+                         smartmill_msgs::FindCoefficients::Response& response) {
+  const auto found = database_.find(request.tool, request.material);
+  if (found) {
+    response.code = smartmill_msgs::FindCoefficients::Response::OK;
+    response.message = "source " + found->source + ", " + std::to_string(found->tests) + " tests";
+    response.coefficients = toMsg(*found);
+  } else {
+    response.code = smartmill_msgs::FindCoefficients::Response::NOT_FOUND;
+    response.message =
+        "nothing for '" + request.tool + "' in '" + request.material + "'; known: " + database_.contents();
+  }
+  return true;
+}
+
+// Liveness only: when every input has fallen silent nothing more can come before what waits.
+void LoadMeterNode::watch() {
+  diagnostics_.update();
+  if ((ros::WallTime::now() - last_input_).toSec() < parameters_.input_timeout) return;
+  if (!waiting_.empty()) ROS_WARN_THROTTLE(5.0, "no controller state or load any more: using what has come");
+  try {
+    identification_.flush();
+  } catch (const Error& error) {
+    ROS_ERROR("%s", error.what());
+  }
+}
+
+void LoadMeterNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
+  const double silent = (ros::WallTime::now() - last_input_).toSec();
+  if (!any_input_) {
+    status.summary(diagnostic_msgs::DiagnosticStatus::WARN, "waiting for cnc/state and cnc/load");
+  } else if (silent > parameters_.input_timeout) {
+    status.summaryf(diagnostic_msgs::DiagnosticStatus::ERROR, "no input for %.1f s", silent);
+  } else {
+    status.summary(diagnostic_msgs::DiagnosticStatus::OK, "listening");
+  }
+  LoadMeterIdentification& identification = identification_.identification();
+  status.add("air cuts", identification.airCuts().size());
+  status.add("cuts", identification.cuts().size());
+  status.add("late inputs", identification_.late());
+  status.add("waiting for", identification_.waitingFor());
+  status.add("last result", last_message_);
+}
+
+}  // namespace smartmill::loadmeter
