@@ -39,7 +39,9 @@ double standardDeviation(const std::vector<double>& values) {
   return std::sqrt(sum / static_cast<double>(values.size() - 1));
 }
 
-double median(std::vector<double> values) { return percentile(std::move(values), 0.5); }
+double median(std::vector<double> values) {
+  return percentile(std::move(values), 0.5);
+}
 
 double percentile(std::vector<double> values, double share) {
   needValues(values, 1, "percentile");

@@ -27,7 +27,7 @@ struct ModalFit {
   double reduced_chi2 = 0.0;   ///< [1] with the stated std_dev of the FRF; NaN without
 };
 
-/// Peaks of |H|, or of |Im H| for a receptance with several modes, strongest first [Hz].
+/// Peaks of |H|, strongest first [Hz].
 /// A peak counts when its prominence exceeds share of the largest one.
 std::vector<double> findPeaks(const FrequencyResponse& frf, double low, double high, double share);
 

@@ -1,0 +1,63 @@
+#include "smartmill_core/modal/modal_filter.h"
+
+#include <Eigen/Core>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/modal/state_space.h"
+#include "smartmill_core/units.h"
+
+namespace smartmill {
+
+ModalFilter::ModalFilter(const ModalModel& model, double sample_rate, Hold hold) : direct_(model.direct) {
+  if (!(sample_rate > 0.0)) {
+    throw Error("modal filter: sample rate " + std::to_string(sample_rate) + " Hz is not positive");
+  }
+  for (const Mode& mode : model.modes) {
+    if (!(mode.frequency > 0.0) || !(mode.damping_ratio > 0.0 && mode.damping_ratio < 1.0)) {
+      throw Error("modal filter: mode of " + std::to_string(mode.frequency) + " Hz, damping ratio " +
+                  std::to_string(mode.damping_ratio) + " (frequency > 0, 0 < damping ratio < 1)");
+    }
+    const double w = units::TWO_PI * mode.frequency;
+    const double angle = w / sample_rate;
+    // States: output, rate / w, input, rise of the input over the step; one exponential gives transition and
+    // both input shares without the cancellation of the closed quotients at small angles.
+    Eigen::MatrixXd joint = Eigen::MatrixXd::Zero(4, 4);
+    joint(0, 1) = angle;
+    joint(1, 0) = -angle;
+    joint(1, 1) = -2.0 * mode.damping_ratio * angle;
+    joint(1, 2) = angle;
+    joint(2, 3) = 1.0;
+    const Eigen::MatrixXd e = matrixExponential(joint);
+    Section section{e(0, 0), e(0, 1) / w, e(1, 0) * w, e(1, 1), e(0, 2), e(1, 2) * w,
+                    0.0,     0.0,         mode.gain,   0.0,     0.0};
+    if (hold == Hold::first_order) {
+      section.c1 = e(0, 3);
+      section.c2 = e(1, 3) * w;
+      section.b1 -= section.c1;
+      section.b2 -= section.c2;
+    }
+    sections_.push_back(section);
+  }
+}
+
+double ModalFilter::step(double input) {
+  double output = direct_ * input;
+  for (Section& s : sections_) {
+    const double x = s.a11 * s.x + s.a12 * s.v + s.b1 * last_input_ + s.c1 * input;
+    s.v = s.a21 * s.x + s.a22 * s.v + s.b2 * last_input_ + s.c2 * input;
+    s.x = x;
+    output += s.gain * x;
+  }
+  last_input_ = input;
+  return output;
+}
+
+void ModalFilter::reset(double constant_input) {
+  for (Section& s : sections_) {
+    s.x = constant_input;
+    s.v = 0.0;
+  }
+  last_input_ = constant_input;
+}
+
+}  // namespace smartmill

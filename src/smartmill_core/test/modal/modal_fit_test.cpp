@@ -1,0 +1,118 @@
+#include "smartmill_core/modal/modal_fit.h"
+
+#include <cmath>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "smartmill_core/error.h"
+
+namespace smartmill {
+namespace {
+
+ModalModel sensor() {
+  ModalModel model;
+  model.modes = {{930.0, 0.03, 0.7}, {1950.0, 0.02, 0.2}};
+  model.direct = 0.1;
+  return model;
+}
+
+// Lines 5 Hz apart with circular noise of the given total standard deviation.
+FrequencyResponse measured(const ModalModel& model, double std_dev, unsigned seed) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> part(0.0, std_dev / std::sqrt(2.0));
+  FrequencyResponse frf;
+  for (double f = 5.0; f <= 4000.0; f += 5.0) {
+    frf.frequency.push_back(f);
+    frf.value.push_back(model.response(f));
+    if (std_dev > 0.0) {
+      frf.value.back() += std::complex<double>(part(random), part(random));
+      frf.std_dev.push_back(std_dev);
+    }
+  }
+  return frf;
+}
+
+TEST(ModalFit, findsAnExactModelAgain) {
+  ModalFitOptions options;
+  options.low = 100.0;
+  options.high = 4000.0;
+  options.modes = 2;
+  const ModalFit fit = fitModes(measured(sensor(), 0.0, 1), options);
+  for (std::size_t k = 0; k < 2; ++k) {
+    EXPECT_NEAR(fit.model.modes[k].frequency / sensor().modes[k].frequency, 1.0, 1e-8);
+    EXPECT_NEAR(fit.model.modes[k].damping_ratio / sensor().modes[k].damping_ratio, 1.0, 1e-6);
+    EXPECT_NEAR(fit.model.modes[k].gain / sensor().modes[k].gain, 1.0, 1e-6);
+  }
+  EXPECT_NEAR(fit.model.direct, 0.1, 1e-7);
+  EXPECT_LT(fit.relative_error, 1e-7);
+}
+
+TEST(ModalFit, choosesTheNumberOfModesByEvidence) {
+  ModalFitOptions options;
+  options.low = 100.0;
+  options.high = 4000.0;
+  options.unit_static_gain = true;
+  const ModalFit fit = fitModes(measured(sensor(), 0.05, 3), options);
+  ASSERT_EQ(fit.model.modes.size(), 2u);
+  EXPECT_NEAR(fit.model.staticGain(), 1.0, 1e-12);
+}
+
+TEST(ModalFit, statedStandardDeviationsAreHonest) {
+  ModalFitOptions options;
+  options.low = 100.0;
+  options.high = 4000.0;
+  options.modes = 2;
+  options.unit_static_gain = true;
+  const ModalModel truth = sensor();
+  double squares = 0.0;
+  int count = 0;
+  for (unsigned seed = 1; seed <= 100; ++seed) {
+    const ModalFit fit = fitModes(measured(truth, 0.05, seed), options);
+    for (std::size_t k = 0; k < 2; ++k) {
+      const Mode& found = fit.model.modes[k];
+      const Mode& due = truth.modes[k];
+      squares += std::pow((found.frequency - due.frequency) / found.frequency_std, 2) +
+                 std::pow((found.damping_ratio - due.damping_ratio) / found.damping_ratio_std, 2) +
+                 std::pow((found.gain - due.gain) / found.gain_std, 2);
+      count += 3;
+    }
+  }
+  // Mean square of 600 z-scores, about 300 of them independent: 1 within four of its standard deviations sqrt(2 / 300).
+  EXPECT_NEAR(squares / count, 1.0, 0.33);
+}
+
+TEST(ModalFit, separatesCloseModes) {
+  ModalModel close;
+  close.modes = {{1000.0, 0.02, 1e-8}, {1060.0, 0.02, 2e-8}};
+  ModalFitOptions options;
+  options.low = 500.0;
+  options.high = 2000.0;
+  options.modes = 2;
+  const ModalFit fit = fitModes(measured(close, 0.0, 1), options);
+  EXPECT_NEAR(fit.model.modes[0].frequency, 1000.0, 0.01);
+  EXPECT_NEAR(fit.model.modes[1].frequency, 1060.0, 0.01);
+  EXPECT_NEAR(fit.model.modes[1].gain / 2e-8, 1.0, 1e-4);
+}
+
+TEST(ModalFit, refusesWhatCannotBeFitted) {
+  ModalFitOptions options;
+  options.low = 100.0;
+  options.high = 110.0;
+  options.modes = 2;
+  EXPECT_THROW(fitModes(measured(sensor(), 0.0, 1), options), Error);
+  FrequencyResponse bad = measured(sensor(), 0.0, 1);
+  bad.value[100] = std::nan("");
+  options.high = 4000.0;
+  EXPECT_THROW(fitModes(bad, options), Error);
+}
+
+TEST(FindPeaks, strongestFirst) {
+  const std::vector<double> peaks = findPeaks(measured(sensor(), 0.0, 1), 0.0, 4000.0, 0.05);
+  ASSERT_EQ(peaks.size(), 2u);
+  EXPECT_NEAR(peaks[0], 930.0, 5.0);
+  EXPECT_NEAR(peaks[1], 1950.0, 5.0);
+}
+
+}  // namespace
+}  // namespace smartmill
