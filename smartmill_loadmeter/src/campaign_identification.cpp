@@ -250,8 +250,7 @@ CoefficientSet identifyFromLoadRecords(const Campaign& campaign, const MachineMo
   found = found.cwiseProduct(unit);
 
   CoefficientSet result;
-  result.value =
-      result.std_dev = {NOT_A_NUMBER, NOT_A_NUMBER, NOT_A_NUMBER, NOT_A_NUMBER, NOT_A_NUMBER, NOT_A_NUMBER};
+  result.value = result.std_dev = NOT_IDENTIFIED;
   result.value.ktc = found[2];
   result.value.kte = found[3];
   result.std_dev.ktc = std_dev[2];

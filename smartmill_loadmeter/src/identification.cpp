@@ -193,8 +193,7 @@ void LoadMeterIdentification::handle(const IdentifyGoal& goal) {
     result.id = goal.id;
     result.message = "earlier tests are forgotten";
     result.coefficients.stamp = goal.stamp;
-    result.coefficients.value = result.coefficients.std_dev = {NOT_A_NUMBER, NOT_A_NUMBER, NOT_A_NUMBER,
-                                                               NOT_A_NUMBER, NOT_A_NUMBER, NOT_A_NUMBER};
+    result.coefficients.value = result.coefficients.std_dev = NOT_IDENTIFIED;
     if (result_) result_(result);
     return;
   }
@@ -206,8 +205,7 @@ void LoadMeterIdentification::handle(const IdentifyGoal& goal) {
 IdentifyResult LoadMeterIdentification::identify(const IdentifyGoal& goal) const {
   IdentifyResult result;
   result.id = goal.id;
-  result.coefficients.value = result.coefficients.std_dev = {NOT_A_NUMBER, NOT_A_NUMBER, NOT_A_NUMBER,
-                                                             NOT_A_NUMBER, NOT_A_NUMBER, NOT_A_NUMBER};
+  result.coefficients.value = result.coefficients.std_dev = NOT_IDENTIFIED;
   result.coefficients.stamp = goal.stamp;
   if (!bad_data_.empty()) {
     result.code = IdentifyResult::Code::bad_data;

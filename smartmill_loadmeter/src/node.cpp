@@ -143,6 +143,9 @@ bool LoadMeterNode::find(smartmill_msgs::FindCoefficients::Request& request,
     response.message = "source " + found->source + ", " + std::to_string(found->tests) + " tests";
     response.coefficients = toMsg(*found);
   } else {
+    CoefficientSet unknown;
+    unknown.value = unknown.std_dev = NOT_IDENTIFIED;
+    response.coefficients = toMsg(unknown);
     response.code = smartmill_msgs::FindCoefficients::Response::NOT_FOUND;
     response.message =
         "nothing for '" + request.tool + "' in '" + request.material + "'; known: " + database_.contents();

@@ -96,6 +96,7 @@ TEST(LoadMeterNode, identifiesPublishesAndAnswers) {
   call.request.material = "steel";
   ASSERT_TRUE(find.call(call));
   EXPECT_EQ(call.response.code, smartmill_msgs::FindCoefficients::Response::NOT_FOUND);
+  EXPECT_TRUE(std::isnan(call.response.coefficients.ktc));
   EXPECT_NE(call.response.message.find("endmill / aluminium"), std::string::npos);
 }
 

@@ -7,6 +7,7 @@
 
 #include <Eigen/Cholesky>
 
+#include "smartmill_core/cutting/coefficient_set.h"
 #include "smartmill_core/error.h"
 
 namespace smartmill {
@@ -201,7 +202,7 @@ IdentifiedCoefficients identifyFromTorque(const std::vector<MeanTorqueTest>& tes
   const Fit fit = leastSquares(x, y, sigma, std::vector<int>(tests.size(), 0));
   IdentifiedCoefficients result;
   result.tests = static_cast<int>(tests.size());
-  result.value = {NOT_KNOWN, NOT_KNOWN, NOT_KNOWN, NOT_KNOWN, NOT_KNOWN, NOT_KNOWN};
+  result.value = NOT_IDENTIFIED;
   result.std_dev = result.value;
   result.value.ktc = fit.value[0];
   result.value.kte = fit.value[1];

@@ -5,6 +5,7 @@
 #include <limits>
 #include <sstream>
 
+#include "smartmill_core/cutting/coefficient_set.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/effect_catalogue.h"
 #include "smartmill_core/model/strict_yaml.h"
@@ -82,7 +83,7 @@ void readTool(const StrictYaml& map, MachineModel& model) {
 }
 
 void readCutting(const StrictYaml& map, MachineModel& model) {
-  CuttingCoefficients value{NOT_KNOWN, NOT_KNOWN, NOT_KNOWN, NOT_KNOWN, NOT_KNOWN, NOT_KNOWN};
+  CuttingCoefficients value = NOT_IDENTIFIED;
   CuttingCoefficients std_dev = value;
   bool any_std = false;
   for (const CuttingKey& k : cuttingKeys()) {
@@ -402,8 +403,7 @@ void writeMachineModel(const MachineModel& model, const std::string& file) {
     writeOptional(out, "stickout_mm", model.stickout, units::MM);
   }
   if (model.cutting) {
-    const CuttingCoefficients none{NOT_KNOWN, NOT_KNOWN, NOT_KNOWN, NOT_KNOWN, NOT_KNOWN, NOT_KNOWN};
-    out << cuttingSection(*model.cutting, model.cutting_std.value_or(none));
+    out << cuttingSection(*model.cutting, model.cutting_std.value_or(NOT_IDENTIFIED));
   }
   if (!model.tool_tip.x.modes.empty() || !model.tool_tip.y.modes.empty()) {
     out << "tool_tip:\n";

@@ -7,6 +7,12 @@
 
 namespace smartmill {
 
+/// NaN throughout.
+inline constexpr CuttingCoefficients NOT_IDENTIFIED{
+    std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::quiet_NaN(),
+    std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::quiet_NaN(),
+    std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::quiet_NaN()};
+
 /// Identified coefficients of a tool and material (topic material/coefficients). NaN: not identified.
 struct CoefficientSet {
   double stamp = 0.0;  ///< [s] of the last test used
