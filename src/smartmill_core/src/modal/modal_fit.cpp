@@ -208,6 +208,20 @@ double bic(const Problem& problem, const Solution& solution) {
   return n * std::log(solution.cost / n) + problem.parameters(solution.modes) * std::log(n);
 }
 
+// Standard deviations from the scatter of a few hits are noisy and lean towards the lines that happen to agree; noise is smooth in
+// frequency, so that the root mean square over neighbouring lines is the better weight.
+std::vector<double> smoothedDeviation(const std::vector<double>& deviation) {
+  constexpr std::size_t SIDE = 5;
+  std::vector<double> result(deviation.size());
+  for (std::size_t i = 0; i < deviation.size(); ++i) {
+    const std::size_t first = i > SIDE ? i - SIDE : 0, last = std::min(i + SIDE, deviation.size() - 1);
+    double sum = 0.0;
+    for (std::size_t j = first; j <= last; ++j) sum += deviation[j] * deviation[j];
+    result[i] = std::sqrt(sum / static_cast<double>(last - first + 1));
+  }
+  return result;
+}
+
 Problem prepare(const FrequencyResponse& frf, const ModalFitOptions& options) {
   if (frf.value.size() != frf.size()) throw Error("modal fit: the FRF has unequal numbers of lines and values");
   if (!(options.high > options.low)) throw Error("modal fit: the band is empty");
@@ -240,6 +254,7 @@ Problem prepare(const FrequencyResponse& frf, const ModalFitOptions& options) {
   if (!(largest > 0.0)) throw Error("modal fit: the FRF is zero in the band");
   problem.scale = largest;
   problem.weighted = known == problem.lines();
+  if (problem.weighted) problem.weight = smoothedDeviation(problem.weight);
   for (double& weight : problem.weight) {
     // std_dev is of the complex value; each part has it over sqrt(2). A vanishing one may not rule alone.
     weight = problem.weighted ? std::sqrt(2.0) / std::max(weight, 1e-9 * largest) : 1.0 / largest;

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "smartmill_core/campaign/campaign.h"
+#include "smartmill_core/campaign/record.h"
+#include "smartmill_core/modal/modal_fit.h"
+#include "smartmill_kalman/harmonic_filter.h"
+
+namespace smartmill::kalman {
+
+/// Band and size of the modal fit of a force sensor's taps.
+struct SensorFitParameters {
+  double low = 100.0;    ///< [Hz]
+  double high = 5000.0;  ///< [Hz] above low
+  int max_modes = 4;     ///< 1..20, chosen by evidence
+  /// @throws Error naming key and value.
+  void validate() const;
+};
+
+/// Sensor model of one axis (static gain 1) from taps along it: H1 over all hits, hammer force windowed (Dunwoody ch. 5).
+/// @param hammer, response [N] one vector a hit, all of one length @param sample_rate [Hz]
+/// @throws Error when there is no hit, a NaN, or no mode in the band.
+ModalFit identifySensor(const std::vector<std::vector<double>>& hammer, const std::vector<std::vector<double>>& response,
+                        double sample_rate, const SensorFitParameters& parameters);
+
+/// Sensor models from a campaign's own tap tests. An axis without taps is ideal.
+/// @throws Error when the campaign has no taps at all.
+std::array<ModalModel, 3> identifySensor(const Campaign& campaign, const SensorFitParameters& parameters);
+
+/// Force on the tool of one cut, at the record's sample times [N]; no latency.
+/// @param measures_workpiece the sensor shows the reaction: turned here.
+std::array<std::vector<double>, 3> compensate(const Record& record, const std::array<ModalModel, 3>& sensor,
+                                              bool measures_workpiece, double spindle_speed, double sample_rate,
+                                              const HarmonicFilterParameters& parameters);
+
+}  // namespace smartmill::kalman
