@@ -17,15 +17,17 @@ const std::array<const char*, 3> DIRECTIONS{{"x", "y", "z"}};
 
 void SensorFitParameters::validate() const {
   if (!(low >= 0.0) || !(high > low)) {
-    throw Error("sensor fit: the band " + std::to_string(low) + " .. " + std::to_string(high) + " Hz is empty");
+    throw Error("sensor fit: the band " + std::to_string(low) + " .. " + std::to_string(high) +
+                " Hz is empty");
   }
   if (max_modes < 1 || max_modes > 20) {
     throw Error("max_modes: " + std::to_string(max_modes) + ", 1 .. 20 is due");
   }
 }
 
-ModalFit identifySensor(const std::vector<std::vector<double>>& hammer, const std::vector<std::vector<double>>& response,
-                        double sample_rate, const SensorFitParameters& parameters) {
+ModalFit identifySensor(const std::vector<std::vector<double>>& hammer,
+                        const std::vector<std::vector<double>>& response, double sample_rate,
+                        const SensorFitParameters& parameters) {
   parameters.validate();
   if (hammer.empty() || hammer.size() != response.size()) throw Error("sensor identification: no hits");
   FrfEstimator estimator(sample_rate, hammer.front().size());
@@ -84,7 +86,8 @@ std::array<ModalModel, 3> identifySensor(const Campaign& campaign, const SensorF
 }
 
 std::array<std::vector<double>, 3> compensate(const Record& record, const std::array<ModalModel, 3>& sensor,
-                                              bool measures_workpiece, double spindle_speed, double sample_rate,
+                                              bool measures_workpiece, double spindle_speed,
+                                              double sample_rate,
                                               const HarmonicFilterParameters& parameters) {
   std::array<std::vector<double>, 3> force;
   const double sign = measures_workpiece ? -1.0 : 1.0;

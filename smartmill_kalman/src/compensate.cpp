@@ -60,8 +60,9 @@ void run(const Request& request) {
     result.add("fz") = force[2];
     writeCsv(result, (std::filesystem::path(request.out) / (test.name + ".csv")).string());
     const auto range = [](const std::vector<double>& v) { return percentile(v, 0.9) - percentile(v, 0.1); };
-    std::printf("%s: range 10..90 %% measured x %.1f y %.1f N, compensated x %.1f y %.1f N\n", test.name.c_str(),
-                range(record.column("fx")), range(record.column("fy")), range(force[0]), range(force[1]));
+    std::printf("%s: range 10..90 %% measured x %.1f y %.1f N, compensated x %.1f y %.1f N\n",
+                test.name.c_str(), range(record.column("fx")), range(record.column("fy")), range(force[0]),
+                range(force[1]));
     ++cuts;
   }
   if (cuts == 0) throw Error(campaign.folder + ": the campaign has no cuts");
@@ -79,7 +80,8 @@ int main(int argc, char** argv) {
   app.add_flag("--identify", request.identify, "take the sensor's modes from the campaign's own taps");
   app.add_option("--bandwidth-hz", request.filter.bandwidth, "harmonics up to this frequency");
   app.add_option("--noise-rms-n", request.filter.noise_rms, "noise of one sample");
-  app.add_option("--settling-revolutions", request.filter.settling_revolutions, "time constant of the amplitudes");
+  app.add_option("--settling-revolutions", request.filter.settling_revolutions,
+                 "time constant of the amplitudes");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

@@ -72,7 +72,8 @@ HarmonicFilter::HarmonicFilter(const ModalModel& sensor, double spindle_speed, d
 
   gain_.assign(gain.data(), gain.data() + gain.size());
   for (Eigen::Index k = 0; k < m; k += 2) {
-    mode_transition_.insert(mode_transition_.end(), {phi(k, k), phi(k, k + 1), phi(k + 1, k), phi(k + 1, k + 1)});
+    mode_transition_.insert(mode_transition_.end(),
+                            {phi(k, k), phi(k, k + 1), phi(k + 1, k), phi(k + 1, k + 1)});
   }
   for (Eigen::Index i = 0; i < m; ++i) {
     for (Eigen::Index j = 0; j < f; ++j) coupling_.push_back(phi(i, m + j));

@@ -9,8 +9,8 @@
 
 namespace smartmill::kalman {
 
-Eigen::MatrixXd stationaryCovariance(const Eigen::MatrixXd& phi, const Eigen::MatrixXd& q, const Eigen::RowVectorXd& c,
-                                     double r) {
+Eigen::MatrixXd stationaryCovariance(const Eigen::MatrixXd& phi, const Eigen::MatrixXd& q,
+                                     const Eigen::RowVectorXd& c, double r) {
   constexpr int MAX_DOUBLINGS = 60;
   constexpr double TOLERANCE = 1e-12;
   const Eigen::Index n = phi.rows();
@@ -29,7 +29,8 @@ Eigen::MatrixXd stationaryCovariance(const Eigen::MatrixXd& phi, const Eigen::Ma
     if (!h.allFinite()) break;
     if (rise.norm() <= TOLERANCE * h.norm()) return h;
   }
-  throw Error("Kalman filter: the Riccati equation of " + std::to_string(n) + " states has no stationary solution");
+  throw Error("Kalman filter: the Riccati equation of " + std::to_string(n) +
+              " states has no stationary solution");
 }
 
 }  // namespace smartmill::kalman

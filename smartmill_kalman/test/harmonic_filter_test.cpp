@@ -58,15 +58,18 @@ TEST(HarmonicFilter, recoversConstantAndHarmonicsThroughTheSensor) {
     };
     const double applied = 50.0 + (wave(232.5, 30.0) + wave(930.0, 100.0)).real();
     const double measured =
-        50.0 + (model.response(232.5) * wave(232.5, 30.0) + model.response(930.0) * wave(930.0, 100.0)).real();
+        50.0 +
+        (model.response(232.5) * wave(232.5, 30.0) + model.response(930.0) * wave(930.0, 100.0)).real();
     const double estimate = filter.step(measured);
     if (t > 8.0) worst = std::max(worst, std::abs(estimate - applied));
   }
-  // The harmonic next to the sensor's zero near 2940 Hz passes it by 0.6 % and settles with 0.2 s: 40 time constants.
+  // The harmonic next to the sensor's zero near 2940 Hz passes it by 0.6 % and settles with 0.2 s: 40 time
+  // constants.
   EXPECT_LT(worst, 1e-6);
 }
 
-// Dunwoody section 5.3: slot at 13950 rpm with four teeth, tooth passing at the sensor's first mode of 930 Hz.
+// Dunwoody section 5.3: slot at 13950 rpm with four teeth, tooth passing at the sensor's first mode of 930
+// Hz.
 TEST(HarmonicFilter, rangeAndWaveformAtTheSensorsResonance) {
   const ToolGeometry tool{4, 19.05e-3, units::radFromDeg(30.0), {}};
   const CuttingCoefficients aluminium{796e6, 168e6, 222e6, 27.7e3, 30.8e3, 1.4e3};
@@ -110,7 +113,8 @@ TEST(HarmonicFilter, innovationHasTheExpectedSize) {
     filter.step(noise(random));
     squares += filter.innovation() * filter.innovation();
   }
-  // Noise alone: the innovation is the noise plus what the filter took for force, below the design's figure but not below the noise.
+  // Noise alone: the innovation is the noise plus what the filter took for force, below the design's figure
+  // but not below the noise.
   const double rms = std::sqrt(squares / count);
   EXPECT_GT(rms, 0.98);
   EXPECT_LT(rms, 1.02 * filter.innovationStd());
@@ -123,9 +127,8 @@ TEST(HarmonicFilter, coastsThroughAGap) {
   double worst = 0.0;
   for (int i = 0; i < 256000; ++i) {
     const double phase = speed * i / RATE;
-    const double estimate = i > 250000 && i < 250100
-                                ? filter.coast()
-                                : filter.step((response * std::polar(100.0, phase)).real());
+    const double estimate =
+        i > 250000 && i < 250100 ? filter.coast() : filter.step((response * std::polar(100.0, phase)).real());
     if (i > 245000) worst = std::max(worst, std::abs(estimate - 100.0 * std::cos(phase)));
   }
   EXPECT_LT(worst, 1e-6);

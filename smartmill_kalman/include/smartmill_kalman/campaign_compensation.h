@@ -20,11 +20,13 @@ struct SensorFitParameters {
   void validate() const;
 };
 
-/// Sensor model of one axis (static gain 1) from taps along it: H1 over all hits, hammer force windowed (Dunwoody ch. 5).
+/// Sensor model of one axis (static gain 1) from taps along it: H1 over all hits, hammer force windowed
+/// (Dunwoody ch. 5).
 /// @param hammer, response [N] one vector a hit, all of one length @param sample_rate [Hz]
 /// @throws Error when there is no hit, a NaN, or no mode in the band.
-ModalFit identifySensor(const std::vector<std::vector<double>>& hammer, const std::vector<std::vector<double>>& response,
-                        double sample_rate, const SensorFitParameters& parameters);
+ModalFit identifySensor(const std::vector<std::vector<double>>& hammer,
+                        const std::vector<std::vector<double>>& response, double sample_rate,
+                        const SensorFitParameters& parameters);
 
 /// Sensor models from a campaign's own tap tests. An axis without taps is ideal.
 /// @throws Error when the campaign has no taps at all.
@@ -33,7 +35,7 @@ std::array<ModalModel, 3> identifySensor(const Campaign& campaign, const SensorF
 /// Force on the tool of one cut, at the record's sample times [N]; no latency.
 /// @param measures_workpiece the sensor shows the reaction: turned here.
 std::array<std::vector<double>, 3> compensate(const Record& record, const std::array<ModalModel, 3>& sensor,
-                                              bool measures_workpiece, double spindle_speed, double sample_rate,
-                                              const HarmonicFilterParameters& parameters);
+                                              bool measures_workpiece, double spindle_speed,
+                                              double sample_rate, const HarmonicFilterParameters& parameters);
 
 }  // namespace smartmill::kalman

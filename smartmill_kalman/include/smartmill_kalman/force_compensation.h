@@ -1,0 +1,105 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "smartmill_core/modal/modal_model.h"
+#include "smartmill_core/signal/stream_sorter.h"
+#include "smartmill_core/signal/streams.h"
+#include "smartmill_kalman/harmonic_filter.h"
+
+namespace smartmill::kalman {
+
+/// See launch/config/kalman.yaml.
+struct CompensationParameters {
+  HarmonicFilterParameters filter;
+  double least_speed = 20.0;  ///< [rad/s] > 0; slower than this the samples pass through
+  double speed_tolerance =
+      0.002;  ///< [1] > 0; filters are laid out anew when the speed leaves this share of theirs
+  double settling_periods =
+      5.0;                  ///< [1] >= 0 settling times after a start or gap that are marked as settling
+  double saturation = 0.0;  ///< [N] >= 0 a sample at or beyond it counts as clipped; 0: not watched
+  /// @throws Error naming key and value.
+  void validate() const;
+};
+
+/// Counts for diagnostics, since the start.
+struct CompensationHealth {
+  std::size_t gaps = 0;        ///< jumps of the sample index
+  std::size_t not_finite = 0;  ///< samples that are NaN or infinite
+  std::size_t clipped = 0;     ///< samples at the saturation limit
+  double innovation_ratio =
+      0;             ///< [1] RMS innovation over the design's, last compensated block; 1 when the model fits
+  double speed = 0;  ///< [rad/s] of the running filters; 0: passing through
+};
+
+/// Sensor blocks in, force blocks out with the same sample index. Inputs come in stamp order
+/// (SortedCompensation); the result depends only on them: the filters start anew at every cutting condition,
+/// at a gap of the sample index and when the speed has moved.
+class ForceCompensation {
+ public:
+  using Output = std::function<void(const ForceBlock& measured, const ForceBlock& compensated)>;
+
+  /// @param measures_workpiece the sensor shows the reaction: turned here, once. @throws Error.
+  ForceCompensation(const CompensationParameters& parameters, bool measures_workpiece, Output output);
+
+  /// Model of an axis (0 x, 1 y, 2 z) from now on; filters start anew.
+  void setSensor(std::size_t axis, const ModalModel& sensor);
+  bool hasSensor() const;
+
+  /// @throws Error when channels fx, fy, fz are missing or not in N.
+  void handle(const SampleBlock& block);
+  void handle(const SpindleAngle& angle);
+  void handle(const CuttingCondition& condition);
+
+  /// A bag was restarted: as new, sensor models stay.
+  void reset();
+
+  const CompensationHealth& health() const { return health_; }
+
+ private:
+  void design(double speed, double sample_rate);
+
+  CompensationParameters parameters_;
+  double sign_;
+  Output output_;
+  std::array<std::optional<ModalModel>, 3> sensor_;
+  std::vector<HarmonicFilter> filters_;  // of the axes with a model, in order; empty: to be laid out
+  double design_rate_ = 0.0;             // [Hz]
+  double speed_ = 0.0;                   // [rad/s]
+  std::optional<std::uint64_t> next_index_;
+  double settling_left_ = 0.0;  // [s]
+  CompensationHealth health_;
+};
+
+/// ForceCompensation behind the sorter: takes inputs in any order of arrival; the node and offline tools feed
+/// this class.
+class SortedCompensation {
+ public:
+  /// @param hold_back [s], see StreamSorter.
+  SortedCompensation(const CompensationParameters& parameters, bool measures_workpiece, double hold_back,
+                     ForceCompensation::Output output);
+
+  ForceCompensation& compensation() { return compensation_; }
+  void push(const SampleBlock& block);
+  void push(const SpindleAngle& angle);
+  void push(const CuttingCondition& condition);
+  void flush() { sorter_.flush(); }  ///< end of data
+  std::string waitingFor() const { return sorter_.waitingFor(); }
+  std::size_t late() const { return sorter_.late(); }
+
+ private:
+  void watch(double stamp);
+
+  ForceCompensation compensation_;
+  StreamSorter sorter_;
+  StreamSorter::Stream conditions_, angles_, blocks_;
+  double newest_ = 0.0;
+};
+
+}  // namespace smartmill::kalman

@@ -1,0 +1,164 @@
+#include "smartmill_kalman/force_compensation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/units.h"
+
+namespace smartmill::kalman {
+namespace {
+
+const std::array<const char*, 3> CHANNELS{{"fx", "fy", "fz"}};
+// A stamp this far behind the newest one means that a recording was started again.
+constexpr double RESTART = 1.0;  // [s]
+
+void require(const char* key, double value, bool good, const char* due) {
+  if (!good || !std::isfinite(value))
+    throw Error(std::string(key) + ": " + std::to_string(value) + ", " + due + " is due");
+}
+
+}  // namespace
+
+void CompensationParameters::validate() const {
+  filter.validate();
+  require("least_speed", least_speed, least_speed > 0.0, "above 0 rad/s");
+  require("speed_tolerance", speed_tolerance, speed_tolerance > 0.0 && speed_tolerance < 0.5, "0 .. 0.5");
+  require("settling_periods", settling_periods, settling_periods >= 0.0, "at least 0");
+  require("saturation", saturation, saturation >= 0.0, "at least 0 N");
+}
+
+ForceCompensation::ForceCompensation(const CompensationParameters& parameters, bool measures_workpiece,
+                                     Output output)
+    : parameters_(parameters), sign_(measures_workpiece ? -1.0 : 1.0), output_(std::move(output)) {
+  parameters_.validate();
+}
+
+void ForceCompensation::setSensor(std::size_t axis, const ModalModel& sensor) {
+  sensor_.at(axis) = sensor;
+  filters_.clear();
+}
+
+bool ForceCompensation::hasSensor() const {
+  for (const auto& sensor : sensor_) {
+    if (!sensor) return false;
+  }
+  return true;
+}
+
+void ForceCompensation::handle(const SpindleAngle& angle) {
+  speed_ = angle.speed;
+}
+
+void ForceCompensation::handle(const CuttingCondition&) {
+  filters_.clear();
+}
+
+void ForceCompensation::reset() {
+  filters_.clear();
+  next_index_.reset();
+  speed_ = 0.0;
+  health_ = {};
+}
+
+void ForceCompensation::design(double speed, double sample_rate) {
+  filters_.clear();
+  for (const auto& sensor : sensor_) filters_.emplace_back(*sensor, speed, sample_rate, parameters_.filter);
+  design_rate_ = sample_rate;
+  settling_left_ =
+      parameters_.settling_periods * parameters_.filter.settling_revolutions * units::TWO_PI / speed;
+}
+
+void ForceCompensation::handle(const SampleBlock& block) {
+  std::array<std::size_t, 3> column{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    column[axis] = block.channel(CHANNELS[axis]);
+    if (block.units.at(column[axis]) != "N") {
+      throw Error("force block: channel " + std::string(CHANNELS[axis]) + " is in " +
+                  block.units[column[axis]] + ", N is due");
+    }
+  }
+  if (next_index_ && *next_index_ != block.first_index) {
+    ++health_.gaps;
+    filters_.clear();
+  }
+  next_index_ = block.first_index + block.size();
+
+  ForceBlock measured;
+  measured.stamp = block.stamp;
+  measured.sample_rate = block.sample_rate;
+  measured.first_index = block.first_index;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    std::vector<double>& force = measured.force[axis];
+    force.reserve(block.size());
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      const double sample = block.at(i, column[axis]);
+      if (!std::isfinite(sample)) ++health_.not_finite;
+      if (parameters_.saturation > 0.0 && std::abs(sample) >= parameters_.saturation) ++health_.clipped;
+      force.push_back(sign_ * sample);
+    }
+  }
+  ForceBlock compensated = measured;
+  if (!hasSensor() || speed_ < parameters_.least_speed) {
+    filters_.clear();
+    health_.speed = 0.0;
+    compensated.status = ForceBlock::Status::passed_through;
+    output_(measured, compensated);
+    return;
+  }
+  const bool fits = !filters_.empty() && design_rate_ == block.sample_rate &&
+                    std::abs(speed_ / filters_.front().spindleSpeed() - 1.0) <= parameters_.speed_tolerance;
+  if (!fits) design(speed_, block.sample_rate);
+  health_.speed = filters_.front().spindleSpeed();
+  double squares = 0.0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    HarmonicFilter& filter = filters_[axis];
+    for (double& force : compensated.force[axis]) {
+      // A sample that is not a number is bridged by the model, never passed on.
+      force = std::isfinite(force) ? filter.step(force) : filter.coast();
+      squares +=
+          filter.innovation() * filter.innovation() / (filter.innovationStd() * filter.innovationStd());
+    }
+  }
+  health_.innovation_ratio =
+      block.size() == 0 ? 0.0 : std::sqrt(squares / (3.0 * static_cast<double>(block.size())));
+  compensated.status = settling_left_ > 0.0 ? ForceBlock::Status::settling : ForceBlock::Status::compensated;
+  settling_left_ -= static_cast<double>(block.size()) / block.sample_rate;
+  output_(measured, compensated);
+}
+
+SortedCompensation::SortedCompensation(const CompensationParameters& parameters, bool measures_workpiece,
+                                       double hold_back, ForceCompensation::Output output)
+    : compensation_(parameters, measures_workpiece, std::move(output)),
+      sorter_(hold_back),
+      conditions_(sorter_.addEvents("cut/condition")),
+      angles_(sorter_.addRegular("spindle/angle")),
+      blocks_(sorter_.addRegular("daq/dynamometer")) {
+}
+
+void SortedCompensation::watch(double stamp) {
+  if (stamp < newest_ - RESTART) {
+    sorter_.reset();
+    compensation_.reset();
+    newest_ = stamp;
+  }
+  newest_ = std::max(newest_, stamp);
+}
+
+void SortedCompensation::push(const SampleBlock& block) {
+  watch(block.stamp);
+  sorter_.push(blocks_, block.stamp, [this, block] { compensation_.handle(block); });
+}
+
+void SortedCompensation::push(const SpindleAngle& angle) {
+  watch(angle.stamp);
+  sorter_.push(angles_, angle.stamp, [this, angle] { compensation_.handle(angle); });
+}
+
+void SortedCompensation::push(const CuttingCondition& condition) {
+  // A latched condition is older than the data around it: no restart.
+  sorter_.push(conditions_, condition.stamp, [this, condition] { compensation_.handle(condition); });
+}
+
+}  // namespace smartmill::kalman
