@@ -34,6 +34,7 @@ struct Problem {
   bool unit_static_gain = false;
   bool direct = false;
   bool mass = false;
+  bool positive = false;
   double low = 0.0, high = 0.0;    // [Hz]
 
   std::size_t lines() const { return frequency.size(); }
@@ -150,6 +151,10 @@ void solve(const Problem& problem, Solution& solution) {
     ceres_problem.SetParameterUpperBound(p, 3 * k, std::log(1.4 * problem.high));
     ceres_problem.SetParameterLowerBound(p, 3 * k + 1, std::log(MIN_DAMPING));
     ceres_problem.SetParameterUpperBound(p, 3 * k + 1, std::log(MAX_DAMPING));
+    if (problem.positive) {
+      p[3 * k + 2] = std::max(p[3 * k + 2], 1e-3);
+      ceres_problem.SetParameterLowerBound(p, 3 * k + 2, 0.0);
+    }
   }
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::DENSE_NORMAL_CHOLESKY;
@@ -232,6 +237,7 @@ Problem prepare(const FrequencyResponse& frf, const ModalFitOptions& options) {
   problem.unit_static_gain = options.unit_static_gain;
   problem.direct = options.fit_direct && !options.unit_static_gain;
   problem.mass = options.fit_mass_line;
+  problem.positive = options.positive_gains;
   double largest = 0.0;
   std::size_t known = 0;
   for (std::size_t i = 0; i < band.size(); ++i) {

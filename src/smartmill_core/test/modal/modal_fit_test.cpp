@@ -48,6 +48,19 @@ TEST(ModalFit, findsAnExactModelAgain) {
   EXPECT_LT(fit.relative_error, 1e-7);
 }
 
+// A negative mode (hit and response at different points) is left out when told that both are at one point.
+TEST(ModalFit, keepsGainsPositiveWhenAsked) {
+  ModalModel cross = sensor();
+  cross.modes.push_back({3000.0, 0.02, -0.1});
+  ModalFitOptions options;
+  options.low = 100.0;
+  options.high = 4000.0;
+  options.modes = 3;
+  EXPECT_NEAR(fitModes(measured(cross, 0.0, 1), options).model.modes[2].gain, -0.1, 1e-6);
+  options.positive_gains = true;
+  for (const Mode& mode : fitModes(measured(cross, 0.0, 1), options).model.modes) EXPECT_GE(mode.gain, 0.0);
+}
+
 TEST(ModalFit, choosesTheNumberOfModesByEvidence) {
   ModalFitOptions options;
   options.low = 100.0;

@@ -18,6 +18,8 @@ struct ModalFitOptions {
   bool fit_direct = true;         ///< without unit_static_gain: a real direct share stands for modes above the band
   /// Below the lowest mode of a free structure (accelerometer taps) a mass line: adds lower / -(2 pi f)^2.
   bool fit_mass_line = false;
+  /// Hit and response at one point: no mode can have a negative gain, and none is fitted.
+  bool positive_gains = false;
 };
 
 struct ModalFit {
