@@ -1,0 +1,22 @@
+#pragma once
+
+#include <string>
+
+#include "smartmill_kalman/force_compensation.h"
+#include "smartmill_ros/parameter_reader.h"
+
+namespace smartmill::kalman {
+
+/// Parameters of kalman_node, see launch/config/kalman.yaml.
+struct NodeParameters {
+  CompensationParameters compensation;
+  std::string model;           ///< machine model file whose force_sensor section gives the sensor
+  double hold_back = 0.05;     ///< [s] >= 0
+  double wrench_rate = 100.0;  ///< [Hz] > 0
+  double input_timeout = 1.0;  ///< [s] > 0 silence of the sensor that raises a diagnostic
+};
+
+/// Reads and checks all parameters. @throws Error.
+NodeParameters readParameters(ParameterReader& reader);
+
+}  // namespace smartmill::kalman

@@ -1,0 +1,110 @@
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include <geometry_msgs/WrenchStamped.h>
+#include <gtest/gtest.h>
+#include <ros/ros.h>
+#include <smartmill_msgs/ForceBlock.h>
+#include <smartmill_msgs/SampleBlock.h>
+#include <smartmill_msgs/SpindleAngle.h>
+
+#include "smartmill_core/modal/modal_model.h"
+#include "smartmill_core/units.h"
+
+namespace smartmill {
+namespace {
+
+bool waitUntil(const std::function<bool()>& done) {
+  for (int i = 0; i < 300 && !done() && ros::ok(); ++i) {
+    ros::spinOnce();
+    ros::WallDuration(0.05).sleep();
+  }
+  return done();
+}
+
+// A sine at the sensor's first mode of 930 Hz, four times the spindle's frequency; amplitude in the sensor 15
+// times too large.
+TEST(KalmanNode, compensatesInTheMachinesFrame) {
+  ros::NodeHandle nh;
+  std::map<std::uint64_t, smartmill_msgs::ForceBlock> compensated, measured;
+  std::vector<geometry_msgs::WrenchStamped> wrenches;
+  const auto sub1 = nh.subscribe<smartmill_msgs::ForceBlock>(
+      "force/compensated", 2000,
+      [&](const smartmill_msgs::ForceBlock::ConstPtr& m) { compensated[m->first_index] = *m; });
+  const auto sub2 = nh.subscribe<smartmill_msgs::ForceBlock>(
+      "force/measured", 2000,
+      [&](const smartmill_msgs::ForceBlock::ConstPtr& m) { measured[m->first_index] = *m; });
+  const auto sub3 = nh.subscribe<geometry_msgs::WrenchStamped>(
+      "force/wrench", 2000, [&](const geometry_msgs::WrenchStamped::ConstPtr& m) { wrenches.push_back(*m); });
+  auto blocks = nh.advertise<smartmill_msgs::SampleBlock>("daq/dynamometer", 2000);
+  auto angles = nh.advertise<smartmill_msgs::SpindleAngle>("spindle/angle", 2000);
+  ASSERT_TRUE(waitUntil([&] {
+    return blocks.getNumSubscribers() > 0 && angles.getNumSubscribers() > 0 && sub1.getNumPublishers() > 0 &&
+           sub2.getNumPublishers() > 0 && sub3.getNumPublishers() > 0;
+  }));
+
+  ModalModel sensor;
+  sensor.modes = {{930.0, 0.03, 0.9}};
+  sensor.direct = 0.1;
+  const std::complex<double> passed = sensor.response(930.0);
+  constexpr double RATE = 25600.0;
+  constexpr int BLOCK = 256, COUNT = 400;
+  const double start = std::floor(ros::Time::now().toSec());
+  for (int b = 0; b < COUNT; ++b) {
+    smartmill_msgs::SampleBlock block;
+    block.header.stamp = ros::Time(start + b * BLOCK / RATE);
+    block.header.frame_id = "dynamometer";
+    block.sample_rate = RATE;
+    block.first_index = static_cast<std::uint64_t>(b) * BLOCK;
+    block.channels = {"fx", "fy", "fz"};
+    block.units = {"N", "N", "N"};
+    for (int i = 0; i < BLOCK; ++i) {
+      const double phase = units::TWO_PI * 930.0 * (b * BLOCK + i) / RATE;
+      block.samples.insert(block.samples.end(), {(passed * std::polar(100.0, phase)).real(), 0.0, 0.0});
+    }
+    smartmill_msgs::SpindleAngle angle;
+    angle.header.stamp = block.header.stamp;
+    angle.speed = units::TWO_PI * 232.5;
+    angles.publish(angle);
+    blocks.publish(block);
+    ros::spinOnce();
+    ros::WallDuration(0.002).sleep();
+  }
+  ASSERT_TRUE(waitUntil(
+      [&] { return compensated.count((COUNT - 1) * BLOCK) > 0 && measured.count((COUNT - 1) * BLOCK) > 0; }));
+  const smartmill_msgs::ForceBlock& last = compensated[(COUNT - 1) * BLOCK];
+  EXPECT_EQ(last.header.frame_id, "machine");
+  EXPECT_EQ(last.status, smartmill_msgs::ForceBlock::COMPENSATED);
+  const auto largest = [](const std::vector<double>& v) { return *std::max_element(v.begin(), v.end()); };
+  // 4 s after the start; the slowest harmonic, next to the sensor's zero, settles with 0.2 s.
+  EXPECT_NEAR(largest(last.fy), 100.0, 0.5);
+  EXPECT_LT(std::abs(largest(last.fx)), 0.5);
+  EXPECT_NEAR(largest(measured[(COUNT - 1) * BLOCK].fy), 100.0 * std::abs(passed), 15.0);
+  EXPECT_GT(wrenches.size(), 300u);
+  EXPECT_EQ(wrenches.back().header.frame_id, "machine");
+}
+
+TEST(KalmanNode, refusesAStringForANumber) {
+  // The node `wrong` got noise_rms: 1e-2, which YAML makes a string; it ended before it advertised anything.
+  std::vector<std::string> nodes;
+  ASSERT_TRUE(waitUntil([&] {
+    nodes.clear();
+    return ros::master::getNodes(nodes) && std::count(nodes.begin(), nodes.end(), "/smartmill/kalman") == 1 &&
+           std::count(nodes.begin(), nodes.end(), "/smartmill/wrong") == 0;
+  }));
+}
+
+}  // namespace
+}  // namespace smartmill
+
+int main(int argc, char** argv) {
+  testing::InitGoogleTest(&argc, argv);
+  ros::init(argc, argv, "kalman_node_test");
+  const ros::NodeHandle nh;
+  return RUN_ALL_TESTS();
+}
