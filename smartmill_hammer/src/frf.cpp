@@ -26,7 +26,7 @@ struct Options {
   std::string out = "frf", format = "auto", model, parameters;
   double low = 500.0, high = 3500.0, peak_share = 0.02, weak_force = 20.0, second_hit_share = 0.1,
          exponential_time = 0.0;
-  int modes = 0, max_modes = 8;
+  int modes = 0, max_modes = 8, max_peaks = 20;
   bool mass_line = false, no_picture = false;
 };
 
@@ -43,10 +43,10 @@ std::string pm(const char* format, double value, double std) {
   return text;
 }
 
-void printModes(const ModalModel& model, const FrequencyResponse& receptance) {
+void printModes(const std::vector<ModeReading>& rows) {
   std::printf("  %-22s %-22s %-24s %s\n", "frequency [Hz]", "damping ratio [%]", "stiffness [N/um]",
               "Im receptance [um/N]");
-  for (const ModeReading& row : readModes(model, receptance)) {
+  for (const ModeReading& row : rows) {
     const Mode& m = row.mode;
     const double stiffness = 1.0 / m.gain / units::N_PER_UM;
     std::printf("  %-22s %-22s %-24s %.4f\n", pm("%.2f +- %.2f", m.frequency, m.frequency_std).c_str(),
@@ -95,30 +95,42 @@ void runTaps(const Options& options, TapFormat format) {
   std::printf("peaks of %s, %g..%g Hz (prominence above %g of the largest):\n",
               peaks_of.unit == "m/N" ? "the receptance" : "the accelerance", options.low, options.high,
               options.peak_share);
-  std::vector<double> peaks = findPeaks(peaks_of, options.low, options.high, options.peak_share);
+  std::vector<double> peaks =
+      findPeaks(peaks_of, options.low, options.high, options.peak_share);  // strongest first
+  if (peaks.size() > static_cast<std::size_t>(options.max_peaks))
+    peaks.resize(static_cast<std::size_t>(options.max_peaks));
   std::sort(peaks.begin(), peaks.end());
   for (const double f : peaks) {
-    const auto r = receptance.at(f);
-    std::printf("  %9.2f Hz  |H| %11.5g %s   Im receptance %9.4f um/N\n", f, std::abs(peaks_of.at(f)),
-                peaks_of.unit.c_str(), r.imag() / units::UM);
+    std::printf("  %9.2f Hz  |H| %11.5g %s\n", f, std::abs(peaks_of.at(f)), peaks_of.unit.c_str());
   }
+  std::cerr << "fitting modes\n";
+  std::printf(
+      "modes at the peaks of |Im| of the receptance, each fitted alone above its half-power height:\n");
+  const std::vector<ModeReading> peak_modes = peakModes(
+      receptance, options.low, options.high, options.peak_share, static_cast<std::size_t>(options.max_peaks));
+  printModes(peak_modes);
+  const bool direct = looksDirect(receptance, options.low, options.high);
   ModalFitOptions fit_options;
   fit_options.low = options.low;
   fit_options.high = options.high;
   fit_options.modes = options.modes;
   fit_options.max_modes = options.max_modes;
   fit_options.fit_mass_line = options.mass_line;
-  std::cerr << "fitting modes\n";
+  fit_options.positive_gains = direct;
   ModalFit fit = fitModes(receptance, fit_options);
   if (options.exponential_time > 0.0) {
     ImpactOptions window;
     window.exponential_time = options.exponential_time;
     ImpactAnalysis(window).removeWindowDamping(fit.model);
   }
-  std::printf("fitted modes (error of the fit %.1f %% of the receptance in the band):\n",
-              100.0 * fit.relative_error);
-  printModes(fit.model, receptance);
+  std::printf("modes fitted together (%serror of the fit %.1f %% of the receptance in the band):\n",
+              direct ? "direct point, gains kept positive; " : "", 100.0 * fit.relative_error);
+  printModes(readModes(fit.model, receptance));
   write(options, "", title, receptance, fit.model, options.low, options.high);
+  ModalModel alone;
+  for (const ModeReading& row : peak_modes) alone.modes.push_back(row.mode);
+  writeModesCsv(alone, options.out + "/peak_modes.csv");
+  std::printf("           %s/peak_modes.csv (modes fitted alone)\n", options.out.c_str());
 }
 
 void runBag(const Options& options) {
@@ -134,7 +146,7 @@ void runBag(const Options& options) {
     std::printf("  sensitivity %.4f +- %.4f um/V, flute at the hammer %.2f deg\n",
                 result.sensitivity / units::UM, result.sensitivity_std / units::UM,
                 units::degFromRad(result.flute_hammer));
-    printModes(result.modes.model, result.frf.frf);
+    printModes(readModes(result.modes.model, result.frf.frf));
     write(options, "_" + result.frf.direction,
           "tool tip " + result.frf.direction + ", " + std::to_string(result.frf.frf.averages) + " hits",
           result.frf.frf, result.modes.model, replay.fit_low, replay.fit_high);
@@ -190,6 +202,9 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_flag("--mass-line", o.mass_line, "free structure: fit a rigid-body mass line too");
   app.add_option("--peak-share", o.peak_share, "least prominence of a listed peak, of the largest")
+      ->capture_default_str();
+  app.add_option("--max-peaks", o.max_peaks, "strongest peaks kept")
+      ->check(CLI::Range(1, 1000))
       ->capture_default_str();
   app.add_option("--weak-force", o.weak_force, "hits below this are left out [N]")->capture_default_str();
   app.add_option("--second-hit-share", o.second_hit_share, "double hit above this share of the peak")

@@ -95,6 +95,7 @@ void HammerParameters::validate() const {
   positive(strike_timeout, "strike_timeout");
   need(max_bad_hits >= 0, "max_bad_hits", max_bad_hits, "at least 0");
   not_negative(exponential_time, "exponential_time");
+  need(straighten_sensor == 0 || straighten_sensor == 1, "straighten_sensor", straighten_sensor, "0 or 1");
   positive(frf_high, "frf_high");
   not_negative(fit_low, "fit_low");
   need(fit_high > fit_low, "fit_high", fit_high, "above fit_low");
@@ -239,13 +240,13 @@ void HammerSequence::orient(double now, double angle) {
   send(std::move(c), Wait::angle, parameters_.orient_timeout);
 }
 
-void HammerSequence::jog(double now, const std::string& axis, double distance) {
+void HammerSequence::jog(double now, const std::string& axis, double distance, double feed) {
   Command c;
   c.kind = Command::Kind::jog;
   c.stamp = now;
   c.axis = axis;
   c.distance = distance;
-  c.feed = parameters_.jog_feed;
+  c.feed = feed;
   // From the commanded place, not from the displayed one, so that the display's rounding does not add up.
   target_[static_cast<std::size_t>(axisIndex(axis))] += distance;
   target_tolerance_ = std::min(parameters_.position_tolerance, 0.25 * std::abs(distance));
@@ -523,7 +524,7 @@ void HammerSequence::measured(double now, double volt, double volt_std) {
     }
     switch (calibration_->state()) {
       case SensorCalibration::State::jogging:
-        return jog(now, goal_.direction, calibration_->next());
+        return jog(now, goal_.direction, calibration_->next(), parameters_.jog_feed);
       case SensorCalibration::State::failed:
         return abort(now, FrfCode::bad_data, "sensor calibration: " + calibration_->reason());
       case SensorCalibration::State::done:
@@ -551,7 +552,7 @@ void HammerSequence::measured(double now, double volt, double volt_std) {
     result_.flute_low = search_->angle();
     stage_ = Stage::to_height;
     say("lowering the tool to find the flute halfway up to the hammer", 0.28);
-    return jog(now, "z", -half);
+    return jog(now, "z", -half, parameters_.approach_feed);
   }
   // Another flute may have been nearer to the walk: the one meant is within half a pitch of where the helix
   // puts it.
@@ -564,7 +565,7 @@ void HammerSequence::measured(double now, double volt, double volt_std) {
              units::degFromRad(result_.flute_low), units::degFromRad(result_.flute_high),
              units::degFromRad(result_.flute_hammer)),
       0.48);
-  jog(now, "z", half);
+  jog(now, "z", half, parameters_.approach_feed);
 }
 
 void HammerSequence::recorded(double now, HitCollector::Record record) {
@@ -601,6 +602,7 @@ void HammerSequence::evaluate() {
   // The blow drives the tool away from the sensor: the voltage falls.
   const double factor = goal_.stickout > 0.0 ? offsetFactor(goal_.stickout, station_.offset) : 1.0;
   options.response_scale = -result_.sensitivity * factor;
+  if (parameters_.straighten_sensor != 0) options.sensor_gain = station_.gain_volt;
   const double relative = result_.sensitivity_std / result_.sensitivity;
   result_.frf.stamp = result_.modes.stamp = hits_.back().stamp;
   result_.frf.tool = result_.modes.tool = goal_.tool;
@@ -617,6 +619,7 @@ void HammerSequence::evaluate() {
     fit_options.high = parameters_.fit_high;
     fit_options.modes = goal_.modes;
     fit_options.max_modes = parameters_.max_modes;
+    fit_options.positive_gains = true;  // corrected to hit and response at the tip
     // The sensitivity's error is common to all lines: it takes no part in the fit and is added after it.
     result_.frf.frf = frf;
     for (std::size_t k = 0; k < frf.size(); ++k) {

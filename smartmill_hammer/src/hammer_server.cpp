@@ -63,10 +63,14 @@ HammerServer::HammerServer(ros::NodeHandle nh, const ros::NodeHandle& private_nh
     using Message = decltype(example);
     boost::function<void(const boost::shared_ptr<const Message>&)> callback =
         [this, &in](const boost::shared_ptr<const Message>& m) {
-          take(in, toSec(m->header.stamp), [this, m] {
-            sequence_->handle(fromMsg(*m));
-            drain();
-          });
+          try {
+            take(in, toSec(m->header.stamp), [this, input = fromMsg(*m)] {
+              sequence_->handle(input);
+              drain();
+            });
+          } catch (const Error& error) {
+            ROS_ERROR_THROTTLE(1.0, "hammer: %s: %s", in.name.c_str(), error.what());
+          }
         };
     subscribers_.push_back(nh_.subscribe<Message>(in.name, queue, callback));
   };
@@ -99,11 +103,7 @@ void HammerServer::take(Input& input, double stamp, const StreamSorter::Deliver&
   if (stamp < input.newest - RESTART_STEP) restart();
   input.newest = std::max(input.newest, stamp);
   input.heard = ros::WallTime::now();
-  try {
-    sorter_->push(input.stream, stamp, deliver);
-  } catch (const Error& error) {
-    ROS_ERROR_THROTTLE(1.0, "hammer: %s", error.what());
-  }
+  sorter_->push(input.stream, stamp, deliver);
 }
 
 void HammerServer::event(const StreamSorter::Deliver& deliver) {

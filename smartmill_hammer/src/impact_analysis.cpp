@@ -118,6 +118,9 @@ void ImpactAnalysis::add(const Hit& hit) {
     response_noise = std::abs(options_.response_scale) * standardDeviation(quiet);
     for (double& f : force) f -= force_base;
     for (double& r : response) r -= base;
+    if (options_.sensor_gain > 0.0) {
+      for (double& r : response) r /= 1.0 + r / (options_.sensor_gain + base);
+    }
   } else if (samples_ >= 10 * LEAST_QUIET) {
     force_noise = standardDeviation(part(force, samples_ - samples_ / 10, samples_));
     response_noise = std::abs(options_.response_scale) *

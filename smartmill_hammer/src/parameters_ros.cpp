@@ -45,6 +45,7 @@ void readParameters(ParameterReader& reader, HammerParameters& parameters, NodeP
   reader.read("strike_timeout", parameters.strike_timeout);
   reader.read("max_bad_hits", parameters.max_bad_hits);
   reader.read("exponential_time", parameters.exponential_time);
+  reader.read("straighten_sensor", parameters.straighten_sensor);
   reader.read("frf_high", parameters.frf_high);
   reader.read("fit_low", parameters.fit_low);
   reader.read("fit_high", parameters.fit_high);

@@ -21,6 +21,12 @@ namespace {
 constexpr double LARGEST_TIME_STEP = 2e-3;  // [s]
 /// Force that counts as the beginning of the hit, of the peak.
 constexpr double ONSET_SHARE = 0.02;
+/// Half width of the smoothing before peaks are sought, of the frequency.
+constexpr double PEAK_SMOOTHING = 0.0015;
+/// Share of a peak's height down to which its mode is fitted.
+constexpr double HALF_POWER = 0.7071;
+/// A rise above the lowest line so far by this factor is the next peak's flank.
+constexpr double VALLEY_RISE = 1.02;
 
 struct ThreeColumns {
   std::vector<double> a, b, c;
@@ -175,6 +181,72 @@ TapFrf averageTaps(const std::vector<TapRecord>& taps, const HitLimits& limits, 
   result.measured = lines;
   result.receptance = acceleration ? receptanceFromAccelerance(lines) : lines;
   return result;
+}
+
+std::vector<ModeReading> peakModes(const FrequencyResponse& receptance, double low, double high, double share,
+                                   std::size_t most) {
+  const FrequencyResponse band = receptance.band(low, high);
+  const std::size_t n = band.size();
+  if (n < 8) throw Error("peaks: fewer than eight lines in the band");
+  const double step = (band.frequency.back() - band.frequency.front()) / static_cast<double>(n - 1);
+  // Averaged over some lines, so that a noisy line of a single hit is no peak; 0.15 % is less than a mode is
+  // wide.
+  FrequencyResponse smooth;
+  smooth.frequency = band.frequency;
+  for (std::size_t i = 0; i < n; ++i) {
+    const auto half = static_cast<std::size_t>(PEAK_SMOOTHING * band.frequency[i] / step);
+    const std::size_t first = i > half ? i - half : 0, last = std::min(n - 1, i + half);
+    double sum = 0.0;
+    for (std::size_t j = first; j <= last; ++j) sum += band.value[j].imag();
+    smooth.value.emplace_back(sum / static_cast<double>(last - first + 1));
+  }
+  std::vector<double> peaks = findPeaks(smooth, low, high, share);  // strongest first
+  if (peaks.size() > most) peaks.resize(most);
+  std::sort(peaks.begin(), peaks.end());
+  std::vector<ModeReading> rows;
+  for (const double peak : peaks) {
+    const auto at = static_cast<std::size_t>(
+        std::lower_bound(band.frequency.begin(), band.frequency.end(), peak) - band.frequency.begin());
+    const double height = std::abs(smooth.value[at].real());
+    std::size_t first = at, last = at;
+    // Down to the half-power height, but not over a valley into the next peak.
+    const auto magnitude = [&](std::size_t i) { return std::abs(smooth.value[i].real()); };
+    for (double valley = height; first > 0 && magnitude(first - 1) >= HALF_POWER * height &&
+                                 magnitude(first - 1) <= VALLEY_RISE * valley;) {
+      valley = std::min(valley, magnitude(--first));
+    }
+    for (double valley = height; last + 1 < n && magnitude(last + 1) >= HALF_POWER * height &&
+                                 magnitude(last + 1) <= VALLEY_RISE * valley;) {
+      valley = std::min(valley, magnitude(++last));
+    }
+    // A lightly damped mode is a few lines wide.
+    while (last - first < 6 && (first > 0 || last + 1 < n)) {
+      if (first > 0) --first;
+      if (last + 1 < n) ++last;
+    }
+    ModalFitOptions options;
+    options.low = band.frequency[first] - 0.1 * step;
+    options.high = band.frequency[last] + 0.1 * step;
+    options.modes = 1;
+    try {
+      const Mode mode = fitModes(band, options).model.modes.at(0);
+      // A fit that leaves its peak tells of another mode.
+      if (mode.frequency < options.low || mode.frequency > options.high) continue;
+      rows.push_back({mode, receptance.at(mode.frequency)});
+    } catch (const Error&) {
+      continue;  // no mode's shape
+    }
+  }
+  return rows;
+}
+
+bool looksDirect(const FrequencyResponse& receptance, double low, double high) {
+  double wrong = 0.0, all = 0.0;
+  for (const std::complex<double>& h : receptance.band(low, high).value) {
+    all += h.imag() * h.imag();
+    if (h.imag() > 0.0) wrong += h.imag() * h.imag();
+  }
+  return wrong < 0.02 * all;
 }
 
 std::vector<ModeReading> readModes(const ModalModel& model, const FrequencyResponse& receptance) {

@@ -64,6 +64,8 @@ struct HammerParameters {
   double strike_timeout = 3.0;    ///< [s] from the command to the hit
   int max_bad_hits = 5;           ///< [1] then it gives up
   double exponential_time = 0.0;  ///< [s] time constant of an exponential window; 0: none
+  int straighten_sensor =
+      1;  ///< [1] 1: bend the sensor's nominal curve straight over the vibration; 0: linear
   // FRF and fit.
   double frf_high = 5000.0;  ///< [Hz] lines above are not handed out
   double fit_low = 200.0;    ///< [Hz]
@@ -187,7 +189,7 @@ class HammerSequence {
 
   void start(double now);
   void orient(double now, double angle);
-  void jog(double now, const std::string& axis, double distance);
+  void jog(double now, const std::string& axis, double distance, double feed);
   void move(double now, std::vector<Waypoint> path);
   void strike(double now);
   void average(double from);

@@ -43,7 +43,11 @@ struct ImpactOptions {
   double exponential_time =
       0.0;                      ///< [s] time constant of an exponential window on force and response; 0: none
   double response_scale = 1.0;  ///< [unit of FRF x N / unit of the response] e.g. -sensitivity
-  std::string unit = "m/N";     ///< of the FRF
+  /// [V] gain of a sensor V = gain (gap0 / gap - 1): bends the response straight, v / (1 + v / (gain + V
+  /// before)), so that a strong mode's second harmonic does not show as another mode; response_scale is then
+  /// the slope at rest. 0: linear.
+  double sensor_gain = 0.0;
+  std::string unit = "m/N";  ///< of the FRF
 };
 
 /// Windows, transforms and averages hits of one point (Dunwoody eq. 4.15..4.27). Baselines before the trigger

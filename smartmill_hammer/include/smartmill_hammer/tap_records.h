@@ -49,6 +49,16 @@ struct ModeReading {
   Mode mode;
   std::complex<double> receptance;  ///< [m/N] measured, between lines interpolated
 };
+/// Modes seen one by one: a peak of |Im| of the receptance, and one mode with a constant rest fitted to the
+/// lines above its half-power height. Robust where modes are close or the model is not complete; lowest
+/// frequency first.
+/// @param share least prominence, of the largest peak @param most strongest peaks kept
+std::vector<ModeReading> peakModes(const FrequencyResponse& receptance, double low, double high, double share,
+                                   std::size_t most);
+
+/// True when Im of the receptance is negative nearly everywhere in the band: hit and response at one point.
+bool looksDirect(const FrequencyResponse& receptance, double low, double high);
+
 std::vector<ModeReading> readModes(const ModalModel& model, const FrequencyResponse& receptance);
 
 /// Columns frequency[Hz],real[..],imag[..],coherence[1],std_dev[..],fit_real[..],fit_imag[..]. @throws Error.
