@@ -1,0 +1,62 @@
+#pragma once
+
+#include <array>
+#include <complex>
+#include <functional>
+#include <limits>
+#include <vector>
+
+#include "smartmill_core/modal/modal_model.h"
+#include "smartmill_core/signal/frequency_response.h"
+
+namespace smartmill::stability {
+
+/// What regenerates: tooth count, radial engagement and the cutting stiffness per depth.
+struct RegenerativeProcess {
+  int teeth = 0;       ///< 1..20, evenly spaced
+  double entry = 0.0;  ///< [rad] immersion angle, clockwise from +y
+  double exit = 0.0;   ///< [rad] > entry
+  double kt = 0.0;     ///< [N/m2] tangential
+  double kr = 0.0;     ///< [1] radial over tangential
+  /// @throws Error naming the quantity.
+  void validate() const;
+};
+
+/// Receptances of the tool tip on one frequency grid [Hz], [m/N].
+struct ToolTipResponse {
+  std::vector<double> frequency;
+  std::vector<std::complex<double>> xx, yy;
+};
+
+/// Evaluated from modes, dense around each mode: lines from low to high [Hz].
+ToolTipResponse responseOf(const ModalModel& x, const ModalModel& y, double low, double high,
+                           std::size_t lines);
+/// From measured FRFs; y is interpolated onto the lines of x. @throws Error when a unit is not m/N or the
+/// bands do not meet.
+ToolTipResponse responseOf(const FrequencyResponse& x, const FrequencyResponse& y);
+
+/// First loss of stability over spindle speed.
+struct StabilityLimit {
+  std::vector<double> spindle_speed;      ///< [rad/s]
+  std::vector<double> depth;              ///< [m] +inf: no limit found
+  std::vector<double> chatter_frequency;  ///< [Hz] at the limit; NaN without
+};
+
+/// Mean directional coefficients a_xx, a_xy, a_yx, a_yy over a revolution times 2 pi / teeth, so that A_0 =
+/// teeth / (2 pi) x these (Dunwoody eq. 6.3..6.9, where the second a_xx is a_yy), for [x, y] vibration of the
+/// tool and forces on the tool.
+std::array<double, 4> directionalCoefficients(const RegenerativeProcess& process);
+
+/// Zero-order solution of Altintas and Budak (Dunwoody eq. 6.10..6.14): at each speed the least depth over
+/// all lobes and both eigenvalues, interpolated between the lines. @param speeds [rad/s] > 0 rising
+StabilityLimit zeroOrderLimit(const RegenerativeProcess& process, const ToolTipResponse& tool,
+                              const std::vector<double>& speeds);
+
+/// Depth below which every speed is stable in the zero-order sense [m]; +inf without a limit.
+double absoluteDepthLimit(const RegenerativeProcess& process, const ToolTipResponse& tool);
+
+/// Merritt's minimum for turning: -1 / (2 k_f min Re G) [m] for a cutting stiffness k_f [N/m2] along the
+/// receptance given; for one mode 2 k zeta (1 + zeta) / k_f. +inf when the real part is nowhere negative.
+double turningDepthLimit(const std::vector<std::complex<double>>& receptance, double cutting_stiffness);
+
+}  // namespace smartmill::stability
