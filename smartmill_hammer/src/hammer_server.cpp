@@ -44,10 +44,14 @@ HammerServer::HammerServer(ros::NodeHandle nh, const ros::NodeHandle& private_nh
   state_ = input("cnc/state");
   angle_ = input("spindle/angle");
 
-  jog_ = std::make_unique<JogClient>(nh_, "cnc/jog", false);
-  orient_ = std::make_unique<OrientClient>(nh_, "cnc/orient_spindle", false);
-  program_ = std::make_unique<ProgramClient>(nh_, "cnc/run_program", false);
-  strike_client_ = nh_.serviceClient<smartmill_msgs::Strike>("daq/strike");
+  // Not in a replay: an action client's constructor waits for the clock, and rosbag play waits for this
+  // node's subscribers before it publishes one.
+  if (node_parameters_.command_machine) {
+    jog_ = std::make_unique<JogClient>(nh_, "cnc/jog", false);
+    orient_ = std::make_unique<OrientClient>(nh_, "cnc/orient_spindle", false);
+    program_ = std::make_unique<ProgramClient>(nh_, "cnc/run_program", false);
+    strike_client_ = nh_.serviceClient<smartmill_msgs::Strike>("daq/strike");
+  }
 
   // Late subscribers get every direction; a latched topic would keep the last message only.
   frf_publisher_ = nh_.advertise<smartmill_msgs::Frf>(

@@ -310,7 +310,9 @@ void plotFrf(const std::string& csv_file, const std::string& png_file, const std
                "'fitted modes'\n",
                csv_file.c_str());
   if (coherence) {
-    std::fprintf(g, "set xlabel 'frequency [Hz]'\nset ylabel 'coherence [1]'\nset yrange [0:1.05]\n");
+    std::fprintf(g,
+                 "set xlabel 'frequency [Hz]'\nset ylabel 'coherence [1]'\nset yrange [0:1.05]\nset key "
+                 "bottom right\n");
     std::fprintf(g, "plot '%s' using 1:4 with lines lw 1.5 title 'coherence'\n", csv_file.c_str());
   }
   std::fprintf(g, "unset multiplot\n");
