@@ -1,0 +1,33 @@
+#pragma once
+
+#include "smartmill_core/model/machine_model.h"
+
+namespace smartmill::sim {
+
+/// Spindle friction and load meter: V = K (T_cut + b w + T_c) w through a first-order lag (Dunwoody
+/// eq. 3.1..3.4 and section 3.2.1).
+class SpindleDrive {
+ public:
+  /// @param time_step [s] > 0
+  SpindleDrive(const Spindle& spindle, double time_step);
+
+  /// Friction torque [N m] at a speed [rad/s]; zero below friction_zero_below.
+  double friction(double speed) const;
+
+  /// At the steady value of cutting air at a speed [rad/s].
+  void reset(double speed);
+
+  /// Load meter [V], unrounded, after one time step under a cutting torque [N m] that is constant over it:
+  /// exact.
+  double step(double cutting_torque, double speed);
+
+  /// The reading: rounded to the load meter's resolution [V].
+  double rounded(double voltage) const;
+
+ private:
+  Spindle spindle_;
+  double decay_;
+  double voltage_ = 0.0;
+};
+
+}  // namespace smartmill::sim

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "smartmill_core/campaign/campaign.h"
+#include "smartmill_core/campaign/record.h"
+#include "smartmill_core/model/machine_model.h"
+
+namespace smartmill::sim {
+
+struct SimulationOptions {
+  bool noise = true;       ///< sensor noise and rounding of the load meter
+  std::uint64_t seed = 1;  ///< of the noise and, without recorded angle, of the phase
+  int substeps = 8;        ///< integration steps a sample, >= 1
+};
+
+/// Simulates one test of a campaign: a record with the columns and sample times of the recorded one. The
+/// recorded spindle angle gives the phase (of a tap: stands as it is), the recorded hammer force drives a
+/// tap. Tool rigid, no effects.
+///
+/// Before engage_time the tool is out of cut; from there full engagement with the surface that steady cutting
+/// leaves. The sensor begins at rest, the load meter at its air-cut value.
+/// @param recorded gives columns, times, phase and hammer force
+/// @throws Error naming what the model lacks or what this twin cannot run.
+Record simulateTest(const MachineModel& model, const CampaignTest& test, const Record& recorded,
+                    const SimulationOptions& options);
+
+/// Without a record: a cut or an air cut of a duration [s] with every column that the model can give.
+Record simulateTest(const MachineModel& model, const CampaignTest& test, double duration,
+                    const SimulationOptions& options);
+
+}  // namespace smartmill::sim

@@ -1,0 +1,74 @@
+// rosrun smartmill_sim simulate MODEL CAMPAIGN -o OUT: re-creates a campaign from its model and plan.
+
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <iostream>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "smartmill_core/campaign/campaign.h"
+#include "smartmill_core/campaign/record.h"
+#include "smartmill_core/error.h"
+#include "smartmill_core/model/machine_model.h"
+#include "smartmill_sim/twin/twin.h"
+
+using namespace smartmill;
+
+namespace {
+
+using namespace smartmill;
+
+void run(const std::string& model_file, const std::string& campaign_path, const std::string& out,
+         sim::SimulationOptions options) {
+  namespace fs = std::filesystem;
+  const MachineModel model = readMachineModel(model_file);
+  Campaign campaign = readCampaign(campaign_path);
+  if (fs::exists(out) && fs::equivalent(out, campaign.folder)) {
+    throw Error(out + ": the campaign's own folder would be overwritten");
+  }
+  fs::create_directories(out);
+  for (CampaignTest& test : campaign.tests) {
+    std::fprintf(stderr, "simulating %s\n", test.name.c_str());
+    const Record record = sim::simulateTest(model, test, readRecord(campaign, test), options);
+    ++options.seed;
+    // Written as smartmill CSV whatever the recorded format was.
+    test.file_format.clear();
+    test.channels.clear();
+    const fs::path file = fs::path(out) / test.file;
+    fs::create_directories(file.parent_path());
+    writeCsv(record, file.string());
+  }
+  campaign.model_file = "model.yaml";
+  writeMachineModel(model, (fs::path(out) / "model.yaml").string());
+  writeCampaign(campaign, out);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  std::string model, campaign, out, noise = "on";
+  sim::SimulationOptions options;
+  CLI::App app{"Re-creates a campaign from a machine model and the campaign's plan."};
+  app.add_option("model", model, "machine model file")->required();
+  app.add_option("campaign", campaign, "campaign folder: plan, sample times, spindle phase, hammer forces")
+      ->required();
+  app.add_option("-o,--out", out, "folder of the new campaign")->required();
+  app.add_option("--noise", noise, "on, or off: neither noise nor rounding")
+      ->check(CLI::IsMember({"on", "off"}));
+  app.add_option("--seed", options.seed, "of the noise");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? 0 : 2;
+  }
+  options.noise = noise == "on";
+  try {
+    run(model, campaign, out, options);
+  } catch (const std::exception& e) {
+    std::cerr << "simulate: " << e.what() << "\n";
+    return 1;
+  }
+  return 0;
+}

@@ -1,0 +1,33 @@
+#include "smartmill_sim/twin/spindle_drive.h"
+
+#include <cmath>
+
+#include "smartmill_core/units.h"
+
+namespace smartmill::sim {
+
+SpindleDrive::SpindleDrive(const Spindle& spindle, double time_step)
+    : spindle_(spindle), decay_(std::exp(-units::TWO_PI * spindle.load_meter_bandwidth * time_step)) {
+}
+
+double SpindleDrive::friction(double speed) const {
+  if (speed < spindle_.friction_zero_below) return 0.0;
+  return spindle_.viscous * speed + spindle_.coulomb;
+}
+
+void SpindleDrive::reset(double speed) {
+  voltage_ = spindle_.load_meter_gain * friction(speed) * speed;
+}
+
+double SpindleDrive::step(double cutting_torque, double speed) {
+  const double steady = spindle_.load_meter_gain * (cutting_torque + friction(speed)) * speed;
+  voltage_ = steady + (voltage_ - steady) * decay_;
+  return voltage_;
+}
+
+double SpindleDrive::rounded(double voltage) const {
+  const double resolution = spindle_.load_meter_resolution;
+  return resolution > 0.0 ? std::round(voltage / resolution) * resolution : voltage;
+}
+
+}  // namespace smartmill::sim

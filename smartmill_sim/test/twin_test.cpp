@@ -1,0 +1,139 @@
+#include "smartmill_sim/twin/twin.h"
+
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <iostream>
+#include <map>
+
+#include <gtest/gtest.h>
+
+#include "smartmill_core/cutting/mechanistic.h"
+#include "smartmill_core/error.h"
+#include "smartmill_core/signal/statistics.h"
+#include "smartmill_core/units.h"
+#include "smartmill_sim/twin/spindle_drive.h"
+
+namespace smartmill::sim {
+namespace {
+
+std::string sharedFolder() {
+  const char* folder = std::getenv("SMARTMILL_SHARED");
+  return folder ? folder : SMARTMILL_SHARED_FOLDER;
+}
+
+MachineModel machine() {
+  MachineModel model;
+  model.tool = ToolGeometry{4, 19.05e-3, units::radFromDeg(30.0), {}};
+  model.cutting = CuttingCoefficients{796e6, 168e6, 222e6, 27.7e3, 30.8e3, 1.4e3};
+  Spindle spindle;
+  spindle.viscous = 3.7e-4;
+  spindle.coulomb = 0.05;
+  spindle.load_meter_gain = 3.88e-4;
+  spindle.load_meter_bandwidth = 7.0;
+  spindle.load_meter_resolution = 3e-4;
+  model.spindle = spindle;
+  return model;
+}
+
+CampaignTest slot() {
+  CampaignTest test;
+  test.name = "slot";
+  test.sample_rate = 25600.0;
+  test.spindle_speed = units::radPerSecFromRpm(6000.0);
+  test.engagement = Engagement{0.0, units::PI, 2e-3, 6e-5};
+  return test;
+}
+
+// First order: 63.2 % of a step after 1 / (2 pi f).
+TEST(SpindleDrive, loadMeterIsFirstOrder) {
+  const Spindle spindle = *machine().spindle;
+  const double step = 1e-5, speed = 500.0;
+  SpindleDrive drive(spindle, step);
+  drive.reset(speed);
+  const double air = spindle.load_meter_gain * (3.7e-4 * speed + 0.05) * speed;
+  double voltage = 0.0;
+  const int steps = static_cast<int>(std::lround(1.0 / (units::TWO_PI * 7.0) / step));
+  for (int i = 0; i < steps; ++i) voltage = drive.step(2.0, speed);
+  EXPECT_NEAR((voltage - air) / (spindle.load_meter_gain * 2.0 * speed), 1.0 - std::exp(-1.0), 1e-3);
+  EXPECT_NEAR(drive.rounded(0.10007), 0.1002, 1e-9);
+}
+
+TEST(SpindleDrive, frictionIsZeroBelowItsSpeed) {
+  Spindle spindle = *machine().spindle;
+  spindle.friction_zero_below = 209.0;
+  const SpindleDrive drive(spindle, 1e-5);
+  EXPECT_EQ(drive.friction(200.0), 0.0);
+  EXPECT_NEAR(drive.friction(1000.0), 0.42, 1e-12);
+}
+
+// Whole revolutions of a slot: mean forces and torque are the closed forms N a / 4 ..., eq. 3.19.
+TEST(Twin, meanForceOfASlotIsTheClosedForm) {
+  SimulationOptions options;
+  options.noise = false;
+  const Record record = simulateTest(machine(), slot(), 0.5, options);
+  const double n = 4, a = 2e-3, c = 6e-5;
+  EXPECT_NEAR(mean(record.column("fx")), -n * a * c * 168e6 / 4.0 - n * a * 30.8e3 / units::PI, 0.5);
+  EXPECT_NEAR(mean(record.column("fy")), n * a * c * 796e6 / 4.0 + n * a * 27.7e3 / units::PI, 0.5);
+  EXPECT_NEAR(mean(record.column("fz")), n * a * c * 222e6 / units::PI + n * a * 1.4e3 / 2.0, 0.5);
+  const double torque = 9.525e-3 * n * a * (796e6 * c / units::PI + 27.7e3 / 2.0);
+  const double speed = slot().spindle_speed;
+  const double steady = 3.88e-4 * (torque + 3.7e-4 * speed + 0.05) * speed;
+  EXPECT_NEAR(record.column("load_meter").back() / steady, 1.0,
+              2e-3);  // ripple of the tooth passing through 7 Hz
+}
+
+TEST(Twin, nothingBeforeTheEngagement) {
+  CampaignTest test = slot();
+  test.engage_time = 0.02;
+  SimulationOptions options;
+  options.noise = false;
+  const Record record = simulateTest(machine(), test, 0.05, options);
+  for (std::size_t i = 0; i < 512; ++i) ASSERT_EQ(record.column("fy")[i], 0.0);
+  EXPECT_GT(std::abs(record.column("fy")[530]), 1.0);
+}
+
+TEST(Twin, refusesWhatItCannotRun) {
+  MachineModel model = machine();
+  model.file = "model.yaml";
+  model.tool_tip.x.modes = {{1000.0, 0.03, 1e-8}};
+  EXPECT_THROW(simulateTest(model, slot(), 0.1, {}), Error);
+  model = machine();
+  model.effects.push_back({});
+  EXPECT_THROW(simulateTest(model, slot(), 0.1, {}), Error);
+  model = machine();
+  model.cutting.reset();
+  EXPECT_THROW(simulateTest(model, slot(), 0.1, {}), Error);
+}
+
+// A campaign made by another program, its model exact: what is left must be its noise, on every channel of
+// every test.
+TEST(Twin, leavesOnlyTheNoiseOfAnIndependentCampaign) {
+  const std::string folder = sharedFolder() + "/campaigns/none";
+  if (!std::filesystem::exists(folder)) {
+    std::cout << folder << " is absent, not checked\n";
+    return;
+  }
+  const Campaign campaign = readCampaign(folder);
+  const MachineModel model = readMachineModel(campaign.modelPath());
+  // Noise RMS that the campaign states: 1 N, and 0.22 mV with the rounding.
+  const std::map<std::string, double> noise{{"fx", 1.0}, {"fy", 1.0}, {"fz", 1.0}, {"load_meter", 2.2e-4}};
+  SimulationOptions options;
+  options.noise = false;
+  std::size_t checked = 0;
+  for (const CampaignTest& test : campaign.tests) {
+    const Record measured = readRecord(campaign, test);
+    const Record simulated = simulateTest(model, test, measured, options);
+    for (const auto& [channel, rms_noise] : noise) {
+      if (!measured.has(channel)) continue;
+      std::vector<double> left = measured.column(channel);
+      for (std::size_t i = 0; i < left.size(); ++i) left[i] -= simulated.column(channel)[i];
+      EXPECT_LE(rms(left) / rms_noise, 1.05) << test.name << " " << channel;
+      ++checked;
+    }
+  }
+  EXPECT_EQ(checked, 21u * 3u + 18u);
+}
+
+}  // namespace
+}  // namespace smartmill::sim
