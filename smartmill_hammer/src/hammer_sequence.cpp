@@ -102,19 +102,26 @@ void HammerParameters::validate() const {
   need(max_modes >= 1 && max_modes <= 20, "max_modes", max_modes, "1..20");
 }
 
-std::string moveProgram(const std::vector<Waypoint>& path) {
-  std::string text = "G90\n";
-  char line[120];
+std::string moveProgram(const Axes3& from, const std::vector<Waypoint>& path) {
+  std::string text = "G91\n";
+  Axes3 at = from;
   for (const Waypoint& w : path) {
-    const double x = w.position[0] / units::MM, y = w.position[1] / units::MM, z = w.position[2] / units::MM;
-    if (w.feed > 0.0) {
-      std::snprintf(line, sizeof line, "G1 X%.4f Y%.4f Z%.4f F%.1f\n", x, y, z, w.feed / units::MM * 60.0);
-    } else {
-      std::snprintf(line, sizeof line, "G0 X%.4f Y%.4f Z%.4f\n", x, y, z);
+    std::string block = w.feed > 0.0 ? "G1" : "G0";
+    bool moves = false;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const double distance = (w.position[i] - at[i]) / units::MM;
+      if (std::abs(distance) < 0.5e-4) continue;
+      char word[40];
+      std::snprintf(word, sizeof word, " %c%.4f", "XYZ"[i], distance);
+      block += word;
+      moves = true;
     }
-    text += line;
+    at = w.position;
+    if (!moves) continue;
+    if (w.feed > 0.0) block += format(" F%.1f", w.feed / units::MM * 60.0);
+    text += block + "\n";
   }
-  return text;
+  return text + "G90\n";
 }
 
 HammerSequence::HammerSequence(const HammerParameters& parameters, const MachineModel& model)
@@ -253,11 +260,18 @@ void HammerSequence::jog(double now, const std::string& axis, double distance, d
   send(std::move(c), Wait::position, parameters_.motion_timeout);
 }
 
-void HammerSequence::move(double now, std::vector<Waypoint> path) {
+void HammerSequence::move(double now, const Axes3& from, std::vector<Waypoint> path) {
   Command c;
   c.kind = Command::Kind::move;
   c.stamp = now;
-  target_ = path.back().position;
+  c.from = from;
+  // In steps that the controller can command.
+  Axes3 at = from;
+  for (Waypoint& w : path) {
+    for (std::size_t i = 0; i < 3; ++i) at[i] += roundTo(w.position[i] - at[i], parameters_.resolution);
+    w.position = at;
+  }
+  target_ = at;
   target_tolerance_ = parameters_.position_tolerance;
   c.path = std::move(path);
   send(std::move(c), Wait::position, parameters_.motion_timeout);
@@ -285,7 +299,7 @@ bool HammerSequence::late(double now) {
   if (stage_ == Stage::idle || wait_ == Wait::rest || now <= deadline_) return false;
   if (stage_ == Stage::check) {
     result_.code = FrfCode::motion_failed;
-    result_.message = "no controller state has come";
+    result_.message = state_ ? "the axes are moving" : "no controller state has come";
     finish();
     return true;
   }
@@ -352,7 +366,8 @@ void HammerSequence::handle(const CncState& state) {
   const std::string trouble = unsafe(state);
   if (!trouble.empty()) return abort(now, FrfCode::motion_failed, trouble);
   if (stage_ == Stage::check) {
-    if (now >= goal_.stamp) start(now);
+    if (now >= goal_.stamp && !state.motion) return start(now);
+    late(now);
     return;
   }
   Axes3 position{};
@@ -465,10 +480,11 @@ void HammerSequence::reached(double now) {
       up[2] = above[2];
       beside[2] = station[2];
       at_station_ = true;
-      return move(now, {{up, 0.0},
-                        {above, 0.0},
-                        {beside, parameters_.approach_feed},
-                        {station, parameters_.approach_feed}});
+      return move(now, here,
+                  {{up, 0.0},
+                   {above, 0.0},
+                   {beside, parameters_.approach_feed},
+                   {station, parameters_.approach_feed}});
     }
     case Stage::to_station:
       stage_ = Stage::search_low;
@@ -703,13 +719,12 @@ void HammerSequence::retract(double now) {
   double to_go = 0.0;
   readPosition(*state_, here, to_go);
   const auto d = static_cast<std::size_t>(direction_);
-  for (double& v : here) v = roundTo(v, parameters_.resolution);
   Axes3 beside = here;
   // Away from the sensor only, never towards it.
   beside[d] = roundTo(std::min(here[d], stationPosition()[d] - parameters_.standoff), parameters_.resolution);
   Axes3 up = beside;
   up[2] = std::max(here[2], safeHeight());
-  move(now, {{beside, parameters_.approach_feed}, {up, 0.0}});
+  move(now, here, {{beside, parameters_.approach_feed}, {up, 0.0}});
 }
 
 void HammerSequence::finish() {

@@ -275,7 +275,7 @@ void HammerServer::pump() {
     smartmill_msgs::RunProgramGoal goal;
     goal.header.stamp = fromSec(command.stamp);
     goal.name = "hammer station";
-    goal.program = moveProgram(command.path);
+    goal.program = moveProgram(command.from, command.path);
     goal.condition.kind = smartmill_msgs::CuttingCondition::NONE;
     sendGoal<smartmill_msgs::RunProgramResult>(*program_, "cnc/run_program", goal);
   }

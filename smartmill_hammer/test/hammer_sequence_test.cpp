@@ -402,9 +402,10 @@ TEST(HammerParameters, NameWhatIsOutOfRange) {
   }
 }
 
-TEST(MoveProgram, IsAbsoluteInMillimetres) {
-  EXPECT_EQ(moveProgram({{{0.3, 0.1, 0.15}, 0.0}, {{0.295, 0.1, 0.05}, 0.01}}),
-            "G90\nG0 X300.0000 Y100.0000 Z150.0000\nG1 X295.0000 Y100.0000 Z50.0000 F600.0\n");
+TEST(MoveProgram, IsIncrementalInMillimetres) {
+  EXPECT_EQ(moveProgram({0.2, 0.1, 0.1},
+                        {{{0.2, 0.1, 0.15}, 0.0}, {{0.295, 0.1, 0.05}, 0.01}, {{0.295, 0.1, 0.05}, 0.01}}),
+            "G91\nG0 Z50.0000\nG1 X95.0000 Z-100.0000 F600.0\nG90\n");
 }
 
 }  // namespace

@@ -1,7 +1,6 @@
 // The closed-form machine as a ROS node, in the place of the CNC bridge and the sensors' driver, for the
 // wiring test.
 
-#include <cstdio>
 #include <optional>
 #include <sstream>
 #include <string>
@@ -23,15 +22,25 @@ namespace smartmill {
 namespace hammer {
 namespace {
 
-std::vector<Waypoint> parse(const std::string& program) {
+/// Incremental G0 and G1 blocks from a position.
+std::vector<Waypoint> parse(const std::string& program, Axes3 at) {
   std::vector<Waypoint> path;
   std::istringstream lines(program);
   for (std::string line; std::getline(lines, line);) {
-    double x = 0.0, y = 0.0, z = 0.0, f = 0.0;
-    int g = 0;
-    if (std::sscanf(line.c_str(), "G%d X%lf Y%lf Z%lf F%lf", &g, &x, &y, &z, &f) >= 4) {
-      path.push_back({{x * units::MM, y * units::MM, z * units::MM}, g == 1 ? f * units::MM / 60.0 : 0.0});
+    std::istringstream words(line);
+    std::string code;
+    words >> code;
+    if (code != "G0" && code != "G1") continue;
+    double feed = 0.0;
+    for (std::string word; words >> word;) {
+      const double value = std::stod(word.substr(1));
+      if (word[0] == 'F') {
+        feed = value * units::MM / 60.0;
+      } else {
+        at[static_cast<std::size_t>(word[0] - 'X')] += value * units::MM;
+      }
     }
+    path.push_back({at, feed});
   }
   return path;
 }
@@ -95,10 +104,10 @@ void run() {
         return c;
       });
   Motion<smartmill_msgs::RunProgramAction, smartmill_msgs::RunProgramResult> program(
-      nh, "cnc/run_program", machine, [](const smartmill_msgs::RunProgramGoalConstPtr& goal) {
+      nh, "cnc/run_program", machine, [&machine](const smartmill_msgs::RunProgramGoalConstPtr& goal) {
         Command c;
         c.kind = Command::Kind::move;
-        c.path = parse(goal->program);
+        c.path = parse(goal->program, machine.position);
         return c;
       });
   boost::function<bool(smartmill_msgs::Strike::Request&, smartmill_msgs::Strike::Response&)> strike =

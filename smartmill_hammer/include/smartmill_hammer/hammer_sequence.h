@@ -123,12 +123,14 @@ struct Command {
   std::string axis;            ///< jog: x, y or z
   double distance = 0.0;       ///< [m] jog
   double feed = 0.0;           ///< [m/s] jog
+  Axes3 from{{0, 0, 0}};       ///< [m] move: machine position from which the path leads
   std::vector<Waypoint> path;  ///< move
   std::string direction;       ///< strike
 };
 
-/// NC text of a move: absolute, one block a waypoint, mm and mm/min.
-std::string moveProgram(const std::vector<Waypoint>& path);
+/// NC text of a move, mm and mm/min, one block a waypoint. Incremental: machine positions need no knowledge
+/// of the work offset.
+std::string moveProgram(const Axes3& from, const std::vector<Waypoint>& path);
 
 struct Feedback {
   std::string stage;
@@ -190,7 +192,7 @@ class HammerSequence {
   void start(double now);
   void orient(double now, double angle);
   void jog(double now, const std::string& axis, double distance, double feed);
-  void move(double now, std::vector<Waypoint> path);
+  void move(double now, const Axes3& from, std::vector<Waypoint> path);
   void strike(double now);
   void average(double from);
   void send(Command command, Wait wait, double timeout);
