@@ -1,0 +1,57 @@
+// rosrun smartmill_discrepancy gap CAMPAIGN: how far measurement and twin are apart, test by test.
+
+#include <algorithm>
+#include <cstdio>
+#include <exception>
+#include <iostream>
+#include <map>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "smartmill_discrepancy/gap.h"
+
+namespace {
+
+void run(const std::string& folder, const std::string& model_file) {
+  using namespace smartmill;
+  const Campaign campaign = readCampaign(folder);
+  const MachineModel model = readMachineModel(model_file.empty() ? campaign.modelPath() : model_file);
+  const discrepancy::CampaignGap gap = discrepancy::campaignGap(campaign, model, [](const std::string& test) {
+    std::fprintf(stderr, "simulating %s\n", test.c_str());
+  });
+  std::map<std::string, double> largest;
+  std::printf("%-24s %-12s %8s %14s\n", "test", "channel", "gap", "residual rms");
+  for (const auto& row : gap.channels) {
+    std::printf("%-24s %-12s %8.3f %14.4g\n", row.test.c_str(), row.channel.c_str(), row.gap,
+                row.residual_rms);
+    largest[row.channel] = std::max(largest[row.channel], row.gap);
+  }
+  for (const auto& [channel, value] : largest) {
+    std::printf("largest %-12s %8.3f (noise %.4g)\n", channel.c_str(), value, gap.noise.at(channel));
+  }
+  std::printf("overall gap %.4f\n", gap.overall);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  std::string campaign, model;
+  CLI::App app{
+      "Gap between a campaign's records and the twin: RMS of the difference over the noise; 1 is the noise "
+      "floor."};
+  app.add_option("campaign", campaign, "campaign folder")->required();
+  app.add_option("--model", model, "machine model file (default: the campaign's)");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? 0 : 2;
+  }
+  try {
+    run(campaign, model);
+  } catch (const std::exception& e) {
+    std::cerr << "gap: " << e.what() << "\n";
+    return 1;
+  }
+  return 0;
+}
