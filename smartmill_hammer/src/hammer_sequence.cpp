@@ -532,7 +532,8 @@ void HammerSequence::measured(double now, double volt, double volt_std) {
       o.gain_volt = station_.gain_volt;
       o.gap_at_zero_volt = station_.gap_at_zero_volt;
       o.min_gap = parameters_.min_gap_share * station_.gap_at_zero_volt;
-      o.max_travel = parameters_.max_approach;
+      // The flute faces the hammer, so the sensor may look between two flutes.
+      o.max_travel = parameters_.max_approach + station_.flute_depth;
       calibration_.emplace(o);
       calibration_->start(volt, volt_std);
     } else {

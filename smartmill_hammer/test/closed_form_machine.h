@@ -77,6 +77,7 @@ class ClosedFormMachine {
     h.offset = 15e-3;
     h.gap_at_zero_volt = 250e-6;
     h.gain_volt = h.range_volt = 10.0;
+    h.flute_depth = 1e-3;
     h.position["x"] = {0.3, 0.1, 0.05};
     h.position["y"] = {0.25, 0.2, 0.05};
     model.hammer = h;

@@ -124,6 +124,7 @@ TEST(HammerSequence, TurnsAFluteToTheHammerForAnyCutter) {
     machine.model.tool->diameter = (8.0 + 17.0 * uniform(random)) * 1e-3;
     machine.model.tool->helix = units::radFromDeg(45.0 * uniform(random));
     machine.model.stickout = 60e-3;
+    machine.model.hammer->flute_depth = 1.5e-3;
     machine.mounting = units::TWO_PI * uniform(random);
     machine.profile =
         FluteProfile::even(teeth, (0.5 + uniform(random)) * 1e-3, (0.15 + 0.1 * uniform(random)) * pitch,

@@ -53,7 +53,7 @@ struct HammerParameters {
       10.0e-6;  ///< [m] half width of the symmetric sensitivity measurement; 0: the thesis's way
   double position_std = 0.1e-6;  ///< [m] of a distance moved
   double min_gap_share = 0.4;    ///< [1] of gap_at_zero_volt: no nearer
-  double max_approach = 3.0e-3;  ///< [m]
+  double max_approach = 1.0e-3;  ///< [m] beyond the depth between two flutes
   // Hits.
   double trigger_force = 10.0;    ///< [N]
   double weak_force = 20.0;       ///< [N]
