@@ -10,7 +10,8 @@ namespace {
 
 void requireLength(const char* field, std::size_t length, std::size_t due) {
   if (length != due) {
-    throw Error(std::string(field) + ": " + std::to_string(length) + " values where " + std::to_string(due) + " are due");
+    throw Error(std::string(field) + ": " + std::to_string(length) + " values where " + std::to_string(due) +
+                " are due");
   }
 }
 
@@ -20,7 +21,9 @@ void requireRate(double rate) {
   }
 }
 
-std::array<double, 3> fromPoint(const geometry_msgs::Point& p) { return {p.x, p.y, p.z}; }
+std::array<double, 3> fromPoint(const geometry_msgs::Point& p) {
+  return {p.x, p.y, p.z};
+}
 
 geometry_msgs::Point toPoint(const std::array<double, 3>& p) {
   geometry_msgs::Point point;
@@ -37,7 +40,9 @@ std::vector<double> orUnknown(const std::vector<double>& values, std::size_t siz
 
 }  // namespace
 
-double toSec(const ros::Time& stamp) { return stamp.toSec(); }
+double toSec(const ros::Time& stamp) {
+  return stamp.toSec();
+}
 
 ros::Time fromSec(double stamp) {
   if (!std::isfinite(stamp) || stamp < 0.0 || stamp > 4294967295.0) {
@@ -150,7 +155,8 @@ smartmill_msgs::LoadSample toMsg(const LoadSample& load) {
 }
 
 CuttingCondition fromMsg(const smartmill_msgs::CuttingCondition& m) {
-  if (m.kind > smartmill_msgs::CuttingCondition::CUT) throw Error("kind: " + std::to_string(m.kind) + " is no condition");
+  if (m.kind > smartmill_msgs::CuttingCondition::CUT)
+    throw Error("kind: " + std::to_string(m.kind) + " is no condition");
   CuttingCondition c;
   c.stamp = toSec(m.header.stamp);
   c.kind = static_cast<CuttingCondition::Kind>(m.kind);
@@ -191,7 +197,8 @@ ForceBlock fromMsg(const smartmill_msgs::ForceBlock& m) {
   requireRate(m.sample_rate);
   requireLength("fy", m.fy.size(), m.fx.size());
   requireLength("fz", m.fz.size(), m.fx.size());
-  if (m.status > smartmill_msgs::ForceBlock::SETTLING) throw Error("status: " + std::to_string(m.status) + " is unknown");
+  if (m.status > smartmill_msgs::ForceBlock::SETTLING)
+    throw Error("status: " + std::to_string(m.status) + " is unknown");
   ForceBlock block;
   block.stamp = toSec(m.header.stamp);
   block.sample_rate = m.sample_rate;
@@ -263,8 +270,8 @@ MeasuredModes fromMsg(const smartmill_msgs::ModalModel& m) {
   measured.model.direct = m.direct;
   measured.model.direct_std = m.direct_std;
   for (const smartmill_msgs::Mode& mode : m.modes) {
-    measured.model.modes.push_back(
-        {mode.frequency, mode.damping_ratio, mode.gain, mode.frequency_std, mode.damping_ratio_std, mode.gain_std});
+    measured.model.modes.push_back({mode.frequency, mode.damping_ratio, mode.gain, mode.frequency_std,
+                                    mode.damping_ratio_std, mode.gain_std});
   }
   return measured;
 }

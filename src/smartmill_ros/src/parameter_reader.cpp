@@ -25,8 +25,10 @@ XmlRpcValue typed(const YAML::Node& node) {
   static const std::regex INTEGER("[-+]?(0|[1-9][0-9]*)");
   static const std::regex NUMBER("[-+]?([0-9]+\\.[0-9]*|\\.[0-9]+)([eE][-+][0-9]+)?");
   static const std::regex SPECIAL("[-+]?\\.(inf|Inf|INF)|\\.(nan|NaN|NAN)");
-  if (text == "true" || text == "True" || text == "TRUE" || text == "yes" || text == "on") return XmlRpcValue(true);
-  if (text == "false" || text == "False" || text == "FALSE" || text == "no" || text == "off") return XmlRpcValue(false);
+  if (text == "true" || text == "True" || text == "TRUE" || text == "yes" || text == "on")
+    return XmlRpcValue(true);
+  if (text == "false" || text == "False" || text == "FALSE" || text == "no" || text == "off")
+    return XmlRpcValue(false);
   if (std::regex_match(text, INTEGER)) {
     try {
       return XmlRpcValue(std::stoi(text));
@@ -64,7 +66,8 @@ double number(const std::string& name, XmlRpcValue value) {
     result = static_cast<double>(value);
   } else {
     std::string hint;
-    if (value.getType() == XmlRpcValue::TypeString) hint = " (in YAML an exponent needs dot and sign: 1.0e-2)";
+    if (value.getType() == XmlRpcValue::TypeString)
+      hint = " (in YAML an exponent needs dot and sign: 1.0e-2)";
     throw Error("parameter " + name + ": " + describe(value) + ", a number is due" + hint);
   }
   if (!std::isfinite(result)) throw Error("parameter " + name + ": not a finite number");
@@ -93,7 +96,8 @@ ParameterReader ParameterReader::fromFile(const std::string& file) {
     for (const auto& entry : root) {
       const std::string key = entry.first.as<std::string>();
       if (entry.second.IsMap() || entry.second.IsNull()) throw Error(file + ": " + key + ": a value is due");
-      if (!reader.values_.emplace(key, typed(entry.second)).second) throw Error(file + ": " + key + " stands twice");
+      if (!reader.values_.emplace(key, typed(entry.second)).second)
+        throw Error(file + ": " + key + " stands twice");
     }
   } catch (const YAML::BadFile&) {
     throw Error(file + ": cannot be read");
@@ -159,7 +163,8 @@ void ParameterReader::read(const std::string& key, std::vector<double>& value) {
 
 void ParameterReader::finish() const {
   for (const auto& entry : values_) {
-    if (read_.find(entry.first) == read_.end()) throw Error("parameter " + prefix_ + entry.first + " is unknown");
+    if (read_.find(entry.first) == read_.end())
+      throw Error("parameter " + prefix_ + entry.first + " is unknown");
   }
 }
 

@@ -12,20 +12,23 @@
 
 namespace smartmill {
 
-/// Hands the messages of a recorded bag to handlers, in the order in which they were received, without a ROS master.
+/// Hands the messages of a recorded bag to handlers, in the order in which they were received, without a ROS
+/// master.
 class BagReader {
  public:
   /// @throws Error of one line naming the file: missing, truncated, not indexed, no bag.
   explicit BagReader(const std::string& path);
 
-  /// @param topic relative to /smartmill, or absolute. The handler gets the message and the time of its reception [s].
+  /// @param topic relative to /smartmill, or absolute. The handler gets the message and the time of its
+  /// reception [s].
   template <class Message>
   void on(const std::string& topic, std::function<void(const Message&, double)> handler) {
     const std::string name = absolute(topic);
     handlers_[name] = [this, name, handler](const rosbag::MessageInstance& instance) {
       const boost::shared_ptr<Message> message = instance.instantiate<Message>();
       if (!message) {
-        throw Error(path_ + ": topic " + name + " holds " + instance.getDataType() + " where another type is due");
+        throw Error(path_ + ": topic " + name + " holds " + instance.getDataType() +
+                    " where another type is due");
       }
       handler(*message, instance.getTime().toSec());
     };
@@ -33,7 +36,8 @@ class BagReader {
 
   bool has(const std::string& topic) const;
 
-  /// @param progress called now and then with the share done, 0..1. @throws Error when the bag ends too early.
+  /// @param progress called now and then with the share done, 0..1. @throws Error when the bag ends too
+  /// early.
   void run(const std::function<void(double)>& progress = {});
 
   double duration() const;  ///< [s] first to last message

@@ -18,14 +18,14 @@
 
 namespace smartmill {
 
-/// Seconds of a message stamp. A double near 1.8e9 s resolves 0.24 us: the same message gives the same double wherever
-/// it is read, and fromSec(toSec(t)) is stable from the first conversion on.
+/// Seconds of a message stamp. A double near 1.8e9 s resolves 0.24 us: the same message gives the same double
+/// wherever it is read, and fromSec(toSec(t)) is stable from the first conversion on.
 double toSec(const ros::Time& stamp);
 /// Nearest nanosecond. @throws Error when not finite or negative.
 ros::Time fromSec(double stamp);
 
-// Both ways without loss. fromMsg throws Error naming the field when the content contradicts itself (sample count, rate,
-// unequal lengths, unknown enumerators); NaN samples pass, the estimators decide about them.
+// Both ways without loss. fromMsg throws Error naming the field when the content contradicts itself (sample
+// count, rate, unequal lengths, unknown enumerators); NaN samples pass, the estimators decide about them.
 SampleBlock fromMsg(const smartmill_msgs::SampleBlock& message);
 smartmill_msgs::SampleBlock toMsg(const SampleBlock& block, const std::string& frame_id = "");
 SpindleAngle fromMsg(const smartmill_msgs::SpindleAngle& message);

@@ -14,8 +14,8 @@ constexpr const char* TABLE = "table";
 constexpr const char* DYNAMOMETER = "dynamometer";
 constexpr const char* HAMMER = "hammer";
 
-/// Row-major rotation matrix of a unit quaternion: v_target = R v_source for the rotation part of a tf2 transform
-/// from source to target. @throws Error when the quaternion is not of unit length.
+/// Row-major rotation matrix of a unit quaternion: v_target = R v_source for the rotation part of a tf2
+/// transform from source to target. @throws Error when the quaternion is not of unit length.
 std::array<double, 9> rotationMatrix(const geometry_msgs::Quaternion& q);
 
 /// Rotates a vector (unit kept) by a row-major matrix.

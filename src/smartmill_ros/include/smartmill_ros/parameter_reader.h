@@ -10,8 +10,9 @@
 
 namespace smartmill {
 
-/// Strict reading of a node's parameters: a wrong type or an unknown key is refused with one line, never silently replaced by a
-/// default. The same rules for the parameter server and for a YAML file that an offline tool reads.
+/// Strict reading of a node's parameters: a wrong type or an unknown key is refused with one line, never
+/// silently replaced by a default. The same rules for the parameter server and for a YAML file that an
+/// offline tool reads.
 class ParameterReader {
  public:
   /// All parameters below a private node handle. @throws Error when the namespace holds no table.
@@ -19,7 +20,8 @@ class ParameterReader {
   /// A flat YAML table; scalars get the types roslaunch would give them (`1e-2` is a string). @throws Error.
   static ParameterReader fromFile(const std::string& file);
 
-  /// Reads a parameter when it is there, else leaves value as it is. An int serves where a double is due, not the reverse.
+  /// Reads a parameter when it is there, else leaves value as it is. An int serves where a double is due, not
+  /// the reverse.
   /// @throws Error naming the parameter and its value: wrong type, NaN or infinite number.
   void read(const std::string& key, double& value);
   void read(const std::string& key, int& value);
