@@ -1,0 +1,108 @@
+#pragma once
+
+#include <array>
+#include <deque>
+#include <functional>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "smartmill_core/signal/stream_sorter.h"
+#include "smartmill_core/signal/streams.h"
+
+namespace smartmill::stability {
+
+struct ChatterParameters {
+  int revolutions =
+      16;  ///< [1] 4..200, length of the window: longer tells nearer frequencies from the harmonics
+  int hop_revolutions = 8;        ///< [1] 1..revolutions, between two verdicts
+  double energy_ratio = 0.1;      ///< [1] 0 < value < 1, chatter above
+  double least_severity = 5.0;    ///< [N] >= 0, and above this force outside the harmonics
+  double path_tolerance = 1e-3;   ///< [m] > 0, distance of the tool from the steady part of the cut
+  double settle_revolutions = 4;  ///< [1] >= 0, dropped after the tool came into full engagement
+  double maximum_gap = 0.2;       ///< [s] > 0, longer without controller state or angle: not steady
+
+  /// @throws Error naming key and value.
+  void validate() const;
+};
+
+/// Verdict on one window (topic chatter/state).
+struct ChatterState {
+  double stamp = 0.0;  ///< [s] end of the window
+  std::string condition;
+  bool valid = false;
+  bool chatter = false;
+  double frequency = std::numeric_limits<double>::quiet_NaN();  ///< [Hz]
+  double energy_ratio = 0.0;  ///< [1] outside the spindle's harmonics over all, without the mean
+  double severity = 0.0;      ///< [N] root mean square outside the harmonics, all axes together
+};
+
+/// Tells chatter from forced vibration in the compensated force: what repeats every revolution (teeth,
+/// runout) is the mean over the window's revolutions at each angle; what is left is chatter or noise. A flip
+/// (period-two) lobe of an even number of teeth lies on spindle harmonics and cannot be seen this way. Inputs
+/// in stamp order; results follow from them alone.
+class ChatterDetector {
+ public:
+  using Output = std::function<void(const ChatterState&)>;
+
+  /// @throws Error as ChatterParameters::validate().
+  ChatterDetector(const ChatterParameters& parameters, Output output);
+
+  void handle(const CuttingCondition& condition);
+  void handle(const CncState& state);
+  void handle(const SpindleAngle& angle);
+  void handle(const ForceBlock& block);
+  void reset();
+
+ private:
+  struct Sample {
+    double time;
+    std::array<double, 3> force;
+  };
+  struct Angle {
+    double time, turned;  // [s], [rad] counted on over full turns
+  };
+  void dropWindow();
+  void notSteady(double stamp);
+  void evaluate();
+  double angleAt(double time) const;
+  double timeAt(double turned) const;
+  void judge(double from, double to);
+
+  ChatterParameters parameters_;
+  Output output_;
+  std::optional<CuttingCondition> condition_;
+  std::deque<Sample> samples_;
+  std::deque<Angle> angles_;
+  std::optional<double> steady_since_, steady_until_;  // [s]
+  std::optional<double> window_start_;                 // [rad] turned
+  double last_state_ = 0.0;
+  std::uint64_t next_index_ = 0;
+  bool said_invalid_ = false;
+};
+
+/// A detector behind a StreamSorter: what node and offline tool both use.
+class SortedDetection {
+ public:
+  /// @param hold_back [s], see StreamSorter.
+  SortedDetection(const ChatterParameters& parameters, double hold_back, ChatterDetector::Output output);
+
+  void push(const CuttingCondition& condition);
+  void push(const CncState& state);
+  void push(const SpindleAngle& angle);
+  void push(const ForceBlock& block);
+  void flush() { sorter_.flush(); }  ///< end of data
+  std::string waitingFor() const { return sorter_.waitingFor(); }
+  std::size_t late() const { return sorter_.late(); }
+
+ private:
+  void watch(double stamp);
+
+  ChatterDetector detector_;
+  StreamSorter sorter_;
+  StreamSorter::Stream conditions_, states_, angles_, blocks_;
+  double newest_ = 0.0;
+};
+
+}  // namespace smartmill::stability

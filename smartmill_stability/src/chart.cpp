@@ -1,0 +1,264 @@
+#include "smartmill_stability/chart.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include "smartmill_core/cutting/mechanistic.h"
+#include "smartmill_core/error.h"
+#include "smartmill_core/units.h"
+
+namespace smartmill::stability {
+namespace {
+
+constexpr double NO_LIMIT = std::numeric_limits<double>::infinity();
+/// Points nearer than this share of their speed belong to one pocket or valley.
+constexpr double SAME_POCKET = 0.03;
+/// A point for a check must lie at least so far above the limit, else its outcome would say nothing.
+constexpr double CLEARLY_UNSTABLE = 1.5;
+
+void bound(bool good, const char* key, double value, const char* range) {
+  if (!good || !std::isfinite(value)) {
+    throw Error(std::string(key) + ": " + std::to_string(value) + " is out of range (" + range + ")");
+  }
+}
+
+/// Worst value over the speeds within the margin on both sides.
+double around(const StabilityLimit& limit, std::size_t k, double margin,
+              const std::function<bool(double, double)>& worse) {
+  double worst = limit.depth[k];
+  const double speed = limit.spindle_speed[k];
+  for (std::size_t j = k; j-- > 0 && limit.spindle_speed[j] >= speed * (1.0 - margin);) {
+    if (worse(limit.depth[j], worst)) worst = limit.depth[j];
+  }
+  for (std::size_t j = k + 1; j < limit.depth.size() && limit.spindle_speed[j] <= speed * (1.0 + margin);
+       ++j) {
+    if (worse(limit.depth[j], worst)) worst = limit.depth[j];
+  }
+  return worst;
+}
+
+/// The first points in the given order, one a pocket.
+std::vector<ChartPoint> pick(std::vector<ChartPoint> points, int count,
+                             const std::function<bool(const ChartPoint&, const ChartPoint&)>& better) {
+  std::stable_sort(points.begin(), points.end(), better);
+  std::vector<ChartPoint> chosen;
+  for (const ChartPoint& point : points) {
+    if (static_cast<int>(chosen.size()) >= count) break;
+    const bool near = std::any_of(chosen.begin(), chosen.end(), [&](const ChartPoint& other) {
+      return std::abs(point.spindle_speed / other.spindle_speed - 1.0) < SAME_POCKET;
+    });
+    if (!near) chosen.push_back(point);
+  }
+  return chosen;
+}
+
+}  // namespace
+
+void ChartParameters::validate() const {
+  bound(entry >= 0.0 && entry < units::TWO_PI, "entry_angle", entry, "0 <= value < 2 pi rad");
+  bound(exit > entry && exit <= units::TWO_PI, "exit_angle", exit, "entry_angle < value <= 2 pi rad");
+  bound(feed_per_tooth > 0.0, "feed_per_tooth", feed_per_tooth, "> 0 m");
+  bound(kr >= 0.0, "kr", kr, ">= 0");
+  bound(speed_low > 0.0, "speed_low", speed_low, "> 0 rad/s");
+  bound(speed_high == 0.0 || speed_high > speed_low, "speed_high", speed_high, "above speed_low, or 0");
+  bound(speeds >= 2 && speeds <= 100000, "speeds", speeds, "2..100000");
+  bound(frequency_low >= 0.0, "frequency_low", frequency_low, ">= 0 Hz");
+  bound(frequency_high > frequency_low, "frequency_high", frequency_high, "above frequency_low");
+  bound(max_depth > 0.0, "max_depth", max_depth, "> 0 m");
+  bound(depth_margin >= 0.0 && depth_margin < 1.0, "depth_margin", depth_margin, "0 <= value < 1");
+  bound(speed_margin >= 0.0 && speed_margin < 0.2, "speed_margin", speed_margin, "0 <= value < 0.2");
+  bound(load_share > 0.0 && load_share <= 1.0, "load_share", load_share, "0 < value <= 1");
+  bound(recommended >= 0 && recommended <= 100, "recommended", recommended, "0..100");
+  bound(unstable_factor >= CLEARLY_UNSTABLE && unstable_factor <= 5.0, "unstable_factor", unstable_factor,
+        "1.5..5");
+  bound(unstable >= 0 && unstable <= 100, "unstable", unstable, "0..100");
+}
+
+struct ChartMaker::Basis {
+  RegenerativeProcess process;
+  ToolTipResponse response;
+};
+
+ChartMaker::ChartMaker(const ChartParameters& parameters, const MachineModel& model)
+    : parameters_(parameters), tool_geometry_(model.needTool("predict stability")) {
+  if (model.spindle) spindle_ = *model.spindle;
+  if (parameters_.speed_high == 0.0 && spindle_.max_speed) parameters_.speed_high = *spindle_.max_speed;
+  parameters_.validate();
+  if (parameters_.speed_high == 0.0) {
+    throw Error("speed_high: 0 takes the spindle's highest speed, which " + model.file + " does not state");
+  }
+}
+
+void ChartMaker::use(const std::string& tool, double stamp) {
+  if (tool != tool_) {
+    frfs_.clear();
+    modes_.clear();
+    tool_ = tool;
+  }
+  stamp_ = std::max(stamp_, stamp);
+}
+
+void ChartMaker::handle(const MeasuredFrf& frf) {
+  if (frf.point != POINT_TOOL_TIP) return;
+  use(frf.tool, frf.stamp);
+  frfs_[frf.direction] = frf;
+}
+
+void ChartMaker::handle(const MeasuredModes& modes) {
+  if (modes.point != POINT_TOOL_TIP) return;
+  use(modes.tool, modes.stamp);
+  modes_[modes.direction] = modes;
+}
+
+void ChartMaker::handle(const CoefficientSet& coefficients) {
+  stamp_ = std::max(stamp_, coefficients.stamp);
+  coefficients_ = coefficients;
+}
+
+std::string ChartMaker::missing() const {
+  std::string list;
+  const auto need = [&](bool there, const std::string& what) {
+    if (!there) list += (list.empty() ? "" : ", ") + what;
+  };
+  for (const std::string direction : {"x", "y"}) {
+    if (parameters_.use_modes) {
+      need(modes_.count(direction) > 0, "modes in " + direction);
+    } else {
+      need(frfs_.count(direction) > 0, "FRF in " + direction);
+    }
+  }
+  need(coefficients_ && coefficients_->value.ktc > 0.0, "tangential coefficient");
+  return list;
+}
+
+ChartMaker::Basis ChartMaker::basis() const {
+  const std::string lacking = missing();
+  if (!lacking.empty()) throw Error("no chart yet, missing: " + lacking);
+  Basis basis;
+  const CuttingCoefficients& cutting = coefficients_->value;
+  basis.process.teeth = tool_geometry_.teeth;
+  basis.process.entry = parameters_.entry;
+  basis.process.exit = parameters_.exit;
+  basis.process.kt = cutting.ktc;
+  basis.process.kr = std::isfinite(cutting.krc) ? cutting.krc / cutting.ktc : parameters_.kr;
+  if (parameters_.use_modes) {
+    constexpr std::size_t LINES = 20000;
+    basis.response = responseOf(modes_.at("x").model, modes_.at("y").model,
+                                std::max(1.0, parameters_.frequency_low), parameters_.frequency_high, LINES);
+  } else {
+    const auto lines = [&](const char* direction) {
+      return frfs_.at(direction).frf.band(parameters_.frequency_low, parameters_.frequency_high);
+    };
+    basis.response = responseOf(lines("x"), lines("y"));
+  }
+  return basis;
+}
+
+double ChartMaker::torquePerDepth() const {
+  Engagement engagement{parameters_.entry, parameters_.exit, 1e-3, parameters_.feed_per_tooth};
+  const auto row = meanForceMatrix(tool_geometry_, engagement)[3];
+  const double edge = std::isfinite(coefficients_->value.kte) ? coefficients_->value.kte : 0.0;
+  return (row[0] * coefficients_->value.ktc + row[3] * edge) / engagement.axial_depth;
+}
+
+double ChartMaker::friction(double speed) const {
+  const bool found =
+      std::isfinite(coefficients_->friction_viscous) && std::isfinite(coefficients_->friction_coulomb);
+  const double torque = found ? coefficients_->friction_viscous * speed + coefficients_->friction_coulomb
+                              : spindle_.viscous * speed + spindle_.coulomb;
+  return std::max(0.0, torque);
+}
+
+std::array<double, 2> ChartMaker::loadLimits(double speed) const {
+  const double per_depth = torquePerDepth(), lost = friction(speed);
+  const double torque =
+      spindle_.rated_torque ? std::max(0.0, *spindle_.rated_torque - lost) / per_depth : NO_LIMIT;
+  const double power =
+      spindle_.rated_power ? std::max(0.0, *spindle_.rated_power / speed - lost) / per_depth : NO_LIMIT;
+  return {{torque, power}};
+}
+
+ChartPoint ChartMaker::point(double speed, double depth, double limit, double frequency) const {
+  ChartPoint result{speed, depth, limit, frequency};
+  result.torque = torquePerDepth() * depth;
+  result.power = result.torque * speed;
+  // A tooth removes the integral of c sin(phi) R over its engagement.
+  const double area = parameters_.feed_per_tooth * tool_geometry_.radius() *
+                      (std::cos(parameters_.entry) - std::cos(parameters_.exit));
+  result.material_removal_rate = area * depth * tool_geometry_.teeth * speed / units::TWO_PI;
+  return result;
+}
+
+Chart ChartMaker::chart() const {
+  const Basis given = basis();
+  Chart chart;
+  chart.stamp = stamp_;
+  chart.tool = tool_;
+  chart.material = coefficients_->material;
+  const int n = parameters_.speeds;
+  std::vector<double> speeds;
+  for (int i = 0; i < n; ++i) {
+    speeds.push_back(parameters_.speed_low + (parameters_.speed_high - parameters_.speed_low) * i / (n - 1));
+  }
+  chart.limit = zeroOrderLimit(given.process, given.response, speeds);
+  chart.absolute_depth_limit = absoluteDepthLimit(given.process, given.response);
+
+  std::vector<ChartPoint> cuts, valleys;
+  std::vector<double> carried;  // [m] by the spindle, with its reserve
+  for (std::size_t k = 0; k < speeds.size(); ++k) {
+    const auto [torque, power] = loadLimits(speeds[k]);
+    chart.torque_depth_limit.push_back(torque);
+    chart.power_depth_limit.push_back(power);
+    carried.push_back(
+        std::min({parameters_.load_share * torque, parameters_.load_share * power, parameters_.max_depth}));
+    const double stable = around(chart.limit, k, parameters_.speed_margin, std::less<>());
+    cuts.push_back(point(speeds[k], std::min((1.0 - parameters_.depth_margin) * stable, carried[k]),
+                         chart.limit.depth[k], chart.limit.chatter_frequency[k]));
+  }
+  std::vector<ChartPoint> peaks;
+  for (std::size_t k = 0; k < cuts.size(); ++k) {
+    const double rate = cuts[k].material_removal_rate;
+    const bool over_left = k == 0 || rate > cuts[k - 1].material_removal_rate;
+    const bool over_right = k + 1 == cuts.size() || rate >= cuts[k + 1].material_removal_rate;
+    if (rate > 0.0 && over_left && over_right) peaks.push_back(cuts[k]);
+  }
+  chart.recommended = pick(peaks, parameters_.recommended, [](const ChartPoint& a, const ChartPoint& b) {
+    return a.material_removal_rate > b.material_removal_rate;
+  });
+  for (std::size_t k = 1; k + 1 < speeds.size(); ++k) {
+    const std::vector<double>& depth = chart.limit.depth;
+    if (!(depth[k] < depth[k - 1] && depth[k] <= depth[k + 1])) continue;
+    const double highest = around(chart.limit, k, parameters_.speed_margin, std::greater<>());
+    const double proposed = std::min(parameters_.unstable_factor * highest, carried[k]);
+    if (!std::isfinite(proposed) || proposed < CLEARLY_UNSTABLE * highest) continue;
+    valleys.push_back(point(speeds[k], proposed, depth[k], chart.limit.chatter_frequency[k]));
+  }
+  // A check beside the recommended cut tells most: nearly the same speed, another outcome.
+  const double reference =
+      chart.recommended.empty() ? speeds.back() : chart.recommended.front().spindle_speed;
+  chart.unstable = pick(valleys, parameters_.unstable, [&](const ChartPoint& a, const ChartPoint& b) {
+    return std::abs(std::log(a.spindle_speed / reference)) < std::abs(std::log(b.spindle_speed / reference));
+  });
+  return chart;
+}
+
+Prediction ChartMaker::predict(double spindle_speed, double axial_depth) const {
+  if (!(spindle_speed > 0.0) || !std::isfinite(spindle_speed)) {
+    throw Error("spindle_speed: " + std::to_string(spindle_speed) + " rad/s is not positive");
+  }
+  if (!(axial_depth > 0.0) || !std::isfinite(axial_depth)) {
+    throw Error("axial_depth: " + std::to_string(axial_depth) + " m is not positive");
+  }
+  const Basis given = basis();
+  const StabilityLimit limit = zeroOrderLimit(given.process, given.response, {spindle_speed});
+  const auto [torque, power] = loadLimits(spindle_speed);
+  Prediction prediction;
+  prediction.point = point(spindle_speed, axial_depth, limit.depth[0], limit.chatter_frequency[0]);
+  prediction.stable = axial_depth < limit.depth[0];
+  prediction.within_spindle_limits =
+      axial_depth <= std::min(torque, power) && (!spindle_.max_speed || spindle_speed <= *spindle_.max_speed);
+  return prediction;
+}
+
+}  // namespace smartmill::stability

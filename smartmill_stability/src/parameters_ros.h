@@ -1,0 +1,22 @@
+#pragma once
+
+#include <string>
+
+#include "smartmill_ros/parameter_reader.h"
+#include "smartmill_stability/chart.h"
+#include "smartmill_stability/chatter_detector.h"
+
+namespace smartmill::stability {
+
+struct NodeParameters {
+  std::string model;  ///< path of a smartmill-model/1 file: tool and spindle limits
+  ChartParameters chart;
+  ChatterParameters chatter;
+  double hold_back = 0.05;     ///< [s] >= 0
+  double input_timeout = 1.0;  ///< [s] > 0, of wall time
+};
+
+/// @throws Error on a wrong type, an unknown key or a value out of its range.
+NodeParameters readParameters(ParameterReader& reader);
+
+}  // namespace smartmill::stability
