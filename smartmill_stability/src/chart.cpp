@@ -23,17 +23,17 @@ void bound(bool good, const char* key, double value, const char* range) {
   }
 }
 
-/// Worst value over the speeds within the margin on both sides.
+/// Worst value over the speeds within the margin on both sides, up to the next speed of the grid.
 double around(const StabilityLimit& limit, std::size_t k, double margin,
               const std::function<bool(double, double)>& worse) {
   double worst = limit.depth[k];
   const double speed = limit.spindle_speed[k];
-  for (std::size_t j = k; j-- > 0 && limit.spindle_speed[j] >= speed * (1.0 - margin);) {
-    if (worse(limit.depth[j], worst)) worst = limit.depth[j];
+  for (std::size_t j = k; j > 0 && limit.spindle_speed[j] >= speed * (1.0 - margin); --j) {
+    if (worse(limit.depth[j - 1], worst)) worst = limit.depth[j - 1];
   }
-  for (std::size_t j = k + 1; j < limit.depth.size() && limit.spindle_speed[j] <= speed * (1.0 + margin);
+  for (std::size_t j = k; j + 1 < limit.depth.size() && limit.spindle_speed[j] <= speed * (1.0 + margin);
        ++j) {
-    if (worse(limit.depth[j], worst)) worst = limit.depth[j];
+    if (worse(limit.depth[j + 1], worst)) worst = limit.depth[j + 1];
   }
   return worst;
 }
@@ -197,11 +197,23 @@ Chart ChartMaker::chart() const {
   chart.tool = tool_;
   chart.material = coefficients_->material;
   const int n = parameters_.speeds;
-  std::vector<double> speeds;
-  for (int i = 0; i < n; ++i) {
-    speeds.push_back(parameters_.speed_low + (parameters_.speed_high - parameters_.speed_low) * i / (n - 1));
+  // A little beyond both ends, so that the margin of speed holds there too.
+  const int beyond = parameters_.speed_margin > 0.0 ? 20 : 0;
+  StabilityLimit wide;
+  for (int i = -beyond; i < n + beyond; ++i) {
+    const double low = parameters_.speed_low, high = parameters_.speed_high,
+                 part = parameters_.speed_margin / 20.0;
+    wide.spindle_speed.push_back(i < 0    ? low * (1.0 + part * i)
+                                 : i >= n ? high * (1.0 + part * (i - n + 1))
+                                          : low + (high - low) * i / (n - 1));
   }
-  chart.limit = zeroOrderLimit(given.process, given.response, speeds);
+  wide = zeroOrderLimit(given.process, given.response, wide.spindle_speed);
+  const auto inner = [&](const std::vector<double>& all) {
+    return std::vector<double>(all.begin() + beyond, all.end() - beyond);
+  };
+  chart.limit = {inner(wide.spindle_speed), inner(wide.depth), inner(wide.chatter_frequency)};
+  const std::vector<double>& speeds = chart.limit.spindle_speed;
+  const auto shift = static_cast<std::size_t>(beyond);
   chart.absolute_depth_limit = absoluteDepthLimit(given.process, given.response);
 
   std::vector<ChartPoint> cuts, valleys;
@@ -212,7 +224,7 @@ Chart ChartMaker::chart() const {
     chart.power_depth_limit.push_back(power);
     carried.push_back(
         std::min({parameters_.load_share * torque, parameters_.load_share * power, parameters_.max_depth}));
-    const double stable = around(chart.limit, k, parameters_.speed_margin, std::less<>());
+    const double stable = around(wide, k + shift, parameters_.speed_margin, std::less<>());
     cuts.push_back(point(speeds[k], std::min((1.0 - parameters_.depth_margin) * stable, carried[k]),
                          chart.limit.depth[k], chart.limit.chatter_frequency[k]));
   }
@@ -229,7 +241,7 @@ Chart ChartMaker::chart() const {
   for (std::size_t k = 1; k + 1 < speeds.size(); ++k) {
     const std::vector<double>& depth = chart.limit.depth;
     if (!(depth[k] < depth[k - 1] && depth[k] <= depth[k + 1])) continue;
-    const double highest = around(chart.limit, k, parameters_.speed_margin, std::greater<>());
+    const double highest = around(wide, k + shift, parameters_.speed_margin, std::greater<>());
     const double proposed = std::min(parameters_.unstable_factor * highest, carried[k]);
     if (!std::isfinite(proposed) || proposed < CLEARLY_UNSTABLE * highest) continue;
     valleys.push_back(point(speeds[k], proposed, depth[k], chart.limit.chatter_frequency[k]));

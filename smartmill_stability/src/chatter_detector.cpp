@@ -244,12 +244,16 @@ void SortedDetection::watch(double stamp) {
     sorter_.reset();
     detector_.reset();
     newest_ = stamp;
+    // The condition of the new run may have come before its first sample.
+    if (last_condition_ && last_condition_->stamp <= stamp + RESTART)
+      push(CuttingCondition(*last_condition_));
   }
   newest_ = std::max(newest_, stamp);
 }
 
 void SortedDetection::push(const CuttingCondition& condition) {
   // A latched condition is older than the data around it: no restart.
+  last_condition_ = condition;
   sorter_.push(conditions_, condition.stamp, [this, condition] { detector_.handle(condition); });
 }
 

@@ -103,6 +103,7 @@ class SortedDetection {
   StreamSorter sorter_;
   StreamSorter::Stream conditions_, states_, angles_, blocks_;
   double newest_ = 0.0;
+  std::optional<CuttingCondition> last_condition_;  // by arrival
 };
 
 }  // namespace smartmill::stability
