@@ -9,6 +9,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/units.h"
+#include "smartmill_hammer/offset_factor.h"
 
 namespace smartmill {
 namespace hammer {

@@ -14,6 +14,7 @@
 #include "smartmill_core/signal/streams.h"
 #include "smartmill_core/units.h"
 #include "smartmill_hammer/hammer_sequence.h"
+#include "smartmill_hammer/offset_factor.h"
 
 namespace smartmill {
 namespace hammer {

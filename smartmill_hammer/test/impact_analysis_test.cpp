@@ -1,4 +1,4 @@
-#include "smartmill_hammer/impact_analysis.h"
+#include "smartmill_core/modal/impact_analysis.h"
 
 #include <cmath>
 #include <random>
@@ -7,8 +7,9 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/modal/modal_filter.h"
+#include "smartmill_core/signal/hit_collector.h"
 #include "smartmill_core/units.h"
-#include "smartmill_hammer/hit_collector.h"
+#include "smartmill_hammer/offset_factor.h"
 
 namespace smartmill {
 namespace hammer {

@@ -7,12 +7,12 @@
 #include <string>
 #include <vector>
 
+#include "smartmill_core/modal/impact_analysis.h"
 #include "smartmill_core/modal/results.h"
 #include "smartmill_core/model/machine_model.h"
+#include "smartmill_core/signal/hit_collector.h"
 #include "smartmill_core/signal/streams.h"
 #include "smartmill_hammer/flute_search.h"
-#include "smartmill_hammer/hit_collector.h"
-#include "smartmill_hammer/impact_analysis.h"
 #include "smartmill_hammer/sensor_calibration.h"
 
 namespace smartmill {

@@ -3,9 +3,9 @@
 #include <string>
 #include <vector>
 
+#include "smartmill_core/modal/impact_analysis.h"
 #include "smartmill_core/modal/modal_fit.h"
 #include "smartmill_core/signal/frequency_response.h"
-#include "smartmill_hammer/impact_analysis.h"
 
 namespace smartmill {
 namespace hammer {

@@ -1,4 +1,4 @@
-#include "smartmill_hammer/hit_collector.h"
+#include "smartmill_core/signal/hit_collector.h"
 
 #include <cmath>
 #include <utility>
@@ -6,7 +6,6 @@
 #include "smartmill_core/error.h"
 
 namespace smartmill {
-namespace hammer {
 
 HitCollector::HitCollector(const HitCollectorOptions& options) : options_(options) {
   if (!(options.trigger_force > 0.0 && options.pre_trigger > 0.0 &&
@@ -88,5 +87,4 @@ std::optional<HitCollector::Record> HitCollector::add(double time, std::uint64_t
   return std::nullopt;
 }
 
-}  // namespace hammer
 }  // namespace smartmill

@@ -5,10 +5,9 @@
 #include <optional>
 #include <string>
 
-#include "smartmill_hammer/impact_analysis.h"
+#include "smartmill_core/signal/hit.h"
 
 namespace smartmill {
-namespace hammer {
 
 struct HitCollectorOptions {
   double trigger_force = 10.0;  ///< [N] above the level before; > 0
@@ -48,5 +47,4 @@ class HitCollector {
   std::string fault_;
 };
 
-}  // namespace hammer
 }  // namespace smartmill

@@ -1,9 +1,8 @@
-#include "smartmill_hammer/impact_analysis.h"
+#include "smartmill_core/modal/impact_analysis.h"
 
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <cstdio>
 #include <limits>
 
 #include "smartmill_core/error.h"
@@ -13,32 +12,13 @@
 #include "smartmill_core/units.h"
 
 namespace smartmill {
-namespace hammer {
 namespace {
 
-/// Equal readings in a row at the top of a noisy signal that mean clipping.
-constexpr std::size_t CLIPPED_RUN = 3;
 /// Lines on each side over which the scatter's variance is averaged: a few hits alone give a variance that is
 /// itself scattered, and lines that happen to agree would get far too much weight in a fit.
 constexpr std::size_t SMOOTH_LINES = 8;
 /// Samples before the hit that give a baseline and a noise worth having.
 constexpr std::size_t LEAST_QUIET = 48;
-
-std::string text(const char* format, double a, double b) {
-  char line[160];
-  std::snprintf(line, sizeof line, format, a, b);
-  return line;
-}
-
-std::size_t runAtMaximum(const std::vector<double>& values) {
-  const double top = *std::max_element(values.begin(), values.end());
-  std::size_t longest = 0, run = 0;
-  for (const double v : values) {
-    run = v == top ? run + 1 : 0;
-    longest = std::max(longest, run);
-  }
-  return longest;
-}
 
 std::vector<double> part(const std::vector<double>& values, std::size_t from, std::size_t to) {
   return {values.begin() + static_cast<std::ptrdiff_t>(from),
@@ -46,49 +26,6 @@ std::vector<double> part(const std::vector<double>& values, std::size_t from, st
 }
 
 }  // namespace
-
-HitFault hitFault(const Hit& hit, const HitLimits& limits) {
-  if (hit.force.empty() || hit.force.size() != hit.response.size()) {
-    return {"the record is empty or its channels differ in length", true};
-  }
-  const std::size_t bad = std::min(firstNotFinite(hit.force), firstNotFinite(hit.response));
-  if (bad < hit.force.size()) {
-    return {"sample " + std::to_string(bad) + " is not a number", true};
-  }
-  const double peak = *std::max_element(hit.force.begin(), hit.force.end());
-  if (peak < limits.weak_force) {
-    return {text("weak hit: peak %.1f N, %.1f N are due", peak, limits.weak_force), false};
-  }
-  if (runAtMaximum(hit.force) >= CLIPPED_RUN)
-    return {text("the force is clipped at %.1f N", peak, 0.0), true};
-  if (limits.response_range > 0.0) {
-    for (const double v : hit.response) {
-      if (std::abs(v) >= limits.response_range) {
-        return {text("the response is clipped: %.3f reaches the range %.3f", v, limits.response_range), true};
-      }
-    }
-  }
-  std::vector<double> force = hit.force;
-  if (hit.pre_trigger >= LEAST_QUIET) {
-    const double base = mean(part(force, 0, hit.pre_trigger));
-    for (double& f : force) f -= base;
-  }
-  if (hasSecondHit(force, limits.second_hit_share)) {
-    return {text("double hit: beside the main peak of %.1f N another one above %.1f N", peak,
-                 limits.second_hit_share * peak),
-            false};
-  }
-  return {};
-}
-
-double offsetFactor(double stickout, double offset) {
-  if (!(offset >= 0.0 && offset < stickout)) {
-    throw Error(text("offset correction: the hammer's offset %.2f mm must lie in 0..stickout (%.2f mm)",
-                     1e3 * offset, 1e3 * stickout));
-  }
-  const double l = stickout - offset;
-  return 2.0 * stickout * stickout * stickout / (l * l * (3.0 * stickout - l));
-}
 
 ImpactAnalysis::ImpactAnalysis(const ImpactOptions& options) : options_(options) {
 }
@@ -188,5 +125,4 @@ void ImpactAnalysis::removeWindowDamping(ModalModel& model) const {
   }
 }
 
-}  // namespace hammer
 }  // namespace smartmill

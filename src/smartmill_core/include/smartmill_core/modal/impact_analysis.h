@@ -4,40 +4,13 @@
 #include <string>
 #include <vector>
 
-#include "smartmill_core/modal/modal_fit.h"
+#include "smartmill_core/modal/modal_model.h"
 #include "smartmill_core/signal/frequency_response.h"
+#include "smartmill_core/signal/hit.h"
 
 namespace smartmill {
-namespace hammer {
 
-/// One recorded hit: hammer force and response, evenly sampled.
-struct Hit {
-  double stamp = 0.0;            ///< [s] of the trigger
-  double sample_rate = 0.0;      ///< [Hz]
-  std::size_t pre_trigger = 0;   ///< [1] samples before the trigger
-  std::vector<double> force;     ///< [N]
-  std::vector<double> response;  ///< [V], [m] or [m/s2]
-};
-
-/// What makes a hit useless.
-struct HitLimits {
-  double weak_force = 20.0;  ///< [N] a peak below this is a weak hit, > 0
-  double second_hit_share =
-      0.1;                      ///< [1] a second peak above this share of the main one is a double hit, 0..1
-  double response_range = 0.0;  ///< [unit of the response] a response reaching this is clipped; 0: unknown
-};
-
-/// Why a hit cannot be used.
-struct HitFault {
-  std::string text;       ///< one line; empty: the hit can be used
-  bool bad_data = false;  ///< clipped, NaN, lost samples; otherwise the blow itself was weak or double
-};
-HitFault hitFault(const Hit& hit, const HitLimits& limits);
-
-/// Receptance factor of Dunwoody eq. 4.44: direct FRF at the tip from a hit offset [m] above it, tool of
-/// stickout L [m]: 2 L^3 / (l^2 (3 L - l)), l = L - offset. @throws Error when 0 <= offset < L does not hold.
-double offsetFactor(double stickout, double offset);
-
+/// How hits become an FRF.
 struct ImpactOptions {
   bool window_force = true;  ///< Dunwoody eq. 4.17..4.19
   double exponential_time =
@@ -77,5 +50,4 @@ class ImpactAnalysis {
   double force_noise_ = 0.0, response_noise_ = 0.0, window_share_ = 0.0;  // sums of squares over hits
 };
 
-}  // namespace hammer
 }  // namespace smartmill
