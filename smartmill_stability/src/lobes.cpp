@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <filesystem>
 #include <fstream>
 #include <iostream>
 #include <string>
@@ -12,6 +11,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "picture.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/units.h"
@@ -42,16 +42,10 @@ std::vector<double> speedsOf(const std::string& text) {
 }
 
 void draw(const std::string& csv, double max_depth_mm) {
-  const std::string png = std::filesystem::path(csv).replace_extension(".png").string();
-  FILE* pipe = popen("gnuplot", "w");
-  if (!pipe) throw Error("gnuplot cannot be started");
-  std::fprintf(
-      pipe,
-      "set terminal pngcairo size 1100,600 font 'sans,12'\nset output '%s'\nset datafile separator ','\n"
-      "set xlabel 'Spindle speed [rpm]'\nset ylabel 'Axial depth [mm]'\nset grid\nset yrange [0:%g]\n"
-      "set key top left\nplot '%s' skip 1 using 1:2 with lines lw 2 title 'zero-order stability limit'\n",
-      png.c_str(), max_depth_mm, csv.c_str());
-  if (pclose(pipe) != 0) throw Error(png + ": gnuplot failed");
+  stability::drawBeside(
+      csv, "set xlabel 'Spindle speed [rpm]'\nset ylabel 'Axial depth [mm]'\nset yrange [0:" +
+               std::to_string(max_depth_mm) +
+               "]\nplot %FILE skip 1 using 1:2 with lines lw 2 title 'zero-order stability limit'");
 }
 
 void run(const Request& request) {

@@ -4,7 +4,7 @@
 
 namespace smartmill::stability {
 
-NodeParameters readParameters(ParameterReader& reader) {
+NodeParameters readParameters(ParameterReader& reader, const std::string& model) {
   NodeParameters parameters;
   ChartParameters& chart = parameters.chart;
   reader.read("entry_angle", chart.entry);
@@ -36,6 +36,7 @@ NodeParameters readParameters(ParameterReader& reader) {
   reader.read("hold_back", parameters.hold_back);
   reader.read("input_timeout", parameters.input_timeout);
   reader.finish();
+  if (!model.empty()) parameters.model = model;
   chart.validate();
   chatter.validate();
   if (parameters.model.empty()) throw Error("model: the path of a smartmill-model/1 file is due");

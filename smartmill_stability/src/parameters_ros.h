@@ -16,7 +16,8 @@ struct NodeParameters {
   double input_timeout = 1.0;  ///< [s] > 0, of wall time
 };
 
+/// @param model path that goes before the key `model`, which then may be absent.
 /// @throws Error on a wrong type, an unknown key or a value out of its range.
-NodeParameters readParameters(ParameterReader& reader);
+NodeParameters readParameters(ParameterReader& reader, const std::string& model = "");
 
 }  // namespace smartmill::stability

@@ -1,11 +1,11 @@
 #include "smartmill_stability/chatter_detector.h"
 
 #include <cmath>
-#include <random>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "cutting_scene.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/units.h"
 
@@ -14,68 +14,11 @@ namespace {
 
 using units::TWO_PI;
 
-constexpr double RATE = 25600.0, SPEED = TWO_PI * 75.3;  // 4518 rpm
-constexpr int BLOCK = 256;
-
-struct Scene {
-  double chatter = 0.0;       // [N] amplitude in x
-  double frequency = 1043.0;  // [Hz]
-  double noise = 1.0;         // [N]
-  double chatter_from = 0.0;  // [s]
-  double duration = 3.0;      // [s]; full engagement from 0.5 s to 2.5 s
-};
-
-/// A cut along x of 20 mm/s with forced vibration at the harmonics of tooth and spindle.
+/// A cut as the detector sees it.
 std::vector<ChatterState> run(const Scene& scene, const ChatterParameters& parameters = {}) {
   std::vector<ChatterState> states;
   ChatterDetector detector(parameters, [&](const ChatterState& state) { states.push_back(state); });
-  CuttingCondition condition;
-  condition.stamp = 0.01;
-  condition.kind = CuttingCondition::Kind::cut;
-  condition.name = "cut_1";
-  condition.steady_from = {{0.010, 0.0, -0.001}};
-  condition.steady_to = {{0.050, 0.0, -0.001}};
-  std::mt19937 random(7);
-  std::normal_distribution<double> normal(0.0, scene.noise);
-  detector.handle(condition);
-  double block_due = 0.0, angle_due = 0.0, state_due = 0.0;
-  for (int b = 0; block_due < scene.duration;) {
-    if (state_due <= angle_due && state_due <= block_due) {
-      CncState state;
-      state.stamp = state_due;
-      state.connected = true;
-      state.axes = {"X", "Y", "Z"};
-      state.position = {0.020 * state_due, 0.0, -0.001};
-      state.feed = 0.020;
-      detector.handle(state);
-      state_due += 0.02;
-    } else if (angle_due <= block_due) {
-      detector.handle(SpindleAngle{angle_due, std::fmod(SPEED * angle_due, TWO_PI), SPEED});
-      angle_due += 0.0087;
-    } else {
-      ForceBlock block;
-      block.stamp = block_due;
-      block.sample_rate = RATE;
-      block.first_index = static_cast<std::uint64_t>(b) * BLOCK;
-      block.status = ForceBlock::Status::compensated;
-      for (int i = 0; i < BLOCK; ++i) {
-        const double t = block_due + i / RATE, angle = SPEED * t;
-        const bool cutting = t > 0.5 && t < 2.5;
-        const double forced = cutting ? 200.0 + 150.0 * std::cos(4.0 * angle) +
-                                            60.0 * std::cos(8.0 * angle + 1.0) +
-                                            40.0 * std::cos(angle + 0.3)  // runout
-                                      : 0.0;
-        const double chatter =
-            cutting && t > scene.chatter_from ? scene.chatter * std::cos(TWO_PI * scene.frequency * t) : 0.0;
-        block.force[0].push_back(forced + chatter + normal(random));
-        block.force[1].push_back(0.7 * forced + normal(random));
-        block.force[2].push_back(normal(random));
-      }
-      detector.handle(block);
-      block_due += BLOCK / RATE;
-      ++b;
-    }
-  }
+  play(scene, [&](const auto& input) { detector.handle(input); });
   return states;
 }
 
