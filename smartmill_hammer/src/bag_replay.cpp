@@ -7,12 +7,12 @@
 #include <smartmill_msgs/SampleBlock.h>
 #include <smartmill_msgs/SpindleAngle.h>
 
-#include "goal_ros.h"
 #include "hammer_server.h"
 #include "parameters_ros.h"
 #include "smartmill_core/signal/stream_sorter.h"
 #include "smartmill_ros/bag_reader.h"
 #include "smartmill_ros/conversions.h"
+#include "smartmill_ros/goals.h"
 #include "smartmill_ros/parameter_reader.h"
 
 namespace smartmill {

@@ -9,10 +9,10 @@
 #include <boost/bind/bind.hpp>
 #include <boost/function.hpp>
 
-#include "goal_ros.h"
 #include "parameters_ros.h"
 #include "smartmill_core/error.h"
 #include "smartmill_ros/conversions.h"
+#include "smartmill_ros/goals.h"
 #include "smartmill_ros/parameter_reader.h"
 
 namespace smartmill {

@@ -52,6 +52,14 @@ double ModalFilter::step(double input) {
   return output;
 }
 
+double ModalFilter::peek(double input) const {
+  double output = direct_ * input;
+  for (const Section& s : sections_) {
+    output += s.gain * (s.a11 * s.x + s.a12 * s.v + s.b1 * last_input_ + s.c1 * input);
+  }
+  return output;
+}
+
 void ModalFilter::reset(double constant_input) {
   for (Section& s : sections_) {
     s.x = constant_input;

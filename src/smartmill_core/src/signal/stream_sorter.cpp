@@ -30,6 +30,13 @@ StreamSorter::Stream StreamSorter::addEvents(std::string name) {
   return sources_.size() - 1;
 }
 
+void StreamSorter::setRegular(Stream stream, bool regular) {
+  Source& source = sources_.at(stream);
+  if (source.regular == regular) return;
+  source.regular = regular;
+  if (!regular) release(passed());
+}
+
 void StreamSorter::push(Stream stream, double stamp, Deliver deliver) {
   Source& source = sources_.at(stream);
   if (!std::isfinite(stamp)) throw Error("stream " + source.name + ": stamp is not a finite number");

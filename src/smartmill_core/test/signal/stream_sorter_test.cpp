@@ -44,6 +44,21 @@ TEST(StreamSorter, equalStampsGoInTheOrderOfTheStreamsThenOfArrival) {
   EXPECT_EQ(got, "12be");
 }
 
+TEST(StreamSorter, aStreamThatMayBeAbsentHoldsBackOnlyWhileItIsThere) {
+  StreamSorter sorter(0.0);
+  const auto a = sorter.addRegular("a"), b = sorter.addEvents("b");
+  std::string got;
+  sorter.push(a, 1.0, [&] { got += "1"; });
+  sorter.push(a, 2.0, [&] { got += "2"; });
+  EXPECT_EQ(got, "1");
+  sorter.setRegular(b, true);
+  sorter.push(b, 2.0, [&] { got += "b"; });
+  sorter.push(a, 4.0, [&] { got += "4"; });
+  EXPECT_EQ(got, "1");
+  sorter.setRegular(b, false);  // it has died
+  EXPECT_EQ(got, "12b");
+}
+
 TEST(StreamSorter, anEventWithinTheHoldBackIsInOrderAndALaterOneIsCounted) {
   StreamSorter sorter(0.05);
   const auto a = sorter.addRegular("a"), events = sorter.addEvents("goal");

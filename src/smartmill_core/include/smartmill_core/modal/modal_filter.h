@@ -21,6 +21,9 @@ class ModalFilter {
   /// Zero order: the output at this sample knows the inputs of the samples before (the direct share also this one's).
   double step(double input);
 
+  /// What step() would give, without taking the step.
+  double peek(double input) const;
+
   /// At rest, or in the static state of a constant input.
   void reset(double constant_input = 0.0);
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 
 #include "smartmill_core/cutting/tool.h"
@@ -28,6 +29,28 @@ struct MeasuredModes {
   std::string unit;  ///< m/N or 1
   ModalModel model;
   double relative_error = 0.0;  ///< [1]
+};
+
+/// What is to be measured (goal of the action MeasureFrf).
+struct MeasureFrfGoal {
+  double stamp = 0.0;  ///< [s] sensor data before it are not used
+  std::string tool, point, direction;
+  int hits = 0;           ///< [1] to average
+  int modes = 0;          ///< [1] 0: by evidence
+  double stickout = 0.0;  ///< [m] 0: no offset correction
+  int teeth = 0;          ///< [1] 0: as the model says
+};
+
+/// Codes of the action MeasureFrf.
+enum class FrfCode : std::uint8_t {
+  ok = 0,
+  cancelled = 1,
+  no_flute = 2,
+  no_hit = 3,
+  motion_failed = 4,
+  bad_goal = 5,
+  bad_data = 6,
+  fit_failed = 7
 };
 
 }  // namespace smartmill

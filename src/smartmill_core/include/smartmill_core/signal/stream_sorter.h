@@ -29,6 +29,10 @@ class StreamSorter {
   Stream addRegular(std::string name);
   Stream addEvents(std::string name);
 
+  /// A stream that may be absent is added as events and becomes regular with its first item; one that has died must
+  /// not hold the others back any longer: what waited for it is delivered.
+  void setRegular(Stream stream, bool regular);
+
   /// @param stamp [s], finite. @throws Error naming the stream when it is not.
   void push(Stream stream, double stamp, Deliver deliver);
 

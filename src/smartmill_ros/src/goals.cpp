@@ -1,4 +1,4 @@
-#include "goal_ros.h"
+#include "smartmill_ros/goals.h"
 
 #include <algorithm>
 #include <cstdint>
@@ -6,10 +6,9 @@
 #include "smartmill_ros/conversions.h"
 
 namespace smartmill {
-namespace hammer {
 
 MeasureFrfGoal goalFromMsg(const smartmill_msgs::MeasureFrfGoal& message, double received) {
-  // Beyond any range that the sequence accepts, and safe as an int.
+  // Beyond any range that a measurement accepts, and safe as an int.
   const auto count = [](std::uint32_t n) { return static_cast<int>(std::min<std::uint32_t>(n, 1000000)); };
   MeasureFrfGoal goal;
   goal.stamp = message.header.stamp.isZero() ? received : toSec(message.header.stamp);
@@ -23,5 +22,4 @@ MeasureFrfGoal goalFromMsg(const smartmill_msgs::MeasureFrfGoal& message, double
   return goal;
 }
 
-}  // namespace hammer
 }  // namespace smartmill
