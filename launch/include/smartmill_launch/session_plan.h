@@ -1,0 +1,139 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "smartmill_core/model/machine_model.h"
+#include "smartmill_core/signal/streams.h"
+
+namespace smartmill::session {
+
+/// What the job is made of; see config/session.yaml.
+struct PlanParameters {
+  std::string tool = "end_mill";  ///< name under which everything about the tool is filed
+  std::string material;           ///< empty: the workpiece's
+
+  std::vector<double> air_speeds{314.2, 628.3, 942.5, 1256.6};  ///< [rad/s] > 0, 4 or more
+  double air_time = 1.5;                                        ///< [s] > 0 at speed, of each air cut
+
+  double slot_speed = 418.9;                                       ///< [rad/s] > 0
+  double slot_depth = 1.0e-3;                                      ///< [m] > 0
+  std::vector<double> slot_feeds{5.0e-5, 1.0e-4, 1.5e-4, 2.0e-4};  ///< [m] a tooth, > 0, 3 or more
+  double slot_time = 2.0;        ///< [s] > 0, longest steady stretch of a slot
+  double least_slot_time = 0.8;  ///< [s] > 0, shortest; the load meter's settling takes 0.2 s of it
+
+  double stable_time = 1.0;         ///< [s] > 0, steady stretch of the cut at the recommended point
+  double unstable_time = 0.5;       ///< [s] > 0, of the cut at the unstable point
+  double least_revolutions = 50.0;  ///< [1] of the spindle in a steady stretch that is judged, > 0
+
+  double resonance_speed = 1460.8;  ///< [rad/s] of the cut `resonance`; 0: none
+  double resonance_depth = 0.5e-3;  ///< [m] > 0
+  double resonance_feed = 5.0e-5;   ///< [m] a tooth, > 0
+  double resonance_time = 0.8;      ///< [s] > 0
+
+  double lane_margin = 2.0e-3;   ///< [m] > 0 of stock between two slots
+  double clearance = 2.0e-3;     ///< [m] > 0 between tool and stock when it goes down
+  double safe_height = 10.0e-3;  ///< [m] > 0 above the stock: sideways motion is safe there
+  double plunge_feed = 20.0e-3;  ///< [m/s] > 0
+  double spin_up_time = 3.0;     ///< [s] > 0 to any speed, where the model has no spindle acceleration
+
+  /// @throws Error naming key and value.
+  void validate() const;
+};
+
+/// A point of a stability chart that may be cut.
+struct Point {
+  double spindle_speed = 0.0;               ///< [rad/s]
+  double axial_depth = 0.0;                 ///< [m]
+  double depth_limit = 0.0;                 ///< [m] +inf: none
+  double chatter_frequency = NOT_A_NUMBER;  ///< [Hz] at the limit
+};
+
+/// One test or cut, ready to be sent.
+struct PlannedCut {
+  CuttingCondition condition;
+  std::array<double, 3> from{{0, 0, 0}};  ///< [m] tool tip beside the stock at cutting height; machine frame
+  std::array<double, 3> to{{0, 0, 0}};    ///< [m] where the feed ends
+  double feed = 0.0;                      ///< [m/s]; 0: in air, no motion
+  double spin_up = 0.0;                   ///< [s] waited after M3
+  double dwell = 0.0;                     ///< [s] at speed, in air
+  double duration() const;                ///< [s] of spin-up, feed and dwell, without rapid motion
+};
+
+/// The paths of the whole job in the stock of the believed model: each cut in a lane of its own along +x,
+/// full slots, lanes side by side in y. All positions are of the tool tip's centre in the machine frame.
+class SessionPlan {
+ public:
+  /// @throws Error of one line when the model lacks something or the job does not fit machine or stock.
+  SessionPlan(const MachineModel& model, const PlanParameters& parameters);
+
+  const std::string& material() const { return material_; }
+  const std::vector<PlannedCut>& airCuts() const { return air_cuts_; }
+  const std::vector<PlannedCut>& slots() const { return slots_; }
+  const std::optional<PlannedCut>& resonance() const { return resonance_; }
+
+  /// The verifying cuts have lanes of their own. @throws Error saying what does not fit.
+  PlannedCut stable(const Point& point, double feed_per_tooth) const;
+  PlannedCut unstable(const Point& point, double feed_per_tooth) const;
+
+  /// First of the points that stable() or unstable() would take. @param why reasons of those refused, one
+  /// line.
+  std::optional<Point> firstStable(const std::vector<Point>& points, double feed_per_tooth,
+                                   std::string& why) const;
+  std::optional<Point> firstUnstable(const std::vector<Point>& points, double feed_per_tooth,
+                                     std::string& why) const;
+
+  /// NC program of a cut (dialect of smartmill_cnc), in increments from where the machine stands, free of
+  /// work offsets. @param position [m] of the machine before it.
+  std::string program(const PlannedCut& cut, const std::array<double, 3>& position) const;
+
+  std::size_t lanes() const { return lanes_; }  ///< that the stock holds
+
+ private:
+  struct Wish {
+    std::string name;
+    std::size_t lane;
+    double speed, depth, feed_per_tooth, time, least_time;
+  };
+  PlannedCut cut(const Wish& wish) const;
+  PlannedCut airCut(double speed) const;
+  double spinUp(double speed) const;
+  void checkSpeed(const std::string& name, double speed) const;
+  double laneY(std::size_t lane) const;
+
+  PlanParameters parameters_;
+  std::string file_, material_;
+  ToolGeometry tool_;
+  Spindle spindle_;
+  MachineAxes axes_;
+  Workpiece stock_;
+  std::size_t lanes_ = 0;
+  std::vector<PlannedCut> air_cuts_, slots_;
+  std::optional<PlannedCut> resonance_;
+};
+
+/// A verdict of the chatter detector on one window of a cut.
+struct ChatterWindow {
+  bool chatter = false;
+  double frequency = NOT_A_NUMBER;  ///< [Hz]
+  double severity = 0.0;            ///< [N]
+};
+
+/// What the windows of one cut say together.
+struct CutVerdict {
+  enum class Kind { unknown, stable, undecided, chatter };
+  Kind kind = Kind::unknown;
+  std::size_t windows = 0, chattering = 0;
+  double frequency = NOT_A_NUMBER;  ///< [Hz] median of the chattering windows
+  double severity = 0.0;            ///< [N] largest
+  std::string text() const;         ///< e.g. "chatter at 812.3 Hz (7 of 8 windows)"
+};
+
+/// Stable when at most a tenth of the windows chatters, chatter from half on: it takes time to grow, and one
+/// window may hold a disturbance. Fewer than two windows say nothing.
+CutVerdict judge(const std::vector<ChatterWindow>& windows);
+
+}  // namespace smartmill::session

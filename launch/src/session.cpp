@@ -1,0 +1,443 @@
+#include "session.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <future>
+#include <thread>
+
+#include <smartmill_msgs/ArmMotion.h>
+#include <smartmill_msgs/SampleBlock.h>
+#include <smartmill_msgs/SpindleAngle.h>
+#include <boost/function.hpp>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/units.h"
+#include "smartmill_ros/conversions.h"
+
+namespace smartmill::session {
+namespace {
+
+constexpr double POLL = 0.01;          // [s]
+constexpr double FRESH = 0.5;          // [s] since the last message of a sensor
+constexpr double CANCEL_WAIT = 0.8;    // [s] for a cancelled goal to end
+constexpr double SERVICE_WAIT = 5.0;   // [s]
+constexpr double HURRY = 0.4;          // [s] of each thing done after Ctrl-C
+constexpr double VERDICT_WAIT = 1.0;   // [s] after a cut until the detector has seen all of it
+constexpr double STOP_TIMEOUT = 10.0;  // [s] for the spindle's stop after a failure
+
+/// Ctrl-C; no failure of a step.
+struct Interrupted {};
+
+std::string format(const char* text, double a, double b = 0.0, double c = 0.0, double d = 0.0) {
+  char line[300];
+  std::snprintf(line, sizeof line, text, a, b, c, d);
+  return line;
+}
+
+std::string modesText(const smartmill_msgs::ModalModel& model) {
+  std::string text;
+  for (const smartmill_msgs::Mode& mode : model.modes) {
+    text += text.empty() ? "" : ", ";
+    text += format("%.2f +- %.2f Hz", mode.frequency, mode.frequency_std);
+    text += model.unit == "m/N" ? format(" %.2f N/um", 1.0 / mode.gain / units::N_PER_UM)
+                                : format(" gain %.3f", mode.gain);
+    text += format(" damping %.2f %%", 100.0 * mode.damping_ratio);
+  }
+  return text;
+}
+
+std::vector<Point> pointsOf(const std::vector<smartmill_msgs::StabilityPoint>& messages) {
+  std::vector<Point> points;
+  for (const smartmill_msgs::StabilityPoint& m : messages) {
+    points.push_back({m.spindle_speed, m.axial_depth, m.depth_limit, m.chatter_frequency});
+  }
+  return points;
+}
+
+std::string pointText(const Point& point) {
+  return format("%.0f rpm %.2f mm (limit %.2f mm)", units::rpmFromRadPerSec(point.spindle_speed),
+                point.axial_depth / units::MM, point.depth_limit / units::MM);
+}
+
+}  // namespace
+
+Session::Session(ros::NodeHandle nh, const ros::NodeHandle& private_nh, const std::atomic<bool>& stop)
+    : nh_(std::move(nh)),
+      stop_(stop),
+      parameters_([&] {
+        ParameterReader reader = ParameterReader::fromServer(private_nh);
+        return readParameters(reader);
+      }()),
+      model_(readMachineModel(parameters_.model)),
+      plan_(model_, parameters_.plan),
+      begin_(ros::WallTime::now()),
+      tool_frf_(nh_, "hammer/measure_frf", false),
+      sensor_frf_(nh_, "kalman/measure_frf", false),
+      identify_(nh_, "loadmeter/identify_coefficients", false),
+      program_(nh_, "cnc/run_program", false) {
+  summary_.tool = parameters_.plan.tool;
+  summary_.material = plan_.material();
+  const auto subscribe = [this](const char* topic, auto example, auto use) {
+    using Message = decltype(example);
+    const boost::function<void(const Message&)> callback = [this, topic, use](const Message& message) {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      heard_[topic] = ros::WallTime::now();
+      use(message);
+    };
+    heard_[topic] = ros::WallTime(0);
+    subscribers_.push_back(nh_.subscribe<Message>(topic, 200, callback));
+  };
+  subscribe("cnc/state", smartmill_msgs::CncState(), [this](const auto& m) { state_ = m; });
+  subscribe("daq/hammer", smartmill_msgs::SampleBlock(), [](const auto&) {});
+  subscribe("daq/dynamometer", smartmill_msgs::SampleBlock(), [](const auto&) {});
+  subscribe("spindle/angle", smartmill_msgs::SpindleAngle(), [](const auto&) {});
+  subscribers_.push_back(nh_.subscribe<smartmill_msgs::StabilityChart>(
+      "stability/chart", 10,
+      boost::function<void(const smartmill_msgs::StabilityChart&)>([this](const auto& m) {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        chart_ = m;
+      })));
+  subscribers_.push_back(nh_.subscribe<smartmill_msgs::ChatterState>(
+      "chatter/state", 1000,
+      boost::function<void(const smartmill_msgs::ChatterState&)>([this](const auto& m) {
+        if (!m.valid) return;
+        const std::lock_guard<std::mutex> lock(mutex_);
+        windows_[m.condition].push_back({m.chatter != 0, m.frequency, m.severity});
+      })));
+  spinner_ = std::make_unique<ros::AsyncSpinner>(2);
+  spinner_->start();
+}
+
+Session::~Session() {
+  spinner_->stop();
+}
+
+// ---------------------------------------------------------------------------------------------- the job
+
+int Session::run() {
+  int code = 1;
+  try {
+    job();
+    code = 0;
+  } catch (const Interrupted&) {
+    say("stop", "interrupted", armed_ ? "goals cancelled, motion is being disarmed" : "goals cancelled");
+  } catch (const std::exception& error) {
+    say("FAIL", "session", error.what());
+  }
+  if (code != 0) makeSafe();
+  if (!parameters_.summary.empty()) {
+    try {
+      summary_.write(parameters_.summary);
+    } catch (const Error& error) {
+      say("FAIL", "summary", error.what());
+      code = 1;
+    }
+  }
+  return code;
+}
+
+void Session::job() {
+  using smartmill_msgs::MeasureFrfAction;
+  step("connect", [&] { return waitReady(); });
+  step("arm motion", [&] { return arm(true, SERVICE_WAIT); });
+  for (char direction : parameters_.tool_directions) {
+    step(std::string("FRF of the tool in ") + direction, [&] {
+      return measure(tool_frf_, "hammer/measure_frf", POINT_TOOL_TIP, {direction}, parameters_.hits,
+                     parameters_.modes);
+    });
+  }
+  for (char direction : parameters_.sensor_directions) {
+    step(std::string("taps on the force sensor in ") + direction, [&] {
+      return measure(sensor_frf_, "kalman/measure_frf", POINT_FORCE_SENSOR, {direction},
+                     parameters_.sensor_hits, parameters_.sensor_modes);
+    });
+  }
+  step("forget earlier tests", [&] { return identify(true); });
+  for (const PlannedCut& air : plan_.airCuts()) {
+    step("air cut " + air.condition.name, [&] { return runCut(air); });
+  }
+  for (const PlannedCut& slot : plan_.slots()) {
+    step("slot test " + slot.condition.name, [&] { return runCut(slot); });
+  }
+  step("cutting coefficients", [&] { return identify(false); });
+  step("stability chart", [&] { return waitChart(); });
+  step("points to verify", [&] { return choose(); });
+  const double feed = used_chart_.feed_per_tooth;
+  step("cut at the recommended point",
+       [&] { return verify("stable", plan_.stable(stable_, feed), CutVerdict::Kind::stable); });
+  step("cut at the unstable point",
+       [&] { return verify("unstable", plan_.unstable(unstable_, feed), CutVerdict::Kind::chatter); });
+  if (plan_.resonance()) {
+    step("cut at the sensor's resonance", [&] { return runCut(*plan_.resonance()); });
+  }
+  step("disarm motion", [&] { return arm(false, SERVICE_WAIT); });
+}
+
+void Session::step(const std::string& name, const std::function<std::string()>& work) {
+  checkStop();
+  try {
+    const std::string detail = work();
+    say("ok", name, detail);
+  } catch (const Error& error) {
+    throw Error(name + ": " + error.what());
+  }
+}
+
+void Session::say(const char* mark, const std::string& name, const std::string& detail) {
+  const double elapsed = (ros::WallTime::now() - begin_).toSec();
+  std::printf("session [%6.1f s] %-4s %s%s%s\n", elapsed, mark, name.c_str(), detail.empty() ? "" : ": ",
+              detail.c_str());
+  std::fflush(stdout);
+  summary_.steps.push_back({name, detail, elapsed, std::string(mark) == "ok"});
+}
+
+// ---------------------------------------------------------------------------------------------- waiting
+
+void Session::checkStop() const {
+  if (stop_ || !ros::ok()) throw Interrupted();
+}
+
+void Session::pause(double seconds) const {
+  waitUntil([] { return false; }, seconds);
+}
+
+bool Session::waitUntil(const std::function<bool()>& ready, double seconds) const {
+  const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(seconds);
+  while (!ready()) {
+    checkStop();
+    if (ros::WallTime::now() > end) return false;
+    ros::WallDuration(POLL).sleep();
+  }
+  return true;
+}
+
+template <class Action, class Goal>
+auto Session::call(Client<Action>& client, const std::string& name, Goal goal, double timeout) {
+  checkStop();
+  if (!client.isServerConnected()) throw Error(name + ": its node is gone");
+  goal.header.stamp = ros::Time::now();
+  client.sendGoal(goal);
+  bool ended = false;
+  std::string fault;
+  try {
+    ended = waitUntil(
+        [&] {
+          if (!client.isServerConnected()) fault = "its node is gone";
+          return !fault.empty() || client.getState().isDone();
+        },
+        timeout);
+  } catch (const Interrupted&) {
+    client.cancelGoal();
+    const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(CANCEL_WAIT);
+    while (ros::ok() && !client.getState().isDone() && ros::WallTime::now() < end)
+      ros::WallDuration(POLL).sleep();
+    throw;
+  }
+  if (!fault.empty()) throw Error(name + ": " + fault);
+  if (!ended) {
+    client.cancelGoal();
+    throw Error(name + format(": no result within %.0f s", timeout));
+  }
+  const auto result = client.getResult();
+  const auto state = client.getState();
+  if (!result || state != actionlib::SimpleClientGoalState::SUCCEEDED || result->code != 0) {
+    const std::string message = result ? result->message : "";
+    throw Error(name + ": " + (message.empty() ? state.toString() : message));
+  }
+  return *result;
+}
+
+template <class Service>
+bool Session::ask(const std::string& name, Service& service, double timeout) const {
+  // A call cannot be given a time limit: it is left behind in its thread when it takes too long.
+  auto shared = std::make_shared<Service>(service);
+  auto promise = std::make_shared<std::promise<bool>>();
+  std::future<bool> answer = promise->get_future();
+  std::thread([shared, promise, path = nh_.resolveName(name)] {
+    promise->set_value(ros::service::call(path, *shared));
+  }).detach();
+  if (answer.wait_for(std::chrono::duration<double>(timeout)) != std::future_status::ready || !answer.get()) {
+    return false;
+  }
+  service = *shared;
+  return true;
+}
+
+std::string Session::missing() const {
+  std::string text;
+  const auto add = [&](const std::string& what) { text += (text.empty() ? "" : ", ") + what; };
+  const auto server = [&](bool there, const char* name) {
+    if (!there) add(std::string("action ") + name);
+  };
+  server(program_.isServerConnected(), "cnc/run_program");
+  server(tool_frf_.isServerConnected(), "hammer/measure_frf");
+  server(sensor_frf_.isServerConnected(), "kalman/measure_frf");
+  server(identify_.isServerConnected(), "loadmeter/identify_coefficients");
+  const std::lock_guard<std::mutex> lock(mutex_);
+  for (const auto& [topic, time] : heard_) {
+    if ((ros::WallTime::now() - time).toSec() > FRESH) add("data on " + topic);
+  }
+  if (!state_.connected) add("the controller's connection");
+  return text;
+}
+
+// ---------------------------------------------------------------------------------------------- the steps
+
+std::string Session::waitReady() {
+  if (!waitUntil([&] { return missing().empty(); }, parameters_.ready_timeout)) {
+    throw Error(format("after %.0f s still missing: ", parameters_.ready_timeout) + missing());
+  }
+  pause(parameters_.start_delay);
+  return format("nodes, sensors and controller are there; the stock holds %.0f lanes",
+                static_cast<double>(plan_.lanes()));
+}
+
+std::string Session::arm(bool on, double timeout) {
+  smartmill_msgs::ArmMotion service;
+  service.request.arm = on;
+  if (!ask("cnc/arm_motion", service, timeout)) throw Error("cnc/arm_motion: no answer");
+  if (service.response.code != smartmill_msgs::ArmMotion::Response::OK) throw Error(service.response.message);
+  armed_ = on;
+  return service.response.message;
+}
+
+std::string Session::measure(Client<smartmill_msgs::MeasureFrfAction>& client, const std::string& name,
+                             const std::string& point, const std::string& direction, int hits, int modes) {
+  smartmill_msgs::MeasureFrfGoal goal;
+  const bool tool = point == POINT_TOOL_TIP;
+  goal.tool = tool ? parameters_.plan.tool : "";
+  goal.point = point;
+  goal.direction = direction;
+  goal.hits = static_cast<std::uint32_t>(hits);
+  goal.modes = static_cast<std::uint32_t>(modes);
+  goal.stickout = tool ? model_.stickout.value_or(0.0) : 0.0;
+  goal.teeth = tool ? static_cast<std::uint32_t>(model_.tool->teeth) : 0;
+  const auto result = call(client, name, goal, parameters_.frf_timeout);
+  summary_.modes.push_back(fromMsg(result.modes));
+  return modesText(result.modes);
+}
+
+std::string Session::runCut(const PlannedCut& cut) {
+  // The place where the last motion has ended: a state asked for after it.
+  const ros::Time now = ros::Time::now();
+  std::array<double, 3> position{};
+  const auto standing = [&] {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (state_.header.stamp < now || !state_.connected || state_.motion) return false;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto name = std::find(state_.axes.begin(), state_.axes.end(), std::string(1, "XYZ"[axis]));
+      const auto index = static_cast<std::size_t>(name - state_.axes.begin());
+      if (index >= state_.position.size()) return false;
+      position[axis] = state_.position[index];
+    }
+    return true;
+  };
+  if (!waitUntil(standing, SERVICE_WAIT)) throw Error("cnc/state: no standing X, Y and Z axes are reported");
+  const double time = cut.duration();
+  runProgram(cut.condition.name, plan_.program(cut, position), cut.condition,
+             time + parameters_.program_timeout);
+  std::string text = format("%.0f rpm", units::rpmFromRadPerSec(cut.condition.spindle_speed));
+  if (cut.feed > 0.0) {
+    const Engagement& engagement = cut.condition.engagement;
+    text += format(", %.2f mm deep, %.3f mm a tooth, %.0f mm/min", engagement.axial_depth / units::MM,
+                   engagement.feed_per_tooth / units::MM, cut.feed / units::MM * 60.0);
+  }
+  return text;
+}
+
+void Session::runProgram(const std::string& name, const std::string& program,
+                         const std::optional<CuttingCondition>& condition, double timeout) {
+  smartmill_msgs::RunProgramGoal goal;
+  goal.name = name;
+  goal.program = program;
+  if (condition) goal.condition = toMsg(*condition);
+  call(program_, "cnc/run_program", goal, timeout);
+}
+
+std::string Session::identify(bool reset) {
+  smartmill_msgs::IdentifyCoefficientsGoal goal;
+  goal.tool = parameters_.plan.tool;
+  goal.material = plan_.material();
+  goal.reset = reset;
+  const auto result = call(identify_, "loadmeter/identify_coefficients", goal, parameters_.identify_timeout);
+  if (!reset) {
+    coefficients_stamp_ = result.coefficients.header.stamp;
+    summary_.coefficients = {fromMsg(result.coefficients)};
+  }
+  return result.message;
+}
+
+std::string Session::waitChart() {
+  const auto there = [&] {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return chart_ && chart_->header.stamp >= coefficients_stamp_ && chart_->material == plan_.material();
+  };
+  if (!waitUntil(there, parameters_.chart_timeout)) {
+    throw Error(
+        format("stability/chart: none for these coefficients within %.0f s", parameters_.chart_timeout));
+  }
+  const std::lock_guard<std::mutex> lock(mutex_);
+  used_chart_ = *chart_;
+  return format("stable below %.3f mm at any speed, %.0f points recommended",
+                used_chart_.absolute_depth_limit / units::MM,
+                static_cast<double>(used_chart_.recommended.size()));
+}
+
+std::string Session::choose() {
+  std::string why;
+  const double feed = used_chart_.feed_per_tooth;
+  const auto stable = plan_.firstStable(pointsOf(used_chart_.recommended), feed, why);
+  if (!stable) throw Error("no recommended point fits machine and stock" + (why.empty() ? "" : ": " + why));
+  why.clear();
+  const auto unstable = plan_.firstUnstable(pointsOf(used_chart_.unstable), feed, why);
+  if (!unstable) throw Error("no unstable point fits machine and stock" + (why.empty() ? "" : ": " + why));
+  stable_ = *stable;
+  unstable_ = *unstable;
+  return "recommended " + pointText(stable_) + ", unstable " + pointText(unstable_);
+}
+
+std::string Session::verify(const char* role, const PlannedCut& cut, CutVerdict::Kind due) {
+  const std::string detail = runCut(cut);
+  pause(VERDICT_WAIT);
+  SessionSummary::Verified verified;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    verified.verdict = judge(windows_[cut.condition.name]);
+  }
+  const Point& point = due == CutVerdict::Kind::stable ? stable_ : unstable_;
+  verified.role = role;
+  verified.spindle_speed = cut.condition.spindle_speed;
+  verified.axial_depth = point.axial_depth;
+  verified.depth_limit = point.depth_limit;
+  verified.as_predicted = verified.verdict.kind == due;
+  summary_.verified.push_back(verified);
+  return detail + "; " + verified.verdict.text() +
+         (verified.as_predicted ? ", as the chart says" : ", the chart says " + std::string(role));
+}
+
+// ---------------------------------------------------------------------------------------------- the end
+
+void Session::makeSafe() {
+  if (!armed_ || !ros::ok()) return;
+  const bool hurry = stop_;
+  try {
+    if (program_.isServerConnected()) {
+      smartmill_msgs::RunProgramGoal goal;
+      goal.header.stamp = ros::Time::now();
+      goal.name = "stop the spindle";
+      goal.program = "M5\n";
+      program_.sendGoal(goal);
+      const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(hurry ? HURRY : STOP_TIMEOUT);
+      while (ros::ok() && !program_.getState().isDone() && ros::WallTime::now() < end && (hurry || !stop_)) {
+        ros::WallDuration(POLL).sleep();
+      }
+      if (!program_.getState().isDone()) program_.cancelGoal();
+    }
+    say("stop", "disarm motion", arm(false, hurry ? HURRY : SERVICE_WAIT));
+  } catch (const Error& error) {
+    say("FAIL", "disarm motion", error.what());
+  }
+}
+
+}  // namespace smartmill::session

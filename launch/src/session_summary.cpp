@@ -1,0 +1,92 @@
+#include "session_summary.h"
+
+#include <cmath>
+#include <fstream>
+
+#include <nlohmann/json.hpp>
+
+#include "smartmill_core/error.h"
+
+namespace smartmill::session {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// JSON knows neither NaN nor infinity.
+Json number(double value) {
+  return std::isfinite(value) ? Json(value) : Json(nullptr);
+}
+
+Json modesOf(const MeasuredModes& measured) {
+  Json modes = Json::array();
+  for (const Mode& mode : measured.model.modes) {
+    modes.push_back({{"frequency_hz", number(mode.frequency)},
+                     {"frequency_hz_std", number(mode.frequency_std)},
+                     {"damping_ratio", number(mode.damping_ratio)},
+                     {"damping_ratio_std", number(mode.damping_ratio_std)},
+                     {"gain", number(mode.gain)},
+                     {"gain_std", number(mode.gain_std)}});
+  }
+  return {{"point", measured.point},
+          {"direction", measured.direction},
+          {"unit", measured.unit},
+          {"modes", modes}};
+}
+
+const char* wordOf(CutVerdict::Kind kind) {
+  switch (kind) {
+    case CutVerdict::Kind::stable:
+      return "stable";
+    case CutVerdict::Kind::chatter:
+      return "chatter";
+    case CutVerdict::Kind::undecided:
+      return "undecided";
+    case CutVerdict::Kind::unknown:
+      break;
+  }
+  return "unknown";
+}
+
+}  // namespace
+
+void SessionSummary::write(const std::string& file) const {
+  Json json;
+  json["tool"] = tool;
+  json["material"] = material;
+  json["steps"] = Json::array();
+  for (const Step& step : steps) {
+    json["steps"].push_back(
+        {{"name", step.name}, {"elapsed_s", step.elapsed}, {"done", step.done}, {"detail", step.detail}});
+  }
+  json["modes"] = Json::array();
+  for (const MeasuredModes& measured : modes) json["modes"].push_back(modesOf(measured));
+  json["coefficients"] = Json::array();
+  for (const CoefficientSet& set : coefficients) {
+    json["coefficients"].push_back({{"ktc_n_per_m2", number(set.value.ktc)},
+                                    {"ktc_n_per_m2_std", number(set.std_dev.ktc)},
+                                    {"kte_n_per_m", number(set.value.kte)},
+                                    {"kte_n_per_m_std", number(set.std_dev.kte)},
+                                    {"friction_viscous_nm_s_per_rad", number(set.friction_viscous)},
+                                    {"friction_coulomb_nm", number(set.friction_coulomb)},
+                                    {"source", set.source},
+                                    {"tests", set.tests}});
+  }
+  json["verified_cuts"] = Json::array();
+  for (const Verified& cut : verified) {
+    json["verified_cuts"].push_back({{"chart_says", cut.role},
+                                     {"spindle_speed_rad_per_s", cut.spindle_speed},
+                                     {"axial_depth_m", cut.axial_depth},
+                                     {"depth_limit_m", number(cut.depth_limit)},
+                                     {"cut_is", wordOf(cut.verdict.kind)},
+                                     {"windows", cut.verdict.windows},
+                                     {"chattering_windows", cut.verdict.chattering},
+                                     {"chatter_frequency_hz", number(cut.verdict.frequency)},
+                                     {"as_predicted", cut.as_predicted}});
+  }
+  std::ofstream out(file);
+  out << json.dump(2) << "\n";
+  out.close();
+  if (!out) throw Error(file + ": cannot be written");
+}
+
+}  // namespace smartmill::session
