@@ -24,6 +24,9 @@ struct ControllerOptions {
   /// @throws Error naming key and value.
   void validate() const;
 
+  /// Of a model's sections axes and spindle. What it leaves out: travel x -250..250, y -200..200, z -300..0
+  /// mm, home 0 0 0, rapid 30 m/min, 5 m/s2; spindle to 20000 rpm, 10000 rpm/s.
+  static ControllerOptions ofModel(const MachineModel& model);
   /// Positions in 0.1 um.
   static focas::SysInfo fineInfo();
 };

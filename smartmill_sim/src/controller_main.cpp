@@ -1,0 +1,96 @@
+// rosrun smartmill_sim controller: the simulated controller on its own, in wall-clock time, without a ROS
+// master.
+
+#include <chrono>
+#include <csignal>
+#include <cstdint>
+#include <cstdio>
+#include <exception>
+#include <iostream>
+#include <map>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "smartmill_core/model/machine_model.h"
+#include "smartmill_focas/server.h"
+#include "smartmill_sim/controller/controller.h"
+
+namespace {
+
+using namespace smartmill;
+using Clock = std::chrono::steady_clock;
+
+constexpr double STEP = 1e-3;  // [s]
+constexpr double MOST_BEHIND =
+    0.5;  // [s] after a longer pause of the computer the machine goes on where it was
+
+volatile std::sig_atomic_t stop_requested = 0;
+
+extern "C" void requestStop(int) {
+  stop_requested = 1;
+}
+
+void run(sim::Controller& controller) {
+  std::vector<sim::MotionState> states;
+  Clock::time_point done = Clock::now();
+  while (stop_requested == 0) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    const Clock::time_point now = Clock::now();
+    if (std::chrono::duration<double>(now - done).count() > MOST_BEHIND) {
+      done = now;
+    }
+    const auto count = static_cast<std::size_t>(std::chrono::duration<double>(now - done).count() / STEP);
+    controller.advance(STEP, count, states);
+    done += std::chrono::milliseconds(1) * count;
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const std::map<std::string, int> modes{{"mdi", focas::AUT_MDI},       {"mem", focas::AUT_MEM},
+                                         {"edit", focas::AUT_EDIT},     {"handle", focas::AUT_HANDLE},
+                                         {"jog", focas::AUT_JOG},       {"inc", focas::AUT_INC},
+                                         {"reference", focas::AUT_REF}, {"dnc", focas::AUT_REMOTE}};
+  std::string mode = "dnc", model_file;
+  focas::ServerOptions server_options;
+  CLI::App app{
+      "Simulated Fanuc controller of a three-axis mill: FOCAS2 over Ethernet, in wall-clock time, until "
+      "Ctrl-C.\n"
+      "Without a model: travel x -250..250, y -200..200, z -300..0 mm, start at 0 0 0, rapid 30 m/min, 5 "
+      "m/s2,\n"
+      "spindle to 20000 rpm at 10000 rpm/s."};
+  app.add_option("--port", server_options.port, "TCP port, 0: any free one")->capture_default_str();
+  app.add_option("--bind", server_options.bind_address, "address to listen on")->capture_default_str();
+  app.add_option(
+         "--mode", mode,
+         "at the panel: mdi, mem, edit, handle, jog, inc, reference, dnc (the one that runs programs)")
+      ->check(CLI::IsMember(modes))
+      ->capture_default_str();
+  app.add_option("--model", model_file, "machine model file: its sections axes and spindle");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? 0 : 2;
+  }
+  std::signal(SIGINT, requestStop);
+  std::signal(SIGTERM, requestStop);
+  try {
+    sim::ControllerOptions options =
+        sim::ControllerOptions::ofModel(model_file.empty() ? MachineModel{} : readMachineModel(model_file));
+    options.mode = modes.at(mode);
+    sim::Controller controller(options);
+    const focas::Server server(server_options, controller);
+    std::printf("controller: listens on %s:%d, mode %s\n", server_options.bind_address.c_str(), server.port(),
+                mode.c_str());
+    std::fflush(stdout);
+    run(controller);
+  } catch (const std::exception& e) {
+    std::cerr << "controller: " << e.what() << "\n";
+    return 1;
+  }
+  return 0;
+}
