@@ -96,9 +96,6 @@ TEST(Twin, nothingBeforeTheEngagement) {
 TEST(Twin, refusesWhatItCannotRun) {
   MachineModel model = machine();
   model.file = "model.yaml";
-  model.tool_tip.x.modes = {{1000.0, 0.03, 1e-8}};
-  EXPECT_THROW(simulateTest(model, slot(), 0.1, {}), Error);
-  model = machine();
   model.effects.push_back({});
   EXPECT_THROW(simulateTest(model, slot(), 0.1, {}), Error);
   model = machine();

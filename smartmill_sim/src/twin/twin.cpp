@@ -8,31 +8,20 @@
 #include <set>
 #include <string>
 
-#include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/error.h"
-#include "smartmill_core/modal/modal_filter.h"
 #include "smartmill_core/signal/window.h"
 #include "smartmill_core/units.h"
-#include "smartmill_sim/twin/spindle_drive.h"
+#include "smartmill_sim/twin/cutting_machine.h"
 
 namespace smartmill::sim {
 namespace {
 
 const std::array<const char*, 3> FORCES{{"fx", "fy", "fz"}};
+const std::array<const char*, 2> TIP{{"tool_x", "tool_y"}};
 
 // Columns that this twin can give.
-const std::set<std::string> KNOWN{"spindle_angle", "fx", "fy", "fz", "load_meter", "hammer"};
-
-void refuseWhatIsNotThere(const MachineModel& model, const CampaignTest& test,
-                          const SimulationOptions& options) {
-  if (options.substeps < 1) throw Error("simulation: substeps below 1");
-  if (!model.effects.empty()) {
-    throw Error(model.file + ": effect " + model.effects.front().name + " is not simulated by this twin");
-  }
-  if (test.kind == TestKind::cut && (!model.tool_tip.x.modes.empty() || !model.tool_tip.y.modes.empty())) {
-    throw Error(model.file + ": tool_tip modes are not simulated by this twin (rigid tool only)");
-  }
-}
+const std::set<std::string> KNOWN{"spindle_angle", "fx",     "fy",     "fz",
+                                  "load_meter",    "hammer", "tool_x", "tool_y"};
 
 // Catmull-Rom through the samples: smooth, exact at the samples.
 double interpolated(const std::vector<double>& samples, std::size_t i, double share) {
@@ -56,58 +45,41 @@ std::vector<double> contactForce(const std::vector<double>& hammer) {
   return force;
 }
 
-// Runs the force on the tool through the sensor and the spindle drive, with substeps between the samples.
-// force(i, share): force and torque at a share 0..1 of the way from sample i to the next; recorded columns
-// are kept.
+// Runs the machine over the record, with substeps between the samples; recorded columns are kept.
+// input(i, share): what happens at a share 0..1 of the way from sample i to the next.
 void run(const MachineModel& model, const CampaignTest& test, const SimulationOptions& options,
-         const std::function<CuttingForce(std::size_t, double)>& force, Record& record) {
-  const double step = 1.0 / (test.sample_rate * options.substeps);
+         CuttingMachine& machine, const std::function<CuttingMachine::Input(std::size_t, double)>& input,
+         Record& record) {
   std::array<std::vector<double>*, 3> out{};
-  std::vector<ModalFilter> sensor;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    sensor.emplace_back(model.force_sensor.axis[axis], 1.0 / step, Hold::first_order);
-  }
-  const bool load_meter = record.has("load_meter");
-  std::optional<SpindleDrive> drive;
-  if (load_meter) {
-    drive.emplace(model.needSpindle("simulate load_meter"), step);
-    drive->reset(test.spindle_speed);
-  }
-  std::mt19937_64 random(options.seed);
-  std::normal_distribution<double> normal;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     if (record.has(FORCES[axis])) out[axis] = &record.add(FORCES[axis]);
   }
-  std::vector<double>* voltage = load_meter ? &record.add("load_meter") : nullptr;
-  const double sign = model.force_sensor.measures_workpiece ? -1.0 : 1.0;
+  std::vector<double>* voltage = nullptr;
+  if (record.has("load_meter")) {
+    model.needSpindle("simulate load_meter");
+    voltage = &record.add("load_meter");
+    machine.resetLoadMeter(test.spindle_speed);
+  }
+  std::array<std::vector<double>*, 2> tip{};
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    if (record.has(TIP[axis])) tip[axis] = &record.add(TIP[axis]);
+  }
+  std::mt19937_64 random(options.seed);
+  std::normal_distribution<double> normal;
   for (std::size_t i = 0; i < record.size(); ++i) {
-    CuttingForce now = force(i, 0.0);
-    const std::array<double, 3> applied{{now.fx, now.fy, now.fz}};
+    const CuttingMachine::Output now = machine.step(input(i, 0.0));
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const double measured = sign * sensor[axis].step(applied[axis]);
       if (!out[axis]) continue;
       const double rms = model.force_sensor.noise_rms ? (*model.force_sensor.noise_rms)[axis] : 0.0;
-      (*out[axis])[i] = measured + (options.noise ? rms * normal(random) : 0.0);
+      (*out[axis])[i] = now.sensor[axis] + (options.noise ? rms * normal(random) : 0.0);
     }
-    double reading = 0.0;
-    if (drive) {
-      // The reading belongs to this sample; the torque of the way to the next one follows it.
-      reading = i == 0 ? drive->step(0.0, test.spindle_speed) : (*voltage)[i];
-      (*voltage)[i] = options.noise ? drive->rounded(reading) : reading;
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      if (tip[axis]) (*tip[axis])[i] = now.displacement[axis];
     }
-    double last = now.torque;
-    double next_reading = reading;
-    for (int s = 1; s <= options.substeps; ++s) {
-      const double share = static_cast<double>(s) / options.substeps;
-      now = force(i, share);
-      if (drive) next_reading = drive->step(0.5 * (last + now.torque), test.spindle_speed);
-      last = now.torque;
-      if (s == options.substeps) break;  // the next sample takes this force
-      sensor[0].step(now.fx);
-      sensor[1].step(now.fy);
-      sensor[2].step(now.fz);
+    if (voltage) (*voltage)[i] = options.noise ? machine.rounded(now.load_meter) : now.load_meter;
+    for (int s = 1; s < options.substeps; ++s) {
+      machine.step(input(i, static_cast<double>(s) / options.substeps));
     }
-    if (drive && i + 1 < record.size()) (*voltage)[i + 1] = next_reading;
   }
 }
 
@@ -123,16 +95,23 @@ double phaseOf(const std::vector<double>& angle, const std::vector<double>& time
 
 Record simulate(const MachineModel& model, const CampaignTest& test, Record record, double phase,
                 const SimulationOptions& options) {
-  refuseWhatIsNotThere(model, test, options);
+  if (options.substeps < 1) throw Error("simulation: substeps below 1");
+  CuttingMachine machine(model, 1.0 / (test.sample_rate * options.substeps));
   if (test.kind == TestKind::tap) {
     const std::vector<double> hammer = contactForce(record.column("hammer"));
     const std::size_t axis = test.direction == "x" ? 0 : test.direction == "y" ? 1 : 2;
     run(
-        model, test, options,
+        model, test, options, machine,
         [&](std::size_t i, double share) {
-          CuttingForce force;
-          (axis == 0 ? force.fx : axis == 1 ? force.fy : force.fz) = interpolated(hammer, i, share);
-          return force;
+          CuttingMachine::Input input;
+          // A record of the tool's displacement is of a hit on the tool, any other of one on the sensor.
+          const double force = interpolated(hammer, i, share);
+          if (axis < 2 && record.has(TIP[axis])) {
+            input.tip_force[axis] = force;
+          } else {
+            input.sensor_force[axis] = force;
+          }
+          return input;
         },
         record);
     return record;
@@ -144,22 +123,32 @@ Record simulate(const MachineModel& model, const CampaignTest& test, Record reco
       if (angle[i] < 0.0) angle[i] += units::TWO_PI;
     }
   }
-  if (test.kind == TestKind::air) {
-    run(
-        model, test, options, [](std::size_t, double) { return CuttingForce{}; }, record);
-    return record;
+  const bool cut = test.kind == TestKind::cut;
+  double feed = 0.0;  // [m/s]
+  if (cut) {
+    model.needCutting("simulate a cut");
+    feed = test.engagement->feed_per_tooth * model.needTool("simulate a cut").teeth * test.spindle_speed /
+           units::TWO_PI;
   }
-  const MechanisticForce process(model.needTool("simulate a cut"), model.needCutting("simulate a cut"),
-                                 *test.engagement);
   const double start = test.engage_time.value_or(record.time.front() - 1.0);
   const double dt = 1.0 / test.sample_rate;
+  bool engaged = false;
   run(
-      model, test, options,
+      model, test, options, machine,
       [&](std::size_t i, double share) {
         const double t = record.time[i] + share * dt;
+        CuttingMachine::Input input;
+        input.motion.angle = phase + test.spindle_speed * (t - record.time[0]);
+        input.motion.speed = test.spindle_speed;
+        input.motion.velocity[0] = feed;
+        input.motion.centre[0] = feed * (t - record.time[0]);
         // A rounded time stamp must not put the sample of engagement on the wrong side.
-        if (t < start - 1e-3 * dt) return CuttingForce{};
-        return process.at(phase + test.spindle_speed * (t - record.time[0]));
+        if (cut && !engaged && t >= start - 1e-3 * dt) {
+          machine.engage({{test.engagement->entry, test.engagement->exit, test.engagement->axial_depth}},
+                         input.motion);
+          engaged = true;
+        }
+        return input;
       },
       record);
   return record;

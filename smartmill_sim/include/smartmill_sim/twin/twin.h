@@ -18,7 +18,7 @@ struct SimulationOptions {
 
 /// Simulates one test of a campaign: a record with the columns and sample times of the recorded one. The
 /// recorded spindle angle gives the phase (of a tap: stands as it is), the recorded hammer force drives a
-/// tap. Tool rigid, no effects.
+/// tap. No effects.
 ///
 /// Before engage_time the tool is out of cut; from there full engagement with the surface that steady cutting
 /// leaves. The sensor begins at rest, the load meter at its air-cut value.

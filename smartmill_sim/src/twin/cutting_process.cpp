@@ -1,0 +1,230 @@
+#include "smartmill_sim/twin/cutting_process.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <utility>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/units.h"
+
+namespace smartmill::sim {
+namespace {
+
+using units::TWO_PI;
+
+constexpr int NODES = 2048;  // of the surface over a turn
+constexpr double NODE_ANGLE = TWO_PI / NODES;
+constexpr double SLICE_ANGLE = 0.02;  // [rad] lag over a slice: the mid-slice rule errs by 2e-5
+constexpr double NO_GAP = 1e-9;       // [m] below this gap the edge still rubs: chips near 0 are rounded
+constexpr double MARGIN = 2.0 * NODE_ANGLE;  // surface kept beyond an arc, for interpolation at its end
+
+double wrapped(double angle) {
+  const double a = std::fmod(angle, TWO_PI);
+  return a < 0.0 ? a + TWO_PI : a;
+}
+
+int nodeIndex(long n) {
+  const long m = n % NODES;
+  return static_cast<int>(m < 0 ? m + NODES : m);
+}
+
+/// The angle's representative that lies in an arc's reach: [entry - margin, entry - margin + 2 pi).
+double besideArc(double angle, const ContactArc& arc, double margin) {
+  const double first = arc.entry - margin;
+  return first + wrapped(angle - first);
+}
+
+bool holds(const ContactArc& arc, double angle, double slice_low) {
+  if (slice_low >= arc.depth) return false;
+  return besideArc(angle, arc, MARGIN) <= arc.exit + MARGIN;
+}
+
+}  // namespace
+
+CuttingProcess::CuttingProcess(const ToolGeometry& tool, const CuttingLaw& law,
+                               std::vector<double> radius_offset)
+    : tool_(tool), law_(law), offset_(std::move(radius_offset)), sin_(NODES), cos_(NODES) {
+  validate(tool);
+  if (offset_.empty()) offset_.assign(static_cast<std::size_t>(tool.teeth), 0.0);
+  if (offset_.size() != static_cast<std::size_t>(tool.teeth)) {
+    throw Error("cutting process: " + std::to_string(offset_.size()) + " radius offsets for " +
+                std::to_string(tool.teeth) + " teeth");
+  }
+  for (int n = 0; n < NODES; ++n) {
+    sin_[static_cast<std::size_t>(n)] = std::sin(n * NODE_ANGLE);
+    cos_[static_cast<std::size_t>(n)] = std::cos(n * NODE_ANGLE);
+  }
+  // Without helix every height is alike: one slice of any height.
+  height_ = tool.lag() > 0.0 ? SLICE_ANGLE / tool.lag() : 1e3;
+}
+
+// The latest reach of any tooth at this angle, had the tool always moved as now.
+double CuttingProcess::steadySurface(double node_angle, double lag, const ToolMotion& now) const {
+  const double s = std::sin(node_angle), c = std::cos(node_angle);
+  const double along = now.velocity[0] * s + now.velocity[1] * c;  // [m/s] into the work
+  double reach = -1e300;
+  for (int j = 0; j < tool_.teeth; ++j) {
+    // As in cut(): the node right behind a tooth is still as the tooth found it.
+    const double past = wrapped(now.angle + tool_.toothAngle(j) - lag - node_angle - NODE_ANGLE) + NODE_ANGLE;
+    const double since = now.speed > 0.0 ? past / now.speed : 0.0;
+    reach = std::max(reach, offset_[static_cast<std::size_t>(j)] - along * since);
+  }
+  return tool_.radius() + reach + now.centre[0] * s + now.centre[1] * c;
+}
+
+double CuttingProcess::lagOf(const Slice& slice, const ContactArc& arc) const {
+  return tool_.lag() * 0.5 * (slice.low + std::min(slice.high, arc.depth));
+}
+
+void CuttingProcess::growTo(double depth) {
+  while (slices_.empty() || slices_.back().high < depth) {
+    const double low = slices_.empty() ? 0.0 : slices_.back().high;
+    slices_.push_back({low, low + height_, std::vector<double>(NODES, 0.0),
+                       std::vector<double>(static_cast<std::size_t>(tool_.teeth), 0.0)});
+  }
+}
+
+void CuttingProcess::engage(const std::vector<ContactArc>& arcs, const ToolMotion& now) {
+  double depth = 0.0;
+  for (const ContactArc& a : arcs) {
+    if (!(a.entry >= 0.0 && a.exit > a.entry && a.exit <= TWO_PI + 1e-9 && a.depth > 0.0)) {
+      char text[160];
+      std::snprintf(text, sizeof text, "contact from %g to %g rad over %g m is impossible", a.entry, a.exit,
+                    a.depth);
+      throw Error(text);
+    }
+    depth = std::max(depth, a.depth);
+  }
+  if (depth > 0.0) growTo(depth);
+  for (Slice& slice : slices_) {
+    for (int n = 0; n < NODES; ++n) {
+      const double angle = n * NODE_ANGLE;
+      const auto in = [&](const ContactArc& a) { return holds(a, angle, slice.low); };
+      const auto arc = std::find_if(arcs.begin(), arcs.end(), in);
+      if (arc != arcs.end() && std::none_of(arcs_.begin(), arcs_.end(), in)) {
+        slice.surface[static_cast<std::size_t>(n)] = steadySurface(angle, lagOf(slice, *arc), now);
+      }
+    }
+  }
+  arcs_ = arcs;
+}
+
+void CuttingProcess::setDepth(double depth, const ToolMotion& now) {
+  std::vector<ContactArc> arcs = arcs_;
+  for (ContactArc& a : arcs) a.depth = depth;
+  if (!slices_.empty() && depth <= slices_.back().high) {
+    bool new_slice = false;
+    for (const Slice& s : slices_) {
+      for (const ContactArc& a : arcs_) new_slice = new_slice || (s.low < depth && s.low >= a.depth);
+    }
+    if (!new_slice) {
+      arcs_ = arcs;
+      return;
+    }
+  }
+  engage(arcs, now);
+}
+
+void CuttingProcess::cut(Slice& slice, int tooth, double before, double angle, const ContactArc& arc,
+                         const ToolMotion& now, CuttingForce& sum) {
+  const auto j = static_cast<std::size_t>(tooth);
+  const double radius = tool_.radius() + offset_[j];
+  const double top = std::min(slice.high, arc.depth);
+  const double half = 0.5 * tool_.lag() * (top - slice.low);
+  // The part of the slice that is in the arc.
+  double length = top - slice.low, middle = angle;
+  if (half > 0.0) {
+    const double from = std::max(angle - half, arc.entry), to = std::min(angle + half, arc.exit);
+    length *= std::clamp((to - from) / (2.0 * half), 0.0, 1.0);
+    middle = 0.5 * (from + to);
+  } else if (angle < arc.entry || angle >= arc.exit) {
+    length = 0.0;
+  }
+  if (length > 0.0) {
+    const double s = std::sin(middle), c = std::cos(middle);
+    // At the exit the surface behind the slice's middle is this tooth's own: the chip of the middle serves.
+    const double at = std::max(angle, middle);
+    if (at <= arc.exit) {
+      const double place = at / NODE_ANGLE, whole = std::floor(place), share = place - whole;
+      const auto a = static_cast<std::size_t>(nodeIndex(static_cast<long>(whole)));
+      const auto b = static_cast<std::size_t>(nodeIndex(static_cast<long>(whole) + 1));
+      // Against the tool's centre, where the surface is smooth enough to be interpolated.
+      const double sa = slice.surface[a] - now.centre[0] * sin_[a] - now.centre[1] * cos_[a];
+      const double sb = slice.surface[b] - now.centre[0] * sin_[b] - now.centre[1] * cos_[b];
+      const double outward = at == middle
+                                 ? now.displacement[0] * s + now.displacement[1] * c
+                                 : now.displacement[0] * std::sin(at) + now.displacement[1] * std::cos(at);
+      slice.chip[j] = radius + outward - sa - share * (sb - sa);
+    }
+    const double chip = std::max(slice.chip[j], 0.0);
+    if (slice.chip[j] > -NO_GAP) {
+      const CuttingCoefficients& k = law_.coefficients;
+      double kc = law_.chip_factor;
+      if (law_.size_exponent != 0.0) kc *= std::pow(chip / law_.size_reference, -law_.size_exponent);
+      const double h = kc * chip;
+      double ft = (k.ktc * h + k.kte * law_.edge_factor) * length;
+      double fr = (k.krc * h + k.kre * law_.edge_factor) * length;
+      const double fa = (k.kac * h + k.kae * law_.edge_factor) * length;
+      if (law_.damping != 0.0 && now.speed > 0.0 && moved_) {
+        const double dt = wrapped(now.angle - last_.angle) / now.speed;
+        const double rate = dt > 0.0 ? ((now.displacement[0] - last_.displacement[0]) * s +
+                                        (now.displacement[1] - last_.displacement[1]) * c) /
+                                           dt
+                                     : 0.0;
+        const double damping = law_.damping * rate / (now.speed * tool_.radius()) * length;
+        fr += damping;
+        ft += 0.3 * damping;
+      }
+      sum.fx += -ft * c - fr * s;
+      sum.fy += ft * s - fr * c;
+      sum.fz += fa;
+      sum.torque += ft * tool_.radius();
+    }
+  }
+  // Cut the nodes passed since the last step, up to the last one before the tooth: the one right behind it is
+  // still needed as it was.
+  const double step = angle - before;
+  const long first = static_cast<long>(std::floor(before / NODE_ANGLE));
+  const long last = static_cast<long>(std::floor(angle / NODE_ANGLE)) - 1;
+  for (long n = first; n <= last; ++n) {
+    const double share = step > 0.0 ? std::clamp((n * NODE_ANGLE - before) / step, -1.0, 1.0) : 1.0;
+    const auto i = static_cast<std::size_t>(nodeIndex(n));
+    const auto blend = [&](double from, double to) { return from + share * (to - from); };
+    const double x = blend(last_.centre[0] + last_.displacement[0], now.centre[0] + now.displacement[0]);
+    const double y = blend(last_.centre[1] + last_.displacement[1], now.centre[1] + now.displacement[1]);
+    slice.surface[i] = std::max(slice.surface[i], radius + x * sin_[i] + y * cos_[i]);
+  }
+}
+
+CuttingForce CuttingProcess::step(const ToolMotion& now) {
+  CuttingForce sum;
+  if (!arcs_.empty()) {
+    const double turned = moved_ ? wrapped(now.angle - last_.angle) : 0.0;
+    const ToolMotion before = moved_ ? last_ : now;
+    if (!moved_) last_ = before;
+    const double half_slice = 0.5 * tool_.lag() * height_;
+    const double margin = MARGIN + half_slice;
+    for (int j = 0; j < tool_.teeth; ++j) {
+      const double tip = now.angle + tool_.toothAngle(j);
+      for (const ContactArc& arc : arcs_) {
+        // Most teeth are away from the arc with all of their edge.
+        const double reach = arc.exit - arc.entry + 2.0 * margin + turned;
+        if (reach + tool_.lag() * arc.depth < TWO_PI) {
+          if (wrapped(tip - (arc.entry - margin)) > reach + tool_.lag() * arc.depth) continue;
+        }
+        for (Slice& slice : slices_) {
+          if (slice.low >= arc.depth) break;
+          const double angle = besideArc(tip - lagOf(slice, arc), arc, margin);
+          if (angle > arc.exit + margin + turned) continue;
+          cut(slice, j, angle - turned, angle, arc, now, sum);
+        }
+      }
+    }
+  }
+  last_ = now;
+  moved_ = true;
+  return sum;
+}
+
+}  // namespace smartmill::sim
