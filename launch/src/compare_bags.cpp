@@ -1,0 +1,183 @@
+// rosrun smartmill_launch compare_bags LIVE.bag REPLAY.bag
+
+#include <cstdio>
+#include <functional>
+#include <iostream>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <smartmill_msgs/ChatterState.h>
+#include <smartmill_msgs/CuttingCoefficients.h>
+#include <smartmill_msgs/ForceBlock.h>
+#include <smartmill_msgs/Frf.h>
+#include <smartmill_msgs/ModalModel.h>
+#include <smartmill_msgs/StabilityChart.h>
+#include <CLI/CLI.hpp>
+
+#include "smartmill_core/error.h"
+#include "smartmill_launch/topic_comparison.h"
+#include "smartmill_ros/bag_reader.h"
+
+namespace {
+
+using namespace smartmill;
+using namespace smartmill::session;
+
+/// Keys are made of stamps with every digit, so that results of equal times meet.
+std::string keyOf(const std_msgs::Header& header, const std::string& about) {
+  char stamp[40];
+  std::snprintf(stamp, sizeof stamp, "%u.%09u", header.stamp.sec, header.stamp.nsec);
+  return about + (about.empty() ? "" : " ") + "at " + stamp;
+}
+
+ResultRecord begin(const std_msgs::Header& header, const std::string& about) {
+  ResultRecord record;
+  record.key = keyOf(header, about);
+  record.stamp = header.stamp.toSec();
+  record.values = {static_cast<double>(header.stamp.sec), static_cast<double>(header.stamp.nsec)};
+  record.words = {header.frame_id};
+  return record;
+}
+
+void add(ResultRecord& record, const std::vector<double>& values) {
+  record.values.push_back(static_cast<double>(values.size()));
+  record.values.insert(record.values.end(), values.begin(), values.end());
+}
+
+ResultRecord recordOf(const smartmill_msgs::ForceBlock& m) {
+  ResultRecord record = begin(m.header, "");
+  record.key = "sample " + std::to_string(m.first_index);
+  record.values.insert(record.values.end(), {m.sample_rate, static_cast<double>(m.status)});
+  for (const std::vector<double>* axis : {&m.fx, &m.fy, &m.fz}) add(record, *axis);
+  return record;
+}
+
+ResultRecord recordOf(const smartmill_msgs::Frf& m) {
+  ResultRecord record = begin(m.header, m.tool + " " + m.point + " " + m.direction);
+  record.words.push_back(m.unit);
+  record.values.push_back(m.averages);
+  for (const std::vector<double>* v : {&m.frequency, &m.real, &m.imag, &m.coherence, &m.standard_deviation})
+    add(record, *v);
+  return record;
+}
+
+ResultRecord recordOf(const smartmill_msgs::ModalModel& m) {
+  ResultRecord record = begin(m.header, m.tool + " " + m.point + " " + m.direction);
+  record.words.push_back(m.unit);
+  for (const smartmill_msgs::Mode& mode : m.modes) {
+    add(record, {mode.frequency, mode.damping_ratio, mode.gain, mode.frequency_std, mode.damping_ratio_std,
+                 mode.gain_std});
+  }
+  add(record, {m.direct, m.direct_std, m.relative_error});
+  return record;
+}
+
+ResultRecord recordOf(const smartmill_msgs::CuttingCoefficients& m) {
+  ResultRecord record = begin(m.header, m.tool + " in " + m.material);
+  record.words.push_back(m.source);
+  add(record,
+      {m.ktc, m.krc, m.kac, m.kte, m.kre, m.kae, m.ktc_std, m.krc_std, m.kac_std, m.kte_std, m.kre_std,
+       m.kae_std, m.friction_viscous, m.friction_coulomb, static_cast<double>(m.test_count)});
+  return record;
+}
+
+ResultRecord recordOf(const smartmill_msgs::StabilityChart& m) {
+  ResultRecord record = begin(m.header, m.tool + " in " + m.material);
+  record.words.push_back(m.method);
+  add(record, {m.entry_angle, m.exit_angle, m.feed_per_tooth, m.absolute_depth_limit});
+  for (const std::vector<double>* v :
+       {&m.spindle_speed, &m.depth_limit, &m.chatter_frequency, &m.torque_depth_limit, &m.power_depth_limit})
+    add(record, *v);
+  for (const auto* points : {&m.recommended, &m.unstable}) {
+    for (const smartmill_msgs::StabilityPoint& p : *points) {
+      add(record, {p.spindle_speed, p.axial_depth, p.depth_limit, p.chatter_frequency, p.torque, p.power,
+                   p.material_removal_rate});
+    }
+  }
+  return record;
+}
+
+ResultRecord recordOf(const smartmill_msgs::ChatterState& m) {
+  ResultRecord record = begin(m.header, m.condition);
+  add(record, {static_cast<double>(m.valid), static_cast<double>(m.chatter), m.frequency, m.energy_ratio,
+               m.severity});
+  return record;
+}
+
+/// One topic of both bags.
+struct Topic {
+  std::string name;
+  TopicComparison comparison;
+  std::function<void(BagReader&, bool first)> attach;
+};
+
+template <class Message>
+std::unique_ptr<Topic> topic(const char* name, double slack) {
+  auto topic = std::make_unique<Topic>(Topic{name, TopicComparison(slack), {}});
+  topic->attach = [at = topic.get()](BagReader& bag, bool first) {
+    bag.on<Message>(at->name, [at, first](const Message& message, double) {
+      if (first) {
+        at->comparison.addFirst(recordOf(message));
+      } else {
+        at->comparison.addSecond(recordOf(message));
+      }
+    });
+  };
+  return topic;
+}
+
+int run(const std::string& first, const std::string& second, double slack) {
+  // A result that comes once must be in both; of what flows all the time a recorder may miss the ends.
+  std::vector<std::unique_ptr<Topic>> topics;
+  topics.push_back(topic<smartmill_msgs::Frf>("tool/frf", 0.0));
+  topics.push_back(topic<smartmill_msgs::ModalModel>("tool/modes", 0.0));
+  topics.push_back(topic<smartmill_msgs::CuttingCoefficients>("material/coefficients", 0.0));
+  topics.push_back(topic<smartmill_msgs::StabilityChart>("stability/chart", 0.0));
+  topics.push_back(topic<smartmill_msgs::ForceBlock>("force/measured", slack));
+  topics.push_back(topic<smartmill_msgs::ForceBlock>("force/compensated", slack));
+  topics.push_back(topic<smartmill_msgs::ChatterState>("chatter/state", slack));
+  for (const bool is_first : {true, false}) {
+    BagReader bag(is_first ? first : second);
+    for (const auto& each : topics) each->attach(bag, is_first);
+    bag.run();
+  }
+  bool same = true;
+  std::size_t common = 0;
+  for (const auto& each : topics) {
+    const TopicDifference difference = each->comparison.result();
+    std::printf("%s\n", difference.text(each->name).c_str());
+    same = same && difference.same();
+    common += difference.common;
+  }
+  if (common == 0) throw Error(first + " and " + second + ": no result is in both");
+  return same ? 0 : 1;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  std::string first, second;
+  double slack = 1.0;
+  CLI::App app{
+      "Compares the results in two recordings (a session and its replay) to the last digit; exit code 1 on "
+      "any "
+      "difference."};
+  app.add_option("first", first, "bag")->required();
+  app.add_option("second", second, "bag")->required();
+  app.add_option("--slack", slack,
+                 "seconds at begin and end that a recorder may have missed of forces and verdicts")
+      ->capture_default_str()
+      ->check(CLI::NonNegativeNumber);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? 0 : 2;
+  }
+  try {
+    return run(first, second, slack);
+  } catch (const std::exception& e) {
+    std::cerr << "compare_bags: " << e.what() << "\n";
+    return 1;
+  }
+}

@@ -1,0 +1,105 @@
+#include "smartmill_launch/topic_comparison.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+
+namespace smartmill::session {
+namespace {
+
+constexpr double INFINITE = std::numeric_limits<double>::infinity();
+
+bool equal(double a, double b) {
+  return a == b || (std::isnan(a) && std::isnan(b));
+}
+
+bool equal(const ResultRecord& a, const ResultRecord& b) {
+  return a.words == b.words && a.values.size() == b.values.size() &&
+         std::equal(a.values.begin(), a.values.end(), b.values.begin(),
+                    [](double x, double y) { return equal(x, y); });
+}
+
+}  // namespace
+
+bool TopicDifference::same() const {
+  return different == 0 && contradictions == 0 && first_only == 0 && second_only == 0;
+}
+
+std::string TopicDifference::text(const std::string& topic) const {
+  char line[500];
+  std::snprintf(line, sizeof line, "%-22s %-9s %7zu common, %zu different", topic.c_str(),
+                same() ? "same" : "DIFFERENT", common, different);
+  std::string out = line;
+  if (different > 0) {
+    std::snprintf(line, sizeof line, " (largest %.3g of %.3g; first at %s)", largest, scale, where.c_str());
+    out += line;
+  }
+  const auto add = [&](std::size_t count, const char* what) {
+    if (count == 0) return;
+    std::snprintf(line, sizeof line, ", %zu %s", count, what);
+    out += line;
+  };
+  add(first_only, "only in the first");
+  add(second_only, "only in the second");
+  add(contradictions, "that contradict themselves");
+  add(first_ends, "of the first beyond the other's ends");
+  add(second_ends, "of the second beyond the other's ends");
+  return out;
+}
+
+TopicComparison::TopicComparison(double slack)
+    : slack_(slack), common_from_(INFINITE), common_to_(-INFINITE) {
+}
+
+void TopicComparison::addFirst(ResultRecord record) {
+  const auto place = first_.find(record.key);
+  if (place == first_.end()) {
+    std::string key = record.key;
+    first_.emplace(std::move(key), std::move(record));
+  } else if (!equal(place->second, record)) {
+    ++found_.contradictions;
+  }
+}
+
+void TopicComparison::addSecond(const ResultRecord& record) {
+  const auto match = first_.find(record.key);
+  if (match == first_.end()) {
+    second_only_.emplace(record.key, record.stamp);
+    return;
+  }
+  const ResultRecord& other = match->second;
+  // A result that was said again (to a late listener) counts once; said differently, it is a difference.
+  const bool again = !seen_.insert(record.key).second;
+  if (!again) ++found_.common;
+  common_from_ = std::min(common_from_, record.stamp);
+  common_to_ = std::max(common_to_, record.stamp);
+  const std::size_t size = std::min(record.values.size(), other.values.size());
+  for (std::size_t i = 0; i < size; ++i) {
+    const double a = other.values[i], b = record.values[i];
+    if (std::isfinite(a)) found_.scale = std::max(found_.scale, std::abs(a));
+    if (equal(a, b)) continue;
+    found_.largest = std::max(found_.largest, std::isfinite(a - b) ? std::abs(a - b) : INFINITE);
+  }
+  if (equal(other, record)) return;
+  ++found_.different;
+  if (found_.where.empty()) found_.where = record.key;
+}
+
+TopicDifference TopicComparison::result() const {
+  TopicDifference difference = found_;
+  const auto sortOut = [&](double stamp, std::size_t& within, std::size_t& ends) {
+    const bool begin = stamp < common_from_ && stamp >= common_from_ - slack_;
+    const bool end = stamp > common_to_ && stamp <= common_to_ + slack_;
+    ++(begin || end ? ends : within);
+  };
+  for (const auto& [key, record] : first_) {
+    if (!seen_.count(key)) sortOut(record.stamp, difference.first_only, difference.first_ends);
+  }
+  for (const auto& [key, stamp] : second_only_) {
+    sortOut(stamp, difference.second_only, difference.second_ends);
+  }
+  return difference;
+}
+
+}  // namespace smartmill::session

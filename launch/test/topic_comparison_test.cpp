@@ -1,0 +1,82 @@
+#include "smartmill_launch/topic_comparison.h"
+
+#include <cmath>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+using smartmill::session::ResultRecord;
+using smartmill::session::TopicComparison;
+using smartmill::session::TopicDifference;
+
+namespace {
+
+constexpr double NOT_A_NUMBER = std::numeric_limits<double>::quiet_NaN();
+
+ResultRecord block(int index, double value = 1.0) {
+  return {"sample " + std::to_string(index), 0.01 * index, {value, NOT_A_NUMBER}, {"machine"}};
+}
+
+TopicDifference compare(const std::vector<ResultRecord>& first, const std::vector<ResultRecord>& second,
+                        double slack) {
+  TopicComparison comparison(slack);
+  for (const ResultRecord& record : first) comparison.addFirst(record);
+  for (const ResultRecord& record : second) comparison.addSecond(record);
+  return comparison.result();
+}
+
+}  // namespace
+
+TEST(TopicComparison, SameInAnyOrderWithRepetitionsAndNaN) {
+  const TopicDifference same =
+      compare({block(1), block(2), block(3)}, {block(3), block(1), block(2), block(1)}, 0.0);
+  EXPECT_TRUE(same.same()) << same.text("force");
+  EXPECT_EQ(same.common, 3u);
+}
+
+TEST(TopicComparison, TheLastDigitCounts) {
+  const double next = std::nextafter(1.0, 2.0);
+  const TopicDifference difference = compare({block(1), block(2)}, {block(1), block(2, next)}, 0.0);
+  EXPECT_FALSE(difference.same());
+  EXPECT_EQ(difference.different, 1u);
+  EXPECT_EQ(difference.largest, next - 1.0);
+  EXPECT_EQ(difference.where, "sample 2");
+}
+
+TEST(TopicComparison, NaNAgainstANumberAndOtherWordsDiffer) {
+  EXPECT_FALSE(compare({block(1, NOT_A_NUMBER)}, {block(1)}, 0.0).same());
+  ResultRecord renamed = block(1);
+  renamed.words = {"dynamometer"};
+  EXPECT_FALSE(compare({block(1)}, {renamed}, 0.0).same());
+  ResultRecord shorter = block(1);
+  shorter.values.pop_back();
+  EXPECT_FALSE(compare({block(1)}, {shorter}, 0.0).same());
+}
+
+TEST(TopicComparison, EndsAreForgivenWithinTheSlackOnly) {
+  const TopicDifference ends = compare({block(1), block(2), block(3)}, {block(2), block(3), block(4)}, 0.015);
+  EXPECT_TRUE(ends.same()) << ends.text("force");
+  EXPECT_EQ(ends.first_ends, 1u);
+  EXPECT_EQ(ends.second_ends, 1u);
+  const TopicDifference far = compare({block(1), block(2), block(9)}, {block(1), block(2)}, 0.015);
+  EXPECT_FALSE(far.same());
+  EXPECT_EQ(far.first_only, 1u);
+}
+
+TEST(TopicComparison, AMissingBlockInTheMiddleIsADifference) {
+  const TopicDifference hole = compare({block(1), block(2), block(3)}, {block(1), block(3)}, 10.0);
+  EXPECT_FALSE(hole.same());
+  EXPECT_EQ(hole.first_only, 1u);
+  EXPECT_EQ(hole.first_ends, 0u);
+}
+
+TEST(TopicComparison, NothingInCommonIsADifferenceNothingAtAllIsNot) {
+  EXPECT_FALSE(compare({block(1)}, {}, 10.0).same());
+  EXPECT_FALSE(compare({}, {block(1)}, 10.0).same());
+  EXPECT_TRUE(compare({}, {}, 10.0).same());
+}
+
+TEST(TopicComparison, ARecordingThatContradictsItselfIsFound) {
+  EXPECT_FALSE(compare({block(1), block(1, 2.0)}, {block(1)}, 0.0).same());
+  EXPECT_FALSE(compare({block(1)}, {block(1), block(1, 2.0)}, 0.0).same());
+}
