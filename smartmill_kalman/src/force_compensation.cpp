@@ -11,9 +11,6 @@ namespace smartmill::kalman {
 namespace {
 
 const std::array<const char*, 3> CHANNELS{{"fx", "fy", "fz"}};
-// A stamp this far behind the newest one means that a recording was started again.
-constexpr double RESTART = 1.0;  // [s]
-
 void require(const char* key, double value, bool good, const char* due) {
   if (!good || !std::isfinite(value))
     throw Error(std::string(key) + ": " + std::to_string(value) + ", " + due + " is due");
@@ -35,8 +32,9 @@ ForceCompensation::ForceCompensation(const CompensationParameters& parameters, b
   parameters_.validate();
 }
 
-void ForceCompensation::setSensor(std::size_t axis, const ModalModel& sensor) {
+void ForceCompensation::setSensor(std::size_t axis, const ModalModel& sensor, double noise_rms) {
   sensor_.at(axis) = sensor;
+  noise_rms_.at(axis) = noise_rms;
   filters_.clear();
 }
 
@@ -64,7 +62,11 @@ void ForceCompensation::reset() {
 
 void ForceCompensation::design(double speed, double sample_rate) {
   filters_.clear();
-  for (const auto& sensor : sensor_) filters_.emplace_back(*sensor, speed, sample_rate, parameters_.filter);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    HarmonicFilterParameters parameters = parameters_.filter;
+    parameters.noise_rms = noise_rms_[axis];
+    filters_.emplace_back(*sensor_[axis], speed, sample_rate, parameters);
+  }
   design_rate_ = sample_rate;
   settling_left_ =
       parameters_.settling_periods * parameters_.filter.settling_revolutions * units::TWO_PI / speed;
@@ -126,39 +128,6 @@ void ForceCompensation::handle(const SampleBlock& block) {
   compensated.status = settling_left_ > 0.0 ? ForceBlock::Status::settling : ForceBlock::Status::compensated;
   settling_left_ -= static_cast<double>(block.size()) / block.sample_rate;
   output_(measured, compensated);
-}
-
-SortedCompensation::SortedCompensation(const CompensationParameters& parameters, bool measures_workpiece,
-                                       double hold_back, ForceCompensation::Output output)
-    : compensation_(parameters, measures_workpiece, std::move(output)),
-      sorter_(hold_back),
-      conditions_(sorter_.addEvents("cut/condition")),
-      angles_(sorter_.addRegular("spindle/angle")),
-      blocks_(sorter_.addRegular("daq/dynamometer")) {
-}
-
-void SortedCompensation::watch(double stamp) {
-  if (stamp < newest_ - RESTART) {
-    sorter_.reset();
-    compensation_.reset();
-    newest_ = stamp;
-  }
-  newest_ = std::max(newest_, stamp);
-}
-
-void SortedCompensation::push(const SampleBlock& block) {
-  watch(block.stamp);
-  sorter_.push(blocks_, block.stamp, [this, block] { compensation_.handle(block); });
-}
-
-void SortedCompensation::push(const SpindleAngle& angle) {
-  watch(angle.stamp);
-  sorter_.push(angles_, angle.stamp, [this, angle] { compensation_.handle(angle); });
-}
-
-void SortedCompensation::push(const CuttingCondition& condition) {
-  // A latched condition is older than the data around it: no restart.
-  sorter_.push(conditions_, condition.stamp, [this, condition] { compensation_.handle(condition); });
 }
 
 }  // namespace smartmill::kalman

@@ -1,12 +1,15 @@
 #include "node.h"
 
 #include <algorithm>
-#include <type_traits>
 
 #include <geometry_msgs/WrenchStamped.h>
+#include <smartmill_msgs/CuttingCondition.h>
 #include <smartmill_msgs/ForceBlock.h>
+#include <smartmill_msgs/SampleBlock.h>
+#include <smartmill_msgs/SpindleAngle.h>
 #include <boost/function.hpp>
 
+#include "rotation.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_ros/conversions.h"
@@ -15,14 +18,7 @@
 namespace smartmill::kalman {
 namespace {
 
-constexpr int QUEUE = 2000;  // 20 s of blocks
-
-void rotateInPlace(const std::array<double, 9>& rotation, ForceBlock& block) {
-  for (std::size_t i = 0; i < block.force[0].size(); ++i) {
-    const auto turned = frames::rotate(rotation, {block.force[0][i], block.force[1][i], block.force[2][i]});
-    for (std::size_t axis = 0; axis < 3; ++axis) block.force[axis][i] = turned[axis];
-  }
-}
+constexpr std::size_t QUEUE = 2000;  // 20 s of blocks
 
 }  // namespace
 
@@ -31,80 +27,100 @@ KalmanNode::KalmanNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
         ParameterReader reader = ParameterReader::fromServer(private_nh);
         return readParameters(reader);
       }()),
-      sorted_([&] {
-        const MachineModel model = readMachineModel(parameters_.model);
-        SortedCompensation sorted(parameters_.compensation, model.force_sensor.measures_workpiece,
-                                  parameters_.hold_back,
-                                  [this](const ForceBlock& m, const ForceBlock& c) { publish(m, c); });
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-          sorted.compensation().setSensor(axis, model.force_sensor.axis[axis]);
-        }
-        return sorted;
-      }()),
       listener_(transforms_),
+      sorted_(parameters_.compensation, parameters_.taps,
+              [this] {
+                if (parameters_.model.empty())
+                  throw Error("model: the path of a smartmill-model/1 file is due");
+                return readMachineModel(parameters_.model).force_sensor;
+              }(),
+              parameters_.hold_back,
+              {[this](const ForceBlock& m, const ForceBlock& c) { publish(m, c); },
+               [this](const StrikeCommand& command) { measure_.strike(command); },
+               [this](const TapFeedback& feedback) { measure_.feedback(feedback); },
+               [this](const SensorResult& result) { measure_.finish(result); }}),
+      measure_(nh, sorted_, parameters_.command_machine),
       diagnostics_(ros::NodeHandle(), private_nh) {
   measured_ = nh.advertise<smartmill_msgs::ForceBlock>("force/measured", QUEUE);
   compensated_ = nh.advertise<smartmill_msgs::ForceBlock>("force/compensated", QUEUE);
   wrench_ = nh.advertise<geometry_msgs::WrenchStamped>("force/wrench", QUEUE);
-  const auto subscribe = [&](const char* topic, auto example) {
-    using Message = decltype(example);
-    const boost::function<void(const Message&)> callback = [this](const Message& m) { input(m); };
-    subscribers_.push_back(nh.subscribe<Message>(topic, QUEUE, callback, ros::VoidConstPtr(),
-                                                 ros::TransportHints().tcpNoDelay()));
-  };
-  subscribe("daq/dynamometer", smartmill_msgs::SampleBlock());
-  subscribe("spindle/angle", smartmill_msgs::SpindleAngle());
-  subscribe("cut/condition", smartmill_msgs::CuttingCondition());
+  sorted_.onRestart([this] { measure_.restart(); });
+  subscribe<smartmill_msgs::SampleBlock>(
+      nh, "daq/dynamometer", [this](const smartmill_msgs::SampleBlock& message) {
+        last_block_ = ros::WallTime::now();
+        flushed_ = false;
+        const std::string frame =
+            message.header.frame_id.empty() ? frames::DYNAMOMETER : message.header.frame_id;
+        if (frame != sensor_frame_) rotation_known_ = false;
+        sensor_frame_ = frame;
+        sorted_.push(fromMsg(message));
+      });
+  subscribe<smartmill_msgs::SampleBlock>(nh, "daq/hammer",
+                                         [this](const smartmill_msgs::SampleBlock& message) {
+                                           last_hammer_ = ros::WallTime::now();
+                                           hammer_seen_ = true;
+                                           sorted_.pushHammer(fromMsg(message));
+                                         });
+  subscribe<smartmill_msgs::SpindleAngle>(
+      nh, "spindle/angle", [this](const smartmill_msgs::SpindleAngle& m) { sorted_.push(fromMsg(m)); });
+  subscribe<smartmill_msgs::CuttingCondition>(
+      nh, "cut/condition", [this](const smartmill_msgs::CuttingCondition& m) { sorted_.push(fromMsg(m)); });
+  // A recording that began after the taps holds the modes that served in it.
+  if (!parameters_.command_machine) {
+    subscribe<smartmill_msgs::ModalModel>(
+        nh, "tool/modes", [this](const smartmill_msgs::ModalModel& m) { sorted_.push(fromMsg(m)); });
+  }
   diagnostics_.setHardwareID("force sensor");
   diagnostics_.add("force compensation", this, &KalmanNode::diagnose);
-  last_block_ = ros::WallTime::now();
-  timer_ = nh.createWallTimer(ros::WallDuration(0.2), [this](const ros::WallTimerEvent&) { watch(); });
+  last_block_ = last_hammer_ = ros::WallTime::now();
+  timer_ = nh.createWallTimer(ros::WallDuration(0.05), [this](const ros::WallTimerEvent&) { watch(); });
+  diagnostics_timer_ = nh.createWallTimer(ros::WallDuration(0.5),
+                                          [this](const ros::WallTimerEvent&) { diagnostics_.update(); });
 }
 
-template <typename Message>
-void KalmanNode::input(const Message& message) {
-  try {
-    if constexpr (std::is_same_v<Message, smartmill_msgs::SampleBlock>) {
-      block(message);
-    } else {
-      sorted_.push(fromMsg(message));
+template <typename Message, typename Handle>
+void KalmanNode::subscribe(ros::NodeHandle& nh, const char* topic, Handle handle) {
+  const boost::function<void(const Message&)> callback = [handle, topic](const Message& message) {
+    try {
+      handle(message);
+    } catch (const Error& error) {
+      ROS_ERROR_THROTTLE(5.0, "kalman: %s: %s", topic, error.what());
     }
-  } catch (const Error& error) {
-    ROS_ERROR_THROTTLE(5.0, "%s", error.what());
-  }
+  };
+  subscribers_.push_back(
+      nh.subscribe<Message>(topic, QUEUE, callback, ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay()));
 }
 
-void KalmanNode::block(const smartmill_msgs::SampleBlock& message) {
-  last_block_ = ros::WallTime::now();
-  flushed_ = false;
-  const std::string frame = message.header.frame_id.empty() ? frames::DYNAMOMETER : message.header.frame_id;
-  if (!rotation_known_ || frame != sensor_frame_) {
-    if (!findRotation(frame)) return;
-  }
-  sorted_.push(fromMsg(message));
-}
-
-// The sensor is bolted to its table: its rotation is asked for once, at the first block.
-bool KalmanNode::findRotation(const std::string& frame) {
+// The sensor is bolted to its table: its rotation is asked for once. Until it is known results wait, for
+// the filters must not depend on when it came.
+bool KalmanNode::findRotation() {
   try {
-    const auto transform = transforms_.lookupTransform(frames::MACHINE, frame, ros::Time(0));
+    const auto transform = transforms_.lookupTransform(frames::MACHINE, sensor_frame_, ros::Time(0));
     rotation_ = frames::rotationMatrix(transform.transform.rotation);
+    return true;
   } catch (const tf2::TransformException& e) {
-    ROS_WARN_THROTTLE(5.0, "no transform from %s to %s yet, force blocks wait: %s", frame.c_str(),
+    ROS_WARN_THROTTLE(5.0, "no transform from %s to %s yet, force blocks wait: %s", sensor_frame_.c_str(),
                       frames::MACHINE, e.what());
     return false;
   }
-  sensor_frame_ = frame;
-  rotation_known_ = true;
-  return true;
 }
 
-void KalmanNode::publish(ForceBlock measured, ForceBlock compensated) {
-  rotateInPlace(rotation_, measured);
-  rotateInPlace(rotation_, compensated);
-  measured_.publish(toMsg(measured, frames::MACHINE));
-  compensated_.publish(toMsg(compensated, frames::MACHINE));
-  publishWrench(compensated);
+void KalmanNode::publish(const ForceBlock& measured, const ForceBlock& compensated) {
+  waiting_.emplace_back(measured, compensated);
+  if (waiting_.size() > QUEUE) waiting_.pop_front();
+  publishWaiting();
+}
+
+void KalmanNode::publishWaiting() {
+  if (waiting_.empty() || !(rotation_known_ || (rotation_known_ = findRotation()))) return;
+  for (auto& [measured, compensated] : waiting_) {
+    rotateInPlace(rotation_, measured);
+    rotateInPlace(rotation_, compensated);
+    measured_.publish(toMsg(measured, frames::MACHINE));
+    compensated_.publish(toMsg(compensated, frames::MACHINE));
+    publishWrench(compensated);
+  }
+  waiting_.clear();
 }
 
 void KalmanNode::publishWrench(const ForceBlock& block) {
@@ -125,16 +141,31 @@ void KalmanNode::publishWrench(const ForceBlock& block) {
 }
 
 void KalmanNode::watch() {
+  const ros::WallTime now = ros::WallTime::now();
+  const double silent = (now - last_block_).toSec(), hammer_silent = (now - last_hammer_).toSec();
+  const bool sensor_dead = silent > parameters_.input_timeout;
+  const bool hammer_dead = hammer_silent > parameters_.input_timeout;
+  std::string dead;
+  if (sensor_dead) dead = "daq/dynamometer is silent";
+  if (hammer_dead) dead = "daq/hammer is silent";
+  if (hammer_dead && hammer_seen_) {
+    hammer_seen_ = false;
+    sorted_.hammerLost(dead);
+  } else if (!dead.empty() && parameters_.command_machine && sorted_.measuring()) {
+    sorted_.event([dead](SensorMeasurement& m) { m.lost(dead); });
+    sorted_.flush();
+  }
+  measure_.poll(parameters_.command_machine ? dead : "");
+  publishWaiting();
   // End of data: nothing more will come to release what waits.
-  if (!flushed_ && (ros::WallTime::now() - last_block_).toSec() > parameters_.input_timeout) {
+  if (!flushed_ && sensor_dead) {
     sorted_.flush();
     flushed_ = true;
   }
-  diagnostics_.update();
 }
 
 void KalmanNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
-  const CompensationHealth& health = sorted_.compensation().health();
+  const CompensationHealth& health = sorted_.health();
   const double silent = (ros::WallTime::now() - last_block_).toSec();
   if (silent > parameters_.input_timeout) {
     status.summary(diagnostic_msgs::DiagnosticStatus::STALE, "no samples from the force sensor");
@@ -146,8 +177,9 @@ void KalmanNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
     status.summary(diagnostic_msgs::DiagnosticStatus::WARN,
                    "innovations larger than the sensor model explains");
   } else {
-    status.summary(diagnostic_msgs::DiagnosticStatus::OK,
-                   health.speed > 0.0 ? "compensating" : "passing through");
+    status.summary(diagnostic_msgs::DiagnosticStatus::OK, sorted_.measuring()  ? "measuring the sensor"
+                                                          : health.speed > 0.0 ? "compensating"
+                                                                               : "passing through");
   }
   status.add("spindle speed of the filters [rad/s]", health.speed);
   status.add("innovation over design [1]", health.innovation_ratio);
@@ -156,6 +188,7 @@ void KalmanNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
   status.add("samples clipped", health.clipped);
   status.add("inputs out of order", sorted_.late());
   status.add("waiting for", sorted_.waitingFor());
+  status.add("last measurement of the sensor", measure_.lastMessage());
 }
 
 }  // namespace smartmill::kalman

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "smartmill_kalman/force_compensation.h"
+#include "smartmill_kalman/sorted_compensation.h"
 #include "smartmill_ros/parameter_reader.h"
 
 namespace smartmill::kalman {
@@ -10,13 +10,15 @@ namespace smartmill::kalman {
 /// Parameters of kalman_node, see launch/config/kalman.yaml.
 struct NodeParameters {
   CompensationParameters compensation;
-  std::string model;           ///< machine model file whose force_sensor section gives the sensor
-  double hold_back = 0.05;     ///< [s] >= 0
-  double wrench_rate = 100.0;  ///< [Hz] > 0
-  double input_timeout = 1.0;  ///< [s] > 0 silence of the sensor that raises a diagnostic
+  TapParameters taps;
+  std::string model;            ///< machine model file whose force_sensor section gives the sensor
+  bool command_machine = true;  ///< false: replay; no blow is asked for, the recorded ones answer
+  double hold_back = 0.05;      ///< [s] >= 0
+  double wrench_rate = 100.0;   ///< [Hz] > 0
+  double input_timeout = 1.0;   ///< [s] > 0 silence of the sensor that raises a diagnostic
 };
 
-/// Reads and checks all parameters. @throws Error.
+/// Reads and checks all parameters; model may stay empty. @throws Error.
 NodeParameters readParameters(ParameterReader& reader);
 
 }  // namespace smartmill::kalman

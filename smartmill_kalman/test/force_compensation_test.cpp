@@ -1,4 +1,4 @@
-#include "smartmill_kalman/force_compensation.h"
+#include "smartmill_kalman/sorted_compensation.h"
 
 #include <algorithm>
 #include <cmath>
@@ -65,6 +65,13 @@ Session session(std::size_t blocks) {
   return result;
 }
 
+ForceSensor forceSensor(bool workpiece) {
+  ForceSensor result;
+  result.axis.fill(sensor());
+  result.measures_workpiece = workpiece;
+  return result;
+}
+
 struct Collected {
   std::vector<ForceBlock> measured, compensated;
 };
@@ -72,12 +79,14 @@ struct Collected {
 class Runner {
  public:
   explicit Runner(bool workpiece = false)
-      : sorted({}, workpiece, 0.05, [this](const ForceBlock& m, const ForceBlock& c) {
-          result.measured.push_back(m);
-          result.compensated.push_back(c);
-        }) {
-    for (std::size_t axis = 0; axis < 3; ++axis) sorted.compensation().setSensor(axis, sensor());
-  }
+      : sorted({}, {}, forceSensor(workpiece), 0.05,
+               {[this](const ForceBlock& m, const ForceBlock& c) {
+                  result.measured.push_back(m);
+                  result.compensated.push_back(c);
+                },
+                {},
+                {},
+                {}}) {}
   void feed(const Session& s) {
     sorted.push(s.condition);
     for (std::size_t b = 0; b < s.blocks.size(); ++b) {
@@ -139,7 +148,7 @@ TEST(ForceCompensation, restartsAtAGapAndMarksIt) {
   gapped.blocks.erase(gapped.blocks.begin() + 50);
   gapped.angles.erase(gapped.angles.begin() + 50);
   runner.feed(gapped);
-  EXPECT_EQ(runner.sorted.compensation().health().gaps, 1u);
+  EXPECT_EQ(runner.sorted.health().gaps, 1u);
   EXPECT_EQ(runner.result.compensated[49].status, ForceBlock::Status::compensated);
   EXPECT_EQ(runner.result.compensated[50].status, ForceBlock::Status::settling);
 }
@@ -149,7 +158,7 @@ TEST(ForceCompensation, bridgesSamplesThatAreNotNumbers) {
   for (std::size_t i = 0; i < 5; ++i) s.blocks[50].samples[3 * (100 + i)] = NAN;
   Runner runner;
   runner.feed(s);
-  EXPECT_EQ(runner.sorted.compensation().health().not_finite, 5u);
+  EXPECT_EQ(runner.sorted.health().not_finite, 5u);
   for (const ForceBlock& block : runner.result.compensated) {
     for (const double force : block.force[0]) ASSERT_TRUE(std::isfinite(force));
   }
@@ -172,13 +181,13 @@ TEST(ForceCompensation, passesThroughAtRestAndTurnsTheReaction) {
 }
 
 TEST(ForceCompensation, refusesBlocksWithoutForces) {
-  Runner runner;
+  ForceCompensation compensation({}, false, [](const ForceBlock&, const ForceBlock&) {});
   SampleBlock block;
   block.channels = {"hammer"};
   block.units = {"N"};
   block.sample_rate = RATE;
   block.samples = {1.0};
-  EXPECT_THROW(runner.sorted.compensation().handle(block), Error);
+  EXPECT_THROW(compensation.handle(block), Error);
 }
 
 }  // namespace

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "smartmill_core/modal/modal_model.h"
-#include "smartmill_core/signal/stream_sorter.h"
 #include "smartmill_core/signal/streams.h"
 #include "smartmill_kalman/harmonic_filter.h"
 
@@ -49,7 +48,11 @@ class ForceCompensation {
   ForceCompensation(const CompensationParameters& parameters, bool measures_workpiece, Output output);
 
   /// Model of an axis (0 x, 1 y, 2 z) from now on; filters start anew.
-  void setSensor(std::size_t axis, const ModalModel& sensor);
+  void setSensor(std::size_t axis, const ModalModel& sensor) {
+    setSensor(axis, sensor, parameters_.filter.noise_rms);
+  }
+  /// @param noise_rms [N] of one sample, > 0
+  void setSensor(std::size_t axis, const ModalModel& sensor, double noise_rms);
   bool hasSensor() const;
 
   /// @throws Error when channels fx, fy, fz are missing or not in N.
@@ -69,37 +72,13 @@ class ForceCompensation {
   double sign_;
   Output output_;
   std::array<std::optional<ModalModel>, 3> sensor_;
-  std::vector<HarmonicFilter> filters_;  // of the axes with a model, in order; empty: to be laid out
-  double design_rate_ = 0.0;             // [Hz]
-  double speed_ = 0.0;                   // [rad/s]
+  std::array<double, 3> noise_rms_{{0, 0, 0}};  // [N]
+  std::vector<HarmonicFilter> filters_;         // of the axes with a model, in order; empty: to be laid out
+  double design_rate_ = 0.0;                    // [Hz]
+  double speed_ = 0.0;                          // [rad/s]
   std::optional<std::uint64_t> next_index_;
   double settling_left_ = 0.0;  // [s]
   CompensationHealth health_;
-};
-
-/// ForceCompensation behind the sorter: takes inputs in any order of arrival; the node and offline tools feed
-/// this class.
-class SortedCompensation {
- public:
-  /// @param hold_back [s], see StreamSorter.
-  SortedCompensation(const CompensationParameters& parameters, bool measures_workpiece, double hold_back,
-                     ForceCompensation::Output output);
-
-  ForceCompensation& compensation() { return compensation_; }
-  void push(const SampleBlock& block);
-  void push(const SpindleAngle& angle);
-  void push(const CuttingCondition& condition);
-  void flush() { sorter_.flush(); }  ///< end of data
-  std::string waitingFor() const { return sorter_.waitingFor(); }
-  std::size_t late() const { return sorter_.late(); }
-
- private:
-  void watch(double stamp);
-
-  ForceCompensation compensation_;
-  StreamSorter sorter_;
-  StreamSorter::Stream conditions_, angles_, blocks_;
-  double newest_ = 0.0;
 };
 
 }  // namespace smartmill::kalman

@@ -1,0 +1,123 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "smartmill_core/modal/results.h"
+#include "smartmill_core/signal/hit_collector.h"
+#include "smartmill_core/signal/streams.h"
+
+namespace smartmill::kalman {
+
+/// Taps on the workpiece that identify the force sensor; see launch/config/kalman.yaml.
+struct TapParameters {
+  double trigger_force = 10.0;     ///< [N] of the hammer above the level before; > 0
+  double weak_force = 20.0;        ///< [N] a blow below this is not used; >= trigger_force
+  double second_hit_share = 0.1;   ///< [1] 0..1 of the peak: above it a second peak makes a double hit
+  double pre_trigger = 0.01;       ///< [s] > 0
+  double record_length = 0.2;      ///< [s] > 2 pre_trigger
+  double rest_time = 0.1;          ///< [s] >= 0 between a record's end and the next blow
+  double strike_timeout = 10.0;    ///< [s] > 0 from the command to the hit; time enough for a hit by hand
+  int max_bad_hits = 5;            ///< [1] >= 0, then it gives up
+  double response_range = 0.0;     ///< [N] >= 0 a sample of the sensor at or beyond it is clipped; 0: unknown
+  double static_tolerance = 0.25;  ///< [1] > 0 the sensor's measured static gain may differ from 1 by this
+  double systematic =
+      0.002;  ///< [1] 0..1 share of |H| that no scatter shows (linearity, aliasing), in every std_dev
+  double frf_high = 5000.0;  ///< [Hz] lines above are not handed out
+  double fit_low = 100.0;    ///< [Hz] >= 0
+  double fit_high = 5000.0;  ///< [Hz] above fit_low
+  int max_modes = 4;         ///< [1] 1..20 when the number is chosen by evidence
+  /// @throws Error naming key and value.
+  void validate() const;
+};
+
+struct SensorResult {
+  FrfCode code = FrfCode::ok;
+  std::string message;       ///< one line
+  MeasuredFrf frf;           ///< [1] measured over applied force, static gain positive
+  MeasuredModes modes;       ///< [1] static gain 1
+  double noise_rms = 0.0;    ///< [N] of one sample of the sensor, from the samples before the hits
+  double static_gain = 0.0;  ///< [1] measured, before the fit took it for 1; negative: blow against the axis
+  double static_gain_std = 0.0;  ///< [1]
+};
+
+struct TapFeedback {
+  std::string stage;
+  double progress = 0.0;  ///< [1] 0..1
+  int hits_done = 0;
+};
+
+struct StrikeCommand {
+  double stamp = 0.0;     ///< [s] of the input that caused it
+  std::string direction;  ///< x, y or z
+};
+
+/// Sequence of a tap test of the force sensor: asks for a blow, waits for it in the hammer's samples, takes
+/// the sensor's samples with the same running index, averages, fits modes with static gain 1 (Dunwoody ch.
+/// 5). Nothing moves.
+///
+/// Inputs come in stamp order; time is theirs. Outputs are drained. Directions are the sensor's own axes. A
+/// blow may come from either side: the response is turned so that its static gain is positive.
+class SensorMeasurement {
+ public:
+  explicit SensorMeasurement(const TapParameters& parameters);
+
+  /// @return false when a measurement is running: the goal is refused and nothing changes.
+  bool handle(const MeasureFrfGoal& goal);
+  /// Block of the hammer (channel hammer [N]). @throws Error when the channel is missing.
+  void handleHammer(const SampleBlock& block);
+  /// Block of the force sensor (channels fx, fy, fz [N]). @throws Error when the channel is missing.
+  void handleSensor(const SampleBlock& block);
+  void cancel();
+  /// There is no automatic hammer: says so; the hit is waited for all the same.
+  void hitByHand();
+  void commandFailed(const std::string& text);
+  /// An input stream has died, nothing further can be judged.
+  void lost(const std::string& text);
+  /// Forgets everything: a bag was restarted.
+  void reset();
+
+  bool active() const { return active_; }
+
+  std::optional<StrikeCommand> takeCommand();
+  std::optional<TapFeedback> takeFeedback();
+  std::optional<SensorResult> takeResult();
+
+ private:
+  struct Sample {
+    double time;
+    std::uint64_t index;
+    double rate, value;
+  };
+  void take(const SampleBlock& block, const std::string& channel, std::deque<Sample>& queue);
+  void join();
+  void sample(double time, std::uint64_t index, double rate, double force, double response);
+  void strike(double now);
+  void recorded(double now, HitCollector::Record record);
+  void badHit(double now, const std::string& why, bool bad_data);
+  void staticGain(const FrequencyResponse& frf);
+  void evaluate();
+  void finish(FrfCode code, const std::string& message);
+  void say(const std::string& stage);
+
+  TapParameters parameters_;
+  bool active_ = false;
+  MeasureFrfGoal goal_;
+  HitCollector collector_;
+  std::deque<Sample> hammer_, sensor_;
+  bool waiting_for_hit_ = false;
+  double deadline_ = 0.0, rest_until_ = 0.0;  // [s]
+  std::vector<Hit> hits_;
+  int bad_hits_ = 0;
+  SensorResult result_;
+
+  std::optional<StrikeCommand> command_;
+  std::optional<TapFeedback> feedback_;
+  std::optional<SensorResult> done_;
+};
+
+}  // namespace smartmill::kalman

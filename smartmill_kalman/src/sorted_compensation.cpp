@@ -1,0 +1,140 @@
+#include "smartmill_kalman/sorted_compensation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace smartmill::kalman {
+namespace {
+
+// A stamp this far behind the newest one means that a recording was started again.
+constexpr double RESTART = 1.0;  // [s]
+constexpr double NEVER = -std::numeric_limits<double>::infinity();
+
+int axisOf(const std::string& direction) {
+  return direction == "x" ? 0 : direction == "y" ? 1 : direction == "z" ? 2 : -1;
+}
+
+}  // namespace
+
+SortedCompensation::SortedCompensation(const CompensationParameters& parameters, const TapParameters& taps,
+                                       const ForceSensor& sensor, double hold_back, Outputs outputs)
+    : believed_(sensor),
+      outputs_(std::move(outputs)),
+      compensation_(parameters, sensor.measures_workpiece, outputs_.force),
+      measurement_(taps),
+      sorter_(hold_back),
+      conditions_(sorter_.addEvents("cut/condition")),
+      goals_(sorter_.addEvents("kalman/measure_frf")),
+      hammers_(sorter_.addEvents("daq/hammer")),
+      angles_(sorter_.addRegular("spindle/angle")),
+      blocks_(sorter_.addRegular("daq/dynamometer")),
+      newest_(NEVER) {
+  useModelFile();
+}
+
+void SortedCompensation::useModelFile() {
+  identified_.fill(NEVER);
+  for (std::size_t axis = 0; axis < 3; ++axis) compensation_.setSensor(axis, believed_.axis[axis]);
+}
+
+void SortedCompensation::watch(double stamp) {
+  if (stamp < newest_ - RESTART) {
+    sorter_.reset();
+    compensation_.reset();
+    measurement_.reset();
+    useModelFile();
+    newest_ = stamp;
+    if (restarted_) restarted_();
+  }
+  newest_ = std::max(newest_, stamp);
+}
+
+void SortedCompensation::push(const SampleBlock& block) {
+  watch(block.stamp);
+  sorter_.push(blocks_, block.stamp, [this, block] {
+    compensation_.handle(block);
+    measurement_.handleSensor(block);
+    drain();
+  });
+}
+
+void SortedCompensation::pushHammer(const SampleBlock& block) {
+  watch(block.stamp);
+  sorter_.setRegular(hammers_, true);
+  sorter_.push(hammers_, block.stamp, [this, block] {
+    measurement_.handleHammer(block);
+    drain();
+  });
+}
+
+void SortedCompensation::push(const SpindleAngle& angle) {
+  watch(angle.stamp);
+  sorter_.push(angles_, angle.stamp, [this, angle] { compensation_.handle(angle); });
+}
+
+void SortedCompensation::push(const CuttingCondition& condition) {
+  // A latched condition is older than the data around it: no restart.
+  sorter_.push(conditions_, condition.stamp, [this, condition] { compensation_.handle(condition); });
+}
+
+void SortedCompensation::push(const MeasureFrfGoal& goal, std::function<bool(bool)> begin) {
+  sorter_.push(goals_, goal.stamp, [this, goal, begin = std::move(begin)] {
+    const bool free = !measurement_.active();
+    const bool wanted = !begin || begin(free);  // before the goal's own results
+    if (free && wanted) measurement_.handle(goal);
+    drain();
+  });
+}
+
+void SortedCompensation::event(std::function<void(SensorMeasurement&)> what) {
+  const auto deliver = [this, what = std::move(what)] {
+    what(measurement_);
+    drain();
+  };
+  if (std::isfinite(newest_)) {
+    sorter_.push(goals_, newest_, deliver);
+  } else {
+    deliver();
+  }
+}
+
+void SortedCompensation::push(const MeasuredModes& modes) {
+  const int found = axisOf(modes.direction);
+  if (modes.point != POINT_FORCE_SENSOR || found < 0) return;
+  sorter_.push(goals_, modes.stamp, [this, modes, axis = static_cast<std::size_t>(found)] {
+    if (modes.stamp <= identified_[axis]) return;
+    identified_[axis] = modes.stamp;
+    compensation_.setSensor(axis, modes.model);
+  });
+}
+
+void SortedCompensation::hammerLost(const std::string& text) {
+  if (measurement_.active()) {
+    measurement_.lost(text);
+    drain();
+  }
+  sorter_.setRegular(hammers_, false);
+}
+
+void SortedCompensation::drain() {
+  if (const auto command = measurement_.takeCommand(); command && outputs_.strike) outputs_.strike(*command);
+  if (const auto feedback = measurement_.takeFeedback(); feedback && outputs_.feedback)
+    outputs_.feedback(*feedback);
+  if (const auto result = measurement_.takeResult()) {
+    if (result->code == FrfCode::ok) {
+      const auto axis = static_cast<std::size_t>(axisOf(result->modes.direction));
+      identified_[axis] = result->modes.stamp;
+      // A record without any noise says nothing about the sensor's.
+      if (result->noise_rms > 0.0) {
+        compensation_.setSensor(axis, result->modes.model, result->noise_rms);
+      } else {
+        compensation_.setSensor(axis, result->modes.model);
+      }
+    }
+    if (outputs_.result) outputs_.result(*result);
+  }
+}
+
+}  // namespace smartmill::kalman
