@@ -1,0 +1,144 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "smartmill_core/model/effect_catalogue.h"
+#include "smartmill_core/model/machine_model.h"
+#include "smartmill_sim/twin/cutting_process.h"
+
+namespace smartmill::sim {
+
+/// Where in the twin an effect acts, in the order in which the stages pass.
+enum class Stage {
+  geometry,       ///< of the tool: radii, pitch, helix
+  motion,         ///< where the tool is in the work: feed, depth
+  cutting_law,    ///< from chip to force
+  structure,      ///< modes of the tool tip
+  sensor,         ///< modes of the force sensor
+  sensor_force,   ///< force on the sensor besides cutting
+  drive,          ///< spindle friction and load meter
+  sensor_output,  ///< measured channels, before they are late
+  delay,          ///< lateness of one channel
+  signal          ///< measured channels at last, before the noise
+};
+const char* stageName(Stage stage);
+
+/// Channels of the measuring chain.
+enum ChannelIndex : std::size_t {
+  FX,
+  FY,
+  FZ,
+  LOAD_METER,
+  TOOL_X,
+  TOOL_Y,
+  DISPLACEMENT,
+  ACCELERATION,
+  CHANNELS
+};
+using ChannelValues = std::array<double, CHANNELS>;  ///< [N], [N], [N], [V], [m], [m], [m], [m/s2]
+/// Name of a channel's column in a record.
+const char* channelName(std::size_t channel);
+/// @throws Error on an unknown name.
+std::size_t channelOf(const std::string& name);
+
+/// What the machine is before it starts; effects change it once.
+struct TwinSetup {
+  MachineModel model;                  ///< without effects
+  std::vector<double> radius_offset;   ///< [m] of each tooth
+  std::array<double, CHANNELS> delay;  ///< [s] of each channel
+};
+
+/// Now.
+struct Instant {
+  double angle = 0.0;        ///< [rad] immersion angle of tooth 1
+  double speed = 0.0;        ///< [rad/s] of the spindle
+  double record_time = 0.0;  ///< [s] since the record began
+  double start_time = 0.0;   ///< [s] of the record since the machine was cold
+  double edge_time = 0.0;    ///< [s] that the edge has cut
+};
+
+/// What effects set anew while the machine runs, from its nominal state each time.
+struct TwinState {
+  CuttingLaw law;
+  double radius = 0.0;            ///< [m] of the tool
+  double feed_ratio = 1.0;        ///< [1] actual over commanded feed
+  double depth_slope = 0.0;       ///< [m/m] of the axial depth along the feed path from engagement
+  double sensor_frequency = 1.0;  ///< [1] on the first mode of each axis of the force sensor
+  double friction_extra = 0.0;    ///< [N m] spindle friction besides the model's
+  double friction_factor = 1.0;   ///< [1] on the friction, the extra too
+};
+
+/// A sine in the signals whose phase no model knows: another one each record.
+struct Tone {
+  double frequency = 0.0;                    ///< [Hz]
+  std::array<double, CHANNELS> amplitude{};  ///< in each channel
+  double phase = 0.0;                        ///< [rad] at the start of the record
+};
+
+/// One physical cause that a nominal model may lack: an entry of a model's `effects:`. A class overrides the
+/// hooks of its stage; effects of one stage act in the order of the registry.
+class Effect {
+ public:
+  virtual ~Effect() = default;
+
+  /// Geometry, structure, sensor, delay, and what of the drive is constant.
+  virtual void setUp(TwinSetup&) const {}
+  /// Motion, cutting law, speed-dependent sensor, friction.
+  virtual void update(const Instant&, TwinState&) const {}
+  /// Adds to the force on the sensor [N].
+  virtual void addForce(const Instant&, Axes3&) const {}
+  /// Sensor output and signal: changes measured channels.
+  virtual void measure(const Instant&, ChannelValues&) const {}
+  /// Of an effect that is a tone in the signals, else nullptr.
+  virtual Tone* tone() { return nullptr; }
+};
+
+/// One registration: the class behind a name of the catalogue (smartmill_core/model/effect_catalogue.h has
+/// its keys, units, bounds, priors and source).
+struct EffectClass {
+  std::string name;
+  Stage stage;
+  std::unique_ptr<Effect> (*make)(const EffectEntry& entry);
+};
+
+/// All effects that the twin runs, in the order in which they act.
+const std::vector<EffectClass>& effectRegistry();
+/// nullptr when no effect has this name.
+const EffectClass* findEffectClass(const std::string& name);
+
+/// The effects of one model, in the order in which they act.
+class EffectSet {
+ public:
+  /// @throws Error on a name without class or a key that is missing, naming the model's file.
+  explicit EffectSet(const MachineModel& model);
+
+  bool empty() const { return effects_.empty(); }
+  bool has(Stage stage) const;
+
+  void setUp(TwinSetup& setup) const;
+  void update(const Instant& now, TwinState& state) const;
+  void addForce(const Instant& now, Axes3& force) const;
+  /// Only the effects of one stage (sensor_output or signal).
+  void measure(Stage stage, const Instant& now, ChannelValues& channels) const;
+  std::vector<Tone*> tones();
+
+ private:
+  struct Member {
+    Stage stage;
+    std::unique_ptr<Effect> effect;
+  };
+  std::vector<Member> effects_;
+  std::array<bool, 10> has_{};
+};
+
+/// An entry of a model's effects: from values by key (shop units, as in the file).
+/// @throws Error on an unknown name or key, a missing key, a value out of range.
+EffectEntry effectEntry(const std::string& name, const std::map<std::string, double>& numbers,
+                        const std::map<std::string, std::string>& words = {});
+
+}  // namespace smartmill::sim

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "smartmill_core/model/machine_model.h"
+#include "smartmill_core/signal/streams.h"
+#include "smartmill_sim/controller/controller.h"
+
+namespace smartmill::sim {
+
+struct WorldOptions {
+  std::uint64_t seed = 1;       ///< of noise and scatter
+  int substeps = 4;             ///< [1] integration steps a sample, 1..64
+  double tap_peak = 300.0;      ///< [N] > 0 of a blow on the workpiece
+  double tap_contact = 0.4e-3;  ///< [s] > 0
+  double operator_delay = 0.0;  ///< [s] >= 0; above 0 a person hits the workpiece, so long after being asked
+  double force_scatter = 0.05;  ///< [1] 0..0.5 standard deviation of a blow's peak over its nominal value
+
+  /// @throws Error naming key and value.
+  void validate() const;
+};
+
+/// A whole machine that obeys its controller: axes, spindle, tool in stock, force sensor under it, hammer
+/// station beside it, load meter. In blocks of samples; time is the running sample index over the sample
+/// rate.
+class World {
+ public:
+  static constexpr double SAMPLE_RATE = 25600.0;  ///< [Hz]
+  static constexpr std::size_t BLOCK = 256;       ///< samples
+  static constexpr std::size_t ANGLES = 2;        ///< readings of the spindle's angle a block
+
+  /// What the sensors deliver and what is true; stamps [s] count from sample 0.
+  struct Block {
+    SampleBlock hammer;       ///< hammer [N] positive in compression, gap [V]
+    SampleBlock dynamometer;  ///< fx, fy, fz [N]
+    std::array<SpindleAngle, ANGLES> angle;
+    ForceBlock force;       ///< true force of the cut on the tool
+    SampleBlock vibration;  ///< true displacement of the tip, x, y [m]
+  };
+  enum class StrikeAnswer { ok, by_hand, failed };
+
+  /// @throws Error naming what the model lacks: tool, spindle, axes, cutting; hammer and workpiece only limit
+  /// what can be done.
+  World(const MachineModel& model, const WorldOptions& options);
+  ~World();
+  World(const World&) = delete;
+  World& operator=(const World&) = delete;
+
+  /// May be used from any thread.
+  Controller& controller();
+
+  /// Fires a hammer, once. May be called from any thread. @param point tool or force_sensor @param message
+  /// one line
+  StrikeAnswer strike(const std::string& point, const std::string& direction, std::string& message);
+
+  /// The next BLOCK samples.
+  void advance(Block& block);
+
+  /// Samples that nobody took: the index goes on, the machine does not move.
+  void lose(std::uint64_t samples);
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace smartmill::sim

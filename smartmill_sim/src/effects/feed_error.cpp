@@ -1,0 +1,23 @@
+#include "classes.h"
+
+namespace smartmill::sim {
+namespace {
+
+/// The feed drive moves at another feed than commanded.
+class FeedError : public Effect {
+ public:
+  explicit FeedError(const EffectEntry& entry) : ratio_(valueOf(entry, "ratio")) {}
+
+  void update(const Instant&, TwinState& state) const override { state.feed_ratio *= ratio_; }
+
+ private:
+  double ratio_;  // [1]
+};
+
+}  // namespace
+
+EffectPtr makeFeedError(const EffectEntry& entry) {
+  return std::make_unique<FeedError>(entry);
+}
+
+}  // namespace smartmill::sim

@@ -1,0 +1,25 @@
+#include "classes.h"
+
+namespace smartmill::sim {
+namespace {
+
+/// Another helix angle than nominal.
+class Helix : public Effect {
+ public:
+  explicit Helix(const EffectEntry& entry) : helix_(units::radFromDeg(valueOf(entry, "helix_deg"))) {}
+
+  void setUp(TwinSetup& setup) const override {
+    if (setup.model.tool) setup.model.tool->helix = helix_;
+  }
+
+ private:
+  double helix_;  // [rad]
+};
+
+}  // namespace
+
+EffectPtr makeHelix(const EffectEntry& entry) {
+  return std::make_unique<Helix>(entry);
+}
+
+}  // namespace smartmill::sim

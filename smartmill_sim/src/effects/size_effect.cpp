@@ -1,0 +1,27 @@
+#include "classes.h"
+
+namespace smartmill::sim {
+namespace {
+
+/// Kc times (h / reference)^(-exponent): thin chips cut harder; edge terms stay.
+class SizeEffect : public Effect {
+ public:
+  explicit SizeEffect(const EffectEntry& entry)
+      : exponent_(valueOf(entry, "exponent")), reference_(units::UM * valueOf(entry, "reference_chip_um")) {}
+
+  void update(const Instant&, TwinState& state) const override {
+    state.law.size_exponent = exponent_;
+    state.law.size_reference = reference_;
+  }
+
+ private:
+  double exponent_, reference_;  // [1], [m]
+};
+
+}  // namespace
+
+EffectPtr makeSizeEffect(const EffectEntry& entry) {
+  return std::make_unique<SizeEffect>(entry);
+}
+
+}  // namespace smartmill::sim

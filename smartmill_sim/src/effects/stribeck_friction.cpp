@@ -1,0 +1,28 @@
+#include "classes.h"
+
+namespace smartmill::sim {
+namespace {
+
+/// Friction that fades with speed: breakaway exp(-(n / speed)^2).
+class StribeckFriction : public Effect {
+ public:
+  explicit StribeckFriction(const EffectEntry& entry)
+      : breakaway_(valueOf(entry, "breakaway_nm")),
+        speed_(units::radPerSecFromRpm(valueOf(entry, "speed_rpm"))) {}
+
+  void update(const Instant& now, TwinState& state) const override {
+    const double ratio = now.speed / speed_;
+    state.friction_extra += breakaway_ * std::exp(-ratio * ratio);
+  }
+
+ private:
+  double breakaway_, speed_;  // [N m], [rad/s]
+};
+
+}  // namespace
+
+EffectPtr makeStribeckFriction(const EffectEntry& entry) {
+  return std::make_unique<StribeckFriction>(entry);
+}
+
+}  // namespace smartmill::sim

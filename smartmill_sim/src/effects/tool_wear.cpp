@@ -1,0 +1,25 @@
+#include "classes.h"
+
+namespace smartmill::sim {
+namespace {
+
+/// Edge coefficients, added ones too, grow with the time that the edge has cut.
+class ToolWear : public Effect {
+ public:
+  explicit ToolWear(const EffectEntry& entry) : growth_(valueOf(entry, "edge_growth_per_min") / 60.0) {}
+
+  void update(const Instant& now, TwinState& state) const override {
+    state.law.edge_factor *= 1.0 + growth_ * now.edge_time;
+  }
+
+ private:
+  double growth_;  // [1/s]
+};
+
+}  // namespace
+
+EffectPtr makeToolWear(const EffectEntry& entry) {
+  return std::make_unique<ToolWear>(entry);
+}
+
+}  // namespace smartmill::sim

@@ -1,0 +1,171 @@
+#include "node.h"
+
+#include <chrono>
+#include <cmath>
+#include <utility>
+
+#include <smartmill_msgs/CuttingCoefficients.h>
+#include <smartmill_msgs/ForceBlock.h>
+#include <smartmill_msgs/SampleBlock.h>
+#include <smartmill_msgs/SpindleAngle.h>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/modal/results.h"
+#include "smartmill_ros/conversions.h"
+#include "smartmill_ros/frames.h"
+
+namespace smartmill::sim {
+namespace {
+
+constexpr double TRUTH_STEP = 2.0, TRUTH_END = 6000.0;  // [Hz] lines of the true FRFs
+constexpr double BLOCK_TIME = World::BLOCK / World::SAMPLE_RATE;
+
+template <class Message>
+ros::Publisher resending(ros::NodeHandle& nh, const std::string& topic,
+                         const std::vector<Message>& messages) {
+  // A latched topic would keep the last message only.
+  return nh.advertise<Message>(topic, 10, [&messages](const ros::SingleSubscriberPublisher& to) {
+    for (const Message& message : messages) to.publish(message);
+  });
+}
+
+}  // namespace
+
+Node::Node(ros::NodeHandle nh, const ros::NodeHandle& private_nh) : nh_(std::move(nh)) {
+  ParameterReader reader = ParameterReader::fromServer(private_nh);
+  parameters_ = readParameters(reader);
+  if (ros::Time::isSimTime())
+    throw Error("/use_sim_time is set: the simulated machine runs by the real clock");
+  model_ = readMachineModel(parameters_.model);
+  world_ = std::make_unique<World>(model_, parameters_.world);
+  focas::ServerOptions options;
+  options.port = static_cast<std::uint16_t>(parameters_.port);
+  options.bind_address = parameters_.bind;
+  server_ = std::make_unique<focas::Server>(options, world_->controller());
+  ROS_INFO("sim: controller listens on %s:%d", parameters_.bind.c_str(), server_->port());
+
+  start_ = toSec(ros::Time::now());
+  publishTruth();
+  hammer_ = nh_.advertise<smartmill_msgs::SampleBlock>("daq/hammer", 200);
+  dynamometer_ = nh_.advertise<smartmill_msgs::SampleBlock>("daq/dynamometer", 200);
+  angle_ = nh_.advertise<smartmill_msgs::SpindleAngle>("spindle/angle", 400);
+  force_ = nh_.advertise<smartmill_msgs::ForceBlock>("sim/truth/force", 200);
+  vibration_ = nh_.advertise<smartmill_msgs::SampleBlock>("sim/truth/vibration", 200);
+  strike_server_ = nh_.advertiseService("daq/strike", &Node::strike, this);
+
+  updater_ = std::make_unique<diagnostic_updater::Updater>(nh_, private_nh);
+  updater_->setHardwareID("simulated mill");
+  updater_->add("simulated machine", this, &Node::diagnose);
+  diagnostics_timer_ = nh_.createWallTimer(ros::WallDuration(1.0),
+                                           [this](const ros::WallTimerEvent&) { updater_->force_update(); });
+  thread_ = std::thread([this] { run(); });
+}
+
+Node::~Node() {
+  stopping_ = true;
+  thread_.join();
+}
+
+void Node::addTruth(const std::string& point, const std::string& direction, const ModalModel& modes) {
+  MeasuredModes m;
+  m.stamp = start_;
+  m.point = point;
+  m.direction = direction;
+  m.unit = point == POINT_TOOL_TIP ? "m/N" : "1";
+  m.model = modes;
+  true_modes_.push_back(toMsg(m));
+  MeasuredFrf f;
+  f.stamp = start_;
+  f.point = point;
+  f.direction = direction;
+  f.frf.unit = m.unit;
+  for (double line = TRUTH_STEP; line <= TRUTH_END; line += TRUTH_STEP) {
+    f.frf.frequency.push_back(line);
+    f.frf.value.push_back(modes.response(line));
+  }
+  true_frfs_.push_back(toMsg(f));
+}
+
+void Node::publishTruth() {
+  addTruth(POINT_TOOL_TIP, "x", model_.tool_tip.x);
+  addTruth(POINT_TOOL_TIP, "y", model_.tool_tip.y);
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    addTruth(POINT_FORCE_SENSOR, std::string(1, "xyz"[axis]), model_.force_sensor.axis[axis]);
+  modes_ = resending(nh_, "sim/truth/modes", true_modes_);
+  frf_ = resending(nh_, "sim/truth/frf", true_frfs_);
+  coefficients_ = nh_.advertise<smartmill_msgs::CuttingCoefficients>("sim/truth/coefficients", 1, true);
+  CoefficientSet set;
+  set.stamp = start_;
+  set.material = model_.workpiece ? model_.workpiece->material : "";
+  set.source = "model";
+  set.value = *model_.cutting;
+  set.std_dev = NOT_IDENTIFIED;
+  set.friction_viscous = model_.spindle->viscous;
+  set.friction_coulomb = model_.spindle->coulomb;
+  coefficients_.publish(toMsg(set));
+}
+
+void Node::publish(const World::Block& block) {
+  const auto shifted = [this](auto part) {
+    part.stamp += start_;
+    return part;
+  };
+  hammer_.publish(toMsg(shifted(block.hammer)));
+  dynamometer_.publish(toMsg(shifted(block.dynamometer), frames::DYNAMOMETER));
+  for (const SpindleAngle& angle : block.angle) angle_.publish(toMsg(shifted(angle)));
+  force_.publish(toMsg(shifted(block.force), frames::MACHINE));
+  vibration_.publish(toMsg(shifted(block.vibration)));
+}
+
+void Node::run() {
+  World::Block block;
+  double done = 0.0;  // [s] since start
+  while (!stopping_) {
+    const double now = toSec(ros::Time::now()) - start_;
+    if (now - done > parameters_.most_behind) {
+      const auto blocks = static_cast<std::uint64_t>((now - done) / BLOCK_TIME);
+      world_->lose(blocks * World::BLOCK);
+      done += static_cast<double>(blocks) * BLOCK_TIME;
+      lost_ += blocks * World::BLOCK;
+      ROS_WARN("sim: the twin fell behind the clock, %.2f s of samples are lost",
+               static_cast<double>(blocks) * BLOCK_TIME);
+    }
+    if (now < done + BLOCK_TIME) {
+      std::this_thread::sleep_for(std::chrono::duration<double>(done + BLOCK_TIME - now));
+      continue;
+    }
+    const auto before = std::chrono::steady_clock::now();
+    world_->advance(block);
+    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - before;
+    load_ = 0.98 * load_ + 0.02 * took.count() / BLOCK_TIME;
+    publish(block);
+    done += BLOCK_TIME;
+  }
+}
+
+bool Node::strike(smartmill_msgs::Strike::Request& request, smartmill_msgs::Strike::Response& response) {
+  switch (world_->strike(request.point, request.direction, response.message)) {
+    case World::StrikeAnswer::ok:
+      response.code = smartmill_msgs::Strike::Response::OK;
+      break;
+    case World::StrikeAnswer::by_hand:
+      response.code = smartmill_msgs::Strike::Response::NO_HAMMER;
+      break;
+    case World::StrikeAnswer::failed:
+      response.code = smartmill_msgs::Strike::Response::FAILED;
+      break;
+  }
+  return true;
+}
+
+void Node::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
+  if (lost_ > 0) {
+    status.summary(diagnostic_msgs::DiagnosticStatus::WARN, "samples were lost: the computer is too slow");
+  } else {
+    status.summary(diagnostic_msgs::DiagnosticStatus::OK, "runs");
+  }
+  status.addf("share of real time needed [1]", "%.3f", load_.load());
+  status.addf("samples lost [1]", "%llu", static_cast<unsigned long long>(lost_.load()));
+}
+
+}  // namespace smartmill::sim

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <atomic>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <diagnostic_updater/diagnostic_updater.h>
+#include <ros/ros.h>
+#include <smartmill_msgs/Frf.h>
+#include <smartmill_msgs/ModalModel.h>
+#include <smartmill_msgs/Strike.h>
+
+#include "parameters_ros.h"
+#include "smartmill_core/modal/modal_model.h"
+#include "smartmill_core/model/machine_model.h"
+#include "smartmill_focas/server.h"
+#include "smartmill_sim/world/world.h"
+
+namespace smartmill::sim {
+
+/// The simulated machine on ROS: the controller on its port, sensors on daq/* and spindle/angle, the hammers
+/// behind daq/strike, truth on sim/truth/*. Paced by the clock.
+class Node {
+ public:
+  /// @throws Error on bad parameters, a bad model file or a port in use.
+  Node(ros::NodeHandle nh, const ros::NodeHandle& private_nh);
+  ~Node();
+  Node(const Node&) = delete;
+  Node& operator=(const Node&) = delete;
+
+ private:
+  void run();
+  void publish(const World::Block& block);
+  void publishTruth();
+  bool strike(smartmill_msgs::Strike::Request& request, smartmill_msgs::Strike::Response& response);
+  void addTruth(const std::string& point, const std::string& direction, const ModalModel& modes);
+  void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
+
+  ros::NodeHandle nh_;
+  NodeParameters parameters_;
+  MachineModel model_;
+  std::unique_ptr<World> world_;
+  std::unique_ptr<focas::Server> server_;
+
+  double start_ = 0.0;  // [s] stamp of sample 0
+  ros::Publisher hammer_, dynamometer_, angle_, force_, vibration_, coefficients_, frf_, modes_;
+  std::vector<smartmill_msgs::Frf> true_frfs_;
+  std::vector<smartmill_msgs::ModalModel> true_modes_;
+  ros::ServiceServer strike_server_;
+  std::unique_ptr<diagnostic_updater::Updater> updater_;
+  ros::WallTimer diagnostics_timer_;
+  std::atomic<double> load_{0.0};  // [1] share of real time that the twin needs
+  std::atomic<std::uint64_t> lost_{0};
+
+  std::atomic<bool> stopping_{false};
+  std::thread thread_;
+};
+
+}  // namespace smartmill::sim

@@ -1,0 +1,280 @@
+#include "smartmill_sim/world/world.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <mutex>
+#include <optional>
+#include <random>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/units.h"
+#include "smartmill_sim/twin/cutting_machine.h"
+#include "smartmill_sim/world/hammer_station.h"
+#include "smartmill_sim/world/stock.h"
+
+namespace smartmill::sim {
+namespace {
+
+constexpr std::size_t LOOK = 64;               // samples between two looks at where the tool meets stock
+constexpr double HAMMER_DELAY = 0.03;          // [s] of the solenoid
+constexpr double TURNING = 1.0;                // [rad/s] a slower spindle cannot cut
+constexpr double STANDING = 0.02;              // [rad/s]
+constexpr double SAME_ANGLE = 1e-7;            // [rad]
+constexpr int TOUCHED = 3001, PLUNGED = 3002;  // external alarms
+
+bool same(const std::vector<ContactArc>& a, const std::vector<ContactArc>& b) {
+  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const ContactArc& p, const ContactArc& q) {
+    return std::abs(p.entry - q.entry) < SAME_ANGLE && std::abs(p.exit - q.exit) < SAME_ANGLE &&
+           p.depth == q.depth;
+  });
+}
+
+void inRange(const char* key, double value, double low, double high) {
+  if (!(value >= low && value <= high)) {
+    throw Error(std::string(key) + ": " + std::to_string(value) + " is not in " + std::to_string(low) + ".." +
+                std::to_string(high));
+  }
+}
+
+}  // namespace
+
+void WorldOptions::validate() const {
+  inRange("substeps", substeps, 1, 64);
+  inRange("tap_peak", tap_peak, 1.0, 1e5);
+  inRange("tap_contact", tap_contact, 1e-5, 1e-2);
+  inRange("operator_delay", operator_delay, 0.0, 60.0);
+  inRange("force_scatter", force_scatter, 0.0, 0.5);
+}
+
+class World::Impl {
+ public:
+  Impl(const MachineModel& model, const WorldOptions& options)
+      : options_(options),
+        spindle_(model.needSpindle("simulate the machine")),
+        controller_(ControllerOptions::ofModel(model)),
+        machine_(model, 1.0 / (SAMPLE_RATE * options.substeps)),
+        random_(options.seed) {
+    const ToolGeometry& tool = model.needTool("simulate the machine");
+    model.needCutting("simulate the machine");
+    model.needAxes("simulate the machine");
+    if (!spindle_.load_meter_full_scale) {
+      throw Error(model.file +
+                  ": spindle.load_meter_full_scale_v is missing (needed to simulate the machine)");
+    }
+    if (model.workpiece) stock_.emplace(*model.workpiece, tool.radius());
+    if (model.hammer) {
+      station_.emplace(*model.hammer, tool, model.stickout);
+      hammer_ = *model.hammer;
+    }
+    if (model.force_sensor.noise_rms) force_noise_ = *model.force_sensor.noise_rms;
+    last_ = controller_.motion();
+    machine_.resetLoadMeter(0.0);
+  }
+
+  Controller& controller() { return controller_; }
+
+  StrikeAnswer strike(const std::string& point, const std::string& direction, std::string& message) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    const std::size_t axis = direction == "x" ? 0 : direction == "y" ? 1 : direction == "z" ? 2 : 3;
+    const double now = static_cast<double>(index_) / SAMPLE_RATE;
+    if (blow_ && !blow_->over(now)) {
+      message = "a blow is still under way";
+      return StrikeAnswer::failed;
+    }
+    const bool tool = point == "tool";
+    if (tool && hammer_ && axis < 2) {
+      // Between two samples anywhere, as a real one.
+      blow_ = Blow{now + HAMMER_DELAY + uniform() / SAMPLE_RATE, scattered(hammer_->peak_force),
+                   hammer_->contact_time};
+      message = "hammer fired in " + direction;
+    } else if (point == "force_sensor" && axis < 3) {
+      const double delay = options_.operator_delay > 0.0 ? options_.operator_delay : HAMMER_DELAY;
+      blow_ = Blow{now + delay + uniform() / SAMPLE_RATE, scattered(options_.tap_peak), options_.tap_contact};
+      message = options_.operator_delay > 0.0 ? "hit the workpiece by hand in " + direction
+                                              : "hammer fired on the workpiece in " + direction;
+    } else {
+      message = "no hammer for point '" + point + "', direction '" + direction + "'";
+      return StrikeAnswer::failed;
+    }
+    blow_on_tool_ = tool;
+    blow_axis_ = axis;
+    return tool || options_.operator_delay == 0.0 ? StrikeAnswer::ok : StrikeAnswer::by_hand;
+  }
+
+  void advance(Block& block) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    controller_.advance(1.0 / SAMPLE_RATE, BLOCK, states_);
+    begin(block);
+    for (std::size_t i = 0; i < BLOCK; ++i) {
+      if ((index_ + i) % LOOK == 0) look(states_[i]);
+      sample(static_cast<double>(index_ + i) / SAMPLE_RATE, states_[i], block);
+      last_ = states_[i];
+    }
+    for (std::size_t k = 0; k < ANGLES; ++k) {
+      const std::size_t i = BLOCK * (k + 1) / ANGLES - 1;
+      block.angle[k] = {static_cast<double>(index_ + i) / SAMPLE_RATE, states_[i].spindle_angle,
+                        states_[i].spindle_speed};
+    }
+    index_ += BLOCK;
+    controller_.setSpindleLoad(100.0 * machine_.rounded(load_meter_) / *spindle_.load_meter_full_scale);
+  }
+
+  void lose(std::uint64_t samples) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    index_ += samples;
+    if (blow_) blow_->begin += static_cast<double>(samples) / SAMPLE_RATE;
+  }
+
+ private:
+  double uniform() { return std::uniform_real_distribution<double>(0.0, 1.0)(random_); }
+  double scattered(double peak) {
+    return peak * std::clamp(1.0 + options_.force_scatter * normal_(random_), 0.5, 1.5);
+  }
+  double noise(double rms) { return rms * normal_(random_); }
+
+  void begin(Block& block) const {
+    const double stamp = static_cast<double>(index_) / SAMPLE_RATE;
+    const auto prepare = [&](SampleBlock& b, std::vector<std::string> channels,
+                             std::vector<std::string> units) {
+      b.stamp = stamp;
+      b.sample_rate = SAMPLE_RATE;
+      b.first_index = index_;
+      b.channels = std::move(channels);
+      b.units = std::move(units);
+      b.samples.clear();
+      b.samples.reserve(BLOCK * b.channels.size());
+    };
+    prepare(block.hammer, {"hammer", "gap"}, {"N", "V"});
+    prepare(block.dynamometer, {"fx", "fy", "fz"}, {"N", "N", "N"});
+    prepare(block.vibration, {"x", "y"}, {"m", "m"});
+    block.force.stamp = stamp;
+    block.force.sample_rate = SAMPLE_RATE;
+    block.force.first_index = index_;
+    block.force.status = ForceBlock::Status::measured;
+    for (std::vector<double>& axis : block.force.force) axis.clear();
+  }
+
+  ToolMotion between(const MotionState& now, double share) const {
+    ToolMotion motion;
+    motion.angle =
+        last_.spindle_angle + share * std::remainder(now.spindle_angle - last_.spindle_angle, units::TWO_PI);
+    motion.speed = last_.spindle_speed + share * (now.spindle_speed - last_.spindle_speed);
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      motion.centre[axis] = last_.position[axis] + share * (now.position[axis] - last_.position[axis]);
+      motion.velocity[axis] = now.velocity[axis];
+    }
+    return motion;
+  }
+
+  /// Where the tool meets stock now.
+  void look(const MotionState& state) {
+    if (!stock_) return;
+    std::vector<ContactArc> arcs = stock_->contact(state.position, state.velocity);
+    if (!arcs.empty() && state.spindle_speed < TURNING) {
+      refuse(TOUCHED, "TOOL MET STOCK WITH SPINDLE AT REST");
+      arcs.clear();
+    }
+    if (state.velocity[2] < 0.0 && stock_->above(state.position)) {
+      refuse(PLUNGED, "TOOL PLUNGED INTO STOCK");
+      arcs.clear();
+    }
+    if (!arcs.empty() || machine_.cutting()) stock_->pass(state.position);
+    if (!same(arcs, arcs_)) {
+      arcs_ = arcs;
+      machine_.engage(arcs, between(state, 0.0));
+    }
+  }
+
+  void refuse(int number, const char* text) {
+    if (controller_.status().alarm == 0) controller_.raiseAlarm(number, text);
+  }
+
+  void sample(double time, const MotionState& now, Block& block) {
+    // The step before this sample, in finer ones.
+    CuttingMachine::Output out;
+    const bool at_station = station_ && station_->facing(now.position).has_value();
+    for (int s = options_.substeps - 1; s >= 0; --s) {
+      const double share = 1.0 - static_cast<double>(s) / options_.substeps;
+      CuttingMachine::Input input;
+      input.motion = between(now, share);
+      const double force = blowAt(time - (1.0 - share) / SAMPLE_RATE, now);
+      if (force != 0.0 && blow_on_tool_) input.tip_force[blow_axis_] = station_->atTip(force);
+      if (force != 0.0 && !blow_on_tool_) input.sensor_force[blow_axis_] = force;
+      out = machine_.step(input);
+    }
+    load_meter_ = out.load_meter;
+    const double hammer = blowAt(time, now);
+    block.hammer.samples.push_back(hammer + (hammer_ ? noise(hammer_->force_noise_rms) : 0.0));
+    double volt = 0.0;
+    if (station_) {
+      volt = at_station ? station_->voltage(now.position, now.spindle_angle, out.displacement)
+                        : -hammer_->range_volt;
+      volt = station_->clipped(volt + noise(hammer_->voltage_noise_rms));
+    }
+    block.hammer.samples.push_back(volt);
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      block.dynamometer.samples.push_back(out.sensor[axis] + noise(force_noise_[axis]));
+    block.force.force[0].push_back(out.force.fx);
+    block.force.force[1].push_back(out.force.fy);
+    block.force.force[2].push_back(out.force.fz);
+    for (double d : out.displacement) block.vibration.samples.push_back(d);
+    if (blow_ && blow_->over(time)) blow_.reset();
+  }
+
+  /// [N] A hammer that meets no standing tool hits the air.
+  double blowAt(double time, const MotionState& now) const {
+    if (!blow_) return 0.0;
+    if (blow_on_tool_ && (now.spindle_speed > STANDING || station_->facing(now.position) != blow_axis_)) {
+      return 0.0;
+    }
+    return blow_->force(time);
+  }
+
+  WorldOptions options_;
+  Spindle spindle_;
+  Controller controller_;
+  CuttingMachine machine_;
+  std::optional<Stock> stock_;
+  std::optional<HammerStation> station_;
+  std::optional<smartmill::HammerStation> hammer_;
+  Axes3 force_noise_{{0, 0, 0}};
+
+  std::mutex mutex_;
+  std::mt19937_64 random_;
+  std::normal_distribution<double> normal_;
+  std::uint64_t index_ = 0;
+  MotionState last_;
+  std::vector<MotionState> states_;
+  std::vector<ContactArc> arcs_;
+  std::optional<Blow> blow_;
+  bool blow_on_tool_ = false;
+  std::size_t blow_axis_ = 0;
+  double load_meter_ = 0.0;  // [V]
+};
+
+World::World(const MachineModel& model, const WorldOptions& options) {
+  options.validate();
+  impl_ = std::make_unique<Impl>(model, options);
+}
+
+World::~World() = default;
+
+Controller& World::controller() {
+  return impl_->controller();
+}
+
+World::StrikeAnswer World::strike(const std::string& point, const std::string& direction,
+                                  std::string& message) {
+  return impl_->strike(point, direction, message);
+}
+
+void World::advance(Block& block) {
+  impl_->advance(block);
+}
+
+void World::lose(std::uint64_t samples) {
+  impl_->lose(samples);
+}
+
+}  // namespace smartmill::sim
