@@ -1,0 +1,170 @@
+#include "smartmill_launch/report_statistics.h"
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/signal/statistics.h"
+
+namespace smartmill::report {
+
+double Figure::percent() const {
+  return 100.0 * (estimate - truth) / std::abs(truth);
+}
+
+double Figure::sigmas() const {
+  return (estimate - truth) / std_dev;
+}
+
+std::optional<bool> Figure::met() const {
+  if (std::isnan(target.percent) || std::isnan(truth)) return std::nullopt;
+  const double off = std::abs(percent());
+  return target.at_least ? off >= target.percent : off <= target.percent;
+}
+
+std::pair<double, double> stiffnessOf(const Mode& mode) {
+  return {1.0 / mode.gain, mode.gain_std / (mode.gain * mode.gain)};
+}
+
+std::vector<std::optional<std::size_t>> matchModes(const std::vector<Mode>& measured,
+                                                   const std::vector<Mode>& truth) {
+  std::vector<std::tuple<double, std::size_t, std::size_t>> pairs;
+  for (std::size_t i = 0; i < measured.size(); ++i) {
+    for (std::size_t j = 0; j < truth.size(); ++j) {
+      const double octaves = std::abs(std::log2(measured[i].frequency / truth[j].frequency));
+      if (octaves <= 1.0) pairs.emplace_back(octaves, i, j);
+    }
+  }
+  std::sort(pairs.begin(), pairs.end());
+  std::vector<std::optional<std::size_t>> match(measured.size());
+  std::vector<bool> taken(truth.size(), false);
+  for (const auto& [octaves, i, j] : pairs) {
+    if (match[i] || taken[j]) continue;
+    match[i] = j;
+    taken[j] = true;
+  }
+  return match;
+}
+
+// ---------------------------------------------------------------------------------------------- force
+
+void ForceTrack::add(const ForceBlock& block) {
+  if (block.force[0].empty()) return;
+  sample_rate_ = block.sample_rate;
+  blocks_[block.first_index] = block;
+}
+
+std::vector<double> ForceTrack::axis(std::size_t axis, std::uint64_t from, std::uint64_t to) const {
+  std::vector<double> values;
+  values.reserve(to - from);
+  auto block = blocks_.upper_bound(from);
+  if (block != blocks_.begin()) --block;
+  for (std::uint64_t index = from; index < to;) {
+    if (block == blocks_.end() || index < block->first) {
+      throw Error("force sample " + std::to_string(index) + " is missing");
+    }
+    const std::vector<double>& source = block->second.force[axis];
+    for (; index < to && index - block->first < source.size(); ++index) {
+      values.push_back(source[index - block->first]);
+    }
+    ++block;
+  }
+  return values;
+}
+
+std::uint64_t ForceTrack::indexAt(double stamp) const {
+  if (empty()) throw Error("no force has been recorded");
+  const ForceBlock* nearest = &blocks_.begin()->second;
+  for (const auto& [index, block] : blocks_) {
+    if (block.stamp <= stamp) nearest = &block;
+  }
+  const double samples = std::ceil((stamp - nearest->stamp) * sample_rate_ - 1e-3);
+  return nearest->first_index + static_cast<std::uint64_t>(std::max(samples, 0.0));
+}
+
+std::pair<std::uint64_t, std::uint64_t> ForceTrack::covered(std::uint64_t from, std::uint64_t to,
+                                                            std::optional<ForceBlock::Status> status) const {
+  std::pair<std::uint64_t, std::uint64_t> best{from, from}, run{from, from};
+  for (const auto& [index, block] : blocks_) {
+    const std::uint64_t begin = std::max(index, from);
+    const std::uint64_t end = std::min<std::uint64_t>(index + block.force[0].size(), to);
+    if (begin >= end || (status && block.status != *status)) continue;
+    run = begin == run.second ? std::make_pair(run.first, end) : std::make_pair(begin, end);
+    if (run.second - run.first > best.second - best.first) best = run;
+  }
+  return best;
+}
+
+double middleRange(const std::vector<double>& values) {
+  return percentile(values, 0.9) - percentile(values, 0.1);
+}
+
+double nonperiodicShare(const std::vector<double>& values, double samples_a_revolution, int revolutions) {
+  constexpr int ANGLES = 360;
+  const double window = samples_a_revolution * revolutions;
+  if (values.size() < 2 || !(window > 0.0)) return NOT_A_NUMBER;
+  const auto at = [&](double position) {
+    const auto index = static_cast<std::size_t>(position);
+    const double share = position - static_cast<double>(index);
+    return values[index] + share * (values[index + 1] - values[index]);
+  };
+  double all = 0.0, rest = 0.0;
+  for (double start = 0.0; start + window < static_cast<double>(values.size() - 1); start += window) {
+    double sum = 0.0, squares = 0.0, repeating = 0.0;
+    for (int angle = 0; angle < ANGLES; ++angle) {
+      double angle_sum = 0.0;
+      for (int turn = 0; turn < revolutions; ++turn) {
+        const double value = at(start + (turn + static_cast<double>(angle) / ANGLES) * samples_a_revolution);
+        angle_sum += value;
+        squares += value * value;
+      }
+      sum += angle_sum;
+      repeating += angle_sum * angle_sum / revolutions;
+    }
+    const double energy = squares - sum * sum / (ANGLES * revolutions);
+    rest += squares - repeating;
+    all += energy;
+  }
+  return all > 0.0 ? rest / all : NOT_A_NUMBER;
+}
+
+// ---------------------------------------------------------------------------------------------- chart
+
+std::vector<Pocket> pockets(const std::vector<double>& speeds, const std::vector<double>& depths,
+                            double factor, double ceiling) {
+  if (speeds.size() != depths.size()) throw Error("a chart with unequal numbers of speeds and depths");
+  std::vector<Pocket> found;
+  bool rising = false;  // the chart's begin is no pocket
+  double extreme = depths.empty() ? 0.0 : std::min(depths[0], ceiling);
+  std::size_t first = 0, last = 0;  // where the extreme is held
+  for (std::size_t i = 1; i < depths.size(); ++i) {
+    const double depth = std::min(depths[i], ceiling);
+    if (depth == extreme && last + 1 == i) last = i;
+    if (rising ? depth > extreme : depth < extreme) {
+      extreme = depth;
+      first = last = i;
+    }
+    if (rising && depth * factor < extreme) {
+      found.push_back({0.5 * (speeds[first] + speeds[last]), extreme});
+    }
+    if (rising ? depth * factor < extreme : depth > extreme * factor) {
+      rising = !rising;
+      extreme = depth;
+      first = last = i;
+    }
+  }
+  return found;
+}
+
+double interpolate(const std::vector<double>& x, const std::vector<double>& y, double at) {
+  if (x.size() != y.size()) throw Error("a curve with unequal numbers of x and y");
+  const auto above = std::lower_bound(x.begin(), x.end(), at);
+  if (above == x.end()) return NOT_A_NUMBER;
+  const auto i = static_cast<std::size_t>(above - x.begin());
+  if (*above == at) return y[i];
+  if (i == 0) return NOT_A_NUMBER;
+  return y[i - 1] + (y[i] - y[i - 1]) * (at - x[i - 1]) / (x[i] - x[i - 1]);
+}
+
+}  // namespace smartmill::report
