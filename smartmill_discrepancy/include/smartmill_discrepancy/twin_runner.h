@@ -1,0 +1,58 @@
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "smartmill_core/model/machine_model.h"
+#include "smartmill_discrepancy/dataset.h"
+
+namespace smartmill::discrepancy {
+
+/// Where a channel of a test stands in a vector over the campaign.
+struct Block {
+  std::size_t test = 0;
+  std::string channel;
+  std::size_t offset = 0;
+  std::size_t size = 0;
+  double noise = 0.0;  ///< [unit of the channel]
+};
+
+/// Simulates tests of a campaign for many models at once. Vectors over the campaign hold all channels of the chosen
+/// tests one after the other, each over its noise.
+class TwinRunner {
+ public:
+  /// @param tests indices into data.tests, in the order of the vectors
+  /// @param data must outlive this. @param threads >= 1. @param substeps of the twin a sample
+  TwinRunner(const Dataset& data, std::vector<std::size_t> tests, int threads, int substeps);
+
+  const std::vector<Block>& blocks() const { return blocks_; }
+  const std::vector<std::size_t>& tests() const { return tests_; }
+  std::size_t size() const { return size_; }
+  const Dataset& data() const { return data_; }
+
+  /// The records.
+  const std::vector<double>& measured() const { return measured_; }
+
+  /// What each model says. @throws Error of the twin.
+  std::vector<std::vector<double>> simulate(const std::vector<MachineModel>& models) const;
+  std::vector<double> simulate(const MachineModel& model) const;
+
+  std::size_t simulations() const { return simulations_; }  ///< tests simulated so far
+
+ private:
+  const Dataset& data_;
+  std::vector<std::size_t> tests_;
+  int threads_, substeps_;
+  std::vector<Block> blocks_;
+  std::vector<std::size_t> first_block_;  // of each chosen test; one more at the end
+  std::size_t size_ = 0;
+  std::vector<double> measured_;
+  mutable std::size_t simulations_ = 0;
+};
+
+/// Calls job(0) .. job(count - 1), spread over threads. @throws the first exception of a job, by index.
+void runParallel(std::size_t count, int threads, const std::function<void(std::size_t)>& job);
+
+}  // namespace smartmill::discrepancy
