@@ -24,8 +24,8 @@ std::size_t rankOf(const std::string& name) {
 
 const std::vector<EffectClass>& effectRegistry() {
   static const std::vector<EffectClass> REGISTRY{
-      {"runout", Stage::geometry, makeRunout},
       {"uneven_pitch", Stage::geometry, makeUnevenPitch},
+      {"runout", Stage::geometry, makeRunout},
       {"helix", Stage::geometry, makeHelix},
       {"feed_error", Stage::motion, makeFeedError},
       {"depth_tilt", Stage::motion, makeDepthTilt},

@@ -1,44 +1,133 @@
 #include "smartmill_sim/twin/cutting_machine.h"
 
+#include <cmath>
+
 #include "smartmill_core/error.h"
 
 namespace smartmill::sim {
+namespace {
 
-void refuseEffects(const MachineModel& model) {
-  if (!model.effects.empty()) {
-    throw Error(model.file + ": effect " + model.effects.front().name + " is not simulated by this twin");
+constexpr int UPDATE_STEPS = 16;           // between looks at what changes slowly with time
+constexpr double SENSOR_TOLERANCE = 1e-5;  // share by which a sensor mode moves before its filter follows
+constexpr double LEAST_DEPTH = 1e-9;       // [m] a tilted cut that would end in air
+
+ModalModel firstModeAt(ModalModel axis, double factor) {
+  if (!axis.modes.empty()) axis.modes.front().frequency *= factor;
+  return axis;
+}
+
+}  // namespace
+
+CuttingMachine::CuttingMachine(const MachineModel& model, double time_step)
+    : effects_(model),
+      model_(model),
+      time_step_(time_step),
+      sign_(model.force_sensor.measures_workpiece ? -1.0 : 1.0) {
+  model_.effects.clear();
+  TwinSetup setup{std::move(model_), {}, {}};
+  if (setup.model.tool) setup.radius_offset.assign(static_cast<std::size_t>(setup.model.tool->teeth), 0.0);
+  effects_.setUp(setup);
+  model_ = std::move(setup.model);
+
+  const double rate = 1.0 / time_step;
+  if (model_.tool) nominal_.radius = model_.tool->radius();
+  if (model_.tool && model_.cutting) {
+    nominal_.law.coefficients = model_.needCutting("simulate a cut");
+    process_.emplace(*model_.tool, nominal_.law, setup.radius_offset);
+  }
+  state_ = nominal_;
+  tip_.emplace_back(model_.tool_tip.x, rate, Hold::first_order);
+  tip_.emplace_back(model_.tool_tip.y, rate, Hold::first_order);
+  for (const ModalModel& axis : model_.force_sensor.axis) {
+    sensor_.emplace_back(axis, rate, Hold::first_order);
+  }
+  if (model_.spindle) drive_.emplace(*model_.spindle, time_step);
+  for (std::size_t c = 0; c < CHANNELS; ++c) {
+    if (setup.delay[c] > 0.0) delays_.emplace_back(c, DelayLine(setup.delay[c], time_step, 0.0));
   }
 }
 
-CuttingMachine::CuttingMachine(const MachineModel& model, double time_step)
-    : sign_(model.force_sensor.measures_workpiece ? -1.0 : 1.0), file_(model.file) {
-  refuseEffects(model);
-  const double rate = 1.0 / time_step;
-  if (model.tool && model.cutting) {
-    CuttingLaw law;
-    law.coefficients = model.needCutting("simulate a cut");
-    process_.emplace(*model.tool, law);
+void CuttingMachine::setClock(const Clock& clock) {
+  clock_ = clock;
+  now_.record_time = 0.0;
+  steps_to_update_ = 0;
+}
+
+ToolMotion CuttingMachine::fed(const ToolMotion& commanded) const {
+  ToolMotion actual = commanded;
+  if (state_.feed_ratio == 1.0 || !feed_start_) return actual;
+  for (std::size_t a = 0; a < 2; ++a) {
+    const double start = (*feed_start_)[a];
+    actual.centre[a] = start + state_.feed_ratio * (commanded.centre[a] - start);
+    actual.velocity[a] *= state_.feed_ratio;
   }
-  tip_.emplace_back(model.tool_tip.x, rate, Hold::first_order);
-  tip_.emplace_back(model.tool_tip.y, rate, Hold::first_order);
-  for (const ModalModel& axis : model.force_sensor.axis) {
-    sensor_.emplace_back(axis, rate, Hold::first_order);
-  }
-  if (model.spindle) drive_.emplace(*model.spindle, time_step);
+  return actual;
 }
 
 void CuttingMachine::engage(const std::vector<ContactArc>& arcs, const ToolMotion& now) {
-  if (!process_) throw Error(file_ + ": tool or cutting is missing (needed to simulate a cut)");
-  process_->engage(arcs, now);
+  if (!process_) throw Error(model_.file + ": tool or cutting is missing (needed to simulate a cut)");
+  if (!feed_start_) feed_start_ = now.centre;
+  Input input;
+  input.motion = now;
+  update(input);
+  if (arcs_.empty()) feed_path_ = 0.0;
+  arcs_ = arcs;
+  std::vector<ContactArc> tilted = arcs;
+  for (ContactArc& a : tilted) a.depth = std::max(a.depth + state_.depth_slope * feed_path_, LEAST_DEPTH);
+  process_->engage(state_.depth_slope != 0.0 ? tilted : arcs, fed(now));
 }
 
 void CuttingMachine::resetLoadMeter(double spindle_speed) {
-  if (drive_) drive_->reset(spindle_speed);
+  if (!drive_) return;
+  Input input;
+  input.motion.speed = spindle_speed;
+  update(input);
+  drive_->reset(spindle_speed);
+  for (auto& [channel, line] : delays_) {
+    ChannelValues values{};
+    values[LOAD_METER] = drive_->steady(spindle_speed);
+    effects_.measure(Stage::sensor_output, now_, values);
+    if (channel == LOAD_METER) line.reset(values[LOAD_METER]);
+  }
+}
+
+void CuttingMachine::update(const Input& input) {
+  now_.angle = input.motion.angle;
+  now_.speed = input.motion.speed;
+  now_.start_time = clock_.start_time;
+  now_.edge_time = clock_.edge_time;
+  state_ = nominal_;
+  effects_.update(now_, state_);
+  if (process_) process_->law() = state_.law;
+  if (drive_) drive_->setFriction(state_.friction_extra, state_.friction_factor);
+  if (std::abs(state_.sensor_frequency / sensor_frequency_ - 1.0) > SENSOR_TOLERANCE) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      ModalFilter next(firstModeAt(model_.force_sensor.axis[axis], state_.sensor_frequency), 1.0 / time_step_,
+                       Hold::first_order);
+      next.continueFrom(sensor_[axis]);
+      sensor_[axis] = std::move(next);
+    }
+    sensor_frequency_ = state_.sensor_frequency;
+  }
 }
 
 CuttingMachine::Output CuttingMachine::step(const Input& input) {
   Output out;
-  ToolMotion motion = input.motion;
+  if (!effects_.empty() && (steps_to_update_ <= 0 || input.motion.speed != now_.speed)) {
+    update(input);
+    steps_to_update_ = UPDATE_STEPS;
+    if (state_.depth_slope != 0.0 && cutting()) {
+      std::vector<double> depths;
+      for (const ContactArc& a : arcs_)
+        depths.push_back(std::max(a.depth + state_.depth_slope * feed_path_, LEAST_DEPTH));
+      process_->setDepths(depths, fed(input.motion));
+    }
+  }
+  --steps_to_update_;
+  now_.angle = input.motion.angle;
+  now_.speed = input.motion.speed;
+
+  ToolMotion motion = fed(input.motion);
   // The tip's place needs this step's force and the force needs the place: the force is first taken to go on
   // in a straight line, which errs by the square of the step.
   for (std::size_t axis = 0; axis < 2; ++axis) {
@@ -48,18 +137,38 @@ CuttingMachine::Output CuttingMachine::step(const Input& input) {
   if (process_) out.force = process_->step(motion);
   out.applied = {{out.force.fx + input.sensor_force[0], out.force.fy + input.sensor_force[1],
                   out.force.fz + input.sensor_force[2]}};
+  if (effects_.has(Stage::sensor_force)) effects_.addForce(now_, out.applied);
   const std::array<double, 2> tip{{out.force.fx + input.tip_force[0], out.force.fy + input.tip_force[1]}};
+  ChannelValues& channels = out.early;
   for (std::size_t axis = 0; axis < 2; ++axis) {
-    out.displacement[axis] = tip_[axis].step(tip[axis]);
+    channels[TOOL_X + axis] = tip_[axis].step(tip[axis]);
     tip_history_[axis] = {{tip[axis], tip_history_[axis][0]}};
   }
   for (std::size_t axis = 0; axis < 3; ++axis)
-    out.sensor[axis] = sign_ * sensor_[axis].step(out.applied[axis]);
+    channels[FX + axis] = sign_ * sensor_[axis].step(out.applied[axis]);
   if (drive_) {
-    out.load_meter = drive_->step(0.5 * (last_torque_ + out.force.torque), input.motion.speed);
+    channels[LOAD_METER] = drive_->step(0.5 * (last_torque_ + out.force.torque), input.motion.speed);
     last_torque_ = out.force.torque;
   }
+  if (effects_.has(Stage::sensor_output)) effects_.measure(Stage::sensor_output, now_, channels);
+  for (auto& [channel, line] : delays_) channels[channel] = line.step(channels[channel]);
+  ChannelValues shown = channels;
+  if (effects_.has(Stage::signal)) effects_.measure(Stage::signal, now_, shown);
+  out.sensor = {{shown[FX], shown[FY], shown[FZ]}};
+  out.load_meter = shown[LOAD_METER];
+  out.displacement = {{shown[TOOL_X], shown[TOOL_Y]}};
+
+  now_.record_time += time_step_;
+  if (clock_.record || cutting()) clock_.edge_time += time_step_;
+  if (!clock_.record) clock_.start_time += time_step_;
+  if (cutting()) feed_path_ += time_step_ * std::hypot(motion.velocity[0], motion.velocity[1]);
   return out;
+}
+
+void CuttingMachine::finish(double record_time, ChannelValues& channels) const {
+  Instant at = now_;
+  at.record_time = record_time;
+  effects_.measure(Stage::signal, at, channels);
 }
 
 }  // namespace smartmill::sim

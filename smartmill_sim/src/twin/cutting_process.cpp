@@ -110,20 +110,20 @@ void CuttingProcess::engage(const std::vector<ContactArc>& arcs, const ToolMotio
   arcs_ = arcs;
 }
 
-void CuttingProcess::setDepth(double depth, const ToolMotion& now) {
-  std::vector<ContactArc> arcs = arcs_;
-  for (ContactArc& a : arcs) a.depth = depth;
-  if (!slices_.empty() && depth <= slices_.back().high) {
-    bool new_slice = false;
-    for (const Slice& s : slices_) {
-      for (const ContactArc& a : arcs_) new_slice = new_slice || (s.low < depth && s.low >= a.depth);
-    }
-    if (!new_slice) {
-      arcs_ = arcs;
-      return;
-    }
+void CuttingProcess::setDepths(const std::vector<double>& depths, const ToolMotion& now) {
+  bool new_slice = false;
+  for (std::size_t a = 0; a < arcs_.size(); ++a) {
+    // Each arc's surface reaches to the end of its last slice.
+    const double filled = std::ceil(arcs_[a].depth / height_) * height_;
+    new_slice = new_slice || depths.at(a) > filled;
   }
-  engage(arcs, now);
+  if (new_slice) {
+    std::vector<ContactArc> arcs = arcs_;
+    for (std::size_t a = 0; a < arcs.size(); ++a) arcs[a].depth = depths[a];
+    engage(arcs, now);
+  } else {
+    for (std::size_t a = 0; a < arcs_.size(); ++a) arcs_[a].depth = depths[a];
+  }
 }
 
 void CuttingProcess::cut(Slice& slice, int tooth, double before, double angle, const ContactArc& arc,

@@ -12,11 +12,20 @@ SpindleDrive::SpindleDrive(const Spindle& spindle, double time_step)
 
 double SpindleDrive::friction(double speed) const {
   if (speed < spindle_.friction_zero_below) return 0.0;
-  return spindle_.viscous * speed + spindle_.coulomb;
+  return factor_ * (spindle_.viscous * speed + spindle_.coulomb + extra_);
+}
+
+void SpindleDrive::setFriction(double extra, double factor) {
+  extra_ = extra;
+  factor_ = factor;
+}
+
+double SpindleDrive::steady(double speed) const {
+  return spindle_.load_meter_gain * friction(speed) * speed;
 }
 
 void SpindleDrive::reset(double speed) {
-  voltage_ = spindle_.load_meter_gain * friction(speed) * speed;
+  voltage_ = steady(speed);
 }
 
 double SpindleDrive::step(double cutting_torque, double speed) {

@@ -7,8 +7,12 @@
 #include <random>
 #include <set>
 #include <string>
+#include <vector>
+
+#include <Eigen/Dense>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/model/effect_catalogue.h"
 #include "smartmill_core/signal/window.h"
 #include "smartmill_core/units.h"
 #include "smartmill_sim/twin/cutting_machine.h"
@@ -16,7 +20,6 @@
 namespace smartmill::sim {
 namespace {
 
-const std::array<const char*, 3> FORCES{{"fx", "fy", "fz"}};
 const std::array<const char*, 2> TIP{{"tool_x", "tool_y"}};
 
 // Columns that this twin can give.
@@ -45,41 +48,125 @@ std::vector<double> contactForce(const std::vector<double>& hammer) {
   return force;
 }
 
+// Times of a test that effects in time need.
+CuttingMachine::Clock clockOf(const MachineModel& model, const CampaignTest& test, const Record& record) {
+  for (const EffectEntry& effect : model.effects) {
+    const EffectKind* kind = findEffect(effect.name);
+    if (!kind) continue;
+    const char* lacks = nullptr;
+    if (kind->needs_start_time && record.has("load_meter") && !test.start_time) lacks = "start_time_s";
+    if (kind->needs_cut_time && test.kind == TestKind::cut && !test.cut_time_before)
+      lacks = "cut_time_before_s";
+    if (lacks)
+      throw Error("test " + test.name + ": " + lacks + " is missing (effect " + effect.name + " needs it)");
+  }
+  return {test.start_time.value_or(0.0), test.cut_time_before.value_or(0.0), true};
+}
+
+// Phases of tones that no model knows, from what the record shows beyond the twin without them: joint least
+// squares of sine and cosine on every channel that a tone is in, about the means. Clipped samples do not
+// count.
+void findPhases(const MachineModel& model, const Record& recorded,
+                const std::array<std::vector<double>*, CHANNELS>& early, double rate,
+                const CuttingMachine& machine, const std::vector<Tone*>& tones) {
+  double limit = 1e300;
+  for (const EffectEntry& effect : model.effects) {
+    if (effect.name == "saturation") limit = std::min(limit, effect.numbers.at("limit_n"));
+  }
+  const auto n = static_cast<Eigen::Index>(2 * tones.size());
+  std::vector<double> amplitude;
+  for (Tone* tone : tones) {
+    amplitude.insert(amplitude.end(), tone->amplitude.begin(), tone->amplitude.end());
+    tone->amplitude.fill(0.0);
+  }
+  const auto amplitudeOf = [&](Eigen::Index tone, std::size_t channel) {
+    return amplitude[static_cast<std::size_t>(tone) * CHANNELS + channel];
+  };
+  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(n, n);
+  Eigen::VectorXd right = Eigen::VectorXd::Zero(n);
+  for (std::size_t c = 0; c < CHANNELS; ++c) {
+    bool in_channel = false;
+    for (Eigen::Index k = 0; k < n / 2; ++k) in_channel = in_channel || amplitudeOf(k, c) != 0.0;
+    if (!in_channel || !early[c] || !recorded.has(channelName(c))) continue;
+    const std::vector<double>& shown = recorded.column(channelName(c));
+    Eigen::MatrixXd square = Eigen::MatrixXd::Zero(n + 1, n + 1);  // last: the mean
+    Eigen::VectorXd product = Eigen::VectorXd::Zero(n + 1), row = Eigen::VectorXd::Ones(n + 1);
+    for (std::size_t i = 0; i < shown.size(); ++i) {
+      if (std::abs(shown[i]) > 0.98 * limit) continue;
+      const double t = static_cast<double>(i) / rate;
+      ChannelValues values{};
+      values[c] = (*early[c])[i];
+      machine.finish(t, values);
+      for (Eigen::Index k = 0; k < n / 2; ++k) {
+        const double a = units::TWO_PI * tones[static_cast<std::size_t>(k)]->frequency * t;
+        row(2 * k) = amplitudeOf(k, c) * std::sin(a);
+        row(2 * k + 1) = amplitudeOf(k, c) * std::cos(a);
+      }
+      square += row * row.transpose();
+      product += row * (shown[i] - values[c]);
+    }
+    if (square(n, n) <= 0.0) continue;
+    const Eigen::VectorXd mean = square.col(n) / square(n, n);
+    normal += (square - mean * square.row(n)).topLeftCorner(n, n);
+    right += (product - mean * product(n)).head(n);
+  }
+  const Eigen::VectorXd wave = normal.completeOrthogonalDecomposition().solve(right);
+  for (Eigen::Index k = 0; k < n / 2; ++k) {
+    Tone& tone = *tones[static_cast<std::size_t>(k)];
+    for (std::size_t c = 0; c < CHANNELS; ++c) tone.amplitude[c] = amplitudeOf(k, c);
+    tone.phase = std::atan2(wave(2 * k + 1), wave(2 * k));
+  }
+}
+
 // Runs the machine over the record, with substeps between the samples; recorded columns are kept.
 // input(i, share): what happens at a share 0..1 of the way from sample i to the next.
+// recorded: nullptr when there is none.
 void run(const MachineModel& model, const CampaignTest& test, const SimulationOptions& options,
          CuttingMachine& machine, const std::function<CuttingMachine::Input(std::size_t, double)>& input,
-         Record& record) {
-  std::array<std::vector<double>*, 3> out{};
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    if (record.has(FORCES[axis])) out[axis] = &record.add(FORCES[axis]);
-  }
-  std::vector<double>* voltage = nullptr;
+         const Record* recorded, Record& record) {
+  machine.setClock(clockOf(model, test, record));
   if (record.has("load_meter")) {
     model.needSpindle("simulate load_meter");
-    voltage = &record.add("load_meter");
     machine.resetLoadMeter(test.spindle_speed);
   }
-  std::array<std::vector<double>*, 2> tip{};
-  for (std::size_t axis = 0; axis < 2; ++axis) {
-    if (record.has(TIP[axis])) tip[axis] = &record.add(TIP[axis]);
+  std::array<std::vector<double>*, CHANNELS> out{};
+  std::vector<std::size_t> shown;
+  for (std::size_t c = 0; c < CHANNELS; ++c) {
+    if (!record.has(channelName(c))) continue;
+    out[c] = &record.add(channelName(c));
+    shown.push_back(c);
   }
-  std::mt19937_64 random(options.seed);
-  std::normal_distribution<double> normal;
   for (std::size_t i = 0; i < record.size(); ++i) {
     const CuttingMachine::Output now = machine.step(input(i, 0.0));
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      if (!out[axis]) continue;
-      const double rms = model.force_sensor.noise_rms ? (*model.force_sensor.noise_rms)[axis] : 0.0;
-      (*out[axis])[i] = now.sensor[axis] + (options.noise ? rms * normal(random) : 0.0);
-    }
-    for (std::size_t axis = 0; axis < 2; ++axis) {
-      if (tip[axis]) (*tip[axis])[i] = now.displacement[axis];
-    }
-    if (voltage) (*voltage)[i] = options.noise ? machine.rounded(now.load_meter) : now.load_meter;
+    for (const std::size_t c : shown) (*out[c])[i] = now.early[c];
     for (int s = 1; s < options.substeps; ++s) {
       machine.step(input(i, static_cast<double>(s) / options.substeps));
     }
+  }
+
+  std::mt19937_64 random(options.seed);
+  std::normal_distribution<double> normal;
+  const std::vector<Tone*> tones = machine.tones();
+  if (!tones.empty()) {
+    if (recorded && !options.random_phases) {
+      findPhases(model, *recorded, out, test.sample_rate, machine, tones);
+    } else {
+      for (Tone* tone : tones)
+        tone->phase = std::uniform_real_distribution<double>(0.0, units::TWO_PI)(random);
+    }
+  }
+  for (std::size_t i = 0; i < record.size(); ++i) {
+    ChannelValues values{};
+    for (const std::size_t c : shown) values[c] = (*out[c])[i];
+    machine.finish(static_cast<double>(i) / test.sample_rate, values);
+    if (options.noise) {
+      for (const std::size_t c : {FX, FY, FZ}) {
+        if (out[c] && model.force_sensor.noise_rms)
+          values[c] += (*model.force_sensor.noise_rms)[c] * normal(random);
+      }
+      values[LOAD_METER] = machine.rounded(values[LOAD_METER]);
+    }
+    for (const std::size_t c : shown) (*out[c])[i] = values[c];
   }
 }
 
@@ -93,8 +180,8 @@ double phaseOf(const std::vector<double>& angle, const std::vector<double>& time
   return std::atan2(s, c);
 }
 
-Record simulate(const MachineModel& model, const CampaignTest& test, Record record, double phase,
-                const SimulationOptions& options) {
+Record simulate(const MachineModel& model, const CampaignTest& test, const Record* recorded, Record record,
+                double phase, const SimulationOptions& options) {
   if (options.substeps < 1) throw Error("simulation: substeps below 1");
   CuttingMachine machine(model, 1.0 / (test.sample_rate * options.substeps));
   if (test.kind == TestKind::tap) {
@@ -113,7 +200,7 @@ Record simulate(const MachineModel& model, const CampaignTest& test, Record reco
           }
           return input;
         },
-        record);
+        recorded, record);
     return record;
   }
   if (record.has("spindle_angle")) {
@@ -150,7 +237,7 @@ Record simulate(const MachineModel& model, const CampaignTest& test, Record reco
         }
         return input;
       },
-      record);
+      recorded, record);
   return record;
 }
 
@@ -167,10 +254,10 @@ Record simulateTest(const MachineModel& model, const CampaignTest& test, const R
   for (const std::string& name : recorded.names) {
     if (KNOWN.count(name) != 0) record.add(name) = recorded.column(name);
   }
-  const double phase = recorded.has("spindle_angle") && test.kind != TestKind::tap
-                           ? phaseOf(recorded.column("spindle_angle"), record.time, test.spindle_speed)
-                           : 0.0;
-  return simulate(model, test, std::move(record), phase, options);
+  double phase = options.phase.value_or(0.0);
+  if (!options.phase && recorded.has("spindle_angle") && test.kind != TestKind::tap)
+    phase = phaseOf(recorded.column("spindle_angle"), record.time, test.spindle_speed);
+  return simulate(model, test, &recorded, std::move(record), phase, options);
 }
 
 Record simulateTest(const MachineModel& model, const CampaignTest& test, double duration,
@@ -184,8 +271,8 @@ Record simulateTest(const MachineModel& model, const CampaignTest& test, double 
   for (const char* name : {"spindle_angle", "fx", "fy", "fz"}) record.add(name).assign(samples, 0.0);
   if (model.spindle) record.add("load_meter").assign(samples, 0.0);
   std::mt19937_64 random(options.seed ^ 0x5eedULL);
-  const double phase = std::uniform_real_distribution<double>(0.0, units::TWO_PI)(random);
-  return simulate(model, test, std::move(record), phase, options);
+  const double drawn = std::uniform_real_distribution<double>(0.0, units::TWO_PI)(random);
+  return simulate(model, test, nullptr, std::move(record), options.phase.value_or(drawn), options);
 }
 
 }  // namespace smartmill::sim

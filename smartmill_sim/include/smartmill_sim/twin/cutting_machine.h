@@ -1,17 +1,22 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "smartmill_core/modal/modal_filter.h"
 #include "smartmill_core/model/machine_model.h"
+#include "smartmill_sim/effects/delay_line.h"
+#include "smartmill_sim/effects/effect.h"
 #include "smartmill_sim/twin/cutting_process.h"
 #include "smartmill_sim/twin/spindle_drive.h"
 
 namespace smartmill::sim {
 
-/// Process, tool structure, force sensor and spindle drive of one machine, in steps of constant length.
+/// Process, tool structure, force sensor, spindle drive and measuring chain of one machine with the effects
+/// that its model lists, in steps of constant length.
 class CuttingMachine {
  public:
   /// What happens between now and the last step.
@@ -25,8 +30,15 @@ class CuttingMachine {
     CuttingForce force;                          ///< of the cut, on the tool
     std::array<double, 3> applied{{0, 0, 0}};    ///< [N] on the sensor, as force on the tool
     std::array<double, 3> sensor{{0, 0, 0}};     ///< [N] what the sensor shows, without noise
-    std::array<double, 2> displacement{{0, 0}};  ///< [m] of the tip
+    std::array<double, 2> displacement{{0, 0}};  ///< [m] of the tip, as its sensor shows it
     double load_meter = 0.0;                     ///< [V] before rounding; 0 without a spindle section
+    ChannelValues early{};  ///< the measured channels before the signal stage (drift, hum, saturation)
+  };
+  /// Of effects in time. Live: the machine counts on from here, the edge's time only while it cuts.
+  struct Clock {
+    double start_time = 0.0;  ///< [s] since the machine was cold
+    double edge_time = 0.0;   ///< [s] that the edge has cut
+    bool record = false;      ///< a record of a campaign: start_time stands, edge_time always goes on
   };
 
   /// Without tool and cutting sections nothing can be cut: engage() then refuses.
@@ -37,6 +49,15 @@ class CuttingMachine {
   void engage(const std::vector<ContactArc>& arcs, const ToolMotion& now);
   bool cutting() const { return process_ && !process_->arcs().empty(); }
 
+  /// A record begins now: drift and hum start anew. A new edge has edge_time 0.
+  void setClock(const Clock& clock);
+  const Clock& clock() const { return clock_; }
+
+  /// Tones in the signals (mains hum), their phases to be set by who knows them.
+  std::vector<Tone*> tones() { return effects_.tones(); }
+  /// Early channels to what is shown: drift, hum and saturation at a time since the record began [s].
+  void finish(double record_time, ChannelValues& channels) const;
+
   /// The load meter stands at the steady value of cutting air.
   void resetLoadMeter(double spindle_speed);
 
@@ -46,17 +67,28 @@ class CuttingMachine {
   double rounded(double voltage) const { return drive_ ? drive_->rounded(voltage) : voltage; }
 
  private:
+  void update(const Input& input);
+  ToolMotion fed(const ToolMotion& commanded) const;
+
+  EffectSet effects_;
+  MachineModel model_;  // as the effects left it
+  double time_step_;
+  TwinState nominal_, state_;
+  Instant now_;
+  Clock clock_;
+  int steps_to_update_ = 0;
   std::optional<CuttingProcess> process_;
-  std::vector<ModalFilter> tip_;     // x, y
-  std::vector<ModalFilter> sensor_;  // x, y, z
+  std::vector<ContactArc> arcs_;                     // as engaged, without tilt
+  double feed_path_ = 0.0;                           // [m] since engagement
+  std::optional<std::array<double, 2>> feed_start_;  // [m] where feed errors begin to count
+  std::vector<ModalFilter> tip_;                     // x, y
+  std::vector<ModalFilter> sensor_;                  // x, y, z
+  double sensor_frequency_ = 1.0;                    // of the first modes now, over the model's
   std::optional<SpindleDrive> drive_;
+  std::vector<std::pair<std::size_t, DelayLine>> delays_;
   std::array<std::array<double, 2>, 2> tip_history_{};  // [N] total force on the tip one and two steps ago
   double last_torque_ = 0.0;
   double sign_;
-  std::string file_;
 };
-
-/// @throws Error naming the first effect of the model, while no effect is simulated.
-void refuseEffects(const MachineModel& model);
 
 }  // namespace smartmill::sim

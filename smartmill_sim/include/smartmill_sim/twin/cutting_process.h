@@ -49,8 +49,8 @@ class CuttingProcess {
   /// present motion leaves. @throws Error on an arc outside 0..2 pi or without height.
   void engage(const std::vector<ContactArc>& arcs, const ToolMotion& now);
   const std::vector<ContactArc>& arcs() const { return arcs_; }
-  /// Depth of all arcs [m], without touching the surface below the least depth so far.
-  void setDepth(double depth, const ToolMotion& now);
+  /// Depth of each arc [m] > 0, without touching the surface below the least depth so far.
+  void setDepths(const std::vector<double>& depths, const ToolMotion& now);
 
   CuttingLaw& law() { return law_; }
 

@@ -14,7 +14,12 @@ class SpindleDrive {
   /// Friction torque [N m] at a speed [rad/s]; zero below friction_zero_below.
   double friction(double speed) const;
 
-  /// At the steady value of cutting air at a speed [rad/s].
+  /// Friction besides the model's [N m], and a factor on all of it.
+  void setFriction(double extra, double factor);
+
+  /// Load meter in steady air cutting at a speed [rad/s], [V].
+  double steady(double speed) const;
+  /// To that value.
   void reset(double speed);
 
   /// Load meter [V], unrounded, after one time step under a cutting torque [N m] that is constant over it:
@@ -27,6 +32,8 @@ class SpindleDrive {
  private:
   Spindle spindle_;
   double decay_;
+  double extra_ = 0.0;  // [N m]
+  double factor_ = 1.0;
   double voltage_ = 0.0;
 };
 

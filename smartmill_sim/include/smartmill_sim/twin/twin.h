@@ -14,11 +14,16 @@ struct SimulationOptions {
   bool noise = true;       ///< sensor noise and rounding of the load meter
   std::uint64_t seed = 1;  ///< of the noise and, without recorded angle, of the phase
   int substeps = 8;        ///< integration steps a sample, >= 1
+  /// [rad] spindle angle at the first sample, instead of the recorded angle's.
+  std::optional<double> phase;
+  /// Tones (mains hum) with a phase of the seed, not with the one that the recorded signals show.
+  bool random_phases = false;
 };
 
 /// Simulates one test of a campaign: a record with the columns and sample times of the recorded one. The
 /// recorded spindle angle gives the phase (of a tap: stands as it is), the recorded hammer force drives a
-/// tap. No effects.
+/// tap. The effects that the model lists act. What no model knows, the phase of a mains hum, is found in the
+/// recorded signals.
 ///
 /// Before engage_time the tool is out of cut; from there full engagement with the surface that steady cutting
 /// leaves. The sensor begins at rest, the load meter at its air-cut value.

@@ -68,4 +68,13 @@ void ModalFilter::reset(double constant_input) {
   last_input_ = constant_input;
 }
 
+void ModalFilter::continueFrom(const ModalFilter& before) {
+  if (before.sections_.size() != sections_.size()) throw Error("modal filter: continued from another model");
+  for (std::size_t k = 0; k < sections_.size(); ++k) {
+    sections_[k].x = before.sections_[k].x;
+    sections_[k].v = before.sections_[k].v;
+  }
+  last_input_ = before.last_input_;
+}
+
 }  // namespace smartmill

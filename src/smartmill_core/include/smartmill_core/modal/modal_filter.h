@@ -27,6 +27,9 @@ class ModalFilter {
   /// At rest, or in the static state of a constant input.
   void reset(double constant_input = 0.0);
 
+  /// Goes on from the state of a filter with as many modes in the same order (whose modes have moved since).
+  void continueFrom(const ModalFilter& before);
+
  private:
   struct Section {
     double a11, a12, a21, a22;  // state transition: output [unit], its rate [unit/s]
