@@ -10,12 +10,13 @@ namespace {
 
 using units::TWO_PI;
 
-constexpr int LOOKS = 360;            // over the front half; finer details of the stock are overlooked
-constexpr double LEAST_ARC = 1e-6;    // [rad]
-constexpr double LEAST_DEPTH = 1e-7;  // [m] controllers' increment
-constexpr double LEAST_SPEED = 1e-7;  // [m/s]
-constexpr double ON_WALL = 1e-9;      // [m] a point this near to a slot's wall is on it: not material
-constexpr double OFF_LINE = 1e-9;     // [m]
+constexpr int LOOKS = 360;               // over the front half; finer details of the stock are overlooked
+constexpr double LEAST_ARC = 1e-6;       // [rad]
+constexpr double LEAST_DEPTH = 1e-7;     // [m] controllers' increment
+constexpr double LEAST_SPEED = 1e-7;     // [m/s]
+constexpr double ON_WALL = 1e-9;         // [m] a point this near to a slot's wall is on it: not material
+constexpr double SAME_WAY = 1.0 - 1e-9;  // [1] cosine
+constexpr double OFF_LINE = 1e-9;        // [m]
 
 double wrapped(double angle) {
   const double a = std::fmod(angle, TWO_PI);
@@ -35,11 +36,12 @@ double distanceToLine(double x, double y, const std::array<double, 2>& from,
 Stock::Stock(const Workpiece& workpiece, double radius) : box_(workpiece), radius_(radius) {
 }
 
-/// [m] height of the material above z at a point, 0 without.
-double Stock::depthAt(double x, double y, double z) const {
+/// [m] height of the material above z at a point that the first so many slots left, 0 without.
+double Stock::depthAt(double x, double y, double z, std::size_t slots) const {
   if (x < box_.low[0] || x > box_.high[0] || y < box_.low[1] || y > box_.high[1]) return 0.0;
   double top = box_.high[2];
-  for (const Slot& slot : slots_) {
+  for (std::size_t k = 0; k < slots; ++k) {
+    const Slot& slot = slots_[k];
     if (slot.bottom < top && distanceToLine(x, y, slot.from, slot.to) <= radius_ + ON_WALL) top = slot.bottom;
   }
   return top - z > LEAST_DEPTH ? top - z : 0.0;
@@ -49,12 +51,13 @@ std::vector<ContactArc> Stock::contact(const std::array<double, 3>& position,
                                        const std::array<double, 3>& velocity) const {
   std::vector<ContactArc> arcs;
   if (std::hypot(velocity[0], velocity[1]) < LEAST_SPEED || position[2] >= box_.high[2]) return arcs;
+  // The slot that this motion is making ends at the tool's own front.
+  const std::size_t slots = slots_.size() - (along(velocity) ? 1 : 0);
   const double heading = std::atan2(velocity[0], velocity[1]), first = heading - 0.5 * units::PI;
   const auto depth = [&](double offset) {
     const double angle = first + offset;
-    // A hair outside the tool: the wall that this very motion leaves is not material.
-    const double r = radius_ + 2.0 * ON_WALL;
-    return depthAt(position[0] + r * std::sin(angle), position[1] + r * std::cos(angle), position[2]);
+    return depthAt(position[0] + radius_ * std::sin(angle), position[1] + radius_ * std::cos(angle),
+                   position[2], slots);
   };
   const auto add = [&](double from, double to, double height) {
     if (height <= 0.0 || to - from < LEAST_ARC) return;
@@ -90,11 +93,21 @@ bool Stock::above(const std::array<double, 3>& position) const {
   for (const double share : {0.0, 0.5, 0.999}) {
     for (int k = 0; k < 16; ++k) {
       const double a = TWO_PI * k / 16, r = share * radius_;
-      if (depthAt(position[0] + r * std::sin(a), position[1] + r * std::cos(a), position[2]) > 0.0)
+      if (depthAt(position[0] + r * std::sin(a), position[1] + r * std::cos(a), position[2], slots_.size()) >
+          0.0)
         return true;
     }
   }
   return false;
+}
+
+/// Whether a motion goes on with the slot that is being made.
+bool Stock::along(const std::array<double, 3>& velocity) const {
+  if (!open_) return false;
+  const Slot& slot = slots_.back();
+  const double lx = slot.to[0] - slot.from[0], ly = slot.to[1] - slot.from[1], length = std::hypot(lx, ly);
+  if (length == 0.0) return true;
+  return velocity[0] * lx + velocity[1] * ly >= SAME_WAY * length * std::hypot(velocity[0], velocity[1]);
 }
 
 bool Stock::inLine(const std::array<double, 3>& position) const {

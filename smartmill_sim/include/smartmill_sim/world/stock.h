@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <vector>
 
 #include "smartmill_core/model/machine_model.h"
@@ -33,7 +34,8 @@ class Stock {
     std::array<double, 2> from, to;  // [m]
     double bottom;                   // [m] z of the tip
   };
-  double depthAt(double x, double y, double z) const;
+  double depthAt(double x, double y, double z, std::size_t slots) const;
+  bool along(const std::array<double, 3>& velocity) const;
   bool inLine(const std::array<double, 3>& position) const;
 
   Workpiece box_;

@@ -1,0 +1,354 @@
+#include "smartmill_sim/world/world.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "smartmill_core/cutting/mechanistic.h"
+#include "smartmill_core/error.h"
+#include "smartmill_core/units.h"
+#include "smartmill_sim/world/hammer_station.h"
+#include "smartmill_sim/world/stock.h"
+
+namespace smartmill::sim {
+namespace {
+
+using units::PI;
+constexpr double RADIUS = 8e-3;
+
+Workpiece box() {
+  Workpiece w;
+  w.material = "al";
+  w.low = {-50e-3, -40e-3, -30e-3};
+  w.high = {50e-3, 40e-3, 0.0};
+  return w;
+}
+
+// ---- stock
+
+TEST(Stock, FullSlotIsHalfTheTool) {
+  const Stock stock(box(), RADIUS);
+  const std::vector<ContactArc> arcs = stock.contact({0.0, 0.0, -2e-3}, {0.01, 0.0, 0.0});
+  ASSERT_EQ(arcs.size(), 1u);
+  EXPECT_NEAR(arcs[0].entry, 0.0, 1e-9);
+  EXPECT_NEAR(arcs[0].exit, PI, 1e-9);
+  EXPECT_NEAR(arcs[0].depth, 2e-3, 1e-12);
+}
+
+// Width ae at the edge of the stock: up-milling leaves at acos(1 - ae / R), down-milling enters at
+// pi - acos(1 - ae / R) (Altintas, Manufacturing Automation, eq. 2.72).
+TEST(Stock, SideCutsHaveTheTextbookImmersion) {
+  const Stock stock(box(), RADIUS);
+  const double ae = 2e-3, immersion = std::acos(1.0 - ae / RADIUS);
+  // Feed in +x with the stock on the side of +y: the tool overlaps it by ae from y = -40 mm on.
+  const std::vector<ContactArc> up = stock.contact({0.0, -40e-3 - RADIUS + ae, -1e-3}, {0.01, 0.0, 0.0});
+  ASSERT_EQ(up.size(), 1u);
+  EXPECT_NEAR(up[0].entry, 0.0, 1e-9);
+  EXPECT_NEAR(up[0].exit, immersion, 1e-6);
+  const std::vector<ContactArc> down = stock.contact({0.0, 40e-3 + RADIUS - ae, -1e-3}, {0.01, 0.0, 0.0});
+  ASSERT_EQ(down.size(), 1u);
+  EXPECT_NEAR(down[0].entry, PI - immersion, 1e-6);
+  EXPECT_NEAR(down[0].exit, PI, 1e-9);
+}
+
+TEST(Stock, EnteringTheFrontGrowsFromTheMiddle) {
+  const Stock stock(box(), RADIUS);
+  // The tip of the circle is 1 mm inside: half angle acos(1 - 1 / 8) about the feed direction.
+  const std::vector<ContactArc> arcs = stock.contact({-50e-3 - RADIUS + 1e-3, 0.0, -1e-3}, {0.01, 0.0, 0.0});
+  const double half = std::acos(1.0 - 1e-3 / RADIUS);
+  ASSERT_EQ(arcs.size(), 1u);
+  EXPECT_NEAR(arcs[0].entry, 0.5 * PI - half, 1e-6);
+  EXPECT_NEAR(arcs[0].exit, 0.5 * PI + half, 1e-6);
+}
+
+TEST(Stock, FeedInMinusYWrapsOverZero) {
+  const Stock stock(box(), RADIUS);
+  // Heading -y is the immersion angle pi: the front half is pi/2 .. 3 pi/2; +y gives 3 pi/2 .. 2 pi and 0 ..
+  // pi/2.
+  const std::vector<ContactArc> minus = stock.contact({0.0, 0.0, -1e-3}, {0.0, -0.01, 0.0});
+  ASSERT_EQ(minus.size(), 1u);
+  EXPECT_NEAR(minus[0].entry, 0.5 * PI, 1e-9);
+  EXPECT_NEAR(minus[0].exit, 1.5 * PI, 1e-9);
+  const std::vector<ContactArc> plus = stock.contact({0.0, 0.0, -1e-3}, {0.0, 0.01, 0.0});
+  ASSERT_EQ(plus.size(), 2u);
+  EXPECT_NEAR(plus[0].entry, 1.5 * PI, 1e-9);
+  EXPECT_NEAR(plus[0].exit, 2.0 * PI, 1e-9);
+  EXPECT_NEAR(plus[1].entry, 0.0, 1e-9);
+  EXPECT_NEAR(plus[1].exit, 0.5 * PI, 1e-9);
+}
+
+TEST(Stock, ASlotMadeIsAir) {
+  Stock stock(box(), RADIUS);
+  for (int k = 0; k <= 200; ++k) {
+    const std::array<double, 3> at{-60e-3 + 0.6e-3 * k, 0.0, -2e-3};
+    stock.pass(at);
+    // Its own slot is no air to the tool that makes it.
+    if (std::abs(at[0]) < 40e-3) {
+      const std::vector<ContactArc> arcs = stock.contact(at, {0.01, 0.0, 0.0});
+      ASSERT_EQ(arcs.size(), 1u);
+      ASSERT_NEAR(arcs[0].entry, 0.0, 1e-9);
+      ASSERT_NEAR(arcs[0].exit, PI, 1e-9);
+    }
+  }
+  // Back through it.
+  EXPECT_TRUE(stock.contact({40e-3, 0.0, -2e-3}, {-0.01, 0.0, 0.0}).empty());
+  stock.pass({40e-3, 0.0, 1e-3});
+  // Again through it at the same depth and with more: only what is below is left.
+  EXPECT_TRUE(stock.contact({0.0, 0.0, -2e-3}, {0.01, 0.0, 0.0}).empty());
+  const std::vector<ContactArc> deeper = stock.contact({0.0, 0.0, -3e-3}, {0.01, 0.0, 0.0});
+  ASSERT_EQ(deeper.size(), 1u);
+  EXPECT_NEAR(deeper[0].depth, 1e-3, 1e-9);
+  // Beside it by 12 mm: 12 - 8 = 4 mm of the tool's width towards the slot are air.
+  const std::vector<ContactArc> beside = stock.contact({0.0, 12e-3, -2e-3}, {0.01, 0.0, 0.0});
+  ASSERT_EQ(beside.size(), 1u);
+  EXPECT_NEAR(beside[0].entry, 0.0, 1e-9);
+  EXPECT_NEAR(beside[0].exit, PI - std::acos(4e-3 / RADIUS), 1e-6);
+  EXPECT_FALSE(stock.above({0.0, 0.0, -2e-3}));
+  EXPECT_TRUE(stock.above({0.0, 0.0, -2.1e-3}));
+  EXPECT_TRUE(stock.above({0.0, 12e-3, -2e-3}));
+}
+
+TEST(Stock, NothingWithoutFeedOrAbove) {
+  const Stock stock(box(), RADIUS);
+  EXPECT_TRUE(stock.contact({0.0, 0.0, -2e-3}, {0.0, 0.0, 0.0}).empty());
+  EXPECT_TRUE(stock.contact({0.0, 0.0, 1e-3}, {0.01, 0.0, 0.0}).empty());
+  EXPECT_TRUE(stock.contact({0.1, 0.0, -1e-3}, {0.01, 0.0, 0.0}).empty());
+}
+
+// ---- world
+
+MachineModel mill() {
+  MachineModel m;
+  m.file = "mill";
+  ToolGeometry tool;
+  tool.teeth = 4;
+  tool.diameter = 2.0 * RADIUS;
+  tool.helix = units::radFromDeg(30.0);
+  m.tool = tool;
+  m.stickout = 50e-3;
+  m.cutting = CuttingCoefficients{800e6, 200e6, 150e6, 20e3, 15e3, 1e3};
+  Spindle spindle;
+  spindle.viscous = 4e-4;
+  spindle.coulomb = 0.1;
+  spindle.load_meter_gain = 4e-4;
+  spindle.load_meter_bandwidth = 7.0;
+  spindle.load_meter_resolution = 3e-4;
+  spindle.load_meter_full_scale = 8.0;
+  spindle.max_speed = units::radPerSecFromRpm(20000.0);
+  spindle.acceleration = units::radPerSecFromRpm(20000.0);  // in one second
+  m.spindle = spindle;
+  MachineAxes axes;
+  axes.travel = {{{-0.2, 0.2}, {-0.2, 0.2}, {-0.2, 0.1}}};
+  axes.rapid = 0.5;
+  axes.acceleration = 5.0;
+  axes.home = {-0.1, 0.0, 0.05};
+  m.axes = axes;
+  smartmill::HammerStation h;
+  h.offset = 15e-3;
+  h.peak_force = 200.0;
+  h.contact_time = 0.5e-3;
+  h.gap_at_zero_volt = 250e-6;
+  h.gain_volt = h.range_volt = 10.0;
+  h.flute_depth = 1e-3;
+  h.position["x"] = {-0.1, 0.0, 0.05};
+  m.hammer = h;
+  m.workpiece = box();
+  return m;
+}
+
+/// Runs a DNC program and gathers everything until the controller is idle.
+class Machine {
+ public:
+  explicit Machine(const MachineModel& model, const WorldOptions& options = {}) : world(model, options) {}
+  void program(const std::string& text) {
+    ASSERT_EQ(world.controller().dncStart(), focas::EW_OK);
+    ASSERT_EQ(world.controller().dncData(text.data(), text.size()), text.size());
+    ASSERT_EQ(world.controller().dncEnd(), focas::EW_OK);
+  }
+  void run(double time) {
+    const auto blocks = static_cast<int>(time * World::SAMPLE_RATE / World::BLOCK);
+    for (int k = 0; k < blocks; ++k) {
+      World::Block b;
+      world.advance(b);
+      for (std::size_t i = 0; i < World::BLOCK; ++i) {
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          force[axis].push_back(b.force.force[axis][i]);
+          sensor[axis].push_back(b.dynamometer.at(i, axis));
+        }
+        hammer.push_back(b.hammer.at(i, 0));
+        gap.push_back(b.hammer.at(i, 1));
+      }
+      angle.insert(angle.end(), b.angle.begin(), b.angle.end());
+      load.push_back(world.controller().spindleLoad().at(0));
+      position.push_back(world.controller().motion().position);
+    }
+  }
+  World world;
+  std::array<std::vector<double>, 3> force, sensor;
+  std::vector<double> hammer, gap, load;
+  std::vector<SpindleAngle> angle;
+  std::vector<std::array<double, 3>> position;
+};
+
+double mean(const std::vector<double>& v, std::size_t from, std::size_t to) {
+  return std::accumulate(v.begin() + static_cast<std::ptrdiff_t>(from),
+                         v.begin() + static_cast<std::ptrdiff_t>(to), 0.0) /
+         static_cast<double>(to - from);
+}
+
+// A slot commanded by NC text gives the closed form's mean forces and the load meter's closed-form voltage.
+TEST(World, ASlotByNcTextGivesClosedFormForceAndLoad) {
+  const MachineModel model = mill();
+  Machine machine(model);
+  // 6000 rpm, 4 teeth, 0.1 mm: 2400 mm/min. From 60 mm beside to the middle of the stock.
+  machine.program("G90\nG0 X-60\nS6000 M3\nG4 P500\nG1 F6000 Z-1\nG1 F2400 X40\nG1 F6000 Z20\nM5\n");
+  // 0.2 s rapid, 0.5 s dwell, 0.55 s down, then 2.5 s of feed: 2.0 .. 3.0 s is well inside.
+  machine.run(3.5);
+  const auto from = static_cast<std::size_t>(2.0 * World::SAMPLE_RATE);
+  const std::size_t to = from + 256 * 50;  // 50 revolutions
+  const Engagement slot{0.0, PI, 1e-3, 0.1e-3};
+  const MechanisticForce closed(*model.tool, *model.cutting, slot);
+  const CuttingForce expected = closed.mean();
+  // The time lag of the surface's node is below 1e-3 of the chip (see CuttingProcess).
+  EXPECT_NEAR(mean(machine.force[0], from, to), expected.fx, 1e-3 * std::abs(expected.fx));
+  EXPECT_NEAR(mean(machine.force[1], from, to), expected.fy, 1e-3 * std::abs(expected.fy));
+  EXPECT_NEAR(mean(machine.force[2], from, to), expected.fz, 1e-3 * std::abs(expected.fz));
+  // Without sensor modes the dynamometer shows the force.
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    for (std::size_t i = from; i < from + 1000; ++i)
+      ASSERT_NEAR(machine.sensor[axis][i], machine.force[axis][i], 1e-9);
+  }
+  const double omega = units::radPerSecFromRpm(6000.0);
+  const Spindle& s = *model.spindle;
+  const double volt = s.load_meter_gain * (expected.torque + s.viscous * omega + s.coulomb) * omega;
+  const double percent = mean(machine.load, from / 256, to / 256);
+  EXPECT_NEAR(percent, 100.0 * volt / *s.load_meter_full_scale, 2e-3 * percent);
+  // Before the tool meets the stock nothing is cut.
+  EXPECT_EQ(mean(machine.force[0], 0, static_cast<std::size_t>(1.2 * World::SAMPLE_RATE)), 0.0);
+}
+
+// The force follows the angle that the encoder tells.
+TEST(World, ForceAndAngleBelongTogether) {
+  MachineModel model = mill();
+  model.tool->helix = 0.0;
+  Machine machine(model);
+  machine.program("G90\nG0 X-60\nS6000 M3\nG4 P500\nG1 F6000 Z-1\nG1 F2400 X40\n");
+  machine.run(2.5);
+  const MechanisticForce closed(*model.tool, *model.cutting, {0.0, PI, 1e-3, 0.1e-3});
+  int compared = 0;
+  for (std::size_t k = machine.angle.size() - 40; k < machine.angle.size(); ++k) {
+    const SpindleAngle& a = machine.angle[k];
+    const auto i = static_cast<std::size_t>(std::lround(a.stamp * World::SAMPLE_RATE));
+    // Not where a tooth enters or leaves in this very sample.
+    const double place = std::fmod(a.angle, 0.5 * PI);
+    if (place < 0.05 || place > 0.5 * PI - 0.05) continue;
+    const CuttingForce f = closed.at(a.angle);
+    EXPECT_NEAR(machine.force[0][i], f.fx, 2e-3 * 200.0);
+    EXPECT_NEAR(machine.force[1][i], f.fy, 2e-3 * 200.0);
+    ++compared;
+  }
+  EXPECT_GT(compared, 10);
+}
+
+TEST(World, TheSpindleAtRestMayNotCut) {
+  Machine machine(mill());
+  machine.program("G90\nG0 X-60\nG1 F6000 Z-1\nG1 F2400 X40\n");
+  machine.run(2.0);
+  ASSERT_EQ(machine.world.controller().status().alarm, 1);
+  EXPECT_NE(machine.world.controller().alarmMessages().at(0).text.find("SPINDLE AT REST"), std::string::npos);
+  // It stopped where it met the stock, not 90 mm further on.
+  EXPECT_LT(machine.position.back()[0], -50e-3 - RADIUS + 5e-3);
+}
+
+TEST(World, PlungingIsRefused) {
+  Machine machine(mill());
+  machine.program("G90\nG0 X0\nS6000 M3\nG4 P500\nG1 F600 Z-5\n");
+  machine.run(7.0);
+  ASSERT_EQ(machine.world.controller().status().alarm, 1);
+  EXPECT_NE(machine.world.controller().alarmMessages().at(0).text.find("PLUNGED"), std::string::npos);
+}
+
+// ---- hammer station
+
+// The hit tells the tip's receptance through eq. 4.43: static flexibility times force over the factor.
+TEST(World, ABlowMovesTheTipAwayByTheCantileversShare) {
+  MachineModel model = mill();
+  model.tool_tip.x.modes = {{3000.0, 0.03, 1.0 / 30e6, NOT_A_NUMBER, NOT_A_NUMBER, NOT_A_NUMBER}};
+  model.hammer->contact_time = 20e-3;  // slow against the mode: the tool follows statically
+  WorldOptions options;
+  options.force_scatter = 0.0;
+  Machine machine(model, options);
+  machine.run(0.02);
+  const double rest = machine.gap.back();
+  std::string message;
+  // Between two flutes or at one: the voltage's own curve tells the gap.
+  ASSERT_EQ(machine.world.strike("tool", "x", message), World::StrikeAnswer::ok) << message;
+  EXPECT_EQ(machine.world.strike("tool", "x", message), World::StrikeAnswer::failed);
+  machine.run(0.1);
+  EXPECT_NEAR(*std::max_element(machine.hammer.begin(), machine.hammer.end()), 200.0, 0.1);
+  const auto gapOf = [&](double volt) { return 250e-6 / (volt / 10.0 + 1.0); };
+  const double away = gapOf(*std::min_element(machine.gap.begin(), machine.gap.end())) - gapOf(rest);
+  const double L = 50e-3, l = 35e-3;
+  const double expected = 200.0 / 30e6 * l * l * (3.0 * L - l) / (2.0 * L * L * L);
+  // A half sine this slow excites the mode by half its period over the contact, 0.8 %.
+  EXPECT_NEAR(away, expected, 0.01 * expected);
+}
+
+TEST(World, ASensorTapShowsOnHammerAndDynamometer) {
+  WorldOptions options;
+  options.operator_delay = 0.5;
+  Machine machine(mill(), options);
+  std::string message;
+  EXPECT_EQ(machine.world.strike("force_sensor", "y", message), World::StrikeAnswer::by_hand) << message;
+  machine.run(0.8);
+  const auto top = std::max_element(machine.hammer.begin(), machine.hammer.end()) - machine.hammer.begin();
+  EXPECT_NEAR(static_cast<double>(top) / World::SAMPLE_RATE, 0.5, 1e-3);
+  EXPECT_GT(machine.hammer[static_cast<std::size_t>(top)], 200.0);
+  // An ideal sensor shows the blow itself, in its direction only.
+  EXPECT_NEAR(machine.sensor[1][static_cast<std::size_t>(top)], machine.hammer[static_cast<std::size_t>(top)],
+              1e-6);
+  EXPECT_NEAR(machine.sensor[0][static_cast<std::size_t>(top)], 0.0, 1e-9);
+  EXPECT_EQ(machine.world.strike("tool", "z", message), World::StrikeAnswer::failed);
+}
+
+TEST(World, LostSamplesAreAJumpOfTheIndex) {
+  World world(mill(), {});
+  World::Block b;
+  world.advance(b);
+  EXPECT_EQ(b.hammer.first_index, 0u);
+  world.lose(1000);
+  world.advance(b);
+  EXPECT_EQ(b.hammer.first_index, 1256u);
+  EXPECT_EQ(b.dynamometer.first_index, 1256u);
+  EXPECT_NEAR(b.hammer.stamp, 1256.0 / World::SAMPLE_RATE, 1e-12);
+}
+
+TEST(World, RefusesWhatItCannotBe) {
+  const auto line = [](const MachineModel& model, const WorldOptions& options) -> std::string {
+    try {
+      World world(model, options);
+    } catch (const Error& e) {
+      return e.what();
+    }
+    return "";
+  };
+  MachineModel m = mill();
+  m.spindle.reset();
+  EXPECT_NE(line(m, {}).find("spindle is missing"), std::string::npos);
+  m = mill();
+  m.spindle->load_meter_full_scale.reset();
+  EXPECT_NE(line(m, {}).find("load_meter_full_scale_v"), std::string::npos);
+  m = mill();
+  m.stickout = 10e-3;
+  EXPECT_NE(line(m, {}).find("offset_mm"), std::string::npos);
+  WorldOptions options;
+  options.substeps = 0;
+  EXPECT_NE(line(mill(), options).find("substeps"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace smartmill::sim
