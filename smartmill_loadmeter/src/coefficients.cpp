@@ -22,6 +22,7 @@ using namespace smartmill::loadmeter;  // NOLINT
 
 struct Options {
   std::string source_path, source, model, means = "all", output, parameters;
+  bool spindle_uncertainty = false, plain_friction = false;
 };
 
 const char* practice(Means means) {
@@ -73,6 +74,32 @@ void fromLoad(const Options& o, const CoefficientSet& found) {
   write(o.output, found.value, found.std_dev);
 }
 
+void printTerms(const Options& o, const LoadRecordResult& found) {
+  if (o.spindle_uncertainty) {
+    std::printf("  with the stated uncertainty of the spindle; load meter's bandwidth %.4f Hz\n",
+                found.bandwidth);
+  }
+  std::string terms;
+  for (const std::string& term : found.terms) terms += (terms.empty() ? "" : ", ") + term;
+  if (terms.empty()) terms = "none";
+  std::printf(
+      "  noise %.4f mV; records disagree by %.4f %% (chi2 %.1f a degree of freedom); added by evidence: %s\n",
+      1e3 * found.noise, 100.0 * found.disagreement, found.misfit, terms.c_str());
+  if (found.friction.breakaway != 0.0) {
+    std::printf("  Stribeck friction %.4f Nm x exp(-(n / %.1f rpm)^2)\n", found.friction.breakaway,
+                units::rpmFromRadPerSec(found.friction.stribeck_speed));
+  }
+  if (found.friction.cold_ratio != 0.0) {
+    std::printf("  warm-up: friction x (1 + %.3f exp(-t / %.0f s))\n", found.friction.cold_ratio,
+                found.friction.warmup_time);
+  }
+  if (found.edge_growth != 0.0)
+    std::printf("  Kte x (1 + %.4f per minute of cut)\n", 60.0 * found.edge_growth);
+  if (!o.spindle_uncertainty && !found.terms.empty() && found.terms.back() == "load meter's lag") {
+    std::printf("  load meter's bandwidth %.4f Hz\n", found.bandwidth);
+  }
+}
+
 void run(const Options& o) {
   if (!std::filesystem::exists(o.source_path)) throw Error(o.source_path + ": cannot be read");
   if (std::filesystem::path(o.source_path).extension() == ".bag") {
@@ -103,10 +130,13 @@ void run(const Options& o) {
     fromForce(o, campaign, model);
     return;
   }
-  std::vector<std::string> notes;
-  const CoefficientSet found = identifyFromLoadRecords(campaign, model, &notes);
-  for (const std::string& note : notes) std::fprintf(stderr, "coefficients: %s\n", note.c_str());
-  fromLoad(o, found);
+  LoadRecordOptions options;
+  options.spindle_uncertainty = o.spindle_uncertainty;
+  options.choose_terms = !o.plain_friction;
+  const LoadRecordResult found = identifyFromLoadRecords(campaign, model, options);
+  for (const std::string& note : found.notes) std::fprintf(stderr, "coefficients: %s\n", note.c_str());
+  fromLoad(o, found.set);
+  printTerms(o, found);
 }
 
 }  // namespace
@@ -123,6 +153,11 @@ int main(int argc, char** argv) {
   app.add_option("--means", o.means, "force: means of all samples in cut, or over whole revolutions")
       ->capture_default_str()
       ->check(CLI::IsMember({"all", "revolutions"}));
+  app.add_flag("--spindle-uncertainty", o.spindle_uncertainty,
+               "load_meter of a campaign: the model's stated uncertainty of the spindle holds for "
+               "load_meter_v_per_w and the bandwidth too (default: both exact)");
+  app.add_flag("--plain-friction", o.plain_friction,
+               "load_meter of a campaign: Coulomb and viscous friction only, nothing added by evidence");
   app.add_option("--params", o.parameters, "bag: parameter file of the node (launch/config/loadmeter.yaml)");
   app.add_option("-o,--output", o.output, "writes the coefficients as a model file's cutting section");
   try {

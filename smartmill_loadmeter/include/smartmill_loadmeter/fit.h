@@ -1,0 +1,35 @@
+#pragma once
+
+#include <functional>
+#include <vector>
+
+namespace smartmill::loadmeter {
+
+/// One unknown of a nonlinear fit.
+struct FitParameter {
+  double start = 0.0;
+  double low = 0.0, high = 0.0;  ///< bounds; equal: held at start
+  double scale = 1.0;            ///< > 0, typical size
+};
+
+struct FitResult {
+  std::vector<double> value;
+  /// (J'J)^-1 row by row: the covariance when residuals are weighted to variance 1; zero rows where held or
+  /// at a bound.
+  std::vector<double> covariance;
+  double squares = 0.0;  ///< sum of squared residuals
+  bool converged = false;
+
+  double covarianceOf(std::size_t i, std::size_t j) const { return covariance[i * value.size() + j]; }
+};
+
+/// Least squares of residuals(value) within bounds (Ceres, central differences).
+/// @param residuals fills `count` numbers. @throws Error when they are not finite at the start.
+FitResult fit(const std::function<void(const std::vector<double>& value, double* residuals)>& residuals,
+              std::size_t count, const std::vector<FitParameter>& parameters);
+
+/// Bayesian information criterion of a fit whose residuals are weighted to variance 1 when
+/// `known_variance`, else of unknown variance, estimated from `squares`.
+double informationCriterion(double squares, std::size_t count, std::size_t unknowns, bool known_variance);
+
+}  // namespace smartmill::loadmeter
