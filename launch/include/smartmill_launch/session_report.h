@@ -1,0 +1,87 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "smartmill_core/cutting/coefficient_set.h"
+#include "smartmill_core/modal/results.h"
+#include "smartmill_core/signal/streams.h"
+#include "smartmill_launch/report_statistics.h"
+#include "smartmill_launch/session_plan.h"
+
+namespace smartmill::report {
+
+/// A stability limit over speed; a measured chart has the spindle's limits and points too.
+struct ChartCurve {
+  std::vector<double> spindle_speed;                          ///< [rad/s] rising
+  std::vector<double> depth_limit;                            ///< [m] +inf: none
+  std::vector<double> torque_depth_limit, power_depth_limit;  ///< [m] +inf: none; may be empty
+  double entry_angle = 0.0, exit_angle = 0.0;                 ///< [rad]
+  double absolute_depth_limit = NOT_A_NUMBER;                 ///< [m]
+};
+
+/// A cut of the session and what was seen of it.
+struct RecordedCut {
+  CuttingCondition condition;
+  double ends = NOT_A_NUMBER;  ///< [s] stamp of the condition after it; NaN: none came
+  double steady_from = NOT_A_NUMBER,
+         steady_to = NOT_A_NUMBER;  ///< [s] at speed on the steady path; NaN: never
+  std::vector<session::ChatterWindow> windows;
+  ForceTrack raw, compensated, truth;  ///< of the cuts that are looked at
+};
+
+/// Everything that the report needs of a recorded session.
+struct SessionRecording {
+  std::vector<MeasuredFrf> frfs, true_frfs;
+  std::vector<MeasuredModes> modes, true_modes;
+  std::optional<CoefficientSet> coefficients, true_coefficients;
+  std::optional<ChartCurve> chart;
+  std::vector<RecordedCut> cuts;
+  double duration = 0.0;  ///< [s] of the recording
+
+  const MeasuredFrf* frf(bool true_one, const std::string& point, const std::string& direction) const;
+  const MeasuredModes* modal(bool true_one, const std::string& point, const std::string& direction) const;
+  const RecordedCut* cut(const std::string& name) const;
+};
+
+/// A cut that checks the chart.
+struct CutCheck {
+  std::string name;
+  double spindle_speed = 0.0, axial_depth = 0.0;                       ///< [rad/s], [m]
+  double limit = NOT_A_NUMBER, true_limit = NOT_A_NUMBER;              ///< [m]
+  session::CutVerdict::Kind due = session::CutVerdict::Kind::unknown;  ///< what the chart says
+  session::CutVerdict verdict;                                         ///< what the detector said
+  double nonperiodic = NOT_A_NUMBER;  ///< [1] share of the true force that does not repeat every revolution
+  bool met() const { return verdict.kind == due; }
+};
+
+struct Section {
+  std::string title;
+  std::vector<Figure> figures;
+};
+
+struct Report {
+  std::vector<Section> sections;
+  std::vector<CutCheck> cuts;
+  std::vector<std::string> notes;
+  std::size_t targets() const;  ///< figures with a verdict, and cuts
+  std::size_t met() const;      ///< of these
+};
+
+/// The samples that a cut is judged by: in its steady stretch, there in all three recordings, compensation
+/// settled. Empty (first == second) when there are none.
+std::pair<std::uint64_t, std::uint64_t> judgedSamples(const RecordedCut& cut, double settle_revolutions);
+
+/// @param true_chart limit computed from the truth; empty without truth
+/// @param true_limits [m] the same at the speed of each cut in recording.cuts; NaN or empty: not known
+Report makeReport(const SessionRecording& recording, const std::optional<ChartCurve>& true_chart,
+                  const std::vector<double>& true_limits);
+
+/// Tables for people, in markdown with aligned columns.
+std::string markdown(const Report& report);
+/// The same for programs. @param session JSON text that the session wrote; empty: none
+std::string json(const Report& report, const std::string& session);
+
+}  // namespace smartmill::report

@@ -1,0 +1,184 @@
+// rosrun smartmill_launch report results/session.bag --session results/session.json -o results
+
+#include <unistd.h>
+
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+#include <limits>
+#include <sstream>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "report_pictures.h"
+#include "session_bag.h"
+#include "smartmill_core/error.h"
+#include "smartmill_core/model/machine_model.h"
+#include "smartmill_core/units.h"
+
+namespace {
+
+using namespace smartmill;
+using namespace smartmill::report;
+namespace fs = std::filesystem;
+
+std::string shellQuoted(const std::string& word) {
+  std::string text = "'";
+  for (const char c : word) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return text + "'";
+}
+
+/// The limit of the true machine, by the tool that makes charts of models.
+class TrueLimit {
+ public:
+  /// @param model file of the true machine @param folder for what the tool writes
+  TrueLimit(std::string model, fs::path folder, const ChartCurve& chart)
+      : model_(std::move(model)), folder_(std::move(folder)), chart_(chart) {}
+
+  ChartCurve over(double low, double high, std::size_t count) const {
+    const std::string csv = (folder_ / "lobes_true.csv").string(),
+                      log = (folder_ / "lobes_true.txt").string();
+    char numbers[300];
+    std::snprintf(numbers, sizeof numbers,
+                  " --entry-deg %.12g --exit-deg %.12g --speeds %.12g:%.12g:%zu --max-depth-mm 1000",
+                  units::degFromRad(chart_.entry_angle), units::degFromRad(chart_.exit_angle),
+                  units::rpmFromRadPerSec(low), units::rpmFromRadPerSec(high), count);
+    const std::string command = "rosrun smartmill_stability lobes " + shellQuoted(model_) + numbers + " -o " +
+                                shellQuoted(csv) + " >" + shellQuoted(log) + " 2>&1";
+    if (std::system(command.c_str()) != 0) throw Error("lobes failed on the true machine, see " + log);
+    return read(csv);
+  }
+
+  /// [m]
+  double at(double speed) const { return over(speed, speed, 1).depth_limit.at(0); }
+
+ private:
+  ChartCurve read(const std::string& csv) const {
+    ChartCurve curve;
+    curve.entry_angle = chart_.entry_angle;
+    curve.exit_angle = chart_.exit_angle;
+    std::ifstream in(csv);
+    std::string line;
+    std::getline(in, line);
+    double least = std::numeric_limits<double>::infinity();
+    while (std::getline(in, line)) {
+      const std::size_t comma = line.find(',');
+      const std::string depth = line.substr(comma + 1, line.find(',', comma + 1) - comma - 1);
+      curve.spindle_speed.push_back(units::radPerSecFromRpm(std::stod(line)));
+      curve.depth_limit.push_back(depth.empty() ? std::numeric_limits<double>::infinity()
+                                                : std::stod(depth) * units::MM);
+      least = std::min(least, curve.depth_limit.back());
+    }
+    if (curve.depth_limit.empty()) throw Error(csv + ": no limit stands there");
+    curve.absolute_depth_limit = least;
+    return curve;
+  }
+
+  std::string model_;
+  fs::path folder_;
+  ChartCurve chart_;
+};
+
+/// The true machine as a model file; empty where the recording does not tell.
+std::string trueModel(const SessionRecording& recording, const fs::path& folder) {
+  const MeasuredModes* x = recording.modal(true, POINT_TOOL_TIP, "x");
+  const MeasuredModes* y = recording.modal(true, POINT_TOOL_TIP, "y");
+  if (!recording.true_coefficients || !x || !y || recording.cuts.empty()) return "";
+  MachineModel model;
+  model.tool = recording.cuts.front().condition.tool;
+  model.cutting = recording.true_coefficients->value;
+  model.tool_tip = {x->model, y->model};
+  const std::string file = (folder / "true_machine.yaml").string();
+  writeMachineModel(model, file);
+  return file;
+}
+
+struct Request {
+  std::string bag, session, out = "results";
+  bool check = false, pictures = true;
+};
+
+std::string readAll(const std::string& file) {
+  std::ifstream in(file);
+  if (!in) throw Error(file + ": cannot be read");
+  std::stringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+void write(const fs::path& file, const std::string& text) {
+  std::ofstream out(file);
+  out << text;
+  out.close();
+  if (!out) throw Error(file.string() + ": cannot be written");
+}
+
+int run(const Request& request) {
+  const std::string session = request.session.empty() ? "" : readAll(request.session);
+  const bool terminal = isatty(STDERR_FILENO) != 0;
+  const SessionRecording recording = readSession(request.bag, [terminal](double share) {
+    if (terminal) std::fprintf(stderr, "\rreading %3.0f %%", 100.0 * share);
+  });
+  if (terminal) std::fprintf(stderr, "\r             \r");
+  const fs::path folder(request.out), data = folder / "data";
+  std::error_code error;
+  fs::create_directories(data, error);
+  if (error) throw Error(data.string() + ": " + error.message());
+
+  std::optional<ChartCurve> true_chart;
+  std::vector<double> true_limits;
+  const std::string model = recording.chart ? trueModel(recording, data) : "";
+  if (!model.empty()) {
+    const TrueLimit limit(model, data, *recording.chart);
+    const std::vector<double>& speeds = recording.chart->spindle_speed;
+    true_chart = limit.over(speeds.front(), speeds.back(), speeds.size());
+    for (const RecordedCut& cut : recording.cuts) {
+      const bool checks = cut.condition.name.rfind("verify_", 0) == 0;
+      true_limits.push_back(checks ? limit.at(cut.condition.spindle_speed) : NOT_A_NUMBER);
+    }
+  }
+  const Report report = makeReport(recording, true_chart, true_limits);
+  if (report.sections.empty() && report.cuts.empty()) throw Error(request.bag + ": no results are in it");
+  const std::string text = markdown(report);
+  write(folder / "summary.md", text);
+  write(folder / "summary.json", json(report, session));
+  std::fputs(text.c_str(), stdout);
+  std::string files = "summary.md, summary.json";
+  if (request.pictures) {
+    for (const std::string& picture : drawPictures(recording, report, true_chart, folder))
+      files += ", " + picture;
+  }
+  std::printf("written to %s: %s\n", folder.string().c_str(), files.c_str());
+  return request.check && report.met() < report.targets() ? 1 : 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Request request;
+  CLI::App app{
+      "Tells what a recorded session measured, beside the truth where a simulator has recorded it: tables, a "
+      "summary "
+      "file and pictures."};
+  app.add_option("bag", request.bag, "recorded session")->required();
+  app.add_option("--session", request.session, "JSON summary of the session node, kept in summary.json");
+  app.add_option("-o,--out", request.out, "folder for summary.md, summary.json and pictures")
+      ->capture_default_str();
+  app.add_flag("--check", request.check, "exit code 1 when a target is missed");
+  app.add_flag("!--no-pictures", request.pictures, "tables only");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? 0 : 2;
+  }
+  try {
+    return run(request);
+  } catch (const std::exception& e) {
+    std::cerr << "report: " << e.what() << "\n";
+    return 1;
+  }
+}

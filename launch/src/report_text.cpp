@@ -1,0 +1,158 @@
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <sstream>
+
+#include <nlohmann/json.hpp>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/units.h"
+#include "smartmill_launch/session_report.h"
+
+namespace smartmill::report {
+namespace {
+
+using Json = nlohmann::ordered_json;
+using Row = std::vector<std::string>;
+using session::CutVerdict;
+
+std::string shown(const char* format, double value) {
+  if (std::isnan(value)) return "-";
+  char text[100];
+  std::snprintf(text, sizeof text, format, value);
+  return text;
+}
+
+std::string aligned(const std::vector<Row>& rows) {
+  std::vector<std::size_t> width(rows[0].size(), 0);
+  for (const Row& row : rows) {
+    for (std::size_t c = 0; c < row.size(); ++c) width[c] = std::max(width[c], row[c].size());
+  }
+  std::string text;
+  for (std::size_t r = 0; r < rows.size(); ++r) {
+    for (std::size_t c = 0; c < width.size(); ++c) {
+      const std::string padding(width[c] - rows[r][c].size(), ' ');
+      text += c == 0 ? "| " + rows[r][c] + padding : " | " + padding + rows[r][c];
+    }
+    text += " |\n";
+    if (r > 0) continue;
+    for (std::size_t c = 0; c < width.size(); ++c) {
+      text += "|" + std::string(width[c] + 1, '-') + (c == 0 ? "-" : ":");
+    }
+    text += "|\n";
+  }
+  return text;
+}
+
+std::string metText(const std::optional<bool>& met) {
+  return !met ? "" : *met ? "met" : "MISSED";
+}
+
+std::string targetText(const Target& target) {
+  if (std::isnan(target.percent)) return "";
+  return shown(target.at_least ? ">= %.1f %%" : "<= %.1f %%", target.percent);
+}
+
+const char* wordOf(CutVerdict::Kind kind) {
+  switch (kind) {
+    case CutVerdict::Kind::stable:
+      return "stable";
+    case CutVerdict::Kind::chatter:
+      return "chatter";
+    case CutVerdict::Kind::undecided:
+      return "undecided";
+    case CutVerdict::Kind::unknown:
+      break;
+  }
+  return "unknown";
+}
+
+/// JSON knows neither NaN nor infinity.
+Json number(double value) {
+  return std::isfinite(value) ? Json(value) : Json(nullptr);
+}
+
+}  // namespace
+
+std::string markdown(const Report& report) {
+  std::ostringstream out;
+  out << "# Session\n";
+  for (const Section& section : report.sections) {
+    std::vector<Row> rows{
+        {"quantity", "unit", "measured", "std", "true", "diff %", "diff/std", "target", "verdict"}};
+    for (const Figure& f : section.figures) {
+      rows.push_back({f.name, f.unit, shown("%.6g", f.estimate), shown("%.2g", f.std_dev),
+                      shown("%.6g", f.truth), shown("%+.3f", f.percent()), shown("%+.2f", f.sigmas()),
+                      targetText(f.target), metText(f.met())});
+    }
+    out << "\n## " << section.title << "\n\n" << aligned(rows);
+  }
+  if (!report.cuts.empty()) {
+    std::vector<Row> rows{{"cut", "rpm", "depth mm", "chart's limit mm", "true limit mm", "chart says",
+                           "detector", "windows", "chatter Hz", "non-periodic share of true force",
+                           "verdict"}};
+    for (const CutCheck& cut : report.cuts) {
+      rows.push_back({cut.name, shown("%.0f", units::rpmFromRadPerSec(cut.spindle_speed)),
+                      shown("%.3f", cut.axial_depth / units::MM), shown("%.3f", cut.limit / units::MM),
+                      shown("%.3f", cut.true_limit / units::MM), wordOf(cut.due), wordOf(cut.verdict.kind),
+                      std::to_string(cut.verdict.chattering) + " of " + std::to_string(cut.verdict.windows),
+                      shown("%.1f", cut.verdict.frequency), shown("%.4f", cut.nonperiodic),
+                      cut.met() ? "met" : "MISSED"});
+    }
+    out << "\n## Cuts that check the chart\n\n" << aligned(rows);
+  }
+  out << "\n";
+  for (const std::string& note : report.notes) out << "- " << note << "\n";
+  out << "\n" << report.met() << " of " << report.targets() << " targets met\n";
+  return out.str();
+}
+
+std::string json(const Report& report, const std::string& session) {
+  Json out;
+  out["targets"] = report.targets();
+  out["targets_met"] = report.met();
+  out["figures"] = Json::array();
+  for (const Section& section : report.sections) {
+    for (const Figure& f : section.figures) {
+      Json figure{{"section", section.title},
+                  {"quantity", f.name},
+                  {"unit", f.unit},
+                  {"measured", number(f.estimate)},
+                  {"std", number(f.std_dev)},
+                  {"true", number(f.truth)},
+                  {"difference_percent", number(f.percent())},
+                  {"difference_over_std", number(f.sigmas())}};
+      if (std::isfinite(f.target.percent)) {
+        figure[f.target.at_least ? "at_least_percent" : "at_most_percent"] = f.target.percent;
+      }
+      if (const auto met = f.met()) figure["met"] = *met;
+      out["figures"].push_back(figure);
+    }
+  }
+  out["cuts"] = Json::array();
+  for (const CutCheck& cut : report.cuts) {
+    out["cuts"].push_back({{"name", cut.name},
+                           {"spindle_speed_rad_per_s", cut.spindle_speed},
+                           {"axial_depth_m", cut.axial_depth},
+                           {"depth_limit_m", number(cut.limit)},
+                           {"true_depth_limit_m", number(cut.true_limit)},
+                           {"chart_says", wordOf(cut.due)},
+                           {"detector_says", wordOf(cut.verdict.kind)},
+                           {"windows", cut.verdict.windows},
+                           {"chattering_windows", cut.verdict.chattering},
+                           {"chatter_frequency_hz", number(cut.verdict.frequency)},
+                           {"nonperiodic_share_of_true_force", number(cut.nonperiodic)},
+                           {"met", cut.met()}});
+  }
+  out["notes"] = report.notes;
+  if (!session.empty()) {
+    try {
+      out["session"] = Json::parse(session);
+    } catch (const Json::exception&) {
+      throw Error("the session's summary is no JSON");
+    }
+  }
+  return out.dump(2) + "\n";
+}
+
+}  // namespace smartmill::report
