@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "smartmill_core/error.h"
@@ -11,6 +12,8 @@ namespace smartmill::kalman {
 namespace {
 
 const std::array<const char*, 3> CHANNELS{{"fx", "fy", "fz"}};
+constexpr double STEADY_TIME = 0.05;  // [s] without a change of speed before filters are laid out
+
 void require(const char* key, double value, bool good, const char* due) {
   if (!good || !std::isfinite(value))
     throw Error(std::string(key) + ": " + std::to_string(value) + ", " + due + " is due");
@@ -46,6 +49,14 @@ bool ForceCompensation::hasSensor() const {
 }
 
 void ForceCompensation::handle(const SpindleAngle& angle) {
+  // While the spindle speeds up or slows down there is no harmonic to follow: a layout would be out of date
+  // before it has settled.
+  if (steady_speed_ > 0.0 && std::abs(angle.speed / steady_speed_ - 1.0) > parameters_.speed_tolerance) {
+    changing_until_ = angle.stamp + STEADY_TIME;
+    steady_speed_ = angle.speed;
+  } else if (steady_speed_ == 0.0) {
+    steady_speed_ = angle.speed;
+  }
   speed_ = angle.speed;
 }
 
@@ -56,7 +67,8 @@ void ForceCompensation::handle(const CuttingCondition&) {
 void ForceCompensation::reset() {
   filters_.clear();
   next_index_.reset();
-  speed_ = 0.0;
+  speed_ = steady_speed_ = 0.0;
+  changing_until_ = -std::numeric_limits<double>::infinity();
   health_ = {};
 }
 
@@ -102,7 +114,7 @@ void ForceCompensation::handle(const SampleBlock& block) {
     }
   }
   ForceBlock compensated = measured;
-  if (!hasSensor() || speed_ < parameters_.least_speed) {
+  if (!hasSensor() || speed_ < parameters_.least_speed || block.stamp < changing_until_) {
     filters_.clear();
     health_.speed = 0.0;
     compensated.status = ForceBlock::Status::passed_through;

@@ -30,29 +30,40 @@ SortedCompensation::SortedCompensation(const CompensationParameters& parameters,
       hammers_(sorter_.addEvents("daq/hammer")),
       angles_(sorter_.addRegular("spindle/angle")),
       blocks_(sorter_.addRegular("daq/dynamometer")),
-      newest_(NEVER) {
+      newest_(NEVER),
+      newest_block_(NEVER),
+      newest_hammer_(NEVER),
+      newest_angle_(NEVER) {
   useModelFile();
 }
 
 void SortedCompensation::useModelFile() {
   identified_.fill(NEVER);
-  for (std::size_t axis = 0; axis < 3; ++axis) compensation_.setSensor(axis, believed_.axis[axis]);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (believed_.noise_rms) {
+      compensation_.setSensor(axis, believed_.axis[axis], (*believed_.noise_rms)[axis]);
+    } else {
+      compensation_.setSensor(axis, believed_.axis[axis]);
+    }
+  }
 }
 
-void SortedCompensation::watch(double stamp) {
-  if (stamp < newest_ - RESTART) {
+void SortedCompensation::watch(double stamp, double& newest_here) {
+  // Against its own stream: under load one topic may come seconds after another.
+  if (stamp < newest_here - RESTART) {
     sorter_.reset();
     compensation_.reset();
     measurement_.reset();
     useModelFile();
-    newest_ = stamp;
+    newest_ = newest_block_ = newest_hammer_ = newest_angle_ = NEVER;
     if (restarted_) restarted_();
   }
+  newest_here = std::max(newest_here, stamp);
   newest_ = std::max(newest_, stamp);
 }
 
 void SortedCompensation::push(const SampleBlock& block) {
-  watch(block.stamp);
+  watch(block.stamp, newest_block_);
   sorter_.push(blocks_, block.stamp, [this, block] {
     compensation_.handle(block);
     measurement_.handleSensor(block);
@@ -61,7 +72,7 @@ void SortedCompensation::push(const SampleBlock& block) {
 }
 
 void SortedCompensation::pushHammer(const SampleBlock& block) {
-  watch(block.stamp);
+  watch(block.stamp, newest_hammer_);
   sorter_.setRegular(hammers_, true);
   sorter_.push(hammers_, block.stamp, [this, block] {
     measurement_.handleHammer(block);
@@ -70,7 +81,7 @@ void SortedCompensation::pushHammer(const SampleBlock& block) {
 }
 
 void SortedCompensation::push(const SpindleAngle& angle) {
-  watch(angle.stamp);
+  watch(angle.stamp, newest_angle_);
   sorter_.push(angles_, angle.stamp, [this, angle] { compensation_.handle(angle); });
 }
 

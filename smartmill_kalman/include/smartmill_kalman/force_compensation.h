@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -76,6 +77,8 @@ class ForceCompensation {
   std::vector<HarmonicFilter> filters_;         // of the axes with a model, in order; empty: to be laid out
   double design_rate_ = 0.0;                    // [Hz]
   double speed_ = 0.0;                          // [rad/s]
+  double steady_speed_ = 0.0;                   // [rad/s] from which readings are counted as a change
+  double changing_until_ = -std::numeric_limits<double>::infinity();  // [s]
   std::optional<std::uint64_t> next_index_;
   double settling_left_ = 0.0;  // [s]
   CompensationHealth health_;

@@ -58,7 +58,7 @@ class SortedCompensation {
   void onRestart(std::function<void()> told) { restarted_ = std::move(told); }
 
  private:
-  void watch(double stamp);
+  void watch(double stamp, double& newest_here);
   void drain();
   void useModelFile();
 
@@ -71,6 +71,7 @@ class SortedCompensation {
   StreamSorter::Stream conditions_, goals_, hammers_, angles_, blocks_;
   std::function<void()> restarted_;
   double newest_;
+  double newest_block_, newest_hammer_, newest_angle_;  // [s] of each stream
 };
 
 }  // namespace smartmill::kalman
