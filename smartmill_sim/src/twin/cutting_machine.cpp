@@ -18,7 +18,7 @@ ModalModel firstModeAt(ModalModel axis, double factor) {
 
 }  // namespace
 
-CuttingMachine::CuttingMachine(const MachineModel& model, double time_step)
+CuttingMachine::CuttingMachine(const MachineModel& model, double time_step, Feed feed)
     : effects_(model),
       model_(model),
       time_step_(time_step),
@@ -33,7 +33,12 @@ CuttingMachine::CuttingMachine(const MachineModel& model, double time_step)
   if (model_.tool) nominal_.radius = model_.tool->radius();
   if (model_.tool && model_.cutting) {
     nominal_.law.coefficients = model_.needCutting("simulate a cut");
-    process_.emplace(*model_.tool, nominal_.law, setup.radius_offset);
+    vibrates_ = !model_.tool_tip.x.modes.empty() || !model_.tool_tip.y.modes.empty();
+    if (feed == Feed::steady && !vibrates_) {
+      rigid_.emplace(*model_.tool, nominal_.law, setup.radius_offset);
+    } else {
+      process_.emplace(*model_.tool, nominal_.law, setup.radius_offset);
+    }
   }
   state_ = nominal_;
   tip_.emplace_back(model_.tool_tip.x, rate, Hold::first_order);
@@ -65,7 +70,8 @@ ToolMotion CuttingMachine::fed(const ToolMotion& commanded) const {
 }
 
 void CuttingMachine::engage(const std::vector<ContactArc>& arcs, const ToolMotion& now) {
-  if (!process_) throw Error(model_.file + ": tool or cutting is missing (needed to simulate a cut)");
+  if (!process_ && !rigid_)
+    throw Error(model_.file + ": tool or cutting is missing (needed to simulate a cut)");
   if (!feed_start_) feed_start_ = now.centre;
   Input input;
   input.motion = now;
@@ -73,8 +79,11 @@ void CuttingMachine::engage(const std::vector<ContactArc>& arcs, const ToolMotio
   if (arcs_.empty()) feed_path_ = 0.0;
   arcs_ = arcs;
   std::vector<ContactArc> tilted = arcs;
-  for (ContactArc& a : tilted) a.depth = std::max(a.depth + state_.depth_slope * feed_path_, LEAST_DEPTH);
-  process_->engage(state_.depth_slope != 0.0 ? tilted : arcs, fed(now));
+  for (ContactArc& a : tilted) {
+    if (state_.depth_slope != 0.0) a.depth = std::max(a.depth + state_.depth_slope * feed_path_, LEAST_DEPTH);
+  }
+  if (process_) process_->engage(tilted, fed(now));
+  if (rigid_) rigid_->engage(tilted, fed(now));
 }
 
 void CuttingMachine::resetLoadMeter(double spindle_speed) {
@@ -99,6 +108,7 @@ void CuttingMachine::update(const Input& input) {
   state_ = nominal_;
   effects_.update(now_, state_);
   if (process_) process_->law() = state_.law;
+  if (rigid_) rigid_->setLaw(state_.law);
   if (drive_) drive_->setFriction(state_.friction_extra, state_.friction_factor);
   if (std::abs(state_.sensor_frequency / sensor_frequency_ - 1.0) > SENSOR_TOLERANCE) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -120,7 +130,8 @@ CuttingMachine::Output CuttingMachine::step(const Input& input) {
       std::vector<double> depths;
       for (const ContactArc& a : arcs_)
         depths.push_back(std::max(a.depth + state_.depth_slope * feed_path_, LEAST_DEPTH));
-      process_->setDepths(depths, fed(input.motion));
+      if (process_) process_->setDepths(depths, fed(input.motion));
+      if (rigid_) rigid_->setDepths(depths);
     }
   }
   --steps_to_update_;
@@ -128,13 +139,17 @@ CuttingMachine::Output CuttingMachine::step(const Input& input) {
   now_.speed = input.motion.speed;
 
   ToolMotion motion = fed(input.motion);
-  // The tip's place needs this step's force and the force needs the place: the force is first taken to go on
-  // in a straight line, which errs by the square of the step.
-  for (std::size_t axis = 0; axis < 2; ++axis) {
-    const std::array<double, 2>& f = tip_history_[axis];
-    motion.displacement[axis] = tip_[axis].peek(2.0 * f[0] - f[1]);
+  if (rigid_) {
+    out.force = rigid_->at(motion.angle);
+  } else if (process_) {
+    // The tip's place needs this step's force and the force needs the place: the force is first taken to go
+    // on in a straight line, which errs by the square of the step.
+    for (std::size_t axis = 0; axis < 2 && vibrates_; ++axis) {
+      const std::array<double, 2>& f = tip_history_[axis];
+      motion.displacement[axis] = tip_[axis].peek(2.0 * f[0] - f[1]);
+    }
+    out.force = process_->step(motion);
   }
-  if (process_) out.force = process_->step(motion);
   out.applied = {{out.force.fx + input.sensor_force[0], out.force.fy + input.sensor_force[1],
                   out.force.fz + input.sensor_force[2]}};
   if (effects_.has(Stage::sensor_force)) effects_.addForce(now_, out.applied);

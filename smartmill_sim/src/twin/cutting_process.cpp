@@ -42,15 +42,29 @@ bool holds(const ContactArc& arc, double angle, double slice_low) {
 
 }  // namespace
 
+void validate(const ContactArc& arc) {
+  if (!(arc.entry >= 0.0 && arc.exit > arc.entry && arc.exit <= TWO_PI + 1e-9 && arc.depth > 0.0)) {
+    char text[160];
+    std::snprintf(text, sizeof text, "contact from %g to %g rad over %g m is impossible", arc.entry, arc.exit,
+                  arc.depth);
+    throw Error(text);
+  }
+}
+
+void checkOffsets(const ToolGeometry& tool, std::vector<double>& radius_offset) {
+  const auto teeth = static_cast<std::size_t>(tool.teeth);
+  if (radius_offset.empty()) radius_offset.assign(teeth, 0.0);
+  if (radius_offset.size() != teeth) {
+    throw Error("cutting: " + std::to_string(radius_offset.size()) + " radius offsets for " +
+                std::to_string(teeth) + " teeth");
+  }
+}
+
 CuttingProcess::CuttingProcess(const ToolGeometry& tool, const CuttingLaw& law,
                                std::vector<double> radius_offset)
     : tool_(tool), law_(law), offset_(std::move(radius_offset)), sin_(NODES), cos_(NODES) {
   validate(tool);
-  if (offset_.empty()) offset_.assign(static_cast<std::size_t>(tool.teeth), 0.0);
-  if (offset_.size() != static_cast<std::size_t>(tool.teeth)) {
-    throw Error("cutting process: " + std::to_string(offset_.size()) + " radius offsets for " +
-                std::to_string(tool.teeth) + " teeth");
-  }
+  checkOffsets(tool, offset_);
   for (int n = 0; n < NODES; ++n) {
     sin_[static_cast<std::size_t>(n)] = std::sin(n * NODE_ANGLE);
     cos_[static_cast<std::size_t>(n)] = std::cos(n * NODE_ANGLE);
@@ -88,12 +102,7 @@ void CuttingProcess::growTo(double depth) {
 void CuttingProcess::engage(const std::vector<ContactArc>& arcs, const ToolMotion& now) {
   double depth = 0.0;
   for (const ContactArc& a : arcs) {
-    if (!(a.entry >= 0.0 && a.exit > a.entry && a.exit <= TWO_PI + 1e-9 && a.depth > 0.0)) {
-      char text[160];
-      std::snprintf(text, sizeof text, "contact from %g to %g rad over %g m is impossible", a.entry, a.exit,
-                    a.depth);
-      throw Error(text);
-    }
+    validate(a);
     depth = std::max(depth, a.depth);
   }
   if (depth > 0.0) growTo(depth);

@@ -183,7 +183,7 @@ double phaseOf(const std::vector<double>& angle, const std::vector<double>& time
 Record simulate(const MachineModel& model, const CampaignTest& test, const Record* recorded, Record record,
                 double phase, const SimulationOptions& options) {
   if (options.substeps < 1) throw Error("simulation: substeps below 1");
-  CuttingMachine machine(model, 1.0 / (test.sample_rate * options.substeps));
+  CuttingMachine machine(model, 1.0 / (test.sample_rate * options.substeps), Feed::steady);
   if (test.kind == TestKind::tap) {
     const std::vector<double> hammer = contactForce(record.column("hammer"));
     const std::size_t axis = test.direction == "x" ? 0 : test.direction == "y" ? 1 : 2;

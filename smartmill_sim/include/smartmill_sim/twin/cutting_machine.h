@@ -11,9 +11,14 @@
 #include "smartmill_sim/effects/delay_line.h"
 #include "smartmill_sim/effects/effect.h"
 #include "smartmill_sim/twin/cutting_process.h"
+#include "smartmill_sim/twin/rigid_cut.h"
 #include "smartmill_sim/twin/spindle_drive.h"
 
 namespace smartmill::sim {
+
+/// How the tool is fed: steady promises that speed, feed and contact do not change while the tool cuts (a
+/// record of a campaign); without tool-tip modes tables over a revolution then give the forces.
+enum class Feed { any, steady };
 
 /// Process, tool structure, force sensor, spindle drive and measuring chain of one machine with the effects
 /// that its model lists, in steps of constant length.
@@ -43,11 +48,11 @@ class CuttingMachine {
 
   /// Without tool and cutting sections nothing can be cut: engage() then refuses.
   /// @param time_step [s] > 0. @throws Error naming what of the model this twin cannot run.
-  CuttingMachine(const MachineModel& model, double time_step);
+  CuttingMachine(const MachineModel& model, double time_step, Feed feed = Feed::any);
 
   /// Changes where the tool meets material, see CuttingProcess.
   void engage(const std::vector<ContactArc>& arcs, const ToolMotion& now);
-  bool cutting() const { return process_ && !process_->arcs().empty(); }
+  bool cutting() const { return !arcs_.empty(); }
 
   /// A record begins now: drift and hum start anew. A new edge has edge_time 0.
   void setClock(const Clock& clock);
@@ -78,6 +83,8 @@ class CuttingMachine {
   Clock clock_;
   int steps_to_update_ = 0;
   std::optional<CuttingProcess> process_;
+  std::optional<RigidCut> rigid_;  // instead of the process
+  bool vibrates_ = false;
   std::vector<ContactArc> arcs_;                     // as engaged, without tilt
   double feed_path_ = 0.0;                           // [m] since engagement
   std::optional<std::array<double, 2>> feed_start_;  // [m] where feed errors begin to count

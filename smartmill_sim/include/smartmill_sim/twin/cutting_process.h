@@ -16,6 +16,12 @@ struct ContactArc {
   double depth = 0.0;  ///< [m] from the tip up
 };
 
+/// @throws Error on an arc outside 0..2 pi or without height.
+void validate(const ContactArc& arc);
+
+/// Makes empty radius offsets zeros. @throws Error when there is not one a tooth.
+void checkOffsets(const ToolGeometry& tool, std::vector<double>& radius_offset);
+
 /// Where the tool is and how it moves.
 struct ToolMotion {
   double angle = 0.0;                          ///< [rad] immersion angle of tooth 1 at its tip

@@ -1,0 +1,197 @@
+#include "smartmill_sim/twin/rigid_cut.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "smartmill_core/units.h"
+
+namespace smartmill::sim {
+namespace {
+
+using units::TWO_PI;
+
+constexpr std::size_t NODES = 2048;  // over a turn: linear between them errs by 1e-6 of the integrand
+constexpr double NODE_ANGLE = TWO_PI / NODES;
+constexpr double LEAST_CHIP = 1e-15;  // [m] at the ends of a contact, which still rub
+constexpr double LEAST_LAG = 1e-6;    // [rad] over the depth; below it the edge is straight
+
+double wrapped(double angle) {
+  const double turns = std::floor(angle * (1.0 / TWO_PI));
+  return angle - turns * TWO_PI;
+}
+
+struct Trigonometry {
+  std::vector<double> sine, cosine;
+  Trigonometry() : sine(NODES + 1), cosine(NODES + 1) {
+    for (std::size_t n = 0; n <= NODES; ++n) {
+      sine[n] = std::sin(static_cast<double>(n) * NODE_ANGLE);
+      cosine[n] = std::cos(static_cast<double>(n) * NODE_ANGLE);
+    }
+  }
+};
+
+const Trigonometry& nodes() {
+  static const Trigonometry NODE_TABLE;
+  return NODE_TABLE;
+}
+
+}  // namespace
+
+RigidCut::RigidCut(const ToolGeometry& tool, const CuttingLaw& law, std::vector<double> radius_offset)
+    : tool_(tool), law_(law), offset_(std::move(radius_offset)), lag_(tool.lag()) {
+  validate(tool);
+  checkOffsets(tool, offset_);
+  const auto teeth = static_cast<std::size_t>(tool.teeth);
+  for (std::size_t j = 0; j < teeth; ++j) tooth_angle_.push_back(tool.toothAngle(static_cast<int>(j)));
+  bool alike = true;
+  for (std::size_t j = 0; j < teeth; ++j) {
+    for (std::size_t step = 1; step <= teeth; ++step) {
+      const std::size_t i = (j + step) % teeth;
+      // Its own last pass comes a whole turn ahead.
+      const double ahead = step == teeth ? TWO_PI : wrapped(tooth_angle_[i] - tooth_angle_[j]);
+      gaps_.push_back({{offset_[j] - offset_[i], ahead}});
+      const std::array<double, 2>& first = gaps_[step - 1];
+      alike = alike && gaps_.back()[0] == first[0] && std::abs(gaps_.back()[1] - first[1]) < 1e-12;
+    }
+  }
+  tables_.resize(alike ? 1 : teeth);
+}
+
+double RigidCut::chip(std::size_t tooth, double sine, double cosine) const {
+  const double along = feed_[0] * sine + feed_[1] * cosine;
+  const std::array<double, 2>* gap = &gaps_[tooth * offset_.size()];
+  double least = 1e300;
+  for (std::size_t i = 0; i < offset_.size(); ++i) least = std::min(least, gap[i][0] + along * gap[i][1]);
+  return least;
+}
+
+double RigidCut::chip(int tooth, double angle) const {
+  return chip(static_cast<std::size_t>(tooth), std::sin(angle), std::cos(angle));
+}
+
+RigidCut::Row RigidCut::elementary(double chip, double sine, double cosine) const {
+  if (chip <= 0.0) return {};
+  const CuttingCoefficients& k = law_.coefficients;
+  double h = chip;
+  if (law_.size_exponent != 0.0) h *= std::pow(chip / law_.size_reference, -law_.size_exponent);
+  const double ft = k.ktc * h, fr = k.krc * h;
+  return {-ft * cosine - fr * sine,       ft * sine - fr * cosine,       k.kac * h, ft,
+          -k.kte * cosine - k.kre * sine, k.kte * sine - k.kre * cosine, k.kae,     k.kte};
+}
+
+void RigidCut::tabulate() {
+  const Trigonometry& trig = nodes();
+  for (std::size_t j = 0; j < tables_.size(); ++j) {
+    std::vector<Row>& table = tables_[j];
+    table.resize(NODES + 1);
+    table[0] = {};
+    double before = chip(j, trig.sine[0], trig.cosine[0]);
+    for (std::size_t n = 1; n <= NODES; ++n) {
+      const double after = chip(j, trig.sine[n], trig.cosine[n]);
+      table[n] = table[n - 1];
+      // Simpson over the part of the cell that is in contact, the chip nearly linear in it.
+      double from = 0.0, to = 1.0;
+      if (before <= 0.0 && after <= 0.0) {
+        before = after;
+        continue;
+      }
+      if (before < 0.0) from = before / (before - after);
+      if (after < 0.0) to = before / (before - after);
+      const double weight = (to - from) * NODE_ANGLE / 6.0;
+      for (const double part : {0.0, 0.5, 1.0}) {
+        const double share = from + part * (to - from);
+        // Angle between nodes by the chord, which is 3e-7 short.
+        const double s = trig.sine[n - 1] + share * (trig.sine[n] - trig.sine[n - 1]);
+        const double c = trig.cosine[n - 1] + share * (trig.cosine[n] - trig.cosine[n - 1]);
+        const Row row = elementary(std::max(chip(j, s, c), LEAST_CHIP), s, c);
+        const double w = part == 0.5 ? 4.0 * weight : weight;
+        for (std::size_t k = 0; k < row.size(); ++k) table[n][k] += w * row[k];
+      }
+      before = after;
+    }
+  }
+}
+
+void RigidCut::engage(const std::vector<ContactArc>& arcs, const ToolMotion& now) {
+  for (const ContactArc& a : arcs) validate(a);
+  arcs_ = arcs;
+  const double turn = now.speed > 0.0 ? 1.0 / now.speed : 0.0;
+  const std::array<double, 2> feed{{now.velocity[0] * turn, now.velocity[1] * turn}};
+  if (feed != feed_ || tables_[0].empty()) {
+    feed_ = feed;
+    tabulate();
+  }
+}
+
+void RigidCut::setDepths(const std::vector<double>& depths) {
+  for (std::size_t a = 0; a < arcs_.size(); ++a) arcs_[a].depth = depths.at(a);
+}
+
+void RigidCut::setLaw(const CuttingLaw& law) {
+  const CuttingCoefficients &a = law.coefficients, &b = law_.coefficients;
+  const bool same = a.ktc == b.ktc && a.krc == b.krc && a.kac == b.kac && a.kte == b.kte && a.kre == b.kre &&
+                    a.kae == b.kae && law.size_exponent == law_.size_exponent &&
+                    law.size_reference == law_.size_reference;
+  law_ = law;
+  if (!same && !tables_[0].empty()) tabulate();
+}
+
+void RigidCut::add(const std::vector<Row>& table, double from, double to, CuttingForce& sum,
+                   double& tangential) const {
+  const double pa = from * (1.0 / NODE_ANGLE), pb = to * (1.0 / NODE_ANGLE);
+  const auto ia = std::min(static_cast<std::size_t>(pa), NODES - 1);
+  const auto ib = std::min(static_cast<std::size_t>(pb), NODES - 1);
+  const double sa = pa - static_cast<double>(ia), sb = pb - static_cast<double>(ib);
+  const Row &a0 = table[ia], &a1 = table[ia + 1], &b0 = table[ib], &b1 = table[ib + 1];
+  Row d;
+  for (std::size_t k = 0; k < d.size(); ++k)
+    d[k] = b0[k] + sb * (b1[k] - b0[k]) - a0[k] - sa * (a1[k] - a0[k]);
+  const double c = law_.chip_factor, e = law_.edge_factor;
+  sum.fx += c * d[0] + e * d[4];
+  sum.fy += c * d[1] + e * d[5];
+  sum.fz += c * d[2] + e * d[6];
+  tangential += c * d[3] + e * d[7];
+}
+
+CuttingForce RigidCut::at(double angle) const {
+  CuttingForce sum;
+  double tangential = 0.0;
+  for (const ContactArc& arc : arcs_) {
+    const double spread = lag_ * arc.depth;
+    if (spread < LEAST_LAG) {
+      for (std::size_t j = 0; j < offset_.size(); ++j) {
+        const double phi = wrapped(angle + tooth_angle_[j]);
+        if (phi < arc.entry || phi >= arc.exit) continue;
+        const double s = std::sin(phi), c = std::cos(phi);
+        const Row row = elementary(chip(j, s, c), s, c);
+        const double chip_part = law_.chip_factor * arc.depth, edge_part = law_.edge_factor * arc.depth;
+        sum.fx += chip_part * row[0] + edge_part * row[4];
+        sum.fy += chip_part * row[1] + edge_part * row[5];
+        sum.fz += chip_part * row[2] + edge_part * row[6];
+        tangential += chip_part * row[3] + edge_part * row[7];
+      }
+      continue;
+    }
+    CuttingForce part;
+    double part_tangential = 0.0;
+    for (std::size_t j = 0; j < offset_.size(); ++j) {
+      // The edge covers low..tip; a whole turn back it may reach into the arc again.
+      double tip = wrapped(angle + tooth_angle_[j]);
+      for (double low = tip - spread;; tip += TWO_PI, low += TWO_PI) {
+        const double from = std::max(low, arc.entry), to = std::min(tip, arc.exit);
+        if (to > from) add(tableOf(j), from, to, part, part_tangential);
+        if (low + TWO_PI >= arc.exit) break;
+      }
+    }
+    const double height = 1.0 / lag_;  // [m/rad]
+    sum.fx += part.fx * height;
+    sum.fy += part.fy * height;
+    sum.fz += part.fz * height;
+    tangential += part_tangential * height;
+  }
+  sum.torque = tangential * tool_.radius();
+  return sum;
+}
+
+}  // namespace smartmill::sim
