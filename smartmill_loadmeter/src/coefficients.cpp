@@ -14,6 +14,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/units.h"
 #include "smartmill_loadmeter/campaign_identification.h"
+#include "smartmill_loadmeter/database.h"
 
 namespace {
 
@@ -21,7 +22,8 @@ using namespace smartmill;             // NOLINT
 using namespace smartmill::loadmeter;  // NOLINT
 
 struct Options {
-  std::string source_path, source, model, means = "all", output, parameters;
+  std::string source_path, source, model, means = "all", output, parameters, database;
+  std::string tool, material;
   bool spindle_uncertainty = false, plain_friction = false;
 };
 
@@ -49,6 +51,42 @@ void write(const std::string& file, const CuttingCoefficients& value, const Cutt
   if (!stream) throw Error(file + ": cannot be written");
 }
 
+void keep(const Options& o, CoefficientRecord record) {
+  if (o.database.empty()) return;
+  if (!o.tool.empty()) record.set.tool = o.tool;
+  if (!o.material.empty()) record.set.material = o.material;
+  record.bag = o.source_path;
+  const bool is_new = CoefficientDatabase(o.database).add(record);
+  std::printf("  %s: %s\n", o.database.c_str(), is_new ? "kept" : "was there already");
+}
+
+/// Means of the cuts of a campaign.
+CoefficientRecord recordOf(const Campaign& campaign, const MachineModel& model) {
+  CoefficientRecord r;
+  if (model.tool) {
+    r.teeth = model.tool->teeth;
+    r.diameter = model.tool->diameter;
+    r.helix = model.tool->helix;
+  }
+  r.cutting_speed = r.feed_per_tooth = r.axial_depth = r.entry = r.exit = r.edge_age = 0.0;
+  double count = 0.0;
+  for (const CampaignTest& test : campaign.tests) {
+    if (test.kind != TestKind::cut) continue;
+    count += 1.0;
+    if (model.tool) r.cutting_speed += test.spindle_speed * model.tool->radius();
+    r.feed_per_tooth += test.engagement->feed_per_tooth;
+    r.axial_depth += test.engagement->axial_depth;
+    r.entry += test.engagement->entry;
+    r.exit += test.engagement->exit;
+    r.edge_age += test.cut_time_before.value_or(NAN);
+    r.set.stamp = std::max(r.set.stamp, test.start_time.value_or(0.0));
+  }
+  for (double* mean : {&r.cutting_speed, &r.feed_per_tooth, &r.axial_depth, &r.entry, &r.exit, &r.edge_age}) {
+    *mean /= count;
+  }
+  return r;
+}
+
 void fromForce(const Options& o, const Campaign& campaign, const MachineModel& model) {
   const Means chosen = o.means == "all" ? Means::all : Means::revolutions;
   for (const Means means : {chosen, chosen == Means::all ? Means::revolutions : Means::all}) {
@@ -58,7 +96,20 @@ void fromForce(const Options& o, const Campaign& campaign, const MachineModel& m
     print(found.value, found.std_dev);
     std::printf("  R2 of the mean forces: x %.4f, y %.4f, z %.4f\n", found.r_squared_x, found.r_squared_y,
                 found.r_squared_z);
-    if (means == chosen) write(o.output, found.value, found.std_dev);
+    if (means != chosen) continue;
+    write(o.output, found.value, found.std_dev);
+    CoefficientRecord record = recordOf(campaign, model);
+    record.set.source = "force";
+    record.set.tests = found.tests;
+    record.set.value = found.value;
+    record.set.std_dev = found.std_dev;
+    for (std::size_t i = 0; i < 6; ++i) {
+      for (std::size_t j = i; j < 6; ++j) {
+        record.covariance[CoefficientRecord::covarianceIndex(i, j)] =
+            found.covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+      }
+    }
+    keep(o, record);
   }
 }
 
@@ -121,6 +172,7 @@ void run(const Options& o) {
       if (result.code != IdentifyResult::Code::ok) throw Error(o.source_path + ": " + result.message);
       std::printf("%s\n", result.message.c_str());
       fromLoad(o, result.coefficients);
+      keep(o, result.record);
     }
     return;
   }
@@ -137,6 +189,15 @@ void run(const Options& o) {
   for (const std::string& note : found.notes) std::fprintf(stderr, "coefficients: %s\n", note.c_str());
   fromLoad(o, found.set);
   printTerms(o, found);
+  CoefficientRecord record = recordOf(campaign, model);
+  const double stamp = record.set.stamp;
+  record.set = found.set;
+  record.set.stamp = stamp;
+  const auto index = CoefficientRecord::covarianceIndex;
+  record.covariance[index(0, 0)] = found.set.std_dev.ktc * found.set.std_dev.ktc;
+  record.covariance[index(0, 3)] = found.covariance_tc_te;
+  record.covariance[index(3, 3)] = found.set.std_dev.kte * found.set.std_dev.kte;
+  keep(o, record);
 }
 
 }  // namespace
@@ -159,6 +220,9 @@ int main(int argc, char** argv) {
   app.add_flag("--plain-friction", o.plain_friction,
                "load_meter of a campaign: Coulomb and viscous friction only, nothing added by evidence");
   app.add_option("--params", o.parameters, "bag: parameter file of the node (launch/config/loadmeter.yaml)");
+  app.add_option("--database", o.database, "SQLite file of the machine that keeps the result");
+  app.add_option("--tool", o.tool, "name of the tool, for the database");
+  app.add_option("--material", o.material, "workpiece material, for the database");
   app.add_option("-o,--output", o.output, "writes the coefficients as a model file's cutting section");
   try {
     app.parse(argc, argv);

@@ -225,15 +225,16 @@ IdentifyResult LoadMeterIdentification::identify(const IdentifyGoal& goal) const
   }
   for (const std::string& reason : dropped_) aside += "; " + reason;
   try {
-    result.coefficients = identifyFromTests(air_cuts_, cuts, spindle_, spindle_uncertainty_);
+    result.record = identifyFromTests(air_cuts_, cuts, spindle_, spindle_uncertainty_);
   } catch (const Error& error) {
     result.code = IdentifyResult::Code::too_few_tests;
     result.message = error.what() + aside;
     return result;
   }
-  CoefficientSet& k = result.coefficients;
+  CoefficientSet& k = result.record.set;
   if (!goal.tool.empty()) k.tool = goal.tool;
   if (!goal.material.empty()) k.material = goal.material;
+  result.coefficients = k;
   char text[200];
   std::snprintf(
       text, sizeof text, "Ktc %.1f +- %.1f N/mm2, Kte %.2f +- %.2f N/mm from %zu air cuts and %zu cuts",
@@ -248,9 +249,10 @@ double LoadTest::torqueStdAsVoltage() const {
   return std::hypot(voltage.std_dev, voltage.mean * speed_std / speed);
 }
 
-CoefficientSet identifyFromTests(const std::vector<LoadTest>& air_cuts, const std::vector<LoadTest>& cuts,
-                                 const Spindle& spindle, double spindle_uncertainty_percent) {
-  CoefficientSet result;
+CoefficientRecord identifyFromTests(const std::vector<LoadTest>& air_cuts, const std::vector<LoadTest>& cuts,
+                                    const Spindle& spindle, double spindle_uncertainty_percent) {
+  CoefficientRecord record;
+  CoefficientSet& result = record.set;
   Friction friction = modelFriction(spindle, spindle_uncertainty_percent);
   if (!air_cuts.empty()) {
     std::vector<AirCut> air;
@@ -285,15 +287,39 @@ CoefficientSet identifyFromTests(const std::vector<LoadTest>& air_cuts, const st
   // follow it.
   const CuttingCoefficients per_viscous = identifyFromTorque(by_friction[0]).value;
   const CuttingCoefficients per_coulomb = identifyFromTorque(by_friction[1]).value;
-  const auto shared = [&](double v, double c) {
-    return v * v * friction.covariance[0] + 2.0 * v * c * friction.covariance[1] +
-           c * c * friction.covariance[3];
+  const auto shared = [&](double v1, double c1, double v2, double c2) {
+    return v1 * v2 * friction.covariance[0] + (v1 * c2 + v2 * c1) * friction.covariance[1] +
+           c1 * c2 * friction.covariance[3];
   };
-  result.std_dev.ktc = std::sqrt(found.covariance(0, 0) + shared(per_viscous.ktc, per_coulomb.ktc));
-  result.std_dev.kte = std::sqrt(found.covariance(3, 3) + shared(per_viscous.kte, per_coulomb.kte));
+  const auto covariance = [&](std::size_t i, std::size_t j) -> double& {
+    return record.covariance[CoefficientRecord::covarianceIndex(i, j)];
+  };
+  covariance(0, 0) =
+      found.covariance(0, 0) + shared(per_viscous.ktc, per_coulomb.ktc, per_viscous.ktc, per_coulomb.ktc);
+  covariance(0, 3) =
+      found.covariance(0, 3) + shared(per_viscous.ktc, per_coulomb.ktc, per_viscous.kte, per_coulomb.kte);
+  covariance(3, 3) =
+      found.covariance(3, 3) + shared(per_viscous.kte, per_coulomb.kte, per_viscous.kte, per_coulomb.kte);
+  result.std_dev.ktc = std::sqrt(covariance(0, 0));
+  result.std_dev.kte = std::sqrt(covariance(3, 3));
   result.source = "load_meter";
   result.tests = static_cast<int>(cuts.size());
-  return result;
+  // Means of what was tried; the database measures distances from them.
+  const CuttingCondition& first = cuts.front().condition;
+  record.teeth = first.tool.teeth;
+  record.diameter = first.tool.diameter;
+  record.helix = first.tool.helix;
+  record.cutting_speed = record.feed_per_tooth = record.axial_depth = record.entry = record.exit = 0.0;
+  const double share = 1.0 / static_cast<double>(cuts.size());
+  for (const LoadTest& test : cuts) {
+    const Engagement& e = test.condition.engagement;
+    record.cutting_speed += share * test.speed * test.condition.tool.radius();
+    record.feed_per_tooth += share * e.feed_per_tooth;
+    record.axial_depth += share * e.axial_depth;
+    record.entry += share * e.entry;
+    record.exit += share * e.exit;
+  }
+  return record;
 }
 
 }  // namespace smartmill::loadmeter

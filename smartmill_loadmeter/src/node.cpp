@@ -111,7 +111,7 @@ void LoadMeterNode::finish(const IdentifyResult& result) {
   if (found) {
     publisher_.publish(message.coefficients);
     try {
-      database_.add(result.coefficients);
+      database_.add(result.record);
     } catch (const Error& error) {
       ROS_ERROR("database: %s", error.what());
       message.message += "; not kept: " + std::string(error.what());
@@ -137,18 +137,18 @@ void LoadMeterNode::feedback() {
 
 bool LoadMeterNode::find(smartmill_msgs::FindCoefficients::Request& request,
                          smartmill_msgs::FindCoefficients::Response& response) {
-  const auto found = database_.find(request.tool, request.material);
-  if (found) {
+  CoefficientSet unknown;
+  unknown.value = unknown.std_dev = NOT_IDENTIFIED;
+  response.coefficients = toMsg(unknown);
+  response.code = smartmill_msgs::FindCoefficients::Response::NOT_FOUND;
+  try {
+    const FoundCoefficients found = findCoefficients(database_, request.tool, request.material);
+    response.message = found.message;
+    if (!found.set) return true;
     response.code = smartmill_msgs::FindCoefficients::Response::OK;
-    response.message = "source " + found->source + ", " + std::to_string(found->tests) + " tests";
-    response.coefficients = toMsg(*found);
-  } else {
-    CoefficientSet unknown;
-    unknown.value = unknown.std_dev = NOT_IDENTIFIED;
-    response.coefficients = toMsg(unknown);
-    response.code = smartmill_msgs::FindCoefficients::Response::NOT_FOUND;
-    response.message =
-        "nothing for '" + request.tool + "' in '" + request.material + "'; known: " + database_.contents();
+    response.coefficients = toMsg(*found.set);
+  } catch (const Error& error) {
+    response.message = error.what();
   }
   return true;
 }

@@ -14,7 +14,6 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_core/units.h"
-#include "smartmill_loadmeter/database.h"
 
 namespace smartmill::loadmeter {
 namespace {
@@ -255,46 +254,6 @@ TEST(ExampleCampaigns, hiddenFrictionAndWearAreFoundAndOthersSaidToBias) {
   const Campaign wear = readCampaign(shared("campaigns/tool_wear_and_unbalance"));
   const LoadRecordResult w = identifyFromLoadRecords(wear, readMachineModel(wear.modelPath()), {});
   EXPECT_NEAR(60.0 * w.edge_growth, 0.4194, 0.002);
-}
-
-TEST(CoefficientDatabase, keepsTheNewestOfEachToolAndMaterialInItsFile) {
-  const TemporaryFolder folder;
-  const std::string file = folder.file("materials.yaml");
-  CoefficientSet k;
-  k.tool = "endmill 12";
-  k.material = "1018";
-  k.source = "load_meter";
-  k.stamp = 1700000000.123456789;
-  k.tests = 3;
-  k.value = {950e6, NAN, NAN, 17e3, NAN, NAN};
-  k.std_dev = {2e6, NAN, NAN, 100, NAN, NAN};
-  k.friction_viscous = 4.7e-4;
-  k.friction_coulomb = -0.06;
-  {
-    CoefficientDatabase database(file);
-    EXPECT_FALSE(database.find("", ""));
-    database.add(k);
-    k.value.ktc = 960e6;
-    database.add(k);
-    k.tool = "other";
-    database.add(k);
-  }
-  const CoefficientDatabase database(file);
-  const auto found = database.find("endmill 12", "1018");
-  ASSERT_TRUE(found);
-  EXPECT_DOUBLE_EQ(found->value.ktc, 960e6);
-  EXPECT_DOUBLE_EQ(found->std_dev.kte, 100.0);
-  EXPECT_TRUE(std::isnan(found->value.krc));
-  EXPECT_NEAR(found->stamp, k.stamp, 1e-6);
-  EXPECT_DOUBLE_EQ(found->friction_coulomb, -0.06);
-  EXPECT_FALSE(database.find("endmill 12", "steel"));
-  EXPECT_EQ(database.contents(), "endmill 12 / 1018, other / 1018");
-  const std::string bad =
-      folder.write("bad.yaml", "format: smartmill-coefficients/1\nentries:\n- {source: guess}\n");
-  EXPECT_EQ(errorOf([&] { CoefficientDatabase{bad}; }),
-            bad + ": entries[0].source: 'guess' is not one of load_meter | force");
-  EXPECT_THAT(errorOf([&] { CoefficientDatabase("/nowhere/m.yaml").add(k); }),
-              HasSubstr("cannot be written"));
 }
 
 }  // namespace

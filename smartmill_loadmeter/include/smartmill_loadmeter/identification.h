@@ -9,6 +9,7 @@
 #include "smartmill_core/cutting/coefficient_set.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/signal/streams.h"
+#include "smartmill_loadmeter/database.h"
 #include "smartmill_loadmeter/load_meter.h"
 
 namespace smartmill::loadmeter {
@@ -40,8 +41,9 @@ struct IdentifyResult {
   Code code = Code::ok;
   std::string message;  ///< one line
   CoefficientSet coefficients;
-  bool reset = false;    ///< answers a goal with reset: no coefficients
-  std::uint64_t id = 0;  ///< of the goal
+  CoefficientRecord record;  ///< the same with tool, engagement and covariance, for the database
+  bool reset = false;        ///< answers a goal with reset: no coefficients
+  std::uint64_t id = 0;      ///< of the goal
 };
 
 /// Mean of one test.
@@ -109,8 +111,9 @@ class LoadMeterIdentification {
 
 /// Coefficients and their standard deviations from means: friction from the air cuts (the model's without
 /// any), torque (eq. 3.5), regression (eq. 3.19 generalised); the standard deviations carry the friction's
-/// covariance, which all cuts share. @throws Error naming what is missing.
-CoefficientSet identifyFromTests(const std::vector<LoadTest>& air_cuts, const std::vector<LoadTest>& cuts,
-                                 const Spindle& spindle, double spindle_uncertainty_percent);
+/// covariance, which all cuts share. With the means of tool and engagement. @throws Error naming what is
+/// missing.
+CoefficientRecord identifyFromTests(const std::vector<LoadTest>& air_cuts, const std::vector<LoadTest>& cuts,
+                                    const Spindle& spindle, double spindle_uncertainty_percent);
 
 }  // namespace smartmill::loadmeter

@@ -1,0 +1,100 @@
+#include "record_fields.h"
+
+#include <cmath>
+#include <cstdio>
+
+#include "smartmill_core/model/machine_model.h"
+
+namespace smartmill::loadmeter {
+
+namespace {
+
+using Record = CoefficientRecord;
+
+template <double Record::*member>
+NumberField own(const char* name, const char* unit) {
+  return {name, unit, [](const Record& r, std::size_t) { return r.*member; },
+          [](Record& r, std::size_t, double v) { r.*member = v; }, 0};
+}
+template <double CoefficientSet::*member>
+NumberField ofSet(const char* name, const char* unit) {
+  return {name, unit, [](const Record& r, std::size_t) { return r.set.*member; },
+          [](Record& r, std::size_t, double v) { r.set.*member = v; }, 0};
+}
+
+// Integers have no NaN: 0 is unknown.
+int whole(double v) {
+  return std::isfinite(v) ? static_cast<int>(std::lround(v)) : 0;
+}
+
+}  // namespace
+
+std::size_t CoefficientRecord::covarianceIndex(std::size_t row, std::size_t column) {
+  return row * 6 - row * (row + 1) / 2 + column;
+}
+
+const std::vector<WordField>& wordFields() {
+  static const std::vector<WordField> fields{
+      {"tool", [](Record& r) -> std::string& { return r.set.tool; }},
+      {"material", [](Record& r) -> std::string& { return r.set.material; }},
+      {"source", [](Record& r) -> std::string& { return r.set.source; }},
+      {"machine", [](Record& r) -> std::string& { return r.machine; }},
+      {"bag", [](Record& r) -> std::string& { return r.bag; }},
+      {"version", [](Record& r) -> std::string& { return r.version; }}};
+  return fields;
+}
+
+const std::vector<NumberField>& numberFields() {
+  static const std::vector<NumberField> fields = [] {
+    std::vector<NumberField> f;
+    f.push_back(ofSet<&CoefficientSet::stamp>("stamp", "s"));
+    f.push_back({"tests", "1", [](const Record& r, std::size_t) { return double(r.set.tests); },
+                 [](Record& r, std::size_t, double v) { r.set.tests = whole(v); }, 0});
+    f.push_back({"teeth", "1", [](const Record& r, std::size_t) { return double(r.teeth); },
+                 [](Record& r, std::size_t, double v) { r.teeth = whole(v); }, 0});
+    f.push_back(own<&Record::diameter>("diameter", "m"));
+    f.push_back(own<&Record::helix>("helix", "rad"));
+    f.push_back(own<&Record::rake>("rake", "rad"));
+    f.push_back(own<&Record::cutting_speed>("cutting_speed", "m/s"));
+    f.push_back(own<&Record::feed_per_tooth>("feed_per_tooth", "m"));
+    f.push_back(own<&Record::axial_depth>("axial_depth", "m"));
+    f.push_back(own<&Record::entry>("entry", "rad"));
+    f.push_back(own<&Record::exit>("exit", "rad"));
+    f.push_back(own<&Record::edge_age>("edge_age", "s"));
+    f.push_back(ofSet<&CoefficientSet::friction_viscous>("friction_viscous", "N m s/rad"));
+    f.push_back(ofSet<&CoefficientSet::friction_coulomb>("friction_coulomb", "N m"));
+    const char* names[] = {"ktc", "krc", "kac", "kte", "kre", "kae"};
+    for (std::size_t i = 0; i < 6; ++i) {
+      f.push_back({names[i], i < 3 ? "N/m2" : "N/m",
+                   [](const Record& r, std::size_t k) { return r.set.value.*cuttingKeys()[k].coefficient; },
+                   [](Record& r, std::size_t k, double v) { r.set.value.*cuttingKeys()[k].coefficient = v; },
+                   i});
+    }
+    for (std::size_t i = 0; i < 6; ++i) {
+      f.push_back(
+          {std::string(names[i]) + "_std", i < 3 ? "N/m2" : "N/m",
+           [](const Record& r, std::size_t k) { return r.set.std_dev.*cuttingKeys()[k].coefficient; },
+           [](Record& r, std::size_t k, double v) { r.set.std_dev.*cuttingKeys()[k].coefficient = v; }, i});
+    }
+    for (std::size_t i = 0; i < 6; ++i) {
+      for (std::size_t j = i; j < 6; ++j) {
+        const char* unit = j < 3 ? "N2/m4" : i < 3 ? "N2/m3" : "N2/m2";
+        f.push_back({std::string("cov_") + names[i] + "_" + names[j], unit,
+                     [](const Record& r, std::size_t k) { return r.covariance[k]; },
+                     [](Record& r, std::size_t k, double v) { r.covariance[k] = v; },
+                     Record::covarianceIndex(i, j)});
+      }
+    }
+    return f;
+  }();
+  return fields;
+}
+
+std::string exactNumber(double value) {
+  if (!std::isfinite(value)) return {};
+  char text[40];
+  std::snprintf(text, sizeof text, "%.17g", value);
+  return text;
+}
+
+}  // namespace smartmill::loadmeter
