@@ -65,6 +65,7 @@ void ChartParameters::validate() const {
   bound(speeds >= 2 && speeds <= 100000, "speeds", speeds, "2..100000");
   bound(frequency_low >= 0.0, "frequency_low", frequency_low, ">= 0 Hz");
   bound(frequency_high > frequency_low, "frequency_high", frequency_high, "above frequency_low");
+  bound(line_error > 0.0, "line_error", line_error, "> 0");
   bound(max_depth > 0.0, "max_depth", max_depth, "> 0 m");
   bound(depth_margin >= 0.0 && depth_margin < 1.0, "depth_margin", depth_margin, "0 <= value < 1");
   bound(speed_margin >= 0.0 && speed_margin < 0.2, "speed_margin", speed_margin, "0 <= value < 0.2");
@@ -74,6 +75,29 @@ void ChartParameters::validate() const {
         "1.5..5");
   bound(unstable >= 0 && unstable <= 100, "unstable", unstable, "0..100");
 }
+
+namespace {
+
+/// Without the lines at which the hammer excited too little: there noise would pass for a resonance. What the
+/// neighbours say is put in their place by the interpolation.
+FrequencyResponse certainLines(const FrequencyResponse& frf, double error) {
+  if (frf.std_dev.size() != frf.size()) return frf;
+  double peak = 0.0;
+  for (std::size_t i = 0; i < frf.size(); ++i) {
+    if (frf.std_dev[i] < std::abs(frf.value[i])) peak = std::max(peak, std::abs(frf.value[i]));
+  }
+  FrequencyResponse kept;
+  kept.unit = frf.unit;
+  kept.averages = frf.averages;
+  for (std::size_t i = 0; i < frf.size(); ++i) {
+    if (frf.std_dev[i] > error * peak) continue;
+    kept.frequency.push_back(frf.frequency[i]);
+    kept.value.push_back(frf.value[i]);
+  }
+  return kept;
+}
+
+}  // namespace
 
 struct ChartMaker::Basis {
   RegenerativeProcess process;
@@ -148,7 +172,8 @@ ChartMaker::Basis ChartMaker::basis() const {
                                 std::max(1.0, parameters_.frequency_low), parameters_.frequency_high, LINES);
   } else {
     const auto lines = [&](const char* direction) {
-      return frfs_.at(direction).frf.band(parameters_.frequency_low, parameters_.frequency_high);
+      return certainLines(frfs_.at(direction).frf.band(parameters_.frequency_low, parameters_.frequency_high),
+                          parameters_.line_error);
     };
     basis.response = responseOf(lines("x"), lines("y"));
   }

@@ -40,6 +40,35 @@ TEST(ChartMaker, measuredFrfsGiveTheBenchmarksLimits) {
   }
 }
 
+// Where the hammer's spectrum has a zero the FRF is noise as large as a resonance; its standard deviation
+// says so.
+TEST(ChartMaker, linesThatTheHammerDidNotExciteMakeNoPocket) {
+  const Chart clean = filled(slot()).chart();
+  ChartParameters parameters = slot();
+  parameters.kr = 1.0 / 3.0;
+  ChartMaker maker(parameters, machine());
+  for (const char* direction : {"x", "y"}) {
+    MeasuredFrf noisy = frf(direction, 1.0);
+    double peak = 0.0;
+    for (const std::complex<double>& value : noisy.frf.value) peak = std::max(peak, std::abs(value));
+    noisy.frf.std_dev.assign(noisy.frf.size(), 1e-3 * peak);
+    for (std::size_t i = 0; i < noisy.frf.size(); ++i) {
+      const double f = noisy.frf.frequency[i];
+      if (f < 2950.0 || f > 3050.0) continue;
+      noisy.frf.value[i] = {-1.2 * peak, (i % 2 ? 0.5 : -0.5) * peak};
+      noisy.frf.std_dev[i] = 1.3 * peak;
+    }
+    maker.handle(noisy);
+  }
+  maker.handle(coefficients());
+  const Chart chart = maker.chart();
+  ASSERT_EQ(chart.limit.depth.size(), clean.limit.depth.size());
+  for (std::size_t k = 0; k < clean.limit.depth.size(); ++k) {
+    if (std::isinf(clean.limit.depth[k])) continue;
+    ASSERT_NEAR(chart.limit.depth[k] / clean.limit.depth[k], 1.0, 1e-2) << k;
+  }
+}
+
 TEST(ChartMaker, modesGiveTheSameChartAsTheirFrf) {
   ChartParameters parameters = slot();
   parameters.kr = 1.0 / 3.0;
