@@ -69,7 +69,7 @@ ToolMotion CuttingMachine::fed(const ToolMotion& commanded) const {
   return actual;
 }
 
-void CuttingMachine::engage(const std::vector<ContactArc>& arcs, const ToolMotion& now) {
+void CuttingMachine::engage(const std::vector<ContactArc>& arcs, const ToolMotion& now, double rise) {
   if (!process_ && !rigid_)
     throw Error(model_.file + ": tool or cutting is missing (needed to simulate a cut)");
   if (!feed_start_) feed_start_ = now.centre;
@@ -77,6 +77,7 @@ void CuttingMachine::engage(const std::vector<ContactArc>& arcs, const ToolMotio
   input.motion = now;
   update(input);
   if (arcs_.empty()) feed_path_ = 0.0;
+  jump_ = 1.0 - rise;
   arcs_ = arcs;
   std::vector<ContactArc> tilted = arcs;
   for (ContactArc& a : tilted) {
@@ -159,12 +160,19 @@ CuttingMachine::Output CuttingMachine::step(const Input& input) {
     channels[TOOL_X + axis] = tip_[axis].step(tip[axis]);
     tip_history_[axis] = {{tip[axis], tip_history_[axis][0]}};
   }
-  for (std::size_t axis = 0; axis < 3; ++axis)
-    channels[FX + axis] = sign_ * sensor_[axis].step(out.applied[axis]);
+  const std::array<double, 3> cut{{out.force.fx, out.force.fy, out.force.fz}};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double before = out.applied[axis] - jump_ * (cut[axis] - last_cut_[axis]);
+    channels[FX + axis] =
+        sign_ * (jump_ != 0.0 ? sensor_[axis].jump(before, out.applied[axis]) : sensor_[axis].step(before));
+  }
+  last_cut_ = cut;
   if (drive_) {
-    channels[LOAD_METER] = drive_->step(0.5 * (last_torque_ + out.force.torque), input.motion.speed);
+    const double mean_torque = last_torque_ + 0.5 * (1.0 - jump_) * (out.force.torque - last_torque_);
+    channels[LOAD_METER] = drive_->step(mean_torque, input.motion.speed);
     last_torque_ = out.force.torque;
   }
+  jump_ = 0.0;
   if (effects_.has(Stage::sensor_output)) effects_.measure(Stage::sensor_output, now_, channels);
   for (auto& [channel, line] : delays_) channels[channel] = line.step(channels[channel]);
   ChannelValues shown = channels;

@@ -22,6 +22,10 @@ namespace {
 
 const std::array<const char*, 2> TIP{{"tool_x", "tool_y"}};
 
+// The force of a cut comes on over this part of a sample before the engagement (so it fits campaigns that
+// another program made): [1]
+constexpr double RISE = 1.0 / 6.0;
+
 // Columns that this twin can give.
 const std::set<std::string> KNOWN{"spindle_angle", "fx",     "fy",     "fz",
                                   "load_meter",    "hammer", "tool_x", "tool_y"};
@@ -232,7 +236,7 @@ Record simulate(const MachineModel& model, const CampaignTest& test, const Recor
         // A rounded time stamp must not put the sample of engagement on the wrong side.
         if (cut && !engaged && t >= start - 1e-3 * dt) {
           machine.engage({{test.engagement->entry, test.engagement->exit, test.engagement->axial_depth}},
-                         input.motion);
+                         input.motion, RISE * options.substeps);
           engaged = true;
         }
         return input;

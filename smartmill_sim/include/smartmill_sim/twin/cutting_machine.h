@@ -51,7 +51,9 @@ class CuttingMachine {
   CuttingMachine(const MachineModel& model, double time_step, Feed feed = Feed::any);
 
   /// Changes where the tool meets material, see CuttingProcess.
-  void engage(const std::vector<ContactArc>& arcs, const ToolMotion& now);
+  /// @param rise [1] share of the change in force that comes on linearly over the step that ends now; the rest
+  /// jumps at its end.
+  void engage(const std::vector<ContactArc>& arcs, const ToolMotion& now, double rise = 1.0);
   bool cutting() const { return !arcs_.empty(); }
 
   /// A record begins now: drift and hum start anew. A new edge has edge_time 0.
@@ -94,7 +96,9 @@ class CuttingMachine {
   std::optional<SpindleDrive> drive_;
   std::vector<std::pair<std::size_t, DelayLine>> delays_;
   std::array<std::array<double, 2>, 2> tip_history_{};  // [N] total force on the tip one and two steps ago
+  std::array<double, 3> last_cut_{{0, 0, 0}};  // [N] force of the cut at the last step
   double last_torque_ = 0.0;
+  double jump_ = 0.0;  // [1] share of the change in force that comes on at once at this step
   double sign_;
 };
 

@@ -13,7 +13,7 @@ namespace smartmill::sim {
 struct SimulationOptions {
   bool noise = true;       ///< sensor noise and rounding of the load meter
   std::uint64_t seed = 1;  ///< of the noise and, without recorded angle, of the phase
-  int substeps = 8;        ///< integration steps a sample, >= 1
+  int substeps = 4;        ///< integration steps a sample, >= 1
   /// [rad] spindle angle at the first sample, instead of the recorded angle's.
   std::optional<double> phase;
   /// Tones (mains hum) with a phase of the seed, not with the one that the recorded signals show.

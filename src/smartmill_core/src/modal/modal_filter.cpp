@@ -52,6 +52,12 @@ double ModalFilter::step(double input) {
   return output;
 }
 
+double ModalFilter::jump(double before, double input) {
+  const double output = step(before);
+  last_input_ = input;
+  return output + direct_ * (input - before);
+}
+
 double ModalFilter::peek(double input) const {
   double output = direct_ * input;
   for (const Section& s : sections_) {

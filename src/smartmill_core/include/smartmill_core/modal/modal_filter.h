@@ -21,6 +21,9 @@ class ModalFilter {
   /// Zero order: the output at this sample knows the inputs of the samples before (the direct share also this one's).
   double step(double input);
 
+  /// step() with an input that came linearly to before and jumps now: output with the new input.
+  double jump(double before, double input);
+
   /// What step() would give, without taking the step.
   double peek(double input) const;
 
