@@ -26,8 +26,9 @@ std::array<std::vector<Complex>, 2> eigenvalues(const RegenerativeProcess& proce
   const std::array<double, 4> a = directionalCoefficients(process);
   std::array<std::vector<Complex>, 2> branches;
   for (std::size_t i = 0; i < tool.frequency.size(); ++i) {
-    const Complex trace = a[0] * tool.xx[i] + a[3] * tool.yy[i];
-    const Complex determinant = (a[0] * a[3] - a[1] * a[2]) * tool.xx[i] * tool.yy[i];
+    const Complex xy = tool.xy.empty() ? 0.0 : tool.xy[i], yx = tool.yx.empty() ? 0.0 : tool.yx[i];
+    const Complex trace = a[0] * tool.xx[i] + a[1] * yx + a[2] * xy + a[3] * tool.yy[i];
+    const Complex determinant = (a[0] * a[3] - a[1] * a[2]) * (tool.xx[i] * tool.yy[i] - xy * yx);
     const Complex root = std::sqrt(trace * trace - 4.0 * determinant);
     std::array<Complex, 2> value{{0.5 * (trace + root), 0.5 * (trace - root)}};
     if (i > 0) {
@@ -70,6 +71,27 @@ std::vector<LobePoint> lobe(const RegenerativeProcess& process, const std::vecto
 }
 
 }  // namespace
+
+std::array<Complex, 4> ToolTipResponse::at(double f) const {
+  const double positive = std::abs(f);
+  const auto value = [&](const std::vector<Complex>& line) -> Complex {
+    if (line.empty()) return 0.0;
+    Complex v;
+    if (positive <= frequency.front()) {
+      v = line.front().real();
+    } else if (positive >= frequency.back()) {
+      const double ratio = frequency.back() / positive;
+      v = line.back().real() * ratio * ratio;
+    } else {
+      const auto above = std::upper_bound(frequency.begin(), frequency.end(), positive);
+      const auto i = static_cast<std::size_t>(above - frequency.begin());
+      const double share = (positive - frequency[i - 1]) / (frequency[i] - frequency[i - 1]);
+      v = line[i - 1] + share * (line[i] - line[i - 1]);
+    }
+    return f < 0.0 ? std::conj(v) : v;
+  };
+  return {value(xx), value(xy), value(yx), value(yy)};
+}
 
 void RegenerativeProcess::validate() const {
   require("number of teeth", teeth >= 1 && teeth <= 20, teeth);

@@ -26,6 +26,10 @@ struct RegenerativeProcess {
 struct ToolTipResponse {
   std::vector<double> frequency;
   std::vector<std::complex<double>> xx, yy;
+  std::vector<std::complex<double>> xy, yx;  ///< x for a force in y and the reverse; empty: none
+  /// xx, xy, yx, yy at any f [Hz]; negative: conjugate. Below the lines the real part of the first, above the
+  /// mass line through the last.
+  std::array<std::complex<double>, 4> at(double f) const;
 };
 
 /// Evaluated from modes, dense around each mode: lines from low to high [Hz].
