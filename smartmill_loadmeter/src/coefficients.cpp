@@ -24,6 +24,7 @@ using namespace smartmill::loadmeter;  // NOLINT
 struct Options {
   std::string source_path, source, model, means = "all", output, parameters, database;
   std::string tool, material;
+  double rake = NAN;
   bool spindle_uncertainty = false, plain_friction = false;
 };
 
@@ -55,6 +56,7 @@ void keep(const Options& o, CoefficientRecord record) {
   if (o.database.empty()) return;
   if (!o.tool.empty()) record.set.tool = o.tool;
   if (!o.material.empty()) record.set.material = o.material;
+  record.rake = units::radFromDeg(o.rake);
   record.bag = o.source_path;
   const bool is_new = CoefficientDatabase(o.database).add(record);
   std::printf("  %s: %s\n", o.database.c_str(), is_new ? "kept" : "was there already");
@@ -223,6 +225,7 @@ int main(int argc, char** argv) {
   app.add_option("--database", o.database, "SQLite file of the machine that keeps the result");
   app.add_option("--tool", o.tool, "name of the tool, for the database");
   app.add_option("--material", o.material, "workpiece material, for the database");
+  app.add_option("--rake", o.rake, "[deg] normal rake of the tool, for the database");
   app.add_option("-o,--output", o.output, "writes the coefficients as a model file's cutting section");
   try {
     app.parse(argc, argv);

@@ -10,6 +10,7 @@
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/units.h"
 #include "smartmill_loadmeter/database.h"
+#include "smartmill_loadmeter/oblique.h"
 
 namespace {
 
@@ -65,6 +66,28 @@ void find(const Options& o) {
               cuttingSection(found->set.value, found->set.std_dev).c_str());
 }
 
+void predictFor(const Options& o) {
+  mustExist(o.file);
+  std::vector<ObliqueSet> sets;
+  int without_rake = 0;
+  for (const CoefficientRecord& r : CoefficientDatabase(o.file).records("", o.material)) {
+    if (!std::isfinite(r.rake) || !std::isfinite(r.helix)) {
+      ++without_rake;
+      continue;
+    }
+    sets.push_back({r.rake, r.helix, r.set.value, r.set.std_dev});
+  }
+  if (without_rake > 0) {
+    std::fprintf(stderr, "coefficients_db: %d records without rake or helix left out\n", without_rake);
+  }
+  const OrthogonalParameters p = semiInverse(sets);
+  const ShearZone zone = p.at(units::radFromDeg(o.rake));
+  const CoefficientSet k = predict(p, units::radFromDeg(o.rake), units::radFromDeg(o.helix));
+  std::printf("# from %d sets: shear stress %.1f N/mm2, shear angle %.2f deg, friction angle %.2f deg\n%s",
+              p.sets, zone.shear_stress / units::N_PER_MM2, units::degFromRad(zone.shear_angle),
+              units::degFromRad(zone.friction_angle), cuttingSection(k.value, k.std_dev).c_str());
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -87,6 +110,11 @@ int main(int argc, char** argv) {
   find_command->add_option("--helix", o.helix, "[deg]");
   find_command->add_option("--rake", o.rake, "[deg] normal rake");
   find_command->add_option("--edge-age", o.age, "[min] cutting time of the edge");
+  CLI::App* predict_command = app.add_subcommand(
+      "predict", "another tool's coefficients by way of shear angle, friction angle and shear stress");
+  predict_command->add_option("--material", o.material, "workpiece material")->required();
+  predict_command->add_option("--rake", o.rake, "[deg] normal rake")->required();
+  predict_command->add_option("--helix", o.helix, "[deg]")->required();
   CLI::App* merge_command = app.add_subcommand("merge", "takes over what another machine's file has");
   merge_command->add_option("OTHER", o.other, "SQLite file")->required();
   CLI::App* export_command = app.add_subcommand("export", "writes everything as .csv or .yaml");
@@ -102,6 +130,7 @@ int main(int argc, char** argv) {
   try {
     if (list_command->parsed()) list(o);
     if (find_command->parsed()) find(o);
+    if (predict_command->parsed()) predictFor(o);
     if (merge_command->parsed()) {
       std::printf("%zu new\n", CoefficientDatabase(o.file).merge(o.other));
     }
