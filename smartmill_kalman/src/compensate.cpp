@@ -1,12 +1,20 @@
-// rosrun smartmill_kalman compensate CAMPAIGN -o OUT: force at the tool of every cut of a campaign.
+// rosrun smartmill_kalman compensate BAG|CAMPAIGN -o OUT: force at the tool of every cut.
 
+#include <unistd.h>
+
+#include <array>
+#include <cctype>
+#include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
+#include <optional>
+#include <set>
 #include <string>
 
 #include <CLI/CLI.hpp>
 
+#include "bag_compensation.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/signal/statistics.h"
@@ -17,10 +25,12 @@ namespace {
 
 using namespace smartmill;
 
+constexpr std::array<const char*, 3> AXES{{"x", "y", "z"}};
+
 struct Request {
-  std::string campaign, out, model;
+  std::string source, out, model, parameters;
   bool identify = false;
-  kalman::HarmonicFilterParameters filter;
+  std::optional<double> bandwidth, noise, settling;
   kalman::SensorFitParameters fit;
 };
 
@@ -32,11 +42,43 @@ void print(const char* axis, const ModalModel& sensor) {
   std::printf("\n");
 }
 
-void run(const Request& request) {
-  const Campaign campaign = readCampaign(request.campaign);
+void printRange(const std::string& name, const std::array<std::vector<double>, 3>& measured,
+                const std::array<std::vector<double>, 3>& compensated) {
+  const auto range = [](const std::vector<double>& v) { return percentile(v, 0.9) - percentile(v, 0.1); };
+  std::printf("%s: range 10..90 %% measured x %.1f y %.1f N, compensated x %.1f y %.1f N\n", name.c_str(),
+              range(measured[0]), range(measured[1]), range(compensated[0]), range(compensated[1]));
+}
+
+void write(const std::string& folder, const std::string& name, const std::vector<double>& time,
+           const std::array<std::vector<double>, 3>& force) {
+  Record record;
+  record.time = time;
+  for (std::size_t axis = 0; axis < 3; ++axis) record.add(std::string("f") + AXES[axis]) = force[axis];
+  writeCsv(record, (std::filesystem::path(folder) / (name + ".csv")).string());
+}
+
+std::array<std::vector<double>, 3> forces(const Record& record) {
+  return {record.column("fx"), record.column("fy"), record.column("fz")};
+}
+
+kalman::NodeParameters parametersOf(const Request& request) {
+  kalman::NodeParameters parameters;
+  if (!request.parameters.empty()) {
+    ParameterReader reader = ParameterReader::fromFile(request.parameters);
+    parameters = kalman::readParameters(reader);
+  }
+  kalman::HarmonicFilterParameters& filter = parameters.compensation.filter;
+  if (request.bandwidth) filter.bandwidth = *request.bandwidth;
+  if (request.noise) filter.noise_rms = *request.noise;
+  if (request.settling) filter.settling_revolutions = *request.settling;
+  return parameters;
+}
+
+void fromCampaign(const Request& request) {
+  const Campaign campaign = readCampaign(request.source);
+  const kalman::NodeParameters parameters = parametersOf(request);
   std::array<ModalModel, 3> sensor;
   bool workpiece = false;
-  kalman::HarmonicFilterParameters filter = request.filter;
   if (request.identify) {
     sensor = kalman::identifySensor(campaign, request.fit);
   } else {
@@ -44,44 +86,96 @@ void run(const Request& request) {
     sensor = model.force_sensor.axis;
     workpiece = model.force_sensor.measures_workpiece;
   }
-  for (std::size_t axis = 0; axis < 3; ++axis) print(axis == 0 ? "x" : axis == 1 ? "y" : "z", sensor[axis]);
-  std::filesystem::create_directories(request.out);
+  for (std::size_t axis = 0; axis < 3; ++axis) print(AXES[axis], sensor[axis]);
   std::size_t cuts = 0;
   for (const CampaignTest& test : campaign.tests) {
     if (test.kind != TestKind::cut) continue;
     std::fprintf(stderr, "compensating %s\n", test.name.c_str());
     const Record record = readRecord(campaign, test);
-    const auto force =
-        kalman::compensate(record, sensor, workpiece, test.spindle_speed, test.sample_rate, filter);
-    Record result;
-    result.time = record.time;
-    result.add("fx") = force[0];
-    result.add("fy") = force[1];
-    result.add("fz") = force[2];
-    writeCsv(result, (std::filesystem::path(request.out) / (test.name + ".csv")).string());
-    const auto range = [](const std::vector<double>& v) { return percentile(v, 0.9) - percentile(v, 0.1); };
-    std::printf("%s: range 10..90 %% measured x %.1f y %.1f N, compensated x %.1f y %.1f N\n",
-                test.name.c_str(), range(record.column("fx")), range(record.column("fy")), range(force[0]),
-                range(force[1]));
+    const auto force = kalman::compensate(record, sensor, workpiece, test.spindle_speed, test.sample_rate,
+                                          parameters.compensation.filter);
+    write(request.out, test.name, record.time, force);
+    printRange(test.name, forces(record), force);
     ++cuts;
   }
   if (cuts == 0) throw Error(campaign.folder + ": the campaign has no cuts");
   std::printf("%zu cuts written to %s (no latency)\n", cuts, request.out.c_str());
 }
 
+/// A test's name as the name of a file; a name that came before gets a number.
+std::string fileName(std::string name, std::set<std::string>& used) {
+  if (name.empty()) name = "cut";
+  for (char& c : name) {
+    if (!std::isalnum(static_cast<unsigned char>(c)) && c != '-' && c != '.' && c != '_') c = '_';
+  }
+  std::string unique = name;
+  for (int n = 2; !used.insert(unique).second; ++n) unique = name + "_" + std::to_string(n);
+  return unique;
+}
+
+void fromBag(const Request& request) {
+  if (request.identify) {
+    throw Error("--identify is for campaigns: the taps in a bag count from their goals on, as in the node");
+  }
+  const kalman::NodeParameters parameters = parametersOf(request);
+  const std::string model_file = request.model.empty() ? parameters.model : request.model;
+  if (model_file.empty()) throw Error(request.source + ": a bag needs the machine's model (--model)");
+  const MachineModel model = readMachineModel(model_file);
+  const bool terminal = isatty(STDERR_FILENO);
+  std::set<std::string> used;
+  const auto began = std::chrono::steady_clock::now();
+  const kalman::BagSummary summary = kalman::compensateBag(
+      request.source, model.force_sensor, parameters,
+      [&](kalman::BagCut&& cut) {
+        const std::string name = fileName(cut.name, used);
+        write(request.out, name, cut.offset, cut.compensated);
+        printRange(name, cut.measured, cut.compensated);
+        std::printf("%s: time 0 is %.9f s, the first %.3f s settle\n", name.c_str(), cut.stamp, cut.settling);
+      },
+      [&](double share) {
+        if (terminal) std::fprintf(stderr, "\rreading %3.0f %%%s", 100.0 * share, share >= 1.0 ? "\n" : "");
+      });
+  for (const kalman::SensorResult& result : summary.identified) {
+    std::printf("taps in %s: %s\n", result.modes.direction.c_str(), result.message.c_str());
+    if (result.code == FrfCode::ok) print(result.modes.direction.c_str(), result.modes.model);
+  }
+  if (summary.cuts == 0) throw Error(request.source + ": no cut (cut/condition of kind CUT with samples)");
+  if (!summary.rotation_known) {
+    std::fprintf(stderr, "compensate: %s holds no transform of the sensor: forces are in its own frame\n",
+                 request.source.c_str());
+  }
+  if (summary.gaps + summary.not_finite + summary.late > 0) {
+    std::fprintf(stderr, "compensate: %zu gaps, %zu samples not numbers, %zu inputs out of order\n",
+                 summary.gaps, summary.not_finite, summary.late);
+  }
+  const double wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+  std::printf("%zu cuts written to %s (no latency); %.1f s of data in %.2f s, %.0f x real time\n",
+              summary.cuts, request.out.c_str(), summary.duration, wall, summary.duration / wall);
+}
+
+void run(const Request& request) {
+  if (!std::filesystem::exists(request.source)) throw Error(request.source + ": cannot be read");
+  std::filesystem::create_directories(request.out);
+  if (std::filesystem::path(request.source).extension() == ".bag") {
+    fromBag(request);
+  } else {
+    fromCampaign(request);
+  }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   Request request;
-  CLI::App app{"Recovers the force at the tool from the records of a force sensor."};
-  app.add_option("campaign", request.campaign, "campaign folder")->required();
+  CLI::App app{"Recovers the force at the tool from the records of a force sensor: one CSV a cut."};
+  app.add_option("SOURCE", request.source, "campaign folder, or a bag")->required();
   app.add_option("-o,--out", request.out, "folder for one CSV a cut")->required();
   app.add_option("--model", request.model, "model file with the force sensor (default: the campaign's)");
-  app.add_flag("--identify", request.identify, "take the sensor's modes from the campaign's own taps");
-  app.add_option("--bandwidth-hz", request.filter.bandwidth, "harmonics up to this frequency");
-  app.add_option("--noise-rms-n", request.filter.noise_rms, "noise of one sample");
-  app.add_option("--settling-revolutions", request.filter.settling_revolutions,
-                 "time constant of the amplitudes");
+  app.add_option("--params", request.parameters, "parameter file of the node (launch/config/kalman.yaml)");
+  app.add_flag("--identify", request.identify, "campaign: take the sensor's modes from its own taps");
+  app.add_option("--bandwidth-hz", request.bandwidth, "harmonics up to this frequency");
+  app.add_option("--noise-rms-n", request.noise, "noise of one sample");
+  app.add_option("--settling-revolutions", request.settling, "time constant of the amplitudes");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

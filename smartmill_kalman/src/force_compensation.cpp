@@ -12,6 +12,10 @@ namespace smartmill::kalman {
 namespace {
 
 const std::array<const char*, 3> CHANNELS{{"fx", "fy", "fz"}};
+/// Gains are laid out at speeds this share apart and serve this far from their own (in points of that grid).
+constexpr double SPEED_GRID = 0.01, GRID_HYSTERESIS = 0.7;
+/// The harmonics follow the spindle when its speed has moved by this share.
+constexpr double RETUNE = 1e-6;
 constexpr double STEADY_TIME = 0.05;  // [s] without a change of speed before filters are laid out
 
 void require(const char* key, double value, bool good, const char* due) {
@@ -39,6 +43,7 @@ void ForceCompensation::setSensor(std::size_t axis, const ModalModel& sensor, do
   sensor_.at(axis) = sensor;
   noise_rms_.at(axis) = noise_rms;
   filters_.clear();
+  schedule_.clear();
 }
 
 bool ForceCompensation::hasSensor() const {
@@ -72,16 +77,33 @@ void ForceCompensation::reset() {
   health_ = {};
 }
 
-void ForceCompensation::design(double speed, double sample_rate) {
-  filters_.clear();
-  for (std::size_t axis = 0; axis < 3; ++axis) {
+const std::vector<HarmonicGain>& ForceCompensation::gains(std::size_t axis, int grid_point,
+                                                          double sample_rate) {
+  std::vector<HarmonicGain>& gains = schedule_[{axis, grid_point}];
+  if (gains.empty()) {
     HarmonicFilterParameters parameters = parameters_.filter;
     parameters.noise_rms = noise_rms_[axis];
-    filters_.emplace_back(*sensor_[axis], speed, sample_rate, parameters);
+    gains = designGains(*sensor_[axis], std::exp(grid_point * SPEED_GRID), sample_rate, parameters);
   }
+  return gains;
+}
+
+// The force goes on where the layout changes while the spindle turns.
+void ForceCompensation::design(double speed, double sample_rate) {
+  if (design_rate_ != sample_rate) schedule_.clear();
   design_rate_ = sample_rate;
-  settling_left_ =
-      parameters_.settling_periods * parameters_.filter.settling_revolutions * units::TWO_PI / speed;
+  grid_point_ = static_cast<int>(std::lround(std::log(speed) / SPEED_GRID));
+  std::vector<HarmonicFilter> before;
+  before.swap(filters_);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const std::vector<HarmonicGain>& scheduled = gains(axis, grid_point_, sample_rate);
+    filters_.emplace_back(scheduled, *sensor_[axis], speed, sample_rate);
+    if (!before.empty()) filters_[axis].adopt(before[axis]);
+  }
+  if (before.empty()) {
+    settling_left_ =
+        parameters_.settling_periods * parameters_.filter.settling_revolutions * units::TWO_PI / speed;
+  }
 }
 
 void ForceCompensation::handle(const SampleBlock& block) {
@@ -121,9 +143,12 @@ void ForceCompensation::handle(const SampleBlock& block) {
     output_(measured, compensated);
     return;
   }
-  const bool fits = !filters_.empty() && design_rate_ == block.sample_rate &&
-                    std::abs(speed_ / filters_.front().spindleSpeed() - 1.0) <= parameters_.speed_tolerance;
-  if (!fits) design(speed_, block.sample_rate);
+  const double off_grid = std::abs(std::log(speed_) / SPEED_GRID - grid_point_);
+  if (filters_.empty() || design_rate_ != block.sample_rate || off_grid > GRID_HYSTERESIS) {
+    design(speed_, block.sample_rate);
+  } else if (std::abs(speed_ / filters_.front().spindleSpeed() - 1.0) > RETUNE) {
+    for (std::size_t axis = 0; axis < 3; ++axis) filters_[axis].retune(*sensor_[axis], speed_);
+  }
   health_.speed = filters_.front().spindleSpeed();
   double squares = 0.0;
   for (std::size_t axis = 0; axis < 3; ++axis) {

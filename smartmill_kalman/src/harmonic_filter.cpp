@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <string>
 
 #include <Eigen/Core>
@@ -14,10 +15,28 @@
 namespace smartmill::kalman {
 namespace {
 
+using Complex = std::complex<double>;
+
+/// A window whose mean square exceeds the largest of the revolution before by this is a change of the force.
+constexpr double OUT_OF_LINE = 5.0;
+/// Revolutions at a memory before a longer one is tried.
+constexpr std::size_t DWELL = 2;
+/// The mean square of a revolution that still falls below this share of the last one's: not settled.
+constexpr double STILL_FALLING = 0.8;
+/// The mean square that a longer memory may have over the one at which it was accepted.
+constexpr double MEMORY_TOO_LONG = 1.5;
+
 void requirePositive(const char* key, double value) {
   if (!(value > 0.0) || !std::isfinite(value)) {
     throw Error(std::string(key) + ": " + std::to_string(value) + ", above 0 is due");
   }
+}
+
+/// Steady answer of a mode's two states (StateSpace form) to a force of 1 at w [rad/s].
+std::array<Complex, 2> steady(const Mode& mode, double w) {
+  const double wn = units::TWO_PI * mode.frequency;
+  const Complex second = mode.response(w / units::TWO_PI);
+  return {(Complex(2.0 * mode.damping_ratio * wn, w) / wn) * second, second};
 }
 
 }  // namespace
@@ -26,26 +45,18 @@ void HarmonicFilterParameters::validate() const {
   requirePositive("bandwidth", bandwidth);
   requirePositive("noise_rms", noise_rms);
   requirePositive("settling_revolutions", settling_revolutions);
-  if (max_harmonics < 1 || max_harmonics > 200) {
-    throw Error("max_harmonics: " + std::to_string(max_harmonics) + ", 1 .. 200 is due");
+  requirePositive("memory_revolutions", memory_revolutions);
+  if (max_harmonics < 0 || max_harmonics > 200) {
+    throw Error("max_harmonics: " + std::to_string(max_harmonics) + ", 0 .. 200 is due");
   }
 }
 
-HarmonicFilter::HarmonicFilter(const ModalModel& sensor, double spindle_speed, double sample_rate,
-                               const HarmonicFilterParameters& parameters)
-    : spindle_speed_(spindle_speed), modes_(sensor.modes.size()), direct_(sensor.direct) {
-  parameters.validate();
-  requirePositive("spindle speed [rad/s]", spindle_speed);
-  requirePositive("sample rate [Hz]", sample_rate);
-  const double spindle_frequency = spindle_speed / units::TWO_PI;
-  const double top = std::min(parameters.bandwidth, 0.45 * sample_rate);
-  harmonics_ = std::clamp(static_cast<int>(top / spindle_frequency), 1, parameters.max_harmonics);
-
-  const auto m = static_cast<Eigen::Index>(2 * modes_);
-  const Eigen::Index f = 2 * harmonics_ + 1;
+HarmonicGain designHarmonicGain(const ModalModel& sensor, double spindle_speed, double sample_rate,
+                                int harmonics, double noise_rms, double settling, double quickest) {
+  const auto m = static_cast<Eigen::Index>(2 * sensor.modes.size());
+  const Eigen::Index f = 2 * harmonics + 1;
   const double dt = 1.0 / sample_rate;
-  const double r = parameters.noise_rms * parameters.noise_rms;
-  const double tau = parameters.settling_revolutions / spindle_frequency;
+  const double r = noise_rms * noise_rms;
 
   // Eq. 5.37: z = (sensor states, force states).
   const StateSpace modes = stateSpace(sensor);
@@ -53,91 +64,305 @@ HarmonicFilter::HarmonicFilter(const ModalModel& sensor, double spindle_speed, d
   Eigen::MatrixXd a = Eigen::MatrixXd::Zero(m + f, m + f);
   Eigen::MatrixXd q = Eigen::MatrixXd::Zero(m + f, m + f);
   force(0) = 1.0;
-  for (Eigen::Index n = 1; n <= harmonics_; ++n) {
+  for (Eigen::Index n = 1; n <= harmonics; ++n) {
     force(2 * n - 1) = 1.0;
     a(m + 2 * n - 1, m + 2 * n) = static_cast<double>(n) * spindle_speed;
     a(m + 2 * n, m + 2 * n - 1) = -static_cast<double>(n) * spindle_speed;
   }
   a.topLeftCorner(m, m) = modes.a;
   a.topRightCorner(m, f) = modes.b * force;
-  q.diagonal().tail(f).setConstant(r * dt / (tau * tau));
-  Eigen::RowVectorXd c(m + f);
-  c << modes.c, direct_ * force;
+  for (Eigen::Index n = 0; n <= harmonics; ++n) {
+    const double passed = std::abs(sensor.response(static_cast<double>(n) * spindle_speed / units::TWO_PI));
+    const double tau = std::max(std::min(1.0, passed) * settling, quickest);
+    const double intensity = r * dt / (tau * tau);
+    q(m + 2 * n, m + 2 * n) = intensity;
+    if (n > 0) q(m + 2 * n - 1, m + 2 * n - 1) = intensity;
+  }
+  Eigen::RowVectorXd c(m + f), d(m + f);
+  c << modes.c, sensor.direct * force;
+  d << Eigen::RowVectorXd::Zero(m), force;
 
   const auto [phi, noise] = discretiseNoise(a, q, dt);
   const Eigen::MatrixXd p = stationaryCovariance(phi, noise, c, r);
-  const double variance = (c * p * c.transpose())(0) + r;
-  const Eigen::VectorXd gain = p * c.transpose() / variance;
-  innovation_std_ = std::sqrt(variance);
+  HarmonicGain gain;
+  gain.variance = (c * p * c.transpose())(0) + r;
+  const Eigen::VectorXd filter = p * c.transpose() / gain.variance, smoothing = p * d.transpose();
+  gain.filter.assign(filter.data(), filter.data() + filter.size());
+  gain.smoothing.assign(smoothing.data(), smoothing.data() + smoothing.size());
+  return gain;
+}
 
-  gain_.assign(gain.data(), gain.data() + gain.size());
-  for (Eigen::Index k = 0; k < m; k += 2) {
-    mode_transition_.insert(mode_transition_.end(),
-                            {phi(k, k), phi(k, k + 1), phi(k + 1, k), phi(k + 1, k + 1)});
+std::vector<HarmonicGain> designGains(const ModalModel& sensor, double spindle_speed, double sample_rate,
+                                      const HarmonicFilterParameters& parameters) {
+  parameters.validate();
+  requirePositive("spindle speed [rad/s]", spindle_speed);
+  requirePositive("sample rate [Hz]", sample_rate);
+  const double revolution = units::TWO_PI / spindle_speed;
+  const double top = std::min(parameters.bandwidth, 0.45 * sample_rate);
+  int harmonics = 0;
+  if (parameters.max_harmonics > 0)
+    harmonics = std::clamp(static_cast<int>(top * revolution), 1, parameters.max_harmonics);
+  const double quick = parameters.settling_revolutions;
+  const double slow = std::max(quick, parameters.memory_revolutions);
+  std::vector<double> memories{quick};
+  if (slow > quick) memories.insert(memories.end(), {std::sqrt(quick * slow), slow});
+  std::vector<HarmonicGain> gains;
+  for (const double memory : memories) {
+    gains.push_back(designHarmonicGain(sensor, spindle_speed, sample_rate, harmonics, parameters.noise_rms,
+                                       memory * revolution, quick * revolution));
   }
-  for (Eigen::Index i = 0; i < m; ++i) {
-    for (Eigen::Index j = 0; j < f; ++j) coupling_.push_back(phi(i, m + j));
+  return gains;
+}
+
+HarmonicFilter::HarmonicFilter(const ModalModel& sensor, double spindle_speed, double sample_rate,
+                               const HarmonicFilterParameters& parameters)
+    : HarmonicFilter(designGains(sensor, spindle_speed, sample_rate, parameters), sensor, spindle_speed,
+                     sample_rate) {
+}
+
+HarmonicFilter::HarmonicFilter(std::vector<HarmonicGain> gains, const ModalModel& sensor,
+                               double spindle_speed, double sample_rate)
+    : sample_rate_(sample_rate),
+      modes_(sensor.modes.size()),
+      harmonics_(static_cast<int>(gains.at(0).filter.size() - 2 * modes_ - 1) / 2),
+      design_(std::move(gains)) {
+  layOut(sensor, spindle_speed);
+  for (Block& block : blocks_) block.re = block.im = Four{};
+  setGains();
+}
+
+void HarmonicFilter::layOut(const ModalModel& sensor, double spindle_speed) {
+  sensor_ = sensor;
+  spindle_speed_ = spindle_speed;
+  const double dt = 1.0 / sample_rate_;
+  const std::size_t pairs = modes_ + 1 + static_cast<std::size_t>(harmonics_);
+  blocks_.resize((pairs + 3) / 4);
+  modal_.clear();
+  for (std::size_t i = 0; i < 4 * blocks_.size(); ++i) {
+    Block& block = blocks_[i / 4];
+    const std::size_t k = i % 4;
+    block.a[k] = block.b[k] = block.c1[k] = block.c2[k] = block.g[k] = 0.0;
+    if (i < modes_) {
+      const Mode& mode = sensor.modes[i];
+      const double wn = units::TWO_PI * mode.frequency, zeta = mode.damping_ratio;
+      const double wd = wn * std::sqrt(1.0 - zeta * zeta), decay = std::exp(-zeta * wn * dt);
+      block.a[k] = decay * std::cos(wd * dt);
+      block.b[k] = decay * std::sin(wd * dt);
+      block.c1[k] = 1.0;
+      // exp of [0 -wn; wn -2 zeta wn] dt
+      const double s = block.b[k] / wd;
+      modal_.push_back({block.a[k] + zeta * wn * s, -wn * s, wn * s, block.a[k] - zeta * wn * s});
+    } else if (i < pairs) {
+      const double n = static_cast<double>(i - modes_);
+      const Complex answer = sensor.response(n * spindle_speed / units::TWO_PI);
+      block.a[k] = std::cos(n * spindle_speed * dt);
+      block.b[k] = std::sin(n * spindle_speed * dt);
+      block.c1[k] = answer.real();
+      block.c2[k] = n > 0.0 ? -answer.imag() : 0.0;
+      block.g[k] = 1.0;
+    }
   }
+  const auto samples = units::TWO_PI / spindle_speed * sample_rate_;
+  windows_a_revolution_ = std::max<std::size_t>(
+      4, static_cast<std::size_t>(std::lround(samples / static_cast<double>(window_length_))));
+}
+
+// Force states w = F - i G turn with exp(i n w dt). A mode's own pair is what it still rings: its state less
+// the steady answer to the force, as (second state, what makes the pair a rotation).
+std::vector<double> HarmonicFilter::toPairs(const std::vector<double>& state) const {
+  std::vector<double> pairs(8 * blocks_.size(), 0.0);
+  const double* force = state.data() + 2 * modes_;
+  pairs[2 * modes_] = force[0];
   for (int n = 1; n <= harmonics_; ++n) {
-    rotation_.push_back(std::cos(n * spindle_speed * dt));
-    rotation_.push_back(std::sin(n * spindle_speed * dt));
+    pairs[2 * (modes_ + n)] = force[2 * n - 1];
+    pairs[2 * (modes_ + n) + 1] = -force[2 * n];
   }
-  state_.assign(static_cast<std::size_t>(m + f), 0.0);
-  next_ = state_;
+  for (std::size_t k = 0; k < modes_; ++k) {
+    double x1 = state[2 * k], x2 = state[2 * k + 1];
+    for (int n = 0; n <= harmonics_; ++n) {
+      const Complex w(pairs[2 * (modes_ + n)], pairs[2 * (modes_ + n) + 1]);
+      const auto answer = steady(sensor_.modes[k], n * spindle_speed_);
+      x1 -= (answer[0] * w).real();
+      x2 -= (answer[1] * w).real();
+    }
+    const Block& block = blocks_[k / 4];
+    pairs[2 * k] = x2;
+    pairs[2 * k + 1] = (block.a[k % 4] * x2 - modal_[k][2] * x1 - modal_[k][3] * x2) / block.b[k % 4];
+  }
+  return pairs;
 }
 
-void HarmonicFilter::reset() {
-  std::fill(state_.begin(), state_.end(), 0.0);
-  innovation_ = 0.0;
+std::vector<double> HarmonicFilter::state() const {
+  std::vector<double> state(2 * modes_ + 1 + 2 * static_cast<std::size_t>(harmonics_));
+  const auto pair = [this](std::size_t i) {
+    return Complex(blocks_[i / 4].re[i % 4], blocks_[i / 4].im[i % 4]);
+  };
+  for (std::size_t k = 0; k < modes_; ++k) {
+    const Block& block = blocks_[k / 4];
+    double x2 = pair(k).real();
+    double x1 = (block.a[k % 4] * x2 - block.b[k % 4] * pair(k).imag() - modal_[k][3] * x2) / modal_[k][2];
+    for (int n = 0; n <= harmonics_; ++n) {
+      const auto answer = steady(sensor_.modes[k], n * spindle_speed_);
+      x1 += (answer[0] * pair(modes_ + n)).real();
+      x2 += (answer[1] * pair(modes_ + n)).real();
+    }
+    state[2 * k] = x1;
+    state[2 * k + 1] = x2;
+  }
+  double* force = state.data() + 2 * modes_;
+  force[0] = pair(modes_).real();
+  for (int n = 1; n <= harmonics_; ++n) {
+    force[2 * n - 1] = pair(modes_ + n).real();
+    force[2 * n] = -pair(modes_ + n).imag();
+  }
+  return state;
 }
 
-double HarmonicFilter::force() const {
-  const double* f = state_.data() + 2 * modes_;
-  double sum = f[0];
-  for (int n = 1; n <= harmonics_; ++n) sum += f[2 * n - 1];
+void HarmonicFilter::setState(const std::vector<double>& state) {
+  const std::vector<double> pairs = toPairs(state);
+  for (std::size_t i = 0; i < 4 * blocks_.size(); ++i) {
+    blocks_[i / 4].re[i % 4] = pairs[2 * i];
+    blocks_[i / 4].im[i % 4] = pairs[2 * i + 1];
+  }
+  expected_ = expectation();
+}
+
+void HarmonicFilter::setGains() {
+  gains_.clear();
+  force_gain_.clear();
+  innovation_std_.clear();
+  for (const HarmonicGain& design : design_) {
+    const std::vector<double> pairs = toPairs(design.filter);
+    std::vector<GainBlock> gain(blocks_.size());
+    double force = 0.0;
+    for (std::size_t i = 0; i < 4 * blocks_.size(); ++i) {
+      gain[i / 4].re[i % 4] = pairs[2 * i];
+      gain[i / 4].im[i % 4] = pairs[2 * i + 1];
+      force += blocks_[i / 4].g[i % 4] * pairs[2 * i];
+    }
+    gains_.push_back(std::move(gain));
+    force_gain_.push_back(force);
+    innovation_std_.push_back(std::sqrt(design.variance));
+  }
+}
+
+void HarmonicFilter::retune(const ModalModel& sensor, double spindle_speed) {
+  if (sensor.modes.size() != modes_) throw Error("Kalman filter: the number of modes cannot change");
+  const std::vector<double> now = state();
+  layOut(sensor, spindle_speed);
+  setState(now);
+  setGains();
+}
+
+void HarmonicFilter::adopt(const HarmonicFilter& other) {
+  if (other.modes_ != modes_) throw Error("Kalman filter: the number of modes cannot change");
+  std::vector<double> state = other.state();
+  level_ = std::min(other.level_, gains_.size() - 1);
+  state.resize(2 * modes_ + 1 + 2 * static_cast<std::size_t>(harmonics_), 0.0);
+  setState(state);
+}
+
+double HarmonicFilter::expectation() const {
+  double sum = 0.0;
+  for (const Block& block : blocks_) {
+    for (int k = 0; k < 4; ++k) sum += block.c1[k] * block.re[k] + block.c2[k] * block.im[k];
+  }
   return sum;
 }
 
-double HarmonicFilter::step(double measured) {
-  double expected = direct_ * force();
-  for (std::size_t k = 0; k < modes_; ++k) expected += state_[2 * k + 1];  // y = second state of each mode
-  innovation_ = measured - expected;
-  for (std::size_t i = 0; i < state_.size(); ++i) state_[i] += gain_[i] * innovation_;
-  return predict();
+void HarmonicFilter::reset() {
+  for (Block& block : blocks_) block.re = block.im = Four{};
+  expected_ = innovation_ = 0.0;
+  level_ = 0;
+  window_count_ = windows_ = dwell_ = 0;
+  window_sum_ = revolution_sum_ = peak_ = last_peak_ = last_mean_ = accepted_mean_ = 0.0;
 }
 
-double HarmonicFilter::coast() {
-  innovation_ = 0.0;
-  return predict();
+// Without fused multiply-adds the clones give the same numbers.
+__attribute__((target_clones("avx2", "default"))) double HarmonicFilter::advance(const GainBlock* gain,
+                                                                                 double innovation,
+                                                                                 double force_gain) {
+  const Four nu = {innovation, innovation, innovation, innovation};
+  Four force = {}, expected = {};
+  Block* block = blocks_.data();
+  for (const Block* end = block + blocks_.size(); block != end; ++block, ++gain) {
+    force += block->g * block->re;
+    const Four re = block->re + gain->re * nu, im = block->im + gain->im * nu;
+    const Four next_re = block->a * re - block->b * im, next_im = block->b * re + block->a * im;
+    expected += block->c1 * next_re + block->c2 * next_im;
+    block->re = next_re;
+    block->im = next_im;
+  }
+  expected_ = (expected[0] + expected[2]) + (expected[1] + expected[3]);
+  return (force[0] + force[2]) + (force[1] + force[3]) + force_gain * innovation;
 }
 
-double HarmonicFilter::predict() {
-  const double now = force();
-  const std::size_t m = 2 * modes_;
-  const std::size_t f = static_cast<std::size_t>(2 * harmonics_ + 1);
-  const double* force_state = state_.data() + m;
-  for (std::size_t k = 0; k < modes_; ++k) {
-    const double* t = mode_transition_.data() + 4 * k;
-    const double* row1 = coupling_.data() + 2 * k * f;
-    const double* row2 = row1 + f;
-    double x1 = t[0] * state_[2 * k] + t[1] * state_[2 * k + 1];
-    double x2 = t[2] * state_[2 * k] + t[3] * state_[2 * k + 1];
-    for (std::size_t j = 0; j < f; ++j) {
-      x1 += row1[j] * force_state[j];
-      x2 += row2[j] * force_state[j];
+void HarmonicFilter::judgeWindow() {
+  const double mean = window_sum_ / static_cast<double>(window_length_);
+  window_count_ = 0;
+  window_sum_ = 0.0;
+  if (level_ > 0 && mean > OUT_OF_LINE * last_peak_) {
+    level_ = 0;
+    ++restarts_;
+    windows_ = dwell_ = 0;
+    revolution_sum_ = peak_ = last_mean_ = 0.0;
+    return;
+  }
+  revolution_sum_ += mean;
+  peak_ = std::max(peak_, mean);
+  if (++windows_ == windows_a_revolution_) judgeRevolution();
+}
+
+void HarmonicFilter::judgeRevolution() {
+  const double mean = revolution_sum_ / static_cast<double>(windows_);
+  const bool settled = mean > STILL_FALLING * last_mean_;
+  if (level_ > 0 && mean > MEMORY_TOO_LONG * accepted_mean_) {
+    --level_;
+    dwell_ = 0;
+  } else if (++dwell_ > DWELL && settled && level_ + 1 < gains_.size()) {
+    if (level_ == 0) accepted_mean_ = mean;
+    ++level_;
+    dwell_ = 0;
+  }
+  last_mean_ = mean;
+  last_peak_ = peak_;
+  windows_ = 0;
+  revolution_sum_ = peak_ = 0.0;
+}
+
+std::vector<double> HarmonicFilter::smooth(const std::vector<double>& measured) {
+  const std::size_t slow = gains_.size() - 1, n = 4 * blocks_.size();
+  std::vector<double> force, innovation;
+  force.reserve(measured.size());
+  innovation.reserve(measured.size());
+  for (const double sample : measured) {
+    innovation.push_back(sample - expected_);
+    force.push_back(advance(gains_[slow].data(), innovation.back(), 0.0));
+  }
+  // lambda(k) = c' nu / S + (I - c' K') Phi' lambda(k + 1); force smoothed = force predicted + (P d')'
+  // lambda.
+  std::vector<double> lambda(2 * n, 0.0);
+  const std::vector<double> smoothing = toPairs(design_[slow].smoothing);
+  for (std::size_t at = measured.size(); at-- > 0;) {
+    double through_gain = 0.0;
+    for (std::size_t i = 0; i < n; ++i) {
+      const Block& block = blocks_[i / 4];
+      const double re = lambda[2 * i], im = lambda[2 * i + 1];
+      lambda[2 * i] = block.a[i % 4] * re + block.b[i % 4] * im;
+      lambda[2 * i + 1] = block.a[i % 4] * im - block.b[i % 4] * re;
+      through_gain +=
+          gains_[slow][i / 4].re[i % 4] * lambda[2 * i] + gains_[slow][i / 4].im[i % 4] * lambda[2 * i + 1];
     }
-    next_[2 * k] = x1;
-    next_[2 * k + 1] = x2;
+    const double drive = innovation[at] / design_[slow].variance - through_gain;
+    double correction = 0.0;
+    for (std::size_t i = 0; i < n; ++i) {
+      lambda[2 * i] += blocks_[i / 4].c1[i % 4] * drive;
+      lambda[2 * i + 1] += blocks_[i / 4].c2[i % 4] * drive;
+      correction += smoothing[2 * i] * lambda[2 * i] + smoothing[2 * i + 1] * lambda[2 * i + 1];
+    }
+    force[at] += correction;
   }
-  next_[m] = force_state[0];
-  for (int n = 1; n <= harmonics_; ++n) {
-    const double c = rotation_[2 * n - 2], s = rotation_[2 * n - 1];
-    const double in_phase = force_state[2 * n - 1], quadrature = force_state[2 * n];
-    next_[m + 2 * n - 1] = c * in_phase + s * quadrature;
-    next_[m + 2 * n] = c * quadrature - s * in_phase;
-  }
-  std::swap(state_, next_);
-  return now;
+  return force;
 }
 
 }  // namespace smartmill::kalman

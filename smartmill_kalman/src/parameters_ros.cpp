@@ -11,6 +11,7 @@ NodeParameters readParameters(ParameterReader& reader) {
   reader.read("max_harmonics", compensation.filter.max_harmonics);
   reader.read("noise_rms", compensation.filter.noise_rms);
   reader.read("settling_revolutions", compensation.filter.settling_revolutions);
+  reader.read("memory_revolutions", compensation.filter.memory_revolutions);
   reader.read("least_speed", compensation.least_speed);
   reader.read("speed_tolerance", compensation.speed_tolerance);
   reader.read("settling_periods", compensation.settling_periods);

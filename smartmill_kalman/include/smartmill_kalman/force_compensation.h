@@ -5,8 +5,10 @@
 #include <cstdint>
 #include <functional>
 #include <limits>
+#include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "smartmill_core/modal/modal_model.h"
@@ -19,8 +21,9 @@ namespace smartmill::kalman {
 struct CompensationParameters {
   HarmonicFilterParameters filter;
   double least_speed = 20.0;  ///< [rad/s] > 0; slower than this the samples pass through
-  double speed_tolerance =
-      0.002;  ///< [1] > 0; filters are laid out anew when the speed leaves this share of theirs
+  /// [1] > 0; a spindle whose speed changes by more than this share between two blocks is not steady: samples
+  /// pass
+  double speed_tolerance = 0.002;
   double settling_periods =
       5.0;                  ///< [1] >= 0 settling times after a start or gap that are marked as settling
   double saturation = 0.0;  ///< [N] >= 0 a sample at or beyond it counts as clipped; 0: not watched
@@ -39,8 +42,9 @@ struct CompensationHealth {
 };
 
 /// Sensor blocks in, force blocks out with the same sample index. Inputs come in stamp order
-/// (SortedCompensation); the result depends only on them: the filters start anew at every cutting condition,
-/// at a gap of the sample index and when the speed has moved.
+/// (SortedCompensation); the result depends only on them: the filters start anew at every cutting condition
+/// and at a gap of the sample index. They follow a speed that moves slowly; their gains are those of the
+/// nearest speed of a fine grid, and change without a jump.
 class ForceCompensation {
  public:
   using Output = std::function<void(const ForceBlock& measured, const ForceBlock& compensated)>;
@@ -68,6 +72,7 @@ class ForceCompensation {
 
  private:
   void design(double speed, double sample_rate);
+  const std::vector<HarmonicGain>& gains(std::size_t axis, int grid_point, double sample_rate);
 
   CompensationParameters parameters_;
   double sign_;
@@ -75,9 +80,12 @@ class ForceCompensation {
   std::array<std::optional<ModalModel>, 3> sensor_;
   std::array<double, 3> noise_rms_{{0, 0, 0}};  // [N]
   std::vector<HarmonicFilter> filters_;         // of the axes with a model, in order; empty: to be laid out
-  double design_rate_ = 0.0;                    // [Hz]
-  double speed_ = 0.0;                          // [rad/s]
-  double steady_speed_ = 0.0;                   // [rad/s] from which readings are counted as a change
+  std::map<std::pair<std::size_t, int>, std::vector<HarmonicGain>>
+      schedule_;  // by axis and point of the speed grid
+  int grid_point_ = 0;
+  double design_rate_ = 0.0;                // [Hz]
+  double speed_ = 0.0, block_speed_ = 0.0;  // [rad/s] newest, at the block before
+  double steady_speed_ = 0.0;               // [rad/s] from which readings are counted as a change
   double changing_until_ = -std::numeric_limits<double>::infinity();  // [s]
   std::optional<std::uint64_t> next_index_;
   double settling_left_ = 0.0;  // [s]

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <vector>
 
@@ -10,55 +11,140 @@ namespace smartmill::kalman {
 /// How a filter is laid out; see launch/config/kalman.yaml.
 struct HarmonicFilterParameters {
   double bandwidth = 5000.0;          ///< [Hz] harmonics of the spindle frequency up to here; > 0
-  int max_harmonics = 60;             ///< 1..200, also kept below 0.45 of the sample rate
+  int max_harmonics = 100;            ///< 0..200, also kept below 0.45 of the sample rate; 0: a random walk
   double noise_rms = 1.0;             ///< [N] of one sample; > 0
-  double settling_revolutions = 0.3;  ///< [1] time constant of each harmonic's amplitude, in revolutions; > 0
+  double settling_revolutions = 0.2;  ///< [1] time constant of each harmonic's amplitude after a change; > 0
+  /// [1] time constant once nothing changes any more, in revolutions; at most settling_revolutions: always
+  /// quick
+  double memory_revolutions = 2.0;
   /// @throws Error naming key and value.
   void validate() const;
 };
 
+/// Gains of one filter, in the coordinates of Dunwoody eq. 5.37: mode states (two a mode, StateSpace form),
+/// then the constant, then (F, G) of each harmonic.
+struct HarmonicGain {
+  std::vector<double> filter;  ///< [state/N] P c' / (c P c' + r)
+  std::vector<double>
+      smoothing;          ///< [state N] P d', d the force of a state, P the stationary prediction covariance
+  double variance = 0.0;  ///< [N2] of the innovation
+};
+
+/// Stationary gain from the discrete Riccati equation. Exact discretisation (Van Loan for the noise). Process
+/// noise q = (r dt) / tau^2 for every amplitude puts each harmonic's pole near -|H| / tau, H the sensor's
+/// answer to it. A harmonic that the sensor hardly passes is slow already: tau is min(1, |H|) settling there,
+/// not below quickest, so that a long memory does not make it slower still. The gain does not depend on r.
+/// @param spindle_speed [rad/s] @param sample_rate [Hz] @param settling, quickest [s]
+HarmonicGain designHarmonicGain(const ModalModel& sensor, double spindle_speed, double sample_rate,
+                                int harmonics, double noise_rms, double settling, double quickest);
+
+/// Gains from quick to slow: settling_revolutions, memory_revolutions and their geometric mean.
+std::vector<HarmonicGain> designGains(const ModalModel& sensor, double spindle_speed, double sample_rate,
+                                      const HarmonicFilterParameters& parameters);
+
 /// Kalman filter of Dunwoody chapter 5 for one axis at one spindle speed: sensor modes (eq. 5.18..5.23,
 /// static gain 1) driven by a force that is a constant and N harmonics of the spindle frequency with slowly
-/// wandering amplitudes (eq. 5.28..5.35), discretised exactly, with the stationary gain of the discrete
-/// Riccati equation. The process noise follows from the settling time: q = (r dt) / tau^2 for every
-/// amplitude, which puts each harmonic's pole near -1/tau where the sensor passes the force unchanged.
+/// wandering amplitudes (eq. 5.28..5.35).
 ///
-/// The update costs (2 M + 1)(2 N + 1) + O(M + N) multiplications for M modes and allocates nothing.
+/// Runs in the coordinates in which nothing couples: each harmonic with the sensor's answer to it in the
+/// steady state (exact, H(n w)), and what each mode still rings beside it. M + N + 1 rotations and a gain:
+/// the cost is linear in the number of states; nothing is allocated.
+///
+/// After a change (start, tool entry) it follows within settling_revolutions; while the innovations say that
+/// nothing changes, the memory grows to memory_revolutions and the noise falls; an innovation out of line
+/// takes it back at once. Only the gain changes, the state goes on.
 class HarmonicFilter {
  public:
+  static constexpr std::size_t LEVELS = 3;
+
   /// @param sensor measured over applied force [1] @param spindle_speed [rad/s] > 0 @param sample_rate [Hz]
   HarmonicFilter(const ModalModel& sensor, double spindle_speed, double sample_rate,
                  const HarmonicFilterParameters& parameters);
+  /// With gains of this speed or one nearby; they tell the number of harmonics.
+  HarmonicFilter(std::vector<HarmonicGain> gains, const ModalModel& sensor, double spindle_speed,
+                 double sample_rate);
 
   /// Takes one measured sample [N]. @return applied force [N] at this sample, from all samples up to it.
-  double step(double measured);
+  double step(double measured) {
+    innovation_ = measured - expected_;
+    const double force = advance(gains_[level_].data(), innovation_, force_gain_[level_]);
+    watch();
+    return force;
+  }
 
   /// Keeps the state going without a measurement. @return predicted force [N].
-  double coast();
+  double coast() {
+    innovation_ = 0.0;
+    return advance(gains_[level_].data(), 0.0, 0.0);
+  }
 
   /// At rest, no force.
   void reset();
 
-  double innovation() const { return innovation_; }         ///< [N] of the last step
-  double innovationStd() const { return innovation_std_; }  ///< [N] expected by the design
-  double spindleSpeed() const { return spindle_speed_; }    ///< [rad/s]
+  /// Other sensor model or spindle speed, same number of harmonics: the force and the modes' displacements go
+  /// on, the gains stay.
+  void retune(const ModalModel& sensor, double spindle_speed);
+
+  /// Takes the force of another filter over (harmonics beyond its own: zero), so that a new layout starts
+  /// without a jump. The sensor's modes must be as many.
+  void adopt(const HarmonicFilter& other);
+
+  /// Fixed-interval smoother with the slowest gain (modified Bryson-Frazier: nothing is stored but
+  /// innovations), of all samples together. @return applied force [N] at each sample. Starts from this
+  /// filter's state and leaves it at the end.
+  std::vector<double> smooth(const std::vector<double>& measured);
+
+  double innovation() const { return innovation_; }                 ///< [N] of the last step
+  double innovationStd() const { return innovation_std_[level_]; }  ///< [N] expected by the design
+  double spindleSpeed() const { return spindle_speed_; }            ///< [rad/s]
   int harmonics() const { return harmonics_; }
+  std::size_t level() const { return level_; }  ///< 0 quick .. LEVELS - 1 slow
+  std::size_t restarts() const {
+    return restarts_;
+  }  ///< times that an innovation out of line took the memory back
+  void setLevel(std::size_t level) { level_ = level < gains_.size() ? level : gains_.size() - 1; }
+  /// State in the coordinates of HarmonicGain.
+  std::vector<double> state() const;
+  void setState(const std::vector<double>& state);
 
  private:
-  double predict();
-  double force() const;
+  // A pair is a rotation (a, b) of (re, im) with the share (c1, c2) in the measured and (g) in the applied
+  // force. Four pairs run side by side.
+  typedef double Four __attribute__((vector_size(32), aligned(8)));
+  struct Block {
+    Four re, im, a, b, c1, c2, g;
+  };
+  struct GainBlock {
+    Four re, im;
+  };
+  double advance(const GainBlock* gain, double innovation, double force_gain);
+  void watch() {
+    window_sum_ += innovation_ * innovation_;
+    if (++window_count_ == window_length_) judgeWindow();
+  }
+  void judgeWindow();
+  void judgeRevolution();
+  void layOut(const ModalModel& sensor, double spindle_speed);
+  std::vector<double> toPairs(const std::vector<double>& state) const;
+  void setGains();
+  double expectation() const;
 
-  double spindle_speed_;
+  ModalModel sensor_;
+  double spindle_speed_, sample_rate_;
   std::size_t modes_;
   int harmonics_;
-  std::vector<double> mode_transition_;  // 4 a mode, row-major
-  std::vector<double> coupling_;         // 2 modes x (2 N + 1), row-major: force states to mode states
-  std::vector<double> rotation_;         // cos, sin of each harmonic's step
-  std::vector<double> gain_;             // mode states, then force states
-  double direct_;
-  std::vector<double> state_, next_;  // predicted: mode states, then constant, then (F, G) of each harmonic
-  double innovation_ = 0.0;
-  double innovation_std_ = 0.0;
+  std::vector<HarmonicGain> design_;
+  std::vector<std::array<double, 4>> modal_;  // transition of each mode's two states, row-major
+  std::vector<Block> blocks_;
+  std::vector<std::vector<GainBlock>> gains_;
+  std::vector<double> force_gain_, innovation_std_;
+  double expected_ = 0.0, innovation_ = 0.0;
+
+  // Judgement of the innovations: short windows for changes, revolutions for the memory.
+  std::size_t level_ = 0, restarts_ = 0;
+  std::size_t window_length_ = 16, window_count_ = 0, windows_ = 0, windows_a_revolution_ = 1, dwell_ = 0;
+  double window_sum_ = 0.0, revolution_sum_ = 0.0, peak_ = 0.0, last_peak_ = 0.0, last_mean_ = 0.0,
+         accepted_mean_ = 0.0;
 };
 
 }  // namespace smartmill::kalman
