@@ -8,6 +8,12 @@
 
 namespace smartmill::loadmeter {
 
+namespace {
+
+constexpr double STRONG_EVIDENCE = 6.0;  // of the information criterion
+
+}  // namespace
+
 std::string FrictionShape::name() const {
   return std::string("Coulomb and viscous") + (stribeck ? ", Stribeck" : "") + (warmup ? ", warm-up" : "");
 }
@@ -120,8 +126,12 @@ std::vector<FittedFriction> fitFrictionLaws(const std::vector<TimedAirCut>& air_
     f.rms = std::sqrt(rest2);
     found.push_back(f);
   }
+  // A term whose place is searched for pays off by chance more often than the criterion allows for.
+  const auto key = [](const FittedFriction& f) {
+    return f.bic + STRONG_EVIDENCE * ((f.shape.stribeck ? 1 : 0) + (f.shape.warmup ? 1 : 0));
+  };
   std::stable_sort(found.begin(), found.end(),
-                   [](const FittedFriction& a, const FittedFriction& b) { return a.bic < b.bic; });
+                   [&](const FittedFriction& a, const FittedFriction& b) { return key(a) < key(b); });
   return found;
 }
 
