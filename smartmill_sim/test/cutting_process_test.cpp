@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -59,11 +60,13 @@ TEST(CuttingProcess, rigidSteadyCutMatchesTheClosedForm) {
   EXPECT_LT(largestError(endMill(4, 30.0), {0.5 * PI, PI, 4e-3, 8e-5}, 13950.0, 881), 5e-4);
   EXPECT_LT(largestError(endMill(1, 45.0), {1.2, 1.3, 10e-3, 5e-5}, 600.0, 9973), 1e-3);
   EXPECT_LT(largestError(endMill(2, 0.0), {0.4, 2.2, 3e-3, 1e-4}, 6000.0, 2001), 5e-4);
+  // Many steps from node to node of the surface.
+  EXPECT_LT(largestError(endMill(4, 30.0), {0.0, PI, 2e-3, 6e-5}, 1200.0, 10240), 5e-4);
 }
 
 /// Growth of the vibration of a tool with one mode: size over the last quarter of a cut over that over the
 /// second quarter.
-double growth(double depth, double rpm, bool both_axes, int steps_per_rev) {
+double growth(double depth, double rpm, bool both_axes, int steps_per_rev, Feed steadiness = Feed::any) {
   // Insperger's benchmark: m 0.03993 kg, 922 Hz, damping ratio 0.011, 2 teeth, Kt 6e8, Kn 2e8 N/m2.
   MachineModel model;
   model.tool = endMill(2, 0.0);
@@ -72,7 +75,7 @@ double growth(double depth, double rpm, bool both_axes, int steps_per_rev) {
   model.tool_tip.x.modes = {mode};
   if (both_axes) model.tool_tip.y.modes = {mode};
   const double speed = units::radPerSecFromRpm(rpm), dt = TWO_PI / speed / steps_per_rev;
-  CuttingMachine machine(model, dt);
+  CuttingMachine machine(model, dt, steadiness);
   const double feed = 2e-4 * 2.0 * speed / TWO_PI;  // large: the tool must not leave the cut
   CuttingMachine::Input input;
   input.motion = motionAt(0.0, speed, feed);
@@ -115,6 +118,15 @@ TEST(CuttingMachine, chattersAboveTheLimitOfTwoAxes) {
   EXPECT_GT(growth(1.03 * 0.0714108e-3, 10000.0, true, 1200), 1.0);
   EXPECT_LT(growth(0.97 * 0.0483482e-3, 6000.0, true, 2000), 1.0);
   EXPECT_GT(growth(1.03 * 0.0483482e-3, 6000.0, true, 2000), 1.0);
+}
+
+TEST(CuttingMachine, steadyFeedChattersAtTheSameLimits) {
+  for (const auto& [rpm, limit] : {std::pair(10000.0, 0.32238e-3), std::pair(5000.0, 0.40863e-3)}) {
+    EXPECT_LT(growth(0.98 * limit, rpm, false, 1200, Feed::steady), 1.0) << rpm;
+    EXPECT_GT(growth(1.02 * limit, rpm, false, 1200, Feed::steady), 1.0) << rpm;
+  }
+  EXPECT_LT(growth(0.98 * 0.0483482e-3, 6000.0, true, 2000, Feed::steady), 1.0);
+  EXPECT_GT(growth(1.02 * 0.0483482e-3, 6000.0, true, 2000, Feed::steady), 1.0);
 }
 
 TEST(CuttingProcess, runoutLetsOneToothOfTwoDoAllTheWork) {

@@ -36,6 +36,8 @@ CuttingMachine::CuttingMachine(const MachineModel& model, double time_step, Feed
     vibrates_ = !model_.tool_tip.x.modes.empty() || !model_.tool_tip.y.modes.empty();
     if (feed == Feed::steady && !vibrates_) {
       rigid_.emplace(*model_.tool, nominal_.law, setup.radius_offset);
+    } else if (feed == Feed::steady) {
+      regenerative_.emplace(*model_.tool, nominal_.law, time_step, setup.radius_offset);
     } else {
       process_.emplace(*model_.tool, nominal_.law, setup.radius_offset);
     }
@@ -70,13 +72,14 @@ ToolMotion CuttingMachine::fed(const ToolMotion& commanded) const {
 }
 
 void CuttingMachine::engage(const std::vector<ContactArc>& arcs, const ToolMotion& now, double rise) {
-  if (!process_ && !rigid_)
+  if (!process_ && !rigid_ && !regenerative_)
     throw Error(model_.file + ": tool or cutting is missing (needed to simulate a cut)");
   if (!feed_start_) feed_start_ = now.centre;
   Input input;
   input.motion = now;
   update(input);
   if (arcs_.empty()) feed_path_ = 0.0;
+  engaged_ = true;
   jump_ = 1.0 - rise;
   arcs_ = arcs;
   std::vector<ContactArc> tilted = arcs;
@@ -85,6 +88,7 @@ void CuttingMachine::engage(const std::vector<ContactArc>& arcs, const ToolMotio
   }
   if (process_) process_->engage(tilted, fed(now));
   if (rigid_) rigid_->engage(tilted, fed(now));
+  if (regenerative_) regenerative_->engage(tilted, fed(now));
 }
 
 void CuttingMachine::resetLoadMeter(double spindle_speed) {
@@ -110,6 +114,7 @@ void CuttingMachine::update(const Input& input) {
   effects_.update(now_, state_);
   if (process_) process_->law() = state_.law;
   if (rigid_) rigid_->setLaw(state_.law);
+  if (regenerative_) regenerative_->setLaw(state_.law);
   if (drive_) drive_->setFriction(state_.friction_extra, state_.friction_factor);
   if (std::abs(state_.sensor_frequency / sensor_frequency_ - 1.0) > SENSOR_TOLERANCE) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -133,6 +138,7 @@ CuttingMachine::Output CuttingMachine::step(const Input& input) {
         depths.push_back(std::max(a.depth + state_.depth_slope * feed_path_, LEAST_DEPTH));
       if (process_) process_->setDepths(depths, fed(input.motion));
       if (rigid_) rigid_->setDepths(depths);
+      if (regenerative_) regenerative_->setDepths(depths);
     }
   }
   --steps_to_update_;
@@ -142,14 +148,14 @@ CuttingMachine::Output CuttingMachine::step(const Input& input) {
   ToolMotion motion = fed(input.motion);
   if (rigid_) {
     out.force = rigid_->at(motion.angle);
-  } else if (process_) {
+  } else if (process_ || regenerative_) {
     // The tip's place needs this step's force and the force needs the place: the force is first taken to go
     // on in a straight line, which errs by the square of the step.
     for (std::size_t axis = 0; axis < 2 && vibrates_; ++axis) {
       const std::array<double, 2>& f = tip_history_[axis];
       motion.displacement[axis] = tip_[axis].peek(2.0 * f[0] - f[1]);
     }
-    out.force = process_->step(motion);
+    out.force = process_ ? process_->step(motion) : regenerative_->at(motion.angle, motion.displacement);
   }
   out.applied = {{out.force.fx + input.sensor_force[0], out.force.fy + input.sensor_force[1],
                   out.force.fz + input.sensor_force[2]}};
@@ -157,9 +163,12 @@ CuttingMachine::Output CuttingMachine::step(const Input& input) {
   const std::array<double, 2> tip{{out.force.fx + input.tip_force[0], out.force.fy + input.tip_force[1]}};
   ChannelValues& channels = out.early;
   for (std::size_t axis = 0; axis < 2; ++axis) {
-    channels[TOOL_X + axis] = tip_[axis].step(tip[axis]);
-    tip_history_[axis] = {{tip[axis], tip_history_[axis][0]}};
+    const double before = tip[axis] - jump_ * ((axis == 0 ? out.force.fx : out.force.fy) - last_cut_[axis]);
+    channels[TOOL_X + axis] = jump_ != 0.0 ? tip_[axis].jump(before, tip[axis]) : tip_[axis].step(before);
+    // A jump does not go on.
+    tip_history_[axis] = {{tip[axis], engaged_ ? tip[axis] : tip_history_[axis][0]}};
   }
+  if (regenerative_) regenerative_->push({{channels[TOOL_X], channels[TOOL_Y]}});
   const std::array<double, 3> cut{{out.force.fx, out.force.fy, out.force.fz}};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const double before = out.applied[axis] - jump_ * (cut[axis] - last_cut_[axis]);
@@ -173,6 +182,7 @@ CuttingMachine::Output CuttingMachine::step(const Input& input) {
     last_torque_ = out.force.torque;
   }
   jump_ = 0.0;
+  engaged_ = false;
   if (effects_.has(Stage::sensor_output)) effects_.measure(Stage::sensor_output, now_, channels);
   for (auto& [channel, line] : delays_) channels[channel] = line.step(channels[channel]);
   ChannelValues shown = channels;

@@ -197,11 +197,17 @@ void CuttingProcess::cut(Slice& slice, int tooth, double before, double angle, c
   const long first = static_cast<long>(std::floor(before / NODE_ANGLE));
   const long last = static_cast<long>(std::floor(angle / NODE_ANGLE)) - 1;
   for (long n = first; n <= last; ++n) {
-    const double share = step > 0.0 ? std::clamp((n * NODE_ANGLE - before) / step, -1.0, 1.0) : 1.0;
+    // At low speed the first node was passed several steps ago: the feed tells where the tool was, the
+    // vibration is known one step back.
+    const double share = step > 0.0 ? std::min((n * NODE_ANGLE - before) / step, 1.0) : 1.0;
+    const double recent = std::max(share, -1.0);
     const auto i = static_cast<std::size_t>(nodeIndex(n));
-    const auto blend = [&](double from, double to) { return from + share * (to - from); };
-    const double x = blend(last_.centre[0] + last_.displacement[0], now.centre[0] + now.displacement[0]);
-    const double y = blend(last_.centre[1] + last_.displacement[1], now.centre[1] + now.displacement[1]);
+    const auto place = [&](std::size_t axis) {
+      const double moved = now.displacement[axis] - last_.displacement[axis];
+      return last_.centre[axis] + share * (now.centre[axis] - last_.centre[axis]) + last_.displacement[axis] +
+             recent * moved;
+    };
+    const double x = place(0), y = place(1);
     slice.surface[i] = std::max(slice.surface[i], radius + x * sin_[i] + y * cos_[i]);
   }
 }

@@ -5,36 +5,17 @@
 #include <utility>
 
 #include "smartmill_core/units.h"
+#include "trigonometry.h"
 
 namespace smartmill::sim {
 namespace {
 
 using units::TWO_PI;
 
-constexpr std::size_t NODES = 2048;  // over a turn: linear between them errs by 1e-6 of the integrand
-constexpr double NODE_ANGLE = TWO_PI / NODES;
+constexpr std::size_t NODES = TURN_NODES;  // linear between them errs by 1e-6 of the integrand
+constexpr double NODE_ANGLE = TURN_NODE_ANGLE;
 constexpr double LEAST_CHIP = 1e-15;  // [m] at the ends of a contact, which still rub
 constexpr double LEAST_LAG = 1e-6;    // [rad] over the depth; below it the edge is straight
-
-double wrapped(double angle) {
-  const double turns = std::floor(angle * (1.0 / TWO_PI));
-  return angle - turns * TWO_PI;
-}
-
-struct Trigonometry {
-  std::vector<double> sine, cosine;
-  Trigonometry() : sine(NODES + 1), cosine(NODES + 1) {
-    for (std::size_t n = 0; n <= NODES; ++n) {
-      sine[n] = std::sin(static_cast<double>(n) * NODE_ANGLE);
-      cosine[n] = std::cos(static_cast<double>(n) * NODE_ANGLE);
-    }
-  }
-};
-
-const Trigonometry& nodes() {
-  static const Trigonometry NODE_TABLE;
-  return NODE_TABLE;
-}
 
 }  // namespace
 
@@ -81,14 +62,14 @@ RigidCut::Row RigidCut::elementary(double chip, double sine, double cosine) cons
 }
 
 void RigidCut::tabulate() {
-  const Trigonometry& trig = nodes();
+  const SineCosine* node = turnTable();
   for (std::size_t j = 0; j < tables_.size(); ++j) {
     std::vector<Row>& table = tables_[j];
     table.resize(NODES + 1);
     table[0] = {};
-    double before = chip(j, trig.sine[0], trig.cosine[0]);
+    double before = chip(j, node[0].sine, node[0].cosine);
     for (std::size_t n = 1; n <= NODES; ++n) {
-      const double after = chip(j, trig.sine[n], trig.cosine[n]);
+      const double after = chip(j, node[n].sine, node[n].cosine);
       table[n] = table[n - 1];
       // Simpson over the part of the cell that is in contact, the chip nearly linear in it.
       double from = 0.0, to = 1.0;
@@ -101,9 +82,7 @@ void RigidCut::tabulate() {
       const double weight = (to - from) * NODE_ANGLE / 6.0;
       for (const double part : {0.0, 0.5, 1.0}) {
         const double share = from + part * (to - from);
-        // Angle between nodes by the chord, which is 3e-7 short.
-        const double s = trig.sine[n - 1] + share * (trig.sine[n] - trig.sine[n - 1]);
-        const double c = trig.cosine[n - 1] + share * (trig.cosine[n] - trig.cosine[n - 1]);
+        const auto [s, c] = sineCosine((static_cast<double>(n - 1) + share) * NODE_ANGLE);
         const Row row = elementary(std::max(chip(j, s, c), LEAST_CHIP), s, c);
         const double w = part == 0.5 ? 4.0 * weight : weight;
         for (std::size_t k = 0; k < row.size(); ++k) table[n][k] += w * row[k];

@@ -11,6 +11,7 @@
 #include "smartmill_sim/effects/delay_line.h"
 #include "smartmill_sim/effects/effect.h"
 #include "smartmill_sim/twin/cutting_process.h"
+#include "smartmill_sim/twin/regenerative_cut.h"
 #include "smartmill_sim/twin/rigid_cut.h"
 #include "smartmill_sim/twin/spindle_drive.h"
 
@@ -51,8 +52,8 @@ class CuttingMachine {
   CuttingMachine(const MachineModel& model, double time_step, Feed feed = Feed::any);
 
   /// Changes where the tool meets material, see CuttingProcess.
-  /// @param rise [1] share of the change in force that comes on linearly over the step that ends now; the rest
-  /// jumps at its end.
+  /// @param rise [1] share of the change in force that comes on linearly over the step that ends now; the
+  /// rest jumps at its end.
   void engage(const std::vector<ContactArc>& arcs, const ToolMotion& now, double rise = 1.0);
   bool cutting() const { return !arcs_.empty(); }
 
@@ -85,7 +86,8 @@ class CuttingMachine {
   Clock clock_;
   int steps_to_update_ = 0;
   std::optional<CuttingProcess> process_;
-  std::optional<RigidCut> rigid_;  // instead of the process
+  std::optional<RigidCut> rigid_;                // instead of the process: steady, no modes
+  std::optional<RegenerativeCut> regenerative_;  // the same: steady, modes
   bool vibrates_ = false;
   std::vector<ContactArc> arcs_;                     // as engaged, without tilt
   double feed_path_ = 0.0;                           // [m] since engagement
@@ -96,9 +98,10 @@ class CuttingMachine {
   std::optional<SpindleDrive> drive_;
   std::vector<std::pair<std::size_t, DelayLine>> delays_;
   std::array<std::array<double, 2>, 2> tip_history_{};  // [N] total force on the tip one and two steps ago
-  std::array<double, 3> last_cut_{{0, 0, 0}};  // [N] force of the cut at the last step
+  std::array<double, 3> last_cut_{{0, 0, 0}};           // [N] force of the cut at the last step
   double last_torque_ = 0.0;
-  double jump_ = 0.0;  // [1] share of the change in force that comes on at once at this step
+  bool engaged_ = false;  // since the last step
+  double jump_ = 0.0;     // [1] share of the change in force that comes on at once at this step
   double sign_;
 };
 

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+
+#include "smartmill_core/units.h"
+
+namespace smartmill::sim {
+
+inline double wrapped(double angle) {
+  return angle - std::floor(angle * (1.0 / units::TWO_PI)) * units::TWO_PI;
+}
+
+struct SineCosine {
+  double sine, cosine;
+};
+
+constexpr std::size_t TURN_NODES = 2048;
+constexpr double TURN_NODE_ANGLE = units::TWO_PI / TURN_NODES;
+
+/// At TURN_NODES + 1 angles over a turn, both ends included.
+const SineCosine* turnTable();
+
+/// Of 0 <= angle <= 4 pi, within 1e-12: third order about the nearest node.
+inline SineCosine sineCosine(double angle) {
+  static const SineCosine* const TABLE = turnTable();
+  const auto node = static_cast<std::size_t>(angle * (1.0 / TURN_NODE_ANGLE) + 0.5);
+  const double d = angle - static_cast<double>(node) * TURN_NODE_ANGLE;
+  const SineCosine& at = TABLE[node & (TURN_NODES - 1)];
+  const double c = 1.0 - 0.5 * d * d, s = d * (1.0 - d * d * (1.0 / 6.0));
+  return {at.sine * c + at.cosine * s, at.cosine * c - at.sine * s};
+}
+
+}  // namespace smartmill::sim
