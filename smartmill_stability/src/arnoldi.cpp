@@ -37,7 +37,7 @@ Complex largest(const Eigen::MatrixXd& h) {
 }  // namespace
 
 Dominant dominantEigenvalue(const std::function<void(const Eigen::VectorXd&, Eigen::VectorXd&)>& map,
-                            Index size, double tolerance, bool with_vector) {
+                            Index size, double tolerance, bool with_vector, Index& expected) {
   constexpr Index FIRST = 6, STEP = 3;
   const Index most = std::min<Index>(size, 150);
   Eigen::MatrixXd basis(size, most + 1), h = Eigen::MatrixXd::Zero(most + 1, most);
@@ -46,8 +46,7 @@ Dominant dominantEigenvalue(const std::function<void(const Eigen::VectorXd&, Eig
   basis.col(0).normalize();
   Eigen::VectorXd in(size), out(size), share;
   Complex value = 0.0;
-  int settled = 0;
-  Index k = 0;
+  Index k = 0, check = std::max(FIRST, expected - 2 * STEP);
   while (k < most) {
     in = basis.col(k);
     map(in, out);
@@ -65,13 +64,15 @@ Dominant dominantEigenvalue(const std::function<void(const Eigen::VectorXd&, Eig
       h(k, k - 1) = rest;
       basis.col(k) = out / rest;
     }
-    if (exhausted || (k >= FIRST && (k - FIRST) % STEP == 0)) {
+    if (exhausted || (k == check)) {
       const Complex found = largest(h.topLeftCorner(k, k));
-      settled = std::abs(found - value) <= tolerance * std::abs(found) ? settled + 1 : 0;
+      const bool settled = std::abs(found - value) <= tolerance * std::abs(found);
       value = found;
-      if (exhausted || settled >= 1) break;
+      if (exhausted || settled) break;
+      check = k + STEP;
     }
   }
+  expected = k;
   Dominant result{value, {}};
   if (with_vector) {
     // Inverse iteration on the small matrix.

@@ -170,6 +170,7 @@ class Shapes {
   Axes axes;
   std::shared_ptr<const Reference> reference;
   bool with_velocity;
+  Index expected = 0;  ///< applications that the last eigenvalue took
 
  private:
   std::vector<std::shared_ptr<const Shape>> known_;
@@ -183,7 +184,8 @@ class PeriodMap {
         n_(shapes.reference->n),
         m2_(2 * static_cast<Index>(system.modes.size())),
         reference_(*shapes.reference),
-        period_(system.period) {
+        period_(system.period),
+        shapes_(shapes) {
     mesh(system, shapes);
     for (Element& element : elements_) fill(system, shapes, element);
     size_ = m2_;
@@ -201,7 +203,7 @@ class PeriodMap {
 
   Dominant dominant(bool with_vector) {
     return dominantEigenvalue([this](const VectorXd& in, VectorXd& out) { apply(in, out); }, size_,
-                              EIGENVALUE_TOLERANCE, with_vector);
+                              EIGENVALUE_TOLERANCE, with_vector, shapes_.expected);
   }
 
   /// [Hz] of the strongest Fourier component of the motion that starts with a mode of the map.
@@ -394,6 +396,7 @@ class PeriodMap {
   Index d_, n_, m2_, size_ = 0;
   const Reference& reference_;
   double period_;
+  Shapes& shapes_;
   std::vector<Element> elements_;
   std::vector<VectorXd> motion_;
   VectorXd state_, next_, force_;

@@ -1,7 +1,8 @@
-// rosrun smartmill_stability lobes MODEL --entry-deg A --exit-deg B --speeds LO:HI:N --max-depth-mm D -o
-// chart.csv
+// rosrun smartmill_stability lobes MODEL --entry-deg A --exit-deg B --method M --speeds LO:HI:N
+// --max-depth-mm D -o chart.csv
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
@@ -15,15 +16,17 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/units.h"
-#include "smartmill_stability/zero_order.h"
+#include "smartmill_stability/boundary.h"
+#include "smartmill_stability/solver.h"
 
 namespace {
 
 using namespace smartmill;
 
 struct Request {
-  std::string model, method = "zero_order", speeds, out;
+  std::string model, method = "collocation", speeds, out, boundary;
   double entry_deg = 0.0, exit_deg = 180.0, max_depth_mm = 0.0;
+  bool errors = false;
 };
 
 std::vector<double> speedsOf(const std::string& text) {
@@ -41,72 +44,145 @@ std::vector<double> speedsOf(const std::string& text) {
   return speeds;
 }
 
-void draw(const std::string& csv, double max_depth_mm) {
-  stability::drawBeside(
-      csv, "set xlabel 'Spindle speed [rpm]'\nset ylabel 'Axial depth [mm]'\nset yrange [0:" +
-               std::to_string(max_depth_mm) +
-               "]\nplot %FILE skip 1 using 1:2 with lines lw 2 title 'zero-order stability limit'");
+std::string axes(double max_depth_mm) {
+  return "set xlabel 'Spindle speed [rpm]'\nset ylabel 'Axial depth [mm]'\nset yrange [0:" +
+         std::to_string(max_depth_mm) + "]\n";
+}
+
+stability::RegenerativeSystem systemOf(const MachineModel& model, const Request& request) {
+  const ToolGeometry& tool = model.needTool("predict stability");
+  const CuttingCoefficients& cutting = model.needCutting("predict stability");
+  stability::RegenerativeSystem system;
+  system.modes = stability::systemModes(model.tool_tip.x, model.tool_tip.y);
+  if (system.modes.empty())
+    throw Error(request.model + ": tool_tip is missing (needed to predict stability)");
+  system.teeth = tool.teeth;
+  system.pitch = tool.pitch;
+  system.helix = tool.helix;
+  system.diameter = tool.diameter;
+  system.entry = units::radFromDeg(request.entry_deg);
+  system.exit = units::radFromDeg(request.exit_deg);
+  system.kt = cutting.ktc;
+  system.kr = cutting.krc;
+  return system;
+}
+
+/// [s] a limit may take before progress is shown.
+constexpr double QUIET = 1.0;
+
+std::vector<stability::Limit> limitsOf(const stability::StabilitySolver& solver,
+                                       const std::vector<double>& speeds, double max_depth) {
+  // In pieces that overlap by one speed, so that neighbours are compared across them.
+  constexpr std::size_t PIECE = 25;
+  const auto begin = std::chrono::steady_clock::now();
+  std::vector<stability::Limit> limits;
+  bool shown = false;
+  for (std::size_t i = 0; i < speeds.size(); i += PIECE) {
+    const std::size_t from = i > 0 ? i - 1 : 0, to = std::min(i + PIECE + 1, speeds.size());
+    const std::vector<double> part(speeds.begin() + static_cast<std::ptrdiff_t>(from),
+                                   speeds.begin() + static_cast<std::ptrdiff_t>(to));
+    const std::vector<stability::Limit> found = solver.limits(part, max_depth);
+    for (std::size_t k = i; k < std::min(i + PIECE, speeds.size()); ++k) limits.push_back(found[k - from]);
+    const std::chrono::duration<double> passed = std::chrono::steady_clock::now() - begin;
+    if (passed.count() > QUIET || shown) {
+      std::fprintf(stderr, "\r%3zu %% of the speeds", 100 * limits.size() / speeds.size());
+      shown = true;
+    }
+  }
+  if (shown) std::fprintf(stderr, "\n");
+  return limits;
+}
+
+void traceAll(const Request& request, const stability::FloquetSolver& solver,
+              const std::vector<double>& speeds) {
+  if (speeds.size() < 2) throw Error("--boundary: a range of speeds is due");
+  stability::TraceOptions options;
+  options.speed_low = speeds.front();
+  options.speed_high = speeds.back();
+  options.max_depth = request.max_depth_mm * units::MM;
+  const auto curves = stability::traceBoundary(solver, options);
+  std::ofstream csv(request.boundary);
+  csv.precision(8);
+  csv << "curve,rpm,depth_mm,chatter_hz,kind\n";
+  for (std::size_t c = 0; c < curves.size(); ++c) {
+    // A blank line parts the curves for gnuplot.
+    if (c > 0) csv << "\n";
+    for (const stability::BoundaryPoint& p : curves[c].points)
+      csv << c << ',' << units::rpmFromRadPerSec(p.speed) << ',' << p.depth / units::MM << ',' << p.frequency
+          << ',' << nameOf(p.kind) << '\n';
+  }
+  csv.close();
+  if (!csv) throw Error(request.boundary + ": cannot be written");
+  stability::drawBeside(request.boundary,
+                        axes(request.max_depth_mm) +
+                            "plot %FILE skip 1 using 2:3 with lines lw 2 title 'boundary', "
+                            "%FILE skip 1 using 2:(strcol(5) eq 'flip' ? $3 : NaN) with points "
+                            "pt 7 ps 0.4 title 'flip'");
+  std::size_t islands = 0;
+  for (const auto& curve : curves) islands += curve.closed;
+  std::printf("%zu boundary curves, %zu of them islands\n", curves.size(), islands);
 }
 
 void run(const Request& request) {
-  if (request.method != "zero_order") throw Error("--method " + request.method + ": zero_order is due");
+  const stability::Method method = stability::methodOf(request.method);
   if (!(request.max_depth_mm > 0.0)) throw Error("--max-depth-mm: above 0 is due");
   const std::vector<double> speeds = speedsOf(request.speeds);
-  const MachineModel model = readMachineModel(request.model);
-  const ToolGeometry& tool = model.needTool("predict stability");
-  const CuttingCoefficients& cutting = model.needCutting("predict stability");
-  double highest = 0.0;
-  for (const ModalModel* axis : {&model.tool_tip.x, &model.tool_tip.y}) {
-    for (const Mode& mode : axis->modes) highest = std::max(highest, mode.frequency);
-  }
-  if (highest == 0.0) throw Error(request.model + ": tool_tip is missing (needed to predict stability)");
-  stability::RegenerativeProcess process;
-  process.teeth = tool.teeth;
-  process.entry = units::radFromDeg(request.entry_deg);
-  process.exit = units::radFromDeg(request.exit_deg);
-  process.kt = cutting.ktc;
-  process.kr = cutting.krc / cutting.ktc;
-  constexpr std::size_t LINES = 40000;
-  // Beyond three times the highest mode the receptance is a small, real, negative mass line.
-  const auto response = stability::responseOf(model.tool_tip.x, model.tool_tip.y, 1.0, 3.0 * highest, LINES);
-  const stability::StabilityLimit limit = stability::zeroOrderLimit(process, response, speeds);
+  const stability::RegenerativeSystem system = systemOf(readMachineModel(request.model), request);
+  stability::SolverOptions options;
+  options.estimate_error = request.errors;
+  const auto solver = stability::makeSolver(method, system, options);
+  const double max_depth = request.max_depth_mm * units::MM;
+  const std::vector<stability::Limit> limits = limitsOf(*solver, speeds, max_depth);
 
   std::ofstream csv(request.out);
   csv.precision(8);
   csv << "rpm,limit_mm,chatter_hz,kind\n";
+  double least = max_depth, error = 0.0;
   for (std::size_t i = 0; i < speeds.size(); ++i) {
     csv << units::rpmFromRadPerSec(speeds[i]) << ',';
-    if (limit.depth[i] / units::MM <= request.max_depth_mm) {
-      csv << limit.depth[i] / units::MM << ',' << limit.chatter_frequency[i] << ",hopf\n";
+    const stability::Limit& limit = limits[i];
+    if (std::isfinite(limit.depth)) {
+      csv << limit.depth / units::MM << ',' << limit.frequency << ',' << nameOf(limit.kind) << '\n';
+      least = std::min(least, limit.depth);
+      if (std::isfinite(limit.error)) error = std::max(error, limit.error / limit.depth);
     } else {
       csv << ",,\n";
     }
   }
   csv.close();
   if (!csv) throw Error(request.out + ": cannot be written");
-  draw(request.out, request.max_depth_mm);
-  const double absolute = stability::absoluteDepthLimit(process, response);
-  if (std::isfinite(absolute)) {
-    std::printf("stable at every speed below %.4f mm (zero-order)\n", absolute / units::MM);
-  } else {
-    std::printf("stable at every depth (zero-order)\n");
-  }
+  stability::drawBeside(
+      request.out, axes(request.max_depth_mm) +
+                       "plot %FILE skip 1 using 1:2 with lines lw 2 title 'first loss of stability (" +
+                       std::string(nameOf(method)) +
+                       ")', %FILE skip 1 using 1:(strcol(4) eq 'flip' ? $2 : NaN) with points pt 7 ps 0.4 "
+                       "title 'flip'");
+  std::printf("stable at every one of these speeds below %.4f mm (%s)\n", least / units::MM, nameOf(method));
+  if (request.errors) std::printf("largest estimated error of a limit %.2g %%\n", 100.0 * error);
+  if (!request.boundary.empty())
+    traceAll(request, *stability::makeFloquetSolver(method, system, options), speeds);
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
   Request request;
-  CLI::App app{"Stability lobes of a machine model: the first loss of stability over spindle speed."};
+  CLI::App app{
+      "Stability lobes of a machine model: the first loss of stability when the depth grows, over spindle "
+      "speed."};
   app.add_option("model", request.model, "machine model file with tool, cutting and tool_tip")->required();
   app.add_option("--entry-deg", request.entry_deg, "immersion angle at which a tooth enters [deg]")
       ->required();
   app.add_option("--exit-deg", request.exit_deg, "immersion angle at which a tooth leaves [deg]")->required();
-  app.add_option("--method", request.method, "solver: zero_order");
+  app.add_option("--method", request.method,
+                 "solver: collocation (default), semi_discretization, multi_frequency, zero_order");
   app.add_option("--speeds", request.speeds, "LO:HI:N [rpm]")->required();
   app.add_option("--max-depth-mm", request.max_depth_mm, "depths up to here [mm]")->required();
   app.add_option("-o,--out", request.out, "CSV file; a picture of the same name with .png stands beside it")
       ->required();
+  app.add_option("--boundary", request.boundary,
+                 "CSV of the whole boundary with its islands, besides the first loss; a picture beside it");
+  app.add_flag("--errors", request.errors, "estimate the error of each limit by a refined solution");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

@@ -128,8 +128,9 @@ class StepMap {
   }
 
   Dominant dominant(bool with_vector) {
+    Index expected = 0;
     return dominantEigenvalue([this](const VectorXd& in, VectorXd& out) { march(in, out, nullptr); },
-                              m2_ + d_ * ring_, EIGENVALUE_TOLERANCE, with_vector);
+                              m2_ + d_ * ring_, EIGENVALUE_TOLERANCE, with_vector, expected);
   }
 
   double strongest(const Dominant& mode, double highest) {

@@ -172,19 +172,27 @@ FloquetSolver::FloquetSolver(const RegenerativeSystem& system, const SolverOptio
   system_.validate();
   if (system_.modes.empty())
     throw Error("stability: this method needs modes of the tool tip, there are none");
-  // Below Merritt's minimum for the whole cutting coefficient nothing can chatter (one mode); a cut that is
-  // interrupted bears more on the mean.
-  double compliance = 0.0;
+  // Below Merritt's minimum for the whole cutting coefficient nothing can chatter (one mode); the mean over
+  // an interrupted cut bears more.
+  double compliance = 0.0, highest = 0.0;
   for (const SystemMode& mode : system_.modes) {
     const double w = units::TWO_PI * mode.frequency;
+    highest = std::max(highest, mode.frequency);
     compliance = std::max(compliance, std::hypot(mode.input[0], mode.input[1]) *
                                           std::hypot(mode.output[0], mode.output[1]) /
                                           (2.0 * mode.damping_ratio * w * w));
   }
-  double share = 1.0;
-  if (system_.cut == Cut::milling)
-    share = std::max(1e-3, system_.teeth * (system_.exit - system_.entry) / units::TWO_PI);
-  depth_scale_ = 1.0 / (std::hypot(system_.kt, system_.kr) * compliance * share);
+  depth_scale_ = 0.5 / (std::hypot(system_.kt, system_.kr) * compliance);
+  if (system_.cut == Cut::milling && system_.kt > 0.0) {
+    constexpr std::size_t LINES = 200;
+    const RegenerativeProcess mean{system_.teeth, system_.entry, std::min(system_.exit, units::TWO_PI),
+                                   system_.kt, system_.kr / system_.kt};
+    const double least = system_.exit <= units::TWO_PI
+                             ? absoluteDepthLimit(mean, responseOf(system_.modes, 1.0, 2.0 * highest, LINES))
+                             : depth_scale_;
+    constexpr double SHARE = 0.4;
+    if (std::isfinite(least)) depth_scale_ = std::max(depth_scale_, SHARE * least);
+  }
 }
 
 CharacteristicMultiplier FloquetSolver::multiplier(double speed, double depth) const {
@@ -195,18 +203,48 @@ Limit FloquetSolver::limit(double speed, double max_depth) const {
   if (!(max_depth > 0.0)) throw Error("stability: the largest depth must be above 0");
   const std::unique_ptr<AtSpeed> here = at(speed);
   Search search(*here, options_.tolerance);
+  const double depth = search.first(depth_scale_, max_depth);
+  return std::isfinite(depth) ? describe(*here, speed, depth, search.slope()) : Limit();
+}
+
+Limit FloquetSolver::describe(AtSpeed& here, double speed, double depth, double slope) const {
   Limit limit;
-  limit.depth = search.first(0.5 * depth_scale_, max_depth);
-  if (!std::isfinite(limit.depth)) return limit;
+  limit.depth = depth;
   // Just above, the multiplier that leaves the circle is the dominant one.
-  const double above = limit.depth * (1.0 + 10.0 * options_.tolerance);
-  limit.kind = here->multiplier(above).kind();
-  limit.frequency = here->chatterFrequency(above);
-  if (options_.estimate_error) {
-    const double radius = refined()->at(speed)->multiplier(limit.depth).radius();
-    limit.error = std::abs(std::log(radius) / search.slope());
-  }
+  const double above = depth * (1.0 + 10.0 * options_.tolerance);
+  limit.kind = here.multiplier(above).kind();
+  limit.frequency = here.chatterFrequency(above);
+  if (options_.estimate_error)
+    limit.error = std::abs(std::log(refined()->at(speed)->multiplier(depth).radius()) / slope);
   return limit;
+}
+
+std::vector<Limit> FloquetSolver::limits(const std::vector<double>& speeds, double max_depth) const {
+  std::vector<Limit> found = StabilitySolver::limits(speeds, max_depth);
+  // A lens of instability that the search stepped over at one speed lies near the limit of its neighbour.
+  const std::vector<Limit> before = found;
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    for (const std::size_t j : {i - 1, i + 1}) {
+      constexpr double JUMP = 1.15;
+      if (j >= found.size() || !(before[i].depth > JUMP * before[j].depth)) continue;
+      const std::unique_ptr<AtSpeed> here = at(speeds[i]);
+      double stable = 0.9 * before[j].depth;
+      if (here->multiplier(stable).radius() > 1.0) continue;
+      for (const double share : {0.97, 1.0, 1.03, 1.08}) {
+        const double depth = share * before[j].depth;
+        if (depth >= found[i].depth) break;
+        if (here->multiplier(depth).radius() > 1.0) {
+          Search search(*here, options_.tolerance);
+          const double limit =
+              search.root({stable, search.logRadius(stable)}, {depth, search.logRadius(depth)});
+          found[i] = describe(*here, speeds[i], limit, search.slope());
+          break;
+        }
+        stable = depth;
+      }
+    }
+  }
+  return found;
 }
 
 std::unique_ptr<FloquetSolver> makeFloquetSolver(Method method, const RegenerativeSystem& system,

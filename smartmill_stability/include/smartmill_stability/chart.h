@@ -24,11 +24,11 @@ struct ChartParameters {
   int speeds = 1500;                ///< [1] 2..100000
   double frequency_low = 50.0;      ///< [Hz] >= 0, lines of measured FRFs below say little and are left out
   double frequency_high = 10000.0;  ///< [Hz] > frequency_low
-  double line_error = 0.05;  ///< [1] > 0, lines with a standard deviation above this share of the FRF's peak
-                             ///< are left out: the hammer's spectrum has zeros
-  bool use_modes = false;         ///< fitted modes instead of the measured FRFs
-  double max_depth = 0.02;        ///< [m] > 0, no deeper cut is recommended or proposed
-  double depth_margin = 0.2;      ///< [1] 0 <= value < 1, recommended depths stay this share below the limit
+  double line_error = 0.05;   ///< [1] > 0, lines with a standard deviation above this share of the FRF's peak
+                              ///< are left out: the hammer's spectrum has zeros
+  bool use_modes = false;     ///< fitted modes instead of the measured FRFs
+  double max_depth = 0.02;    ///< [m] > 0, no deeper cut is recommended or proposed
+  double depth_margin = 0.2;  ///< [1] 0 <= value < 1, recommended depths stay this share below the limit
   double speed_margin = 0.01;     ///< [1] 0 <= value < 0.2, and below it for speeds this much off
   double load_share = 0.9;        ///< [1] 0 < value <= 1, of the spindle's torque and power that is used
   int recommended = 5;            ///< [1] 0..100 points

@@ -137,11 +137,14 @@ class FloquetSolver : public StabilitySolver {
   /// @param speed [rad/s], depth [m] >= 0
   CharacteristicMultiplier multiplier(double speed, double depth) const;
   Limit limit(double speed, double max_depth) const override;
+  /// Looks again where a neighbour's limit is much lower.
+  std::vector<Limit> limits(const std::vector<double>& speeds, double max_depth) const override;
 
  protected:
   FloquetSolver(const RegenerativeSystem& system, const SolverOptions& options);
   RegenerativeSystem system_;
   SolverOptions options_;
+  Limit describe(AtSpeed& here, double speed, double depth, double slope) const;
   double depth_scale_ = 0.0;  // [m] where a search from zero begins to look closely
 };
 
