@@ -16,6 +16,7 @@
 
 #include "report_pictures.h"
 #include "session_bag.h"
+#include "shell.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/units.h"
@@ -25,12 +26,6 @@ namespace {
 using namespace smartmill;
 using namespace smartmill::report;
 namespace fs = std::filesystem;
-
-std::string shellQuoted(const std::string& word) {
-  std::string text = "'";
-  for (const char c : word) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
-  return text + "'";
-}
 
 /// The limit of the true machine, by the tool that makes charts of models.
 class TrueLimit {

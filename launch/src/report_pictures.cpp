@@ -61,8 +61,10 @@ std::string number(double value) {
   return text;
 }
 
+/// -270..90: a receptance's phase goes from 0 to -180 and must not jump there.
 double degrees(const std::complex<double>& value) {
-  return units::degFromRad(std::arg(value));
+  const double phase = units::degFromRad(std::arg(value));
+  return phase > 90.0 ? phase - 360.0 : phase;
 }
 
 bool drawFrf(const SessionRecording& recording, const std::filesystem::path& folder) {
@@ -105,8 +107,9 @@ bool drawFrf(const SessionRecording& recording, const std::filesystem::path& fol
   };
   for (const Part& part :
        {Part{"magnitude [um/N]", "set logscale y\nset format y '10^{%T}'\nset autoscale y", 2, true},
-        Part{"phase [deg]", "unset logscale y\nset format y '%g'\nset yrange [-190:190]", 3, true},
-        Part{"coherence [1]", "unset logscale y\nset yrange [0:1.05]", 4, false}}) {
+        Part{"phase [deg]", "unset logscale y\nset format y '%g'\nset yrange [-270:90]\nset ytics 90", 3,
+             true},
+        Part{"coherence [1]", "unset logscale y\nset yrange [0:1.05]\nset ytics 0.2", 4, false}}) {
     commands += std::string(part.settings) + "\nset ylabel '" + part.label + "'\n";
     for (std::size_t i = 0; i < files.size(); ++i) {
       commands += part.column == 2 ? "set title 'tool tip, " + measured[i]->direction + "'\n" : "set title\n";

@@ -134,25 +134,23 @@ double nonperiodicShare(const std::vector<double>& values, double samples_a_revo
 std::vector<Pocket> pockets(const std::vector<double>& speeds, const std::vector<double>& depths,
                             double factor, double ceiling) {
   if (speeds.size() != depths.size()) throw Error("a chart with unequal numbers of speeds and depths");
+  constexpr double TOP = 0.9;  // [1] of the highest depth belongs to the pocket's top
+  const auto depth = [&](std::size_t i) { return std::min(depths[i], ceiling); };
   std::vector<Pocket> found;
   bool rising = false;  // the chart's begin is no pocket
-  double extreme = depths.empty() ? 0.0 : std::min(depths[0], ceiling);
-  std::size_t first = 0, last = 0;  // where the extreme is held
+  std::size_t extreme = 0;
   for (std::size_t i = 1; i < depths.size(); ++i) {
-    const double depth = std::min(depths[i], ceiling);
-    if (depth == extreme && last + 1 == i) last = i;
-    if (rising ? depth > extreme : depth < extreme) {
-      extreme = depth;
-      first = last = i;
+    if (rising ? depth(i) > depth(extreme) : depth(i) < depth(extreme)) extreme = i;
+    const bool turned = rising ? depth(i) * factor < depth(extreme) : depth(i) > depth(extreme) * factor;
+    if (!turned) continue;
+    if (rising) {
+      std::size_t low = extreme, high = extreme;
+      while (low > 0 && depth(low - 1) >= TOP * depth(extreme)) --low;
+      while (depth(high + 1) >= TOP * depth(extreme)) ++high;
+      found.push_back({0.5 * (speeds[low] + speeds[high]), depth(extreme)});
     }
-    if (rising && depth * factor < extreme) {
-      found.push_back({0.5 * (speeds[first] + speeds[last]), extreme});
-    }
-    if (rising ? depth * factor < extreme : depth > extreme * factor) {
-      rising = !rising;
-      extreme = depth;
-      first = last = i;
-    }
+    rising = !rising;
+    extreme = i;
   }
   return found;
 }

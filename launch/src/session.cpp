@@ -119,6 +119,7 @@ int Session::run() {
   int code = 1;
   try {
     job();
+    summary_.completed = true;
     code = 0;
   } catch (const Interrupted&) {
     say("stop", "interrupted", armed_ ? "goals cancelled, motion is being disarmed" : "goals cancelled");
@@ -161,13 +162,15 @@ void Session::job() {
     step("slot test " + slot.condition.name, [&] { return runCut(slot); });
   }
   step("cutting coefficients", [&] { return identify(false); });
-  step("stability chart", [&] { return waitChart(); });
-  step("points to verify", [&] { return choose(); });
-  const double feed = used_chart_.feed_per_tooth;
-  step("cut at the recommended point",
-       [&] { return verify("stable", plan_.stable(stable_, feed), CutVerdict::Kind::stable); });
-  step("cut at the unstable point",
-       [&] { return verify("unstable", plan_.unstable(unstable_, feed), CutVerdict::Kind::chatter); });
+  if (parameters_.verify) {
+    step("stability chart", [&] { return waitChart(); });
+    step("points to verify", [&] { return choose(); });
+    const double feed = used_chart_.feed_per_tooth;
+    step("cut at the recommended point",
+         [&] { return verify("stable", plan_.stable(stable_, feed), CutVerdict::Kind::stable); });
+    step("cut at the unstable point",
+         [&] { return verify("unstable", plan_.unstable(unstable_, feed), CutVerdict::Kind::chatter); });
+  }
   if (plan_.resonance()) {
     step("cut at the sensor's resonance", [&] { return runCut(*plan_.resonance()); });
   }

@@ -42,7 +42,7 @@ class Gatherer {
     const auto force = [&](const char* topic, ForceTrack RecordedCut::*track) {
       bag.on<smartmill_msgs::ForceBlock>(topic, [this, track](const auto& m, double) {
         RecordedCut* cut = cutAt(m.header.stamp.toSec());
-        if (cut && looksAt(*cut)) (cut->*track).add(fromMsg(m));
+        if (cut) (cut->*track).add(fromMsg(m));
       });
     };
     force("force/measured", &RecordedCut::raw);
@@ -104,10 +104,6 @@ class Gatherer {
       if (cut->condition.stamp <= stamp) return stamp < cut->ends || std::isnan(cut->ends) ? &*cut : nullptr;
     }
     return nullptr;
-  }
-
-  static bool looksAt(const RecordedCut& cut) {
-    return cut.condition.name == "resonance" || cut.condition.name.rfind("verify_", 0) == 0;
   }
 
   SessionRecording& recording_;

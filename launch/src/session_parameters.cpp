@@ -23,6 +23,10 @@ void within(const char* key, double value, double low, double high) {
 void SessionParameters::validate() const {
   plan.validate();
   if (model.empty()) throw Error("model: the path of a smartmill-model/1 file is due");
+  if (verify && tool_directions.size() < 2) {
+    throw Error("verify: a chart needs the tool's FRF in x and y, tool_directions is '" + tool_directions +
+                "'");
+  }
   directions("tool_directions", tool_directions, "xy");
   directions("sensor_directions", sensor_directions, "xyz");
   within("hits", hits, 1, 1000);
@@ -70,6 +74,7 @@ SessionParameters readParameters(ParameterReader& reader) {
   reader.read("modes", parameters.modes);
   reader.read("sensor_hits", parameters.sensor_hits);
   reader.read("sensor_modes", parameters.sensor_modes);
+  reader.read("verify", parameters.verify);
   reader.read("start_delay", parameters.start_delay);
   reader.read("ready_timeout", parameters.ready_timeout);
   reader.read("frf_timeout", parameters.frf_timeout);

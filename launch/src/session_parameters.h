@@ -18,6 +18,7 @@ struct SessionParameters {
   int modes = 0;                          ///< [1] 0..20 of the tool; 0: chosen by evidence
   int sensor_hits = 10;                   ///< [1] 1..1000
   int sensor_modes = 0;                   ///< [1] 0..20
+  bool verify = true;                     ///< wait for the chart and check it with two cuts
   double start_delay = 2.0;               ///< [s] >= 0 before the first goal: a recorder finds the topics
   double ready_timeout = 30.0;            ///< [s] > 0 for nodes and sensors to be there
   double frf_timeout = 300.0;             ///< [s] > 0 of one direction

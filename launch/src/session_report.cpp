@@ -17,6 +17,7 @@ using session::CutVerdict;
 // and how far off the raw force is where compensation is needed.
 constexpr double KTC_TARGET = 3.0, FREQUENCY_TARGET = 0.5, STIFFNESS_TARGET = 5.0, POCKET_TARGET = 1.0;
 constexpr double RANGE_TARGET = 5.0, RAW_TARGET = 30.0;
+constexpr double LEAST_RANGE = 0.2;      // [1] of the largest axis: axes with less carry no target
 constexpr double POCKET_FACTOR = 1.3;    // [1] over the valleys beside it
 constexpr double POCKET_CEILING = 20.0;  // [1] of the absolute limit
 constexpr int MOST_POCKETS = 4;
@@ -113,11 +114,15 @@ Section modeSection(const SessionRecording& recording, const std::string& point)
 /// Length of measured minus true over that of true, on the measured lines in the band.
 std::string frfNote(const MeasuredFrf& measured, const MeasuredFrf* truth) {
   constexpr double LOW = 200.0, HIGH = 3500.0;  // [Hz] band of the hammer's fits
+  constexpr double COHERENT = 0.9;              // [1] lines below say more about noise than about the tool
   const FrequencyResponse band = measured.frf.band(LOW, HIGH);
   double error = 0.0, all = 0.0;
   std::vector<double> coherence;
   for (std::size_t i = 0; i < band.size(); ++i) {
-    if (i < band.coherence.size() && std::isfinite(band.coherence[i])) coherence.push_back(band.coherence[i]);
+    if (i < band.coherence.size() && std::isfinite(band.coherence[i])) {
+      coherence.push_back(band.coherence[i]);
+      if (band.coherence[i] < COHERENT) continue;
+    }
     if (!truth || band.frequency[i] < truth->frf.frequency.front() ||
         band.frequency[i] > truth->frf.frequency.back()) {
       continue;
@@ -129,7 +134,9 @@ std::string frfNote(const MeasuredFrf& measured, const MeasuredFrf* truth) {
   std::string note = "FRF of the tool in " + measured.direction + shown(", %.0f..%.0f Hz: ", LOW, HIGH) +
                      std::to_string(measured.frf.averages) + " hits";
   if (!coherence.empty()) note += shown(", median coherence %.4f", median(coherence));
-  if (all > 0.0) note += shown(", measured minus true is %.2f %% of true", 100.0 * std::sqrt(error / all));
+  if (all > 0.0)
+    note += shown(", measured minus true is %.2f %% of true where the coherence exceeds 0.9",
+                  100.0 * std::sqrt(error / all));
   return note;
 }
 
@@ -185,24 +192,23 @@ Section forceSection(const RecordedCut& cut, std::vector<std::string>& notes) {
     notes.push_back("cut " + cut.condition.name + ": no steady samples with settled compensation");
     return section;
   }
-  std::size_t worst = 0;
-  std::vector<Figure> raws, compensated;
+  std::array<double, 3> truth;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    truth[axis] = cut.truth.empty() ? NOT_A_NUMBER : middleRange(cut.truth.axis(axis, from, to));
+  }
+  const double largest = *std::max_element(truth.begin(), truth.end());
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const std::string name = std::string(1, AXES[axis]);
-    const double truth = cut.truth.empty() ? NOT_A_NUMBER : middleRange(cut.truth.axis(axis, from, to));
-    raws.push_back({name + " raw", "N", middleRange(cut.raw.axis(axis, from, to)), NOT_A_NUMBER, truth, {}});
-    compensated.push_back({name + " compensated",
-                           "N",
-                           middleRange(cut.compensated.axis(axis, from, to)),
-                           NOT_A_NUMBER,
-                           truth,
-                           {RANGE_TARGET, false}});
-    if (std::abs(raws[axis].percent()) > std::abs(raws[worst].percent())) worst = axis;
-  }
-  raws[worst].target = {RAW_TARGET, true};
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    section.figures.push_back(raws[axis]);
-    section.figures.push_back(compensated[axis]);
+    Figure raw{name + " raw", "N", middleRange(cut.raw.axis(axis, from, to)), NOT_A_NUMBER, truth[axis], {}};
+    Figure compensated{name + " compensated", "N",         middleRange(cut.compensated.axis(axis, from, to)),
+                       NOT_A_NUMBER,          truth[axis], {}};
+    // Where hardly any force acts the range is that of the sensor's noise.
+    if (truth[axis] >= LEAST_RANGE * largest) {
+      compensated.target = {RANGE_TARGET, false};
+      raw.target = {RAW_TARGET, true};
+    }
+    section.figures.push_back(raw);
+    section.figures.push_back(compensated);
   }
   const double revolutions = static_cast<double>(to - from) / cut.compensated.sampleRate() *
                              cut.condition.spindle_speed / units::TWO_PI;

@@ -51,6 +51,7 @@ const char* wordOf(CutVerdict::Kind kind) {
 
 void SessionSummary::write(const std::string& file) const {
   Json json;
+  json["completed"] = completed;
   json["tool"] = tool;
   json["material"] = material;
   json["steps"] = Json::array();

@@ -22,6 +22,7 @@ struct SessionSummary {
     CutVerdict verdict;
     bool as_predicted = false;
   };
+  bool completed = false;  ///< every step was done
   std::string tool, material;
   std::vector<Step> steps;
   std::vector<MeasuredModes> modes;

@@ -172,6 +172,13 @@ TEST(Pockets, AnInfinitePlateauIsTakenAtItsMiddle) {
   EXPECT_DOUBLE_EQ(found[0].depth, 10.0);
 }
 
+TEST(Pockets, OnAPlateauTheHighestPointDoesNotDecide) {
+  std::vector<double> left{1, 1, 3.0, 2.9, 2.9, 2.9, 1, 1}, right{1, 1, 2.9, 2.9, 2.9, 3.0, 1, 1};
+  const std::vector<double> speeds{1, 2, 3, 4, 5, 6, 7, 8};
+  EXPECT_DOUBLE_EQ(pockets(speeds, left, 1.5, 10.0).at(0).spindle_speed, 4.5);
+  EXPECT_DOUBLE_EQ(pockets(speeds, right, 1.5, 10.0).at(0).spindle_speed, 4.5);
+}
+
 TEST(Interpolate, LinearInsideNaNOutside) {
   EXPECT_DOUBLE_EQ(interpolate({1.0, 3.0}, {10.0, 20.0}, 2.5), 17.5);
   EXPECT_DOUBLE_EQ(interpolate({1.0, 3.0}, {10.0, 20.0}, 1.0), 10.0);

@@ -29,7 +29,7 @@ struct RecordedCut {
   double steady_from = NOT_A_NUMBER,
          steady_to = NOT_A_NUMBER;  ///< [s] at speed on the steady path; NaN: never
   std::vector<session::ChatterWindow> windows;
-  ForceTrack raw, compensated, truth;  ///< of the cuts that are looked at
+  ForceTrack raw, compensated, truth;  ///< while it ran
 };
 
 /// Everything that the report needs of a recorded session.

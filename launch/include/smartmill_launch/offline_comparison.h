@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+namespace smartmill::report {
+
+/// Numbers that an offline tool wrote: a CSV with one line of column names.
+struct NumberTable {
+  std::vector<std::string> names;
+  std::vector<std::vector<double>> columns;  ///< NaN: an empty cell or "nan"
+
+  /// By the name's begin up to a bracket or the end: "fx" finds "fx[N]". @throws Error naming the column.
+  const std::vector<double>& column(const std::string& name) const;
+};
+
+/// @throws Error naming file and line.
+NumberTable readNumberTable(const std::string& file);
+
+/// How far the numbers of two sources part.
+struct Agreement {
+  std::size_t compared = 0;
+  std::size_t missing = 0;  ///< numbers that only one of them has
+  double largest = 0.0;     ///< [1] largest difference over the largest number of its series
+  /// @param tolerance [1] half a unit of the last digit printed
+  bool same(double tolerance) const { return compared > 0 && missing == 0 && largest <= tolerance; }
+
+  /// A series whose numbers are of one kind: differences count against its largest number. NaN and infinity
+  /// must stand on both sides.
+  void add(const std::vector<double>& live, const std::vector<double>& offline);
+};
+
+}  // namespace smartmill::report

@@ -1,0 +1,187 @@
+// rosrun smartmill_launch offline results/session.bag -o results/offline
+
+#include <unistd.h>
+
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <functional>
+#include <iostream>
+#include <string>
+#include <vector>
+
+#include <ros/package.h>
+#include <CLI/CLI.hpp>
+
+#include "session_bag.h"
+#include "shell.h"
+#include "smartmill_core/error.h"
+#include "smartmill_core/model/strict_yaml.h"
+#include "smartmill_core/units.h"
+#include "smartmill_launch/offline_comparison.h"
+
+namespace {
+
+using namespace smartmill;
+using namespace smartmill::report;
+namespace fs = std::filesystem;
+
+// The tools print ten digits.
+constexpr double PRINTED = 1e-9;
+
+struct Request {
+  std::string bag, out = "offline", model, config;
+  double least_ratio = 20.0;
+};
+
+Agreement compareFrf(const SessionRecording& live, const fs::path& folder) {
+  Agreement agreement;
+  for (const char* direction : {"x", "y"}) {
+    const MeasuredFrf* frf = live.frf(false, POINT_TOOL_TIP, direction);
+    const MeasuredModes* modes = live.modal(false, POINT_TOOL_TIP, direction);
+    if (!frf || !modes) continue;
+    const NumberTable lines = readNumberTable(folder / ("frf_" + std::string(direction) + ".csv"));
+    std::vector<double> real, imag;
+    for (const std::complex<double>& value : frf->frf.value) {
+      real.push_back(value.real());
+      imag.push_back(value.imag());
+    }
+    agreement.add(frf->frf.frequency, lines.column("frequency"));
+    agreement.add(real, lines.column("real"));
+    agreement.add(imag, lines.column("imag"));
+    agreement.add(frf->frf.coherence, lines.column("coherence"));
+    const NumberTable table = readNumberTable(folder / ("modes_" + std::string(direction) + ".csv"));
+    std::vector<double> frequency, frequency_std, damping, stiffness;
+    for (const Mode& mode : modes->model.modes) {
+      frequency.push_back(mode.frequency);
+      frequency_std.push_back(mode.frequency_std);
+      damping.push_back(mode.damping_ratio);
+      stiffness.push_back(stiffnessOf(mode).first / units::N_PER_UM);
+    }
+    agreement.add(frequency, table.column("frequency"));
+    agreement.add(frequency_std, table.column("frequency_std"));
+    agreement.add(damping, table.column("damping_ratio"));
+    agreement.add(stiffness, table.column("stiffness"));
+  }
+  return agreement;
+}
+
+Agreement compareCoefficients(const SessionRecording& live, const std::string& file) {
+  Agreement agreement;
+  if (!live.coefficients) return agreement;
+  const StrictYaml root = StrictYaml::fromFile(file);
+  const StrictYaml cutting = root.map("cutting");
+  for (const CuttingKey& key : cuttingKeys()) {
+    for (const bool std_dev : {false, true}) {
+      const double value = (std_dev ? live.coefficients->std_dev : live.coefficients->value).*key.coefficient;
+      if (!std::isfinite(value)) continue;
+      agreement.add({value / key.unit}, {cutting.number(key.key + std::string(std_dev ? "_std" : ""))});
+    }
+  }
+  return agreement;
+}
+
+Agreement compareForces(const SessionRecording& live, const fs::path& folder) {
+  Agreement agreement;
+  for (const RecordedCut& cut : live.cuts) {
+    const NumberTable table = readNumberTable(folder / (cut.condition.name + ".csv"));
+    const std::vector<double>& time = table.column("time");
+    if (time.empty() || cut.compensated.empty()) continue;
+    const std::uint64_t from = cut.compensated.indexAt(cut.condition.stamp + time.front());
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      agreement.add(cut.compensated.axis(axis, from, from + time.size()),
+                    table.column(std::string("f") + "xyz"[axis]));
+    }
+  }
+  return agreement;
+}
+
+Agreement compareChart(const SessionRecording& live, const std::string& file) {
+  Agreement agreement;
+  if (!live.chart) return agreement;
+  const NumberTable table = readNumberTable(file);
+  std::vector<double> rpm, depth;
+  for (const double speed : live.chart->spindle_speed) rpm.push_back(units::rpmFromRadPerSec(speed));
+  for (const double limit : live.chart->depth_limit) depth.push_back(limit / units::MM);
+  agreement.add(rpm, table.column("rpm"));
+  agreement.add(depth, table.column("limit_mm"));
+  return agreement;
+}
+
+struct Tool {
+  std::string name, package, arguments, parameters;
+  fs::path out;
+  std::function<Agreement(const SessionRecording&, const fs::path&)> compare;
+};
+
+int run(const Request& request) {
+  std::error_code error;
+  fs::create_directories(request.out, error);
+  if (error) throw Error(request.out + ": " + error.message());
+  const SessionRecording live = readSession(request.bag, {});
+  const fs::path out(request.out);
+  const std::vector<Tool> tools{
+      {"frf", "smartmill_hammer", "--no-picture ", "hammer.yaml", out / "frf", compareFrf},
+      {"coefficients", "smartmill_loadmeter", "", "loadmeter.yaml", out / "coefficients.yaml",
+       compareCoefficients},
+      {"compensate", "smartmill_kalman", "", "kalman.yaml", out / "compensated", compareForces},
+      {"chart", "smartmill_stability", "", "stability.yaml", out / "chart.csv", compareChart}};
+  std::printf("%-14s %8s %10s %10s %12s  %s\n", "offline tool", "seconds", "x real", "numbers", "difference",
+              "against the live session");
+  bool good = true;
+  for (const Tool& tool : tools) {
+    const fs::path log = out / (tool.name + ".txt");
+    const auto begin = std::chrono::steady_clock::now();
+    const std::string command = "rosrun " + tool.package + " " + tool.name + " " + shellQuoted(request.bag) +
+                                " --model " + shellQuoted(request.model) + " --params " +
+                                shellQuoted((fs::path(request.config) / tool.parameters).string()) + " " +
+                                tool.arguments + "-o " + shellQuoted(tool.out.string()) + " >" +
+                                shellQuoted(log.string()) + " 2>&1";
+    if (std::system(command.c_str()) != 0) {
+      throw Error(tool.name + " failed on " + request.bag + ", see " + log.string());
+    }
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    const double ratio = live.duration / seconds;
+    const Agreement agreement = tool.compare(live, tool.out);
+    const bool same = agreement.same(PRINTED), fast = ratio >= request.least_ratio;
+    std::printf("%-14s %8.2f %10.1f %10zu %12.2g  %s%s\n", tool.name.c_str(), seconds, ratio,
+                agreement.compared, agreement.largest, same ? "same to printed digits" : "DIFFERENT",
+                fast ? "" : ", SLOW");
+    if (agreement.missing > 0) std::printf("%zu numbers are only on one side\n", agreement.missing);
+    std::fflush(stdout);
+    good = good && same && fast;
+  }
+  return good ? 0 : 1;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Request request;
+  const std::string package = ros::package::getPath("smartmill_launch");
+  request.model = package + "/models/mill.yaml";
+  request.config = package + "/config";
+  CLI::App app{
+      "Puts a recorded session through the offline tools, times them and holds their results against those "
+      "of the "
+      "nodes; exit code 1 when one differs in its printed digits or is slower than asked for."};
+  app.add_option("bag", request.bag, "recorded session")->required()->check(CLI::ExistingFile);
+  app.add_option("-o,--out", request.out, "folder for what the tools write")->capture_default_str();
+  app.add_option("--model", request.model, "machine model that the session ran with")->capture_default_str();
+  app.add_option("--config", request.config, "folder with the nodes' parameter files")->capture_default_str();
+  app.add_option("--least-ratio", request.least_ratio, "times real time that each tool must reach")
+      ->capture_default_str();
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? 0 : 2;
+  }
+  try {
+    return run(request);
+  } catch (const std::exception& e) {
+    std::cerr << "offline: " << e.what() << "\n";
+    return 1;
+  }
+}

@@ -1,0 +1,126 @@
+// The whole graph with the shipped parameter files and models, as `roslaunch smartmill_launch
+// pipeline.launch` starts it.
+
+#include <algorithm>
+#include <map>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <ros/package.h>
+#include <ros/ros.h>
+#include <smartmill_msgs/CncState.h>
+#include <smartmill_msgs/ForceBlock.h>
+#include <smartmill_msgs/PredictStability.h>
+#include <smartmill_msgs/SampleBlock.h>
+#include <smartmill_msgs/SpindleAngle.h>
+#include <tf2_ros/transform_listener.h>
+
+#include "../src/session_parameters.h"
+#include "smartmill_core/model/machine_model.h"
+
+namespace {
+
+bool waitFor(const std::function<bool()>& there, double seconds) {
+  const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(seconds);
+  while (!there()) {
+    if (ros::WallTime::now() > end || !ros::ok()) return false;
+    ros::spinOnce();
+    ros::WallDuration(0.02).sleep();
+  }
+  return true;
+}
+
+TEST(Pipeline, EveryNodeTakesItsParametersAndStays) {
+  const std::vector<std::string> due{"/smartmill/cnc",    "/smartmill/hammer",    "/smartmill/loadmeter",
+                                     "/smartmill/kalman", "/smartmill/stability", "/smartmill/sim"};
+  const auto missing = [&] {
+    ros::V_string nodes;
+    ros::master::getNodes(nodes);
+    std::string text;
+    for (const std::string& name : due) {
+      if (std::find(nodes.begin(), nodes.end(), name) == nodes.end()) text += name + " ";
+    }
+    return text;
+  };
+  EXPECT_TRUE(waitFor([&] { return missing().empty(); }, 20.0)) << "not there: " << missing();
+  // A node that dislikes a parameter is gone at once.
+  ros::WallDuration(2.0).sleep();
+  EXPECT_EQ(missing(), "");
+}
+
+TEST(Pipeline, StreamsFlowAtTheirRates) {
+  ros::NodeHandle nh("smartmill");
+  std::map<std::string, int> count;
+  std::map<std::string, double> first, last;
+  std::vector<ros::Subscriber> subscribers;
+  const auto listen = [&](const char* topic, auto example) {
+    using Message = decltype(example);
+    subscribers.push_back(nh.subscribe<Message>(
+        topic, 1000, boost::function<void(const Message&)>([&, topic](const Message& m) {
+          const double stamp = m.header.stamp.toSec();
+          if (count[topic]++ == 0) first[topic] = stamp;
+          last[topic] = stamp;
+        })));
+  };
+  listen("daq/hammer", smartmill_msgs::SampleBlock());
+  listen("daq/dynamometer", smartmill_msgs::SampleBlock());
+  listen("spindle/angle", smartmill_msgs::SpindleAngle());
+  listen("cnc/state", smartmill_msgs::CncState());
+  listen("force/compensated", smartmill_msgs::ForceBlock());
+  ASSERT_TRUE(waitFor([&] { return count["cnc/state"] > 100 && count["force/compensated"] > 200; }, 30.0));
+  const auto rate = [&](const char* topic) { return (count[topic] - 1) / (last[topic] - first[topic]); };
+  // Blocks of 256 samples at 25600 Hz; stamps come from the sample clock, whatever the machine's load is.
+  EXPECT_NEAR(rate("daq/hammer"), 100.0, 1.0);
+  EXPECT_NEAR(rate("daq/dynamometer"), 100.0, 1.0);
+  EXPECT_NEAR(rate("force/compensated"), 100.0, 1.0);
+  EXPECT_GE(rate("spindle/angle"), 100.0);
+  EXPECT_GE(rate("cnc/state"), 20.0);
+}
+
+TEST(Pipeline, FramesHangTogether) {
+  tf2_ros::Buffer buffer;
+  const tf2_ros::TransformListener listener(buffer);
+  for (const char* frame : {"spindle", "tool_tip", "table", "dynamometer", "hammer"}) {
+    EXPECT_TRUE(waitFor([&] { return buffer.canTransform("machine", frame, ros::Time(0)); }, 10.0)) << frame;
+  }
+}
+
+TEST(Pipeline, AnUnmadeChartIsSaidSo) {
+  ros::NodeHandle nh("smartmill");
+  smartmill_msgs::PredictStability service;
+  service.request.spindle_speed = 1000.0;
+  service.request.axial_depth = 1e-3;
+  ASSERT_TRUE(ros::service::waitForService("/smartmill/stability/predict", 10000));
+  ASSERT_TRUE(nh.serviceClient<smartmill_msgs::PredictStability>("stability/predict").call(service));
+  EXPECT_EQ(service.response.code, smartmill_msgs::PredictStability::Response::NO_CHART);
+}
+
+TEST(ShippedFiles, SessionParametersAndModelsAreRead) {
+  const std::string package = ros::package::getPath("smartmill_launch");
+  smartmill::ParameterReader reader = smartmill::ParameterReader::fromFile(package + "/config/session.yaml");
+  smartmill::session::SessionParameters parameters;
+  // The model comes from the launch file; everything else stands in the YAML.
+  try {
+    parameters = smartmill::session::readParameters(reader);
+    FAIL() << "a session without a model was accepted";
+  } catch (const smartmill::Error& error) {
+    EXPECT_EQ(std::string(error.what()).rfind("model: ", 0), 0u) << error.what();
+  }
+  const smartmill::MachineModel machine = smartmill::readMachineModel(package + "/models/mill.yaml");
+  const smartmill::MachineModel twin = smartmill::readMachineModel(package + "/models/mill_twin.yaml");
+  // What is believed says nothing about what the session finds out.
+  EXPECT_FALSE(machine.cutting);
+  EXPECT_TRUE(machine.tool_tip.x.modes.empty() && machine.tool_tip.y.modes.empty());
+  EXPECT_TRUE(twin.cutting);
+  EXPECT_NO_THROW(smartmill::session::SessionPlan(machine, smartmill::session::PlanParameters()));
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  ros::init(argc, argv, "pipeline_test");
+  ros::NodeHandle keep;
+  ::testing::InitGoogleTest(&argc, argv);
+  return RUN_ALL_TESTS();
+}

@@ -1,0 +1,72 @@
+// A short session is recorded from the simulated machine; its replay must give the same results to the last
+// digit.
+
+#include <arpa/inet.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <fstream>
+#include <sstream>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "smartmill_core/testing/temporary_folder.h"
+
+namespace {
+
+using smartmill::TemporaryFolder;
+
+std::string freePort() {
+  const int s = socket(AF_INET, SOCK_STREAM, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t size = sizeof address;
+  EXPECT_EQ(bind(s, reinterpret_cast<sockaddr*>(&address), size), 0);
+  EXPECT_EQ(getsockname(s, reinterpret_cast<sockaddr*>(&address), &size), 0);
+  close(s);
+  return std::to_string(ntohs(address.sin_port));
+}
+
+std::string contentOf(const std::string& file) {
+  std::ifstream in(file);
+  std::stringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+/// Exit code of a command; what it said goes to a file.
+int run(const std::string& command, const std::string& log) {
+  return std::system(("timeout --signal=INT 150 " + command + " >'" + log + "' 2>&1").c_str());
+}
+
+TEST(Replay, OfAShortSessionIsTheSameToTheLastDigit) {
+  const TemporaryFolder folder;
+  setenv("ROS_HOSTNAME", "localhost", 1);
+  setenv("ROS_HOME", folder.file("ros_home").c_str(), 1);
+  const std::string live = folder.file("live.bag"), again = folder.file("again.bag");
+  const std::string summary = folder.file("session.json"), log = folder.file("log.txt");
+
+  // A roslaunch that the launch test framework has not started needs a master of its own.
+  run("roslaunch -p " + freePort() + " smartmill_launch pipeline.launch session:=true port:=" + freePort() +
+          " bag:=" + live + " summary:=" + summary + " session_params:=" + SHORT_SESSION,
+      log);
+  ASSERT_NE(contentOf(summary).find("\"completed\": true"), std::string::npos) << contentOf(log);
+  run("roslaunch -p " + freePort() + " smartmill_launch replay.launch rate:=2 bag:=" + live +
+          " out:=" + again,
+      log);
+  const std::string replayed = contentOf(log);
+  const int code = run("rosrun smartmill_launch compare_bags " + live + " " + again, log);
+  const std::string verdict = contentOf(log);
+  EXPECT_EQ(code, 0) << verdict << replayed;
+  for (const char* topic :
+       {"tool/frf", "tool/modes", "material/coefficients", "force/measured", "force/compensated"}) {
+    const std::size_t line = verdict.find(topic);
+    ASSERT_NE(line, std::string::npos) << verdict;
+    EXPECT_EQ(verdict.substr(line, 80).find(" 0 common"), std::string::npos) << verdict;
+  }
+}
+
+}  // namespace

@@ -1,0 +1,142 @@
+#include "../src/session_bag.h"
+
+#include <cmath>
+#include <fstream>
+
+#include <gtest/gtest.h>
+#include <rosbag/bag.h>
+#include <smartmill_msgs/ChatterState.h>
+#include <smartmill_msgs/StabilityChart.h>
+
+#include "smartmill_core/testing/temporary_folder.h"
+#include "smartmill_core/units.h"
+#include "smartmill_ros/conversions.h"
+
+namespace smartmill::report {
+namespace {
+
+constexpr double SPEED = 1000.0;  // [rad/s]
+constexpr double RATE = 25600.0;  // [Hz]
+
+CuttingCondition condition(double stamp, CuttingCondition::Kind kind, const std::string& name = "") {
+  CuttingCondition out;
+  out.stamp = stamp;
+  out.kind = kind;
+  out.name = name;
+  out.spindle_speed = SPEED;
+  out.tool.teeth = 4;
+  out.tool.diameter = 0.02;
+  out.engagement = {0.0, units::PI, 1e-3, 1e-4};
+  out.steady_from = {0.0, 0.0, 0.0};
+  out.steady_to = {0.1, 0.0, 0.0};
+  return out;
+}
+
+CncState state(double stamp, double x, double speed) {
+  CncState out;
+  out.stamp = stamp;
+  out.connected = true;
+  out.axes = {"X", "Y", "Z"};
+  out.position = {x, 0.0, 0.0};
+  out.distance_to_go = {0.0, 0.0, 0.0};
+  out.spindle_speed = speed;
+  return out;
+}
+
+ForceBlock force(double stamp, std::uint64_t first, double value) {
+  ForceBlock out;
+  out.stamp = stamp;
+  out.sample_rate = RATE;
+  out.first_index = first;
+  for (auto& axis : out.force) axis.assign(256, value);
+  return out;
+}
+
+/// A bag with one cut from 10 s to 12 s.
+class SessionBag : public ::testing::Test {
+ protected:
+  SessionBag() {
+    rosbag::Bag bag(file_, rosbag::bagmode::Write);
+    const auto put = [&](const std::string& topic, double time, const auto& message) {
+      bag.write("/smartmill/" + topic, ros::Time(time), message);
+    };
+    using Kind = CuttingCondition::Kind;
+    put("cut/condition", 10.0, toMsg(condition(10.0, Kind::cut, "resonance")));
+    put("cut/condition", 10.01, toMsg(condition(10.0, Kind::cut, "resonance")));  // latched, said again
+    put("cnc/state", 10.2, toMsg(state(10.2, -0.05, SPEED)));                     // not there yet
+    put("cnc/state", 10.4, toMsg(state(10.4, 0.01, 0.9 * SPEED)));                // not at speed yet
+    put("cnc/state", 10.6, toMsg(state(10.6, 0.02, SPEED)));
+    put("cnc/state", 11.4, toMsg(state(11.4, 0.09, SPEED)));
+    put("cnc/state", 11.6, toMsg(state(11.6, 0.12, SPEED)));  // past its end
+    put("force/compensated", 10.91, toMsg(force(10.9, 2560, 1.0), "machine"));
+    put("sim/truth/force", 10.91, toMsg(force(10.9, 2560, 2.0), "machine"));
+    smartmill_msgs::ChatterState window;
+    window.condition = "resonance";
+    window.valid = 1;
+    window.chatter = 1;
+    window.frequency = 900.0;
+    put("chatter/state", 11.0, window);
+    window.valid = 0;
+    put("chatter/state", 11.1, window);
+    put("cut/condition", 12.0, toMsg(condition(12.0, Kind::none)));
+    // What the filter has held back arrives after the cut's end and belongs to it; what comes after does not.
+    put("force/compensated", 12.05, toMsg(force(11.99, 30464, 1.0), "machine"));
+    put("force/compensated", 12.06, toMsg(force(12.0, 30720, 1.0), "machine"));
+    CoefficientSet set;
+    set.stamp = 12.0;
+    set.value = set.std_dev = NOT_IDENTIFIED;
+    set.value.ktc = 8e8;
+    put("material/coefficients", 12.1, toMsg(set));
+    set.value.ktc = 8.1e8;
+    put("sim/truth/coefficients", 12.1, toMsg(set));
+    smartmill_msgs::StabilityChart chart;
+    chart.spindle_speed = {900.0, 1100.0};
+    chart.depth_limit = {1e-3, 2e-3};
+    chart.absolute_depth_limit = 1e-3;
+    put("stability/chart", 12.2, chart);
+    bag.close();
+  }
+
+  TemporaryFolder folder_;
+  const std::string file_ = folder_.file("session.bag");
+};
+
+TEST_F(SessionBag, CutsKnowTheirSteadyStretchAndTheirForces) {
+  const SessionRecording recording = readSession(file_, {});
+  ASSERT_EQ(recording.cuts.size(), 1u);
+  const RecordedCut& cut = recording.cuts[0];
+  EXPECT_EQ(cut.condition.name, "resonance");
+  EXPECT_NEAR(cut.ends, 12.0, 1e-6);
+  EXPECT_NEAR(cut.steady_from, 10.6, 1e-6);
+  EXPECT_NEAR(cut.steady_to, 11.4, 1e-6);
+  ASSERT_EQ(cut.windows.size(), 1u);
+  EXPECT_TRUE(cut.windows[0].chatter);
+  EXPECT_EQ(cut.compensated.covered(0, 100000), std::make_pair(std::uint64_t{2560}, std::uint64_t{2816}));
+  EXPECT_EQ(cut.compensated.axis(0, 30464, 30720).size(), 256u);
+  EXPECT_THROW(cut.compensated.axis(0, 30464, 30721), Error);
+  EXPECT_EQ(cut.truth.axis(2, 2560, 2561)[0], 2.0);
+  EXPECT_TRUE(cut.raw.empty());
+}
+
+TEST_F(SessionBag, MeasuredAndTrueValuesAreKeptApart) {
+  const SessionRecording recording = readSession(file_, {});
+  ASSERT_TRUE(recording.coefficients && recording.true_coefficients && recording.chart);
+  EXPECT_DOUBLE_EQ(recording.coefficients->value.ktc, 8e8);
+  EXPECT_DOUBLE_EQ(recording.true_coefficients->value.ktc, 8.1e8);
+  const Report report = makeReport(recording, std::nullopt, {});
+  EXPECT_NEAR(report.sections.at(0).figures.at(0).percent(), -100.0 / 81.0, 1e-9);
+  EXPECT_NEAR(recording.duration, 2.2, 1e-6);
+}
+
+TEST_F(SessionBag, ABrokenBagIsRefusedWithOneLine) {
+  std::ifstream in(file_, std::ios::binary);
+  const std::string all((std::istreambuf_iterator<char>(in)), std::istreambuf_iterator<char>());
+  const std::string cut = folder_.write("cut.bag", all.substr(0, all.size() / 2));
+  const std::string message = errorOf([&] { readSession(cut, {}); });
+  EXPECT_NE(message.find("cut.bag"), std::string::npos) << message;
+  EXPECT_EQ(message.find('\n'), std::string::npos);
+  EXPECT_NE(errorOf([&] { readSession(folder_.file("absent.bag"), {}); }), "");
+}
+
+}  // namespace
+}  // namespace smartmill::report
