@@ -56,7 +56,8 @@ struct FittedFriction {
 };
 
 /// All shapes the air cuts can carry (more cuts than unknowns), best first by the Bayesian information
-/// criterion, each further term to win by 6 (strong evidence). Each has at least one cut more than unknowns. @throws Error with fewer than two speeds.
+/// criterion, each further term to win by 6 (strong evidence). Each has at least one cut more than unknowns.
+/// @throws Error with fewer than two speeds.
 std::vector<FittedFriction> fitFrictionLaws(const std::vector<TimedAirCut>& air_cuts, double load_meter_gain,
                                             double zero_below);
 
