@@ -113,7 +113,7 @@ class World::Impl {
     }
     for (std::size_t k = 0; k < ANGLES; ++k) {
       const std::size_t i = BLOCK * (k + 1) / ANGLES - 1;
-      block.angle[k] = {static_cast<double>(index_ + i) / SAMPLE_RATE, states_[i].spindle_angle,
+      block.angle[k] = {(static_cast<double>(index_ + i) + 0.5) / SAMPLE_RATE, states_[i].spindle_angle,
                         states_[i].spindle_speed};
     }
     index_ += BLOCK;
@@ -190,35 +190,43 @@ class World::Impl {
     if (controller_.status().alarm == 0) controller_.raiseAlarm(number, text);
   }
 
+  /// Sensors are averaged over the sample's own interval, centred on it, as a converter with an anti-aliasing
+  /// filter does: what a short blow has above half the sample rate would else fold into its spectrum, another
+  /// way in force and in answer. @param now state half a sample after it
   void sample(double time, const MotionState& now, Block& block) {
-    // The step before this sample, in finer ones.
-    CuttingMachine::Output out;
     const bool at_station = station_ && station_->facing(now.position).has_value();
-    for (int s = options_.substeps - 1; s >= 0; --s) {
-      const double share = 1.0 - static_cast<double>(s) / options_.substeps;
+    std::array<double, 3> sensor{}, force{};
+    std::array<double, 2> displacement{};
+    double hammer = 0.0, volt = 0.0;
+    for (int s = 0; s < options_.substeps; ++s) {
+      const double share = (s + 0.5) / options_.substeps;
       CuttingMachine::Input input;
       input.motion = between(now, share);
-      const double force = blowAt(time - (1.0 - share) / SAMPLE_RATE, now);
-      if (force != 0.0 && blow_on_tool_) input.tip_force[blow_axis_] = station_->atTip(force);
-      if (force != 0.0 && !blow_on_tool_) input.sensor_force[blow_axis_] = force;
-      out = machine_.step(input);
+      const double blow = blowAt(time + (share - 0.5) / SAMPLE_RATE, now);
+      if (blow != 0.0 && blow_on_tool_) input.tip_force[blow_axis_] = station_->atTip(blow);
+      if (blow != 0.0 && !blow_on_tool_) input.sensor_force[blow_axis_] = blow;
+      const CuttingMachine::Output out = machine_.step(input);
+      hammer += blow;
+      if (at_station) volt += station_->voltage(now.position, input.motion.angle, out.displacement);
+      for (std::size_t axis = 0; axis < 3; ++axis) sensor[axis] += out.sensor[axis];
+      for (std::size_t axis = 0; axis < 2; ++axis) displacement[axis] += out.displacement[axis];
+      force[0] += out.force.fx;
+      force[1] += out.force.fy;
+      force[2] += out.force.fz;
+      load_meter_ = out.load_meter;
     }
-    load_meter_ = out.load_meter;
-    const double hammer = blowAt(time, now);
-    block.hammer.samples.push_back(hammer + (hammer_ ? noise(hammer_->force_noise_rms) : 0.0));
-    double volt = 0.0;
+    const double share = 1.0 / options_.substeps;
+    block.hammer.samples.push_back(share * hammer + (hammer_ ? noise(hammer_->force_noise_rms) : 0.0));
     if (station_) {
-      volt = at_station ? station_->voltage(now.position, now.spindle_angle, out.displacement)
-                        : -hammer_->range_volt;
+      volt = at_station ? share * volt : -hammer_->range_volt;
       volt = station_->clipped(volt + noise(hammer_->voltage_noise_rms));
     }
     block.hammer.samples.push_back(volt);
-    for (std::size_t axis = 0; axis < 3; ++axis)
-      block.dynamometer.samples.push_back(out.sensor[axis] + noise(force_noise_[axis]));
-    block.force.force[0].push_back(out.force.fx);
-    block.force.force[1].push_back(out.force.fy);
-    block.force.force[2].push_back(out.force.fz);
-    for (double d : out.displacement) block.vibration.samples.push_back(d);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      block.dynamometer.samples.push_back(share * sensor[axis] + noise(force_noise_[axis]));
+      block.force.force[axis].push_back(share * force[axis]);
+    }
+    for (double d : displacement) block.vibration.samples.push_back(share * d);
     if (blow_ && blow_->over(time)) blow_.reset();
   }
 
@@ -244,7 +252,7 @@ class World::Impl {
   std::mt19937_64 random_;
   std::normal_distribution<double> normal_;
   std::uint64_t index_ = 0;
-  MotionState last_;
+  MotionState last_;  // half a sample after the last sample
   std::vector<MotionState> states_;
   std::vector<ContactArc> arcs_;
   std::optional<Blow> blow_;
