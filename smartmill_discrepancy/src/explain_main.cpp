@@ -3,47 +3,49 @@
 #include <chrono>
 #include <cstdio>
 #include <exception>
+#include <filesystem>
 #include <iostream>
 #include <string>
 
 #include <CLI/CLI.hpp>
 
-#include "smartmill_discrepancy/search.h"
+#include "smartmill_core/error.h"
+#include "smartmill_discrepancy/explanation.h"
 
 namespace {
 
-void run(const std::string& folder, const std::string& model_file, int threads) {
+void run(const std::string& folder, const std::string& model_file, const std::string& out, int threads) {
   using namespace smartmill;
   using namespace smartmill::discrepancy;
   const auto begin = std::chrono::steady_clock::now();
-  const auto say = [&](const std::string& line) {
+  ExplainOptions options;
+  options.search.threads = threads;
+  options.search.progress = [&](const std::string& line) {
     const double t = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     std::fprintf(stderr, "[%5.1f s] %s\n", t, line.c_str());
   };
   const Campaign campaign = readCampaign(folder);
   const Dataset data =
       loadDataset(campaign, readMachineModel(model_file.empty() ? campaign.modelPath() : model_file));
-  std::vector<std::string> notes = data.notes;
-  const std::vector<Hypothesis> hypotheses = catalogueHypotheses(data, &notes);
-  for (const std::string& note : notes) say("note: " + note);
-  std::vector<std::size_t> fitted;
-  for (std::size_t t = 0; t < data.tests.size(); ++t) {
-    if (data.tests[t].heldout) {
-      say("held out: " + data.tests[t].test.name);
-    } else {
-      fitted.push_back(t);
-    }
+  std::error_code failed;
+  std::filesystem::create_directories(out, failed);
+  if (failed) throw Error(out + ": " + failed.message());
+  const Explanation explanation = explain(data, options, out);
+  writeReport(explanation, out);
+  std::printf("verdict: %s\n", explanation.verdict.c_str());
+  for (const FoundEffect& e : explanation.effects) {
+    std::printf("%s:", e.name.c_str());
+    for (const auto& [key, word] : e.words) std::printf(" %s %s", key.c_str(), word.c_str());
+    for (const FoundParameter& p : e.parameters) std::printf(" %s %.5g +- %.2g", p.key.c_str(), p.value, p.std_dev);
+    std::printf("\n");
   }
-  SearchOptions options;
-  options.threads = threads;
-  options.progress = say;
-  const NominalFreedom freedom(data.nominal);
-  const TwinRunner quick_runner(data, fitted, threads, options.screening_substeps);
-  const TwinRunner exact_runner(data, fitted, threads, options.final_substeps);
-  const Fitter quick(quick_runner, freedom), exact(exact_runner, freedom);
-  const SearchResult result = search(quick, exact, hypotheses, options);
-  (void)result;
-  say("done");
+  for (const Finding& f : explanation.unexplained) {
+    std::printf("unexplained: %s, %s", f.channel.c_str(), f.domain.c_str());
+    for (const auto& [key, value] : f.location) std::printf(" %s %.5g", key.c_str(), value);
+    std::printf(", amplitude %.3g, share %.3f\n", f.amplitude, f.share_of_gap);
+  }
+  std::printf("gap: fit %.4f -> %.4f, held out %.4f -> %.4f\n", explanation.before.fit, explanation.after.fit,
+              explanation.before.heldout, explanation.after.heldout);
 }
 
 }  // namespace
@@ -62,7 +64,7 @@ int main(int argc, char** argv) {
     return app.exit(e) == 0 ? 0 : 2;
   }
   try {
-    run(campaign, model, threads);
+    run(campaign, model, out, threads);
   } catch (const std::exception& e) {
     std::cerr << "explain: " << e.what() << "\n";
     return 1;

@@ -254,6 +254,21 @@ std::vector<Hypothesis> catalogueHypotheses(const Dataset& data, std::vector<std
     // The two need both: a rate of zero on x leaves y without its ratio.
     drift.probes = {{{0.0, 0.0}, {{20.0, 0.0}, {20.0, 20.0}}, false}};
     all.push_back(std::move(drift));
+    for (const double frequency : {50.0, 60.0}) {
+      if (!scope.channels.count("fx") && !scope.channels.count("fy")) break;
+      Hypothesis hum = amplitudes("mains_hum", {{"amplitude_n", 0.0, 0.0, 1e4, 0.02, 10.0}, {"y_ratio", 0.5, -20.0, 20.0, 0.005, 1.0}}, 1.0);
+      hum.variant = frequency == 50.0 ? "50 Hz" : "60 Hz";
+      // The twin takes each record's phase from the record, for which the amplitude must not be zero.
+      hum.probes.clear();
+      for (const double ratio : {0.6, -0.6}) hum.probes.push_back({{0.0, ratio}, {{2.0, ratio}}, false});
+      hum.entry = [frequency](const Values& v) {
+        EffectEntry e;
+        e.name = "mains_hum";
+        e.numbers = {{"frequency_hz", frequency}, {"amplitude_n", v[0]}, {"y_ratio", v[1]}};
+        return e;
+      };
+      all.push_back(std::move(hum));
+    }
     all.push_back(planar("unbalance", "mass_eccentricity_g_mm", 1.0, 5000.0, 30.0));
     const double limit = scope.largest_force;
     Hypothesis saturation;
@@ -271,7 +286,7 @@ std::vector<Hypothesis> catalogueHypotheses(const Dataset& data, std::vector<std
   for (const std::string& channel : scope.channels) {
     const bool slow = channel == "load_meter";
     all.push_back(withWord(amplitudes("channel_delay",
-                                      {{"delay_us", 0.0, slow ? -2e4 : -2000.0, slow ? 2e5 : 5000.0, slow ? 50.0 : 1.0,
+                                      {{"delay_us", 0.0, 0.0, slow ? 2e5 : 5000.0, slow ? 50.0 : 1.0,
                                         slow ? 10000.0 : 200.0}},
                                       slow ? 500.0 : 10.0),
                            "channel", channel));

@@ -5,6 +5,8 @@
 
 #include <Eigen/Cholesky>
 
+#include "smartmill_discrepancy/mode_probes.h"
+
 namespace smartmill::discrepancy {
 namespace {
 
@@ -80,21 +82,84 @@ class Projection {
   Eigen::LDLT<Eigen::MatrixXd> information_;
 };
 
+// The two best frequencies of a mode, one octave-third or more apart, from columns to first order.
+std::vector<double> bestFrequencies(const Projection& projection, const std::vector<double>& frequencies,
+                                    const std::function<std::vector<double>(double)>& column, bool positive,
+                                    int threads) {
+  std::vector<double> gains(frequencies.size(), 0.0);
+  runParallel(frequencies.size(), threads, [&](std::size_t k) {
+    const std::vector<double> values = column(frequencies[k]);
+    const Eigen::Map<const Eigen::VectorXd> map(values.data(), static_cast<Index>(values.size()));
+    if (!map.allFinite() || map.squaredNorm() == 0.0) return;
+    Eigen::VectorXd amplitude;
+    const double gain = projection.gain(map, &amplitude, nullptr);
+    if (!positive || amplitude[0] > 0.0) gains[k] = gain;
+  });
+  std::vector<double> best;
+  for (int n = 0; n < 2; ++n) {
+    const auto top = std::max_element(gains.begin(), gains.end());
+    if (*top <= 0.0) break;
+    const double f = frequencies[static_cast<std::size_t>(top - gains.begin())];
+    best.push_back(f);
+    for (std::size_t k = 0; k < gains.size(); ++k) {
+      if (std::abs(std::log(frequencies[k] / f)) < 0.23) gains[k] = 0.0;
+    }
+  }
+  return best;
+}
+
+// Where to try a mode whose frequency nobody knows.
+std::vector<Hypothesis::Probe> modeProbes(const Hypothesis& h, const Projection& projection, const ModeProbes& probes,
+                                          const TwinRunner& runner) {
+  std::vector<Hypothesis::Probe> found;
+  double rate = 0.0;
+  for (const TestData& t : runner.data().tests) rate = std::max(rate, t.test.sample_rate);
+  if (h.effect == "extra_mode") {
+    constexpr double DAMPING = 0.04;
+    const std::size_t axis = h.variant == "x" ? 0 : h.variant == "y" ? 1 : 2;
+    for (const double f : bestFrequencies(
+             projection, ModeProbes::grid(60.0, 0.42 * rate, 1.06),
+             [&](double at) { return probes.sensorMode(axis, at, DAMPING); }, false, runner.threads())) {
+      const double d = std::log(DAMPING);
+      found.push_back({{std::log(f), d, 0.0}, {{std::log(f), d, 0.01}}, false});
+    }
+  }
+  if (h.effect == "tool_flexibility") {
+    constexpr double DAMPING = 0.05;
+    Hypothesis::Probe probe;
+    for (const char a : h.variant) {
+      const std::vector<double> best = bestFrequencies(
+          projection, ModeProbes::grid(200.0, 6000.0, 1.08),
+          [&](double at) { return probes.tipMode(a == 'x' ? 0 : 1, at, DAMPING); }, true, runner.threads());
+      const double f = best.empty() ? 1200.0 : best.front();
+      for (const double v : {std::log(f), std::log(DAMPING), 0.0}) probe.null.push_back(v);
+    }
+    for (std::size_t k = 2; k < probe.null.size(); k += 3) {
+      probe.points.push_back(probe.null);
+      probe.points.back()[k] = 1.0;
+    }
+    found.push_back(probe);
+  }
+  return found;
+}
+
 }  // namespace
 
 std::vector<Promise> screen(const Fitter& fitter, const Fit& now, const NominalTangents& tangents,
                             const std::vector<Hypothesis>& tried) {
   const Projection projection(fitter, now, tangents);
   const auto samples = static_cast<Index>(fitter.runner().size());
+  const ModeProbes mode_probes(fitter.runner(), fitter.model(now.state));
   std::vector<Promise> promises;
   for (const Hypothesis& h : tried) {
     const bool taken = std::any_of(now.state.members.begin(), now.state.members.end(), [&](const Member& m) {
       return m.hypothesis->effect == h.effect && m.hypothesis->variant == h.variant;
     });
-    if (taken || h.probes.empty()) continue;
+    if (taken) continue;
     Promise best;
     best.hypothesis = &h;
-    for (const Hypothesis::Probe& probe : h.probes) {
+    for (const Hypothesis::Probe& probe :
+         h.probes.empty() ? modeProbes(h, projection, mode_probes, fitter.runner()) : h.probes) {
       std::vector<MachineModel> models;
       for (const std::vector<double>& point : probe.points) {
         FitState with = now.state;
@@ -113,16 +178,17 @@ std::vector<Promise> screen(const Fitter& fitter, const Fit& now, const NominalT
       Eigen::VectorXd amplitudes, signature;
       const double gain = projection.gain(columns, &amplitudes, &signature);
       if (gain <= best.gain) continue;
+      std::vector<double> start = probe.from_points ? probe.points.front() : probe.null;
+      for (Index k = 0; k < amplitudes.size() && !probe.from_points; ++k) {
+        for (std::size_t c = 0; c < start.size(); ++c)
+          start[c] += amplitudes[k] * (probe.points[static_cast<std::size_t>(k)][c] - probe.null[c]);
+      }
+      for (std::size_t c = 0; c < start.size(); ++c)
+        start[c] = std::clamp(start[c], h.coordinates[c].low, h.coordinates[c].high);
+      if (start == probe.null) continue;  // the data ask for what cannot be
       best.gain = gain;
       best.signature = std::move(signature);
-      best.start = probe.from_points ? probe.points.front() : probe.null;
-      if (probe.from_points) continue;
-      for (Index k = 0; k < amplitudes.size(); ++k) {
-        for (std::size_t c = 0; c < best.start.size(); ++c)
-          best.start[c] += amplitudes[k] * (probe.points[static_cast<std::size_t>(k)][c] - probe.null[c]);
-      }
-      for (std::size_t c = 0; c < best.start.size(); ++c)
-        best.start[c] = std::clamp(best.start[c], h.coordinates[c].low, h.coordinates[c].high);
+      best.start = std::move(start);
     }
     promises.push_back(std::move(best));
   }

@@ -28,7 +28,46 @@ FitState without(const FitState& state, std::size_t member) {
 
 }  // namespace
 
-SearchResult search(const Fitter& quick, const Fitter& exact, const std::vector<Hypothesis>& hypotheses,
+void refine(TwinRunner& quick_runner, const Fitter& quick, const Fitter& exact, const FitState& state, SearchResult* result) {
+  Fit best = exact.fit(state, nullptr, {5, 1e-6, true});
+  if (best.converged) result->best = std::move(best);
+  const FitState& at = result->best.state;
+  result->contribution.clear();
+  result->rivals.clear();
+  if (at.members.empty()) return;
+  const MachineModel model = quick.model(at);
+  quick_runner.correctTo(model, exact.runner().simulate(model));
+  const NominalTangents tangents = quick.nominalTangents(at);
+  const double bic = result->best.bic;
+  for (std::size_t m = 0; m < at.members.size(); ++m) {
+    const FitState less = without(at, m);
+    const double lost = quick.fit(less, &tangents, {6, 1e-3, true}).bic;
+    result->contribution.push_back(lost - bic);
+    const std::string& own = at.members[m].hypothesis->effect;
+    // Rivals: what came near to it in the round that took it.
+    std::size_t round = 0;
+    for (const Rung& r : result->ladder) {
+      if (r.taken && r.effect == own && r.variant == at.members[m].hypothesis->variant) round = r.round;
+    }
+    double largest = 0.0;
+    for (const Rung& r : result->ladder) {
+      if (r.round == round) largest = std::max(largest, r.delta_bic);
+    }
+    for (const Rung& r : result->ladder) {
+      if (r.round != round || r.effect == own || r.delta_bic < 0.3 * largest) continue;
+      const bool member = std::any_of(at.members.begin(), at.members.end(), [&](const Member& o) {
+        return o.hypothesis->effect == r.effect && o.hypothesis->variant == r.variant;
+      });
+      if (member || !r.hypothesis) continue;
+      FitState with = less;
+      with.members.push_back({r.hypothesis, r.values});
+      const Fit fit = quick.fit(with, &tangents, {6, 1e-3, true});
+      if (fit.converged) result->rivals.push_back({m, r.effect, r.variant, lost - fit.bic, fit.state});
+    }
+  }
+}
+
+SearchResult search(TwinRunner& quick_runner, const Fitter& quick, const Fitter& exact, const std::vector<Hypothesis>& hypotheses,
                     const SearchOptions& options) {
   const auto say = [&](const std::string& line) {
     if (options.progress) options.progress(line);
@@ -36,38 +75,50 @@ SearchResult search(const Fitter& quick, const Fitter& exact, const std::vector<
   SearchResult result;
   FitState state;
   state.nominal.assign(quick.freedom().coordinates().size(), 0.0);
+  const auto correct = [&](const FitState& at) {
+    const MachineModel model = quick.model(at);
+    quick_runner.correctTo(model, exact.runner().simulate(model));
+  };
+  correct(state);
   NominalTangents tangents = quick.nominalTangents(state);
   Fit now = quick.fit(state, &tangents, {});
   result.null = now;
   const double samples = static_cast<double>(quick.runner().size());
   say(text("nominal model, values free within their uncertainty: gap %.4f", std::sqrt(now.chi2 / samples), 0.0));
   for (std::size_t round = 0; round < options.most_effects; ++round) {
-    if (round > 0) tangents = quick.nominalTangents(now.state);
     const std::vector<Promise> promises = screen(quick, now, tangents, hypotheses);
+    // A trifle beside what is left is not what is missing.
+    const double least = std::max(options.least_gain, options.least_share * (now.chi2 - samples));
     Fit best = now;
     std::size_t fitted = 0;
     std::vector<Rung> rungs;
     for (const Promise& p : promises) {
-      if (p.gain < options.least_gain) break;
+      if (p.gain < least) break;
+      if (fitted >= 2 && p.gain < 0.02 * promises.front().gain) break;
       if (fitted >= options.fitted_per_round) break;
       FitState with = now.state;
       with.members.push_back({p.hypothesis, p.start});
       const Fit tried = quick.fit(with, &tangents, {6, 1e-3, true});
       ++fitted;
-      rungs.push_back({round, p.hypothesis->effect, p.hypothesis->variant, p.gain, now.bic - tried.bic, false});
+      rungs.push_back({round, p.hypothesis->effect, p.hypothesis->variant, p.gain, now.bic - tried.bic, false,
+                       p.hypothesis, tried.state.members.back().values});
       say(text("  promise %.4g, gain %.4g  ", p.gain, now.bic - tried.bic) + describe(tried.state.members.back()));
       if (tried.bic < best.bic) best = tried;
     }
-    const bool better = now.bic - best.bic > options.least_gain;
+    const bool better = now.bic - best.bic > least;
     for (Rung& r : rungs) {
       r.taken = better && r.effect == best.state.members.back().hypothesis->effect &&
                 r.variant == best.state.members.back().hypothesis->variant;
       result.ladder.push_back(r);
     }
     if (!better) break;
+    correct(best.state);
     tangents = quick.nominalTangents(best.state);
-    Fit refined = quick.fit(best.state, &tangents, {8, 1e-4, true});
-    now = refined.bic < best.bic ? refined : best;
+    Fit refined = quick.fit(best.state, &tangents, {10, 1e-7, true});
+    // The tangents held where the fit began; where it went far they are taken anew.
+    correct(refined.state);
+    tangents = quick.nominalTangents(refined.state);
+    now = quick.fit(refined.state, &tangents, {10, 1e-7, true});
     // What was found earlier may have stood for what has been found now.
     for (std::size_t m = 0; m < now.state.members.size() && now.state.members.size() > 1;) {
       const Fit less = quick.fit(without(now.state, m), &tangents, {6, 1e-3, true});
@@ -80,18 +131,8 @@ SearchResult search(const Fitter& quick, const Fitter& exact, const std::vector<
     }
     say(text("gap %.4f with ", std::sqrt(now.chi2 / samples), 0.0) + describe(now.state.members.back()));
   }
-  if (now.state.members.empty()) {
-    result.best = exact.fit(now.state, nullptr, {3, 1e-5, true});
-    result.null = result.best;
-    return result;
-  }
-  result.best = exact.fit(now.state, nullptr, {5, 1e-6, true});
+  refine(quick_runner, quick, exact, now.state, &result);
   for (const Member& m : result.best.state.members) say("found " + describe(m));
-  say(text("gap %.4f", std::sqrt(result.best.chi2 / samples), 0.0));
-  for (std::size_t m = 0; m < now.state.members.size(); ++m) {
-    const Fit less = quick.fit(without(now.state, m), &tangents, {6, 1e-3, true});
-    result.contribution.push_back(less.bic - now.bic);
-  }
   return result;
 }
 

@@ -59,10 +59,19 @@ std::vector<std::vector<double>> TwinRunner::simulate(const std::vector<MachineM
       const Block& block = blocks_[b];
       const std::vector<double>& values = record.column(block.channel);
       for (std::size_t i = 0; i < block.size; ++i) results[m][block.offset + i] = values[i] / block.noise;
+      if (correction_.empty()) continue;
+      for (std::size_t i = block.offset; i < block.offset + block.size; ++i) results[m][i] += correction_[i];
     }
   });
   simulations_ += models.size() * tests_.size();
   return results;
+}
+
+void TwinRunner::correctTo(const MachineModel& reference, const std::vector<double>& exact) {
+  correction_.clear();
+  const std::vector<double> mine = simulate(reference);
+  correction_.resize(size_);
+  for (std::size_t i = 0; i < size_; ++i) correction_[i] = exact[i] - mine[i];
 }
 
 std::vector<double> TwinRunner::simulate(const MachineModel& model) const {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -17,6 +18,7 @@ struct SearchOptions {
   std::size_t fitted_per_round = 5;  ///< hypotheses that a round fits after screening
   std::size_t most_effects = 4;
   double least_gain = 30.0;          ///< [1] difference of BIC below which nothing is named
+  double least_share = 0.01;         ///< [1] of the squares above the noise that an effect must take
   std::function<void(const std::string&)> progress;
 };
 
@@ -27,6 +29,16 @@ struct Rung {
   double promised = 0.0;   ///< gain of the screening
   double delta_bic = 0.0;  ///< of the fit against the round's start; positive is better
   bool taken = false;
+  const Hypothesis* hypothesis = nullptr;
+  std::vector<double> values;  ///< as fitted then
+};
+
+/// Another effect fitted in the place of a member.
+struct Rival {
+  std::size_t member = 0;
+  std::string effect, variant;
+  double delta_bic = 0.0;  ///< against the model without the member
+  FitState state;
 };
 
 struct SearchResult {
@@ -34,12 +46,19 @@ struct SearchResult {
   Fit best;          ///< with the effects found
   std::vector<Rung> ladder;
   std::vector<double> contribution;  ///< of each member: BIC that is lost without it, others fitted again
-  /// Effects that the data cannot tell apart from a member, first the member.
-  std::vector<std::vector<std::string>> not_separable;
+  std::vector<Rival> rivals;
 };
 
+/// Fits a state with every value free and simulated exactly, and measures what each member contributes and how its best
+/// rivals do in its place.
+void refine(TwinRunner& quick_runner, const Fitter& quick, const Fitter& exact, const FitState& state, SearchResult* result);
+
+/// The cut or air cut, among variations of the campaign's tests, in which two models differ most.
+std::optional<std::string> separatingTest(const Dataset& data, const MachineModel& a, const MachineModel& b);
+
 /// Forward addition of effects with re-fitting and pruning, on the tests of the runner.
-SearchResult search(const Fitter& quick, const Fitter& exact, const std::vector<Hypothesis>& hypotheses,
+/// @param quick_runner the runner of quick, kept equal to the exact one at the state the search stands at
+SearchResult search(TwinRunner& quick_runner, const Fitter& quick, const Fitter& exact, const std::vector<Hypothesis>& hypotheses,
                     const SearchOptions& options);
 
 }  // namespace smartmill::discrepancy

@@ -35,6 +35,12 @@ class TwinRunner {
   /// The records.
   const std::vector<double>& measured() const { return measured_; }
 
+  int threads() const { return threads_; }
+
+  /// Makes simulate() of the reference model give exactly this; what other models differ from it stays as it is. Takes the
+  /// error of few substeps out, which is nearly alike for models nearby.
+  void correctTo(const MachineModel& reference, const std::vector<double>& exact);
+
   /// What each model says. @throws Error of the twin.
   std::vector<std::vector<double>> simulate(const std::vector<MachineModel>& models) const;
   std::vector<double> simulate(const MachineModel& model) const;
@@ -49,6 +55,7 @@ class TwinRunner {
   std::vector<std::size_t> first_block_;  // of each chosen test; one more at the end
   std::size_t size_ = 0;
   std::vector<double> measured_;
+  std::vector<double> correction_;
   mutable std::size_t simulations_ = 0;
 };
 

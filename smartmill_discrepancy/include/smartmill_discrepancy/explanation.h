@@ -1,0 +1,72 @@
+#pragma once
+
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "smartmill_discrepancy/dataset.h"
+#include "smartmill_discrepancy/search.h"
+#include "smartmill_discrepancy/structure.h"
+
+namespace smartmill::discrepancy {
+
+/// A number of an effect with what is known of it.
+struct FoundParameter {
+  std::string key;  ///< as in the model file
+  double value = 0.0;
+  double std_dev = 0.0;
+};
+
+struct FoundEffect {
+  std::string name, variant;
+  std::map<std::string, std::string> words;
+  std::vector<FoundParameter> parameters;
+  double delta_bic = 0.0;              ///< BIC that is lost without it
+  double heldout_gap_reduction = 0.0;  ///< [1] share of the held-out squares above the noise that it takes away
+  double evenness = 0.0;  ///< [1] variance over the tests of the size in which each test shows it; 0 where all agree
+  std::vector<std::pair<std::string, double>> alternatives;  ///< other effects in its place: name, delta_bic
+};
+
+/// Gap of one channel of one test before and after.
+struct BlockGap {
+  std::string test, channel;
+  bool heldout = false;
+  double before = 0.0, after = 0.0;
+  double std_dev = 0.0;  ///< of a gap at the noise floor, by chance alone
+};
+
+struct GapPair {
+  double fit = 0.0, heldout = 0.0;
+};
+
+/// What explain found (formats.md section 3).
+struct Explanation {
+  std::string verdict;
+  std::vector<Finding> where, unexplained;
+  std::vector<FoundEffect> effects;
+  std::vector<std::vector<std::string>> not_separable;
+  std::optional<std::string> suggested_test;
+  GapPair before, after;
+  std::vector<BlockGap> gaps;
+  std::vector<Rung> ladder;
+  std::vector<std::string> notes;
+  MachineModel model;                ///< the improved one, as written
+  double seconds = 0.0;
+};
+
+struct ExplainOptions {
+  SearchOptions search;
+  StructureOptions structure;
+  double least_evenness = 0.04;  ///< an effect whose size differs more from test to test stands for another cause
+};
+
+/// The whole workflow. Writes FOLDER/model.yaml and measures the gap after from that file.
+/// @throws Error on a campaign or model that cannot be worked with.
+Explanation explain(const Dataset& data, const ExplainOptions& options, const std::string& folder);
+
+/// Writes FOLDER/report.json (smartmill-report/1).
+void writeReport(const Explanation& explanation, const std::string& folder);
+
+}  // namespace smartmill::discrepancy

@@ -1,0 +1,248 @@
+#include "smartmill_discrepancy/explanation.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+
+#include <Eigen/Core>
+
+namespace smartmill::discrepancy {
+namespace {
+
+constexpr double ALIKE = 10.0;  // difference of BIC below which two effects are not told apart
+
+double squaresOf(const std::vector<double>& v) {
+  double s = 0.0;
+  for (const double x : v) s += x * x;
+  return s;
+}
+
+std::vector<double> residualOf(const TwinRunner& runner, const MachineModel& model) {
+  std::vector<double> r = runner.simulate(model);
+  for (std::size_t i = 0; i < r.size(); ++i) r[i] = runner.measured()[i] - r[i];
+  return r;
+}
+
+double gapOf(const std::vector<double>& residual) {
+  return residual.empty() ? 0.0 : std::sqrt(squaresOf(residual) / static_cast<double>(residual.size()));
+}
+
+// How an effect shows: squares of its trace by channel, and how evenly the tests agree on its size.
+struct Trace {
+  std::map<std::string, double> squares;
+  double total = 0.0, evenness = 0.0;
+};
+
+Trace traceOf(const Fitter& fitter, const Fit& fit, std::size_t member) {
+  FitState less = fit.state;
+  less.members.erase(less.members.begin() + static_cast<std::ptrdiff_t>(member));
+  const auto simulated = fitter.runner().simulate({fitter.model(fit.state), fitter.model(less)});
+  Trace trace;
+  std::map<std::size_t, std::pair<double, double>> by_test;  // squares, product with the residual
+  for (const Block& b : fitter.runner().blocks()) {
+    for (std::size_t i = b.offset; i < b.offset + b.size; ++i) {
+      const double s = simulated[0][i] - simulated[1][i];
+      trace.squares[b.channel] += s * s;
+      trace.total += s * s;
+      by_test[b.test].first += s * s;
+      by_test[b.test].second += s * fit.residual[i];
+    }
+  }
+  if (trace.total <= 0.0) return trace;
+  double variance = 0.0, count = 0.0;
+  for (const auto& [test, sums] : by_test) {
+    if (sums.first < 1e-6 * trace.total) continue;
+    variance += sums.second * sums.second / sums.first;
+    count += 1.0;
+  }
+  trace.evenness = std::max(0.0, (variance - count) / trace.total);
+  return trace;
+}
+
+FitState without(const FitState& state, std::size_t member) {
+  FitState less = state;
+  less.members.erase(less.members.begin() + static_cast<std::ptrdiff_t>(member));
+  return less;
+}
+
+// Standard deviations of the keys of a member's entry, by the law of propagation.
+std::vector<FoundParameter> parametersOf(const Member& member, const Eigen::MatrixXd& covariance) {
+  const auto numbers = numbersOf(member.hypothesis->entry(member.values));
+  std::vector<FoundParameter> parameters;
+  Eigen::MatrixXd gradient = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(numbers.size()), covariance.cols());
+  for (std::size_t c = 0; c < member.values.size(); ++c) {
+    const double step = 1e-3 * std::max(std::sqrt(covariance(static_cast<Eigen::Index>(c), static_cast<Eigen::Index>(c))), 1e-12);
+    std::vector<double> moved = member.values;
+    moved[c] += step;
+    const auto other = numbersOf(member.hypothesis->entry(moved));
+    if (other.size() != numbers.size()) continue;
+    for (std::size_t k = 0; k < numbers.size(); ++k) {
+      double difference = other[k].second - numbers[k].second;
+      if (numbers[k].first == "angle_deg") difference = std::remainder(difference, 360.0);
+      gradient(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(c)) = difference / step;
+    }
+  }
+  const Eigen::MatrixXd spread = gradient * covariance * gradient.transpose();
+  for (std::size_t k = 0; k < numbers.size(); ++k) {
+    const auto i = static_cast<Eigen::Index>(k);
+    parameters.push_back({numbers[k].first, numbers[k].second, std::sqrt(std::max(spread(i, i), 0.0))});
+  }
+  return parameters;
+}
+
+void writeStdDevs(EffectEntry& entry, const std::vector<FoundParameter>& parameters) {
+  for (const FoundParameter& p : parameters) {
+    if (entry.numbers.count(p.key)) entry.std_devs[p.key] = p.std_dev;
+  }
+  const auto setModes = [&](const std::string& axis, ModalModel& modes) {
+    for (std::size_t k = 0; k < modes.modes.size(); ++k) {
+      const std::string name = axis + "[" + std::to_string(k) + "].";
+      for (const FoundParameter& p : parameters) {
+        if (p.key == name + "frequency_hz") modes.modes[k].frequency_std = p.std_dev;
+        if (p.key == name + "damping_ratio") modes.modes[k].damping_ratio_std = p.std_dev;
+        if (p.key == name + "stiffness_n_per_um") modes.modes[k].gain_std = modes.modes[k].gain * p.std_dev / p.value;
+      }
+    }
+  };
+  setModes("x", entry.flexibility.x);
+  setModes("y", entry.flexibility.y);
+}
+
+// Chi-square statistic of noise alone varies by sqrt(2 / n).
+double floorDeviation(std::size_t samples) {
+  return samples ? std::sqrt(0.5 / static_cast<double>(samples)) : 0.0;
+}
+
+}  // namespace
+
+Explanation explain(const Dataset& data, const ExplainOptions& options, const std::string& folder) {
+  const auto begin = std::chrono::steady_clock::now();
+  const auto say = [&](const std::string& line) {
+    if (options.search.progress) options.search.progress(line);
+  };
+  Explanation result;
+  result.notes = data.notes;
+  const std::vector<Hypothesis> hypotheses = catalogueHypotheses(data, &result.notes);
+  std::vector<std::size_t> fitted, heldout;
+  for (std::size_t t = 0; t < data.tests.size(); ++t) (data.tests[t].heldout ? heldout : fitted).push_back(t);
+  const SearchOptions& s = options.search;
+  const NominalFreedom freedom(data.nominal);
+  TwinRunner quick_runner(data, fitted, s.threads, s.screening_substeps);
+  const TwinRunner exact_runner(data, fitted, s.threads, s.final_substeps);
+  const TwinRunner heldout_runner(data, heldout, s.threads, s.final_substeps);
+  const Fitter quick(quick_runner, freedom), exact(exact_runner, freedom);
+
+  const std::vector<double> before = residualOf(exact_runner, data.nominal);
+  const std::vector<double> before_heldout = residualOf(heldout_runner, data.nominal);
+  result.before = {gapOf(before), gapOf(before_heldout)};
+  char line[200];
+  std::snprintf(line, sizeof line, "gap of the nominal model: %.4f, held out %.4f", result.before.fit, result.before.heldout);
+  say(line);
+
+  SearchResult found = search(quick_runner, quick, exact, hypotheses, s);
+  result.ladder = found.ladder;
+  result.unexplained = findStructure(exact_runner, found.best.residual, options.structure);
+  // What the calibration of the nominal values takes away is no disagreement of their kind.
+  result.where = findStructure(exact_runner, found.null.residual, options.structure);
+  // An effect that the tests do not agree on, or that is small beside what is left where it acts, stands for another cause.
+  while (!result.unexplained.empty() && !found.best.state.members.empty()) {
+    std::size_t worst = 0;
+    double worst_score = 1.0;
+    for (std::size_t m = 0; m < found.best.state.members.size(); ++m) {
+      const Trace trace = traceOf(exact, found.best, m);
+      double rest = 0.0;
+      for (const Finding& f : result.unexplained) {
+        const auto at = trace.squares.find(f.channel);
+        if (at != trace.squares.end() && at->second > 0.01 * trace.total) rest += f.squares;
+      }
+      const double score = std::max(trace.evenness / options.least_evenness, 2.0 * rest / std::max(found.contribution[m], 1.0));
+      std::snprintf(line, sizeof line, "  %s: tests differ by %.3g, rest %.3g, contribution %.3g",
+                    found.best.state.members[m].hypothesis->title().c_str(), trace.evenness, rest, found.contribution[m]);
+      say(line);
+      if (score > worst_score) {
+        worst_score = score;
+        worst = m;
+      }
+    }
+    if (worst_score <= 1.0) break;
+    say("  stands for another cause: " + found.best.state.members[worst].hypothesis->title());
+    refine(quick_runner, quick, exact, without(found.best.state, worst), &found);
+    result.unexplained = findStructure(exact_runner, found.best.residual, options.structure);
+  }
+
+  const Fit& best = found.best;
+  MachineModel model = exact.model(best.state);
+  // Where structure is left, the noise does not tell how well the values are known.
+  const double scale = std::max(1.0, best.chi2 / static_cast<double>(exact_runner.size()));
+  const Eigen::MatrixXd covariance = scale * best.covariance;
+  const std::size_t nominal = freedom.coordinates().size();
+  std::vector<double> nominal_std;
+  for (std::size_t c = 0; c < nominal; ++c) {
+    const auto i = static_cast<Eigen::Index>(c);
+    nominal_std.push_back(std::sqrt(covariance(i, i)));
+  }
+  freedom.writeStdDevs(model, nominal_std);
+  auto first = static_cast<Eigen::Index>(nominal);
+  for (std::size_t m = 0; m < best.state.members.size(); ++m) {
+    const Member& member = best.state.members[m];
+    const auto own = static_cast<Eigen::Index>(member.values.size());
+    FoundEffect effect;
+    effect.name = member.hypothesis->effect;
+    effect.variant = member.hypothesis->variant;
+    effect.parameters = parametersOf(member, covariance.block(first, first, own, own));
+    first += own;
+    EffectEntry& entry = model.effects[data.nominal.effects.size() + m];
+    effect.words = entry.words;
+    writeStdDevs(entry, effect.parameters);
+    effect.delta_bic = found.contribution[m];
+    effect.evenness = traceOf(exact, best, m).evenness;
+    const double with = squaresOf(residualOf(heldout_runner, exact.model(best.state)));
+    const double without_it = squaresOf(residualOf(heldout_runner, exact.model(without(best.state, m))));
+    const auto floor = static_cast<double>(heldout_runner.size());
+    effect.heldout_gap_reduction =
+        without_it > floor ? std::clamp(1.0 - std::max(with - floor, 0.0) / (without_it - floor), -1.0, 1.0) : 0.0;
+    for (const Rival& rival : found.rivals) {
+      if (rival.member != m) continue;
+      effect.alternatives.emplace_back(rival.effect, rival.delta_bic);
+      if (rival.delta_bic > effect.delta_bic - ALIKE) {
+        result.not_separable.push_back({effect.name, rival.effect});
+        if (!result.suggested_test)
+          result.suggested_test = separatingTest(data, exact.model(best.state), exact.model(rival.state));
+      }
+    }
+    result.effects.push_back(std::move(effect));
+  }
+
+  const std::string file = folder + "/model.yaml";
+  writeMachineModel(model, file);
+  result.model = readMachineModel(file);
+  const std::vector<double> after = residualOf(exact_runner, result.model);
+  const std::vector<double> after_heldout = residualOf(heldout_runner, result.model);
+  result.after = {gapOf(after), gapOf(after_heldout)};
+  const auto addGaps = [&](const TwinRunner& runner, const std::vector<double>& b, const std::vector<double>& a, bool held) {
+    for (const Block& block : runner.blocks()) {
+      const auto from = static_cast<std::ptrdiff_t>(block.offset), to = from + static_cast<std::ptrdiff_t>(block.size);
+      result.gaps.push_back({data.tests[block.test].test.name, block.channel, held,
+                             gapOf({b.begin() + from, b.begin() + to}), gapOf({a.begin() + from, a.begin() + to}),
+                             floorDeviation(block.size)});
+    }
+  };
+  addGaps(exact_runner, before, after, false);
+  addGaps(heldout_runner, before_heldout, after_heldout, true);
+
+  if (result.effects.empty()) {
+    result.verdict = result.unexplained.empty() ? "no_disagreement" : "unknown_effect";
+  } else {
+    result.verdict = result.unexplained.empty() ? "explained" : "partly_explained";
+  }
+  if (result.verdict == "no_disagreement") result.where.clear();
+  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  std::snprintf(line, sizeof line, "verdict %s; gap %.4f -> %.4f, held out %.4f -> %.4f", result.verdict.c_str(),
+                result.before.fit, result.after.fit, result.before.heldout, result.after.heldout);
+  say(line);
+  return result;
+}
+
+}  // namespace smartmill::discrepancy
