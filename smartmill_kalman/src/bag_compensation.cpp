@@ -28,12 +28,13 @@ class Cutter {
 
   void condition(const CuttingCondition& condition) { conditions_[condition.stamp] = condition; }
 
-  void blocks(const ForceBlock& measured, const ForceBlock& compensated) {
+  void blocks(const ForceBlock& measured, const ForceBlock& compensated, double speed) {
     for (std::size_t i = 0; i < measured.force[0].size(); ++i) {
       const double time = measured.stamp + static_cast<double>(i) / measured.sample_rate;
       turnTo(time);
       if (!cut_) continue;
       cut_->sample_rate = measured.sample_rate;
+      if (speed > 0.0) cut_->speed = speed;
       cut_->offset.push_back(time - cut_->stamp);
       if (compensated.status != ForceBlock::Status::compensated) cut_->settling += 1.0 / measured.sample_rate;
       for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -71,7 +72,7 @@ class Cutter {
 }  // namespace
 
 BagSummary compensateBag(const std::string& path, const ForceSensor& sensor, const NodeParameters& parameters,
-                         const std::function<void(BagCut&&)>& done,
+                         Method method, const std::function<void(BagCut&&)>& done,
                          const std::function<void(double)>& progress) {
   BagSummary summary;
   tf2::BufferCore transforms;
@@ -83,19 +84,26 @@ BagSummary compensateBag(const std::string& path, const ForceSensor& sensor, con
         transforms.lookupTransform(frames::MACHINE, frame, ros::Time(0)).transform.rotation);
     summary.rotation_known = true;
   };
+  std::optional<SortedCompensation> sorted;
   Cutter cutter([&](BagCut&& cut) {
     ++summary.cuts;
+    if (method != Method::kalman && cut.speed > 0.0) {
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        cut.compensated[axis] = compensateRecord(method, cut.measured[axis], sorted->sensor(axis), cut.speed,
+                                                 cut.sample_rate, parameters.compensation.filter);
+      }
+    }
+    for (auto* force : {&cut.measured, &cut.compensated}) rotateInPlace(rotation, *force);
     done(std::move(cut));
   });
-  SortedCompensation sorted(parameters.compensation, parameters.taps, sensor, parameters.hold_back,
-                            {[&](ForceBlock measured, ForceBlock compensated) {
-                               rotateInPlace(rotation, measured);
-                               rotateInPlace(rotation, compensated);
-                               cutter.blocks(measured, compensated);
-                             },
-                             {},
-                             {},
-                             [&](const SensorResult& result) { summary.identified.push_back(result); }});
+  sorted.emplace(
+      parameters.compensation, parameters.taps, sensor, parameters.hold_back,
+      SortedCompensation::Outputs{[&](const ForceBlock& measured, const ForceBlock& compensated) {
+                                    cutter.blocks(measured, compensated, sorted->health().speed);
+                                  },
+                                  {},
+                                  {},
+                                  [&](const SensorResult& result) { summary.identified.push_back(result); }});
   {
     // The rotation holds for the whole bag, also for blocks that came before it.
     BagReader bag(path);
@@ -116,31 +124,31 @@ BagSummary compensateBag(const std::string& path, const ForceSensor& sensor, con
       if (!m.header.frame_id.empty()) frame = m.header.frame_id;
       findRotation();
     }
-    sorted.push(fromMsg(m));
+    sorted->push(fromMsg(m));
   });
   bag.on<smartmill_msgs::SampleBlock>(
-      "daq/hammer", [&](const smartmill_msgs::SampleBlock& m, double) { sorted.pushHammer(fromMsg(m)); });
+      "daq/hammer", [&](const smartmill_msgs::SampleBlock& m, double) { sorted->pushHammer(fromMsg(m)); });
   bag.on<smartmill_msgs::SpindleAngle>(
-      "spindle/angle", [&](const smartmill_msgs::SpindleAngle& m, double) { sorted.push(fromMsg(m)); });
+      "spindle/angle", [&](const smartmill_msgs::SpindleAngle& m, double) { sorted->push(fromMsg(m)); });
   bag.on<smartmill_msgs::CuttingCondition>("cut/condition",
                                            [&](const smartmill_msgs::CuttingCondition& m, double) {
                                              const CuttingCondition condition = fromMsg(m);
                                              cutter.condition(condition);
-                                             sorted.push(condition);
+                                             sorted->push(condition);
                                            });
   bag.on<smartmill_msgs::ModalModel>(
-      "tool/modes", [&](const smartmill_msgs::ModalModel& m, double) { sorted.push(fromMsg(m)); });
+      "tool/modes", [&](const smartmill_msgs::ModalModel& m, double) { sorted->push(fromMsg(m)); });
   bag.on<smartmill_msgs::MeasureFrfActionGoal>(
       "kalman/measure_frf/goal", [&](const smartmill_msgs::MeasureFrfActionGoal& m, double received) {
-        sorted.push(goalFromMsg(m.goal, received));
+        sorted->push(goalFromMsg(m.goal, received));
       });
   bag.run(progress);
   if (blocks == 0) throw Error(path + ": holds no daq/dynamometer");
-  sorted.flush();
+  sorted->flush();
   cutter.close();
-  summary.gaps = sorted.health().gaps;
-  summary.not_finite = sorted.health().not_finite;
-  summary.late = sorted.late();
+  summary.gaps = sorted->health().gaps;
+  summary.not_finite = sorted->health().not_finite;
+  summary.late = sorted->late();
   return summary;
 }
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "parameters_ros.h"
+#include "smartmill_kalman/record_compensation.h"
 
 namespace smartmill::kalman {
 
@@ -14,6 +15,7 @@ struct BagCut {
   std::string name;                                          ///< of the cutting condition
   double stamp = 0.0;                                        ///< [s] of the cutting condition
   double sample_rate = 0.0;                                  ///< [Hz]
+  double speed = 0.0;                                        ///< [rad/s] of the spindle, last
   double settling = 0.0;                                     ///< [s] marked as settling or passed through
   std::vector<double> offset;                                ///< [s] of each sample since stamp
   std::array<std::vector<double>, 3> measured, compensated;  ///< [N]
@@ -28,9 +30,11 @@ struct BagSummary {
 };
 
 /// Puts a bag's sensors, conditions and goals through SortedCompensation, as the node does, without a master.
+/// Methods other than kalman run over each cut's samples with the sensor and the speed that the node had in
+/// it.
 /// @param done called at the end of each cut, in order @throws Error.
 BagSummary compensateBag(const std::string& path, const ForceSensor& sensor, const NodeParameters& parameters,
-                         const std::function<void(BagCut&&)>& done,
+                         Method method, const std::function<void(BagCut&&)>& done,
                          const std::function<void(double)>& progress = {});
 
 }  // namespace smartmill::kalman

@@ -87,15 +87,15 @@ std::array<ModalModel, 3> identifySensor(const Campaign& campaign, const SensorF
 
 std::array<std::vector<double>, 3> compensate(const Record& record, const std::array<ModalModel, 3>& sensor,
                                               bool measures_workpiece, double spindle_speed,
-                                              double sample_rate,
-                                              const HarmonicFilterParameters& parameters) {
+                                              double sample_rate, const HarmonicFilterParameters& parameters,
+                                              Method method) {
   std::array<std::vector<double>, 3> force;
-  const double sign = measures_workpiece ? -1.0 : 1.0;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    HarmonicFilter filter(sensor[axis], spindle_speed, sample_rate, parameters);
-    const std::vector<double>& measured = record.column(FORCES[axis]);
-    force[axis].reserve(measured.size());
-    for (const double sample : measured) force[axis].push_back(filter.step(sign * sample));
+    std::vector<double> measured = record.column(FORCES[axis]);
+    if (measures_workpiece) {
+      for (double& sample : measured) sample = -sample;
+    }
+    force[axis] = compensateRecord(method, measured, sensor[axis], spindle_speed, sample_rate, parameters);
   }
   return force;
 }

@@ -28,7 +28,7 @@ using namespace smartmill;
 constexpr std::array<const char*, 3> AXES{{"x", "y", "z"}};
 
 struct Request {
-  std::string source, out, model, parameters;
+  std::string source, out, model, parameters, method = "kalman";
   bool identify = false;
   std::optional<double> bandwidth, noise, settling;
   kalman::SensorFitParameters fit;
@@ -55,6 +55,11 @@ void write(const std::string& folder, const std::string& name, const std::vector
   record.time = time;
   for (std::size_t axis = 0; axis < 3; ++axis) record.add(std::string("f") + AXES[axis]) = force[axis];
   writeCsv(record, (std::filesystem::path(folder) / (name + ".csv")).string());
+}
+
+/// What is said about the samples' times.
+const char* latency(const Request& request) {
+  return request.method == "inverse" ? "its latency of 256 samples taken out" : "no latency";
 }
 
 std::array<std::vector<double>, 3> forces(const Record& record) {
@@ -93,13 +98,13 @@ void fromCampaign(const Request& request) {
     std::fprintf(stderr, "compensating %s\n", test.name.c_str());
     const Record record = readRecord(campaign, test);
     const auto force = kalman::compensate(record, sensor, workpiece, test.spindle_speed, test.sample_rate,
-                                          parameters.compensation.filter);
+                                          parameters.compensation.filter, kalman::methodOf(request.method));
     write(request.out, test.name, record.time, force);
     printRange(test.name, forces(record), force);
     ++cuts;
   }
   if (cuts == 0) throw Error(campaign.folder + ": the campaign has no cuts");
-  std::printf("%zu cuts written to %s (no latency)\n", cuts, request.out.c_str());
+  std::printf("%zu cuts written to %s (%s)\n", cuts, request.out.c_str(), latency(request));
 }
 
 /// A test's name as the name of a file; a name that came before gets a number.
@@ -125,7 +130,7 @@ void fromBag(const Request& request) {
   std::set<std::string> used;
   const auto began = std::chrono::steady_clock::now();
   const kalman::BagSummary summary = kalman::compensateBag(
-      request.source, model.force_sensor, parameters,
+      request.source, model.force_sensor, parameters, kalman::methodOf(request.method),
       [&](kalman::BagCut&& cut) {
         const std::string name = fileName(cut.name, used);
         write(request.out, name, cut.offset, cut.compensated);
@@ -173,6 +178,9 @@ int main(int argc, char** argv) {
   app.add_option("--model", request.model, "model file with the force sensor (default: the campaign's)");
   app.add_option("--params", request.parameters, "parameter file of the node (launch/config/kalman.yaml)");
   app.add_flag("--identify", request.identify, "campaign: take the sensor's modes from its own taps");
+  app.add_option("--method", request.method, "kalman (causal, as the node), smoother or inverse")
+      ->check(CLI::IsMember({"kalman", "smoother", "inverse"}))
+      ->capture_default_str();
   app.add_option("--bandwidth-hz", request.bandwidth, "harmonics up to this frequency");
   app.add_option("--noise-rms-n", request.noise, "noise of one sample");
   app.add_option("--settling-revolutions", request.settling, "time constant of the amplitudes");

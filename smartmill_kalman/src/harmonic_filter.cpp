@@ -19,6 +19,8 @@ using Complex = std::complex<double>;
 
 /// A window whose mean square exceeds the largest of the revolution before by this is a change of the force.
 constexpr double OUT_OF_LINE = 5.0;
+/// Windows after a start that tell what is usual.
+constexpr std::size_t LEAST_WINDOWS = 12;
 /// Revolutions at a memory before a longer one is tried.
 constexpr std::size_t DWELL = 2;
 /// The mean square of a revolution that still falls below this share of the last one's: not settled.
@@ -73,7 +75,7 @@ HarmonicGain designHarmonicGain(const ModalModel& sensor, double spindle_speed, 
   a.topRightCorner(m, f) = modes.b * force;
   for (Eigen::Index n = 0; n <= harmonics; ++n) {
     const double passed = std::abs(sensor.response(static_cast<double>(n) * spindle_speed / units::TWO_PI));
-    const double tau = std::max(std::min(1.0, passed) * settling, quickest);
+    const double tau = std::max(std::min(1.0, 2.0 * passed) * settling, quickest);
     const double intensity = r * dt / (tau * tau);
     q(m + 2 * n, m + 2 * n) = intensity;
     if (n > 0) q(m + 2 * n - 1, m + 2 * n - 1) = intensity;
@@ -301,11 +303,13 @@ void HarmonicFilter::judgeWindow() {
   const double mean = window_sum_ / static_cast<double>(window_length_);
   window_count_ = 0;
   window_sum_ = 0.0;
-  if (level_ > 0 && mean > OUT_OF_LINE * last_peak_) {
+  const bool known = level_ > 0 || windows_ >= LEAST_WINDOWS || last_peak_ > 0.0;
+  if (known && mean > OUT_OF_LINE * (level_ > 0 ? last_peak_ : std::max(last_peak_, peak_))) {
     level_ = 0;
     ++restarts_;
     windows_ = dwell_ = 0;
-    revolution_sum_ = peak_ = last_mean_ = 0.0;
+    revolution_sum_ = last_mean_ = 0.0;
+    peak_ = last_peak_ = mean;
     return;
   }
   revolution_sum_ += mean;

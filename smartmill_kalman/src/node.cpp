@@ -114,8 +114,8 @@ void KalmanNode::publish(const ForceBlock& measured, const ForceBlock& compensat
 void KalmanNode::publishWaiting() {
   if (waiting_.empty() || !(rotation_known_ || (rotation_known_ = findRotation()))) return;
   for (auto& [measured, compensated] : waiting_) {
-    rotateInPlace(rotation_, measured);
-    rotateInPlace(rotation_, compensated);
+    rotateInPlace(rotation_, measured.force);
+    rotateInPlace(rotation_, compensated.force);
     measured_.publish(toMsg(measured, frames::MACHINE));
     compensated_.publish(toMsg(compensated, frames::MACHINE));
     publishWrench(compensated);

@@ -7,7 +7,7 @@
 #include "smartmill_core/campaign/campaign.h"
 #include "smartmill_core/campaign/record.h"
 #include "smartmill_core/modal/modal_fit.h"
-#include "smartmill_kalman/harmonic_filter.h"
+#include "smartmill_kalman/record_compensation.h"
 
 namespace smartmill::kalman {
 
@@ -32,10 +32,11 @@ ModalFit identifySensor(const std::vector<std::vector<double>>& hammer,
 /// @throws Error when the campaign has no taps at all.
 std::array<ModalModel, 3> identifySensor(const Campaign& campaign, const SensorFitParameters& parameters);
 
-/// Force on the tool of one cut, at the record's sample times [N]; no latency.
+/// Force on the tool of one cut, at the record's sample times [N]; any latency is taken out.
 /// @param measures_workpiece the sensor shows the reaction: turned here.
 std::array<std::vector<double>, 3> compensate(const Record& record, const std::array<ModalModel, 3>& sensor,
                                               bool measures_workpiece, double spindle_speed,
-                                              double sample_rate, const HarmonicFilterParameters& parameters);
+                                              double sample_rate, const HarmonicFilterParameters& parameters,
+                                              Method method = Method::kalman);
 
 }  // namespace smartmill::kalman

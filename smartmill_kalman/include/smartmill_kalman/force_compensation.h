@@ -59,6 +59,8 @@ class ForceCompensation {
   /// @param noise_rms [N] of one sample, > 0
   void setSensor(std::size_t axis, const ModalModel& sensor, double noise_rms);
   bool hasSensor() const;
+  /// Model in use. @throws std::bad_optional_access when there is none.
+  const ModalModel& sensor(std::size_t axis) const { return sensor_.at(axis).value(); }
 
   /// @throws Error when channels fx, fy, fz are missing or not in N.
   void handle(const SampleBlock& block);

@@ -32,8 +32,9 @@ struct HarmonicGain {
 
 /// Stationary gain from the discrete Riccati equation. Exact discretisation (Van Loan for the noise). Process
 /// noise q = (r dt) / tau^2 for every amplitude puts each harmonic's pole near -|H| / tau, H the sensor's
-/// answer to it. A harmonic that the sensor hardly passes is slow already: tau is min(1, |H|) settling there,
-/// not below quickest, so that a long memory does not make it slower still. The gain does not depend on r.
+/// answer to it. A harmonic that the sensor hardly passes is slow already: tau is min(1, 2 |H|) settling
+/// there, not below quickest, so that a long memory does not make it slower still. The gain does not depend
+/// on r.
 /// @param spindle_speed [rad/s] @param sample_rate [Hz] @param settling, quickest [s]
 HarmonicGain designHarmonicGain(const ModalModel& sensor, double spindle_speed, double sample_rate,
                                 int harmonics, double noise_rms, double settling, double quickest);
@@ -101,7 +102,7 @@ class HarmonicFilter {
   std::size_t level() const { return level_; }  ///< 0 quick .. LEVELS - 1 slow
   std::size_t restarts() const {
     return restarts_;
-  }  ///< times that an innovation out of line took the memory back
+  }  ///< times that an innovation was out of line: the memory begins anew
   void setLevel(std::size_t level) { level_ = level < gains_.size() ? level : gains_.size() - 1; }
   /// State in the coordinates of HarmonicGain.
   std::vector<double> state() const;

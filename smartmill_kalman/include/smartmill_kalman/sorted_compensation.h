@@ -51,6 +51,8 @@ class SortedCompensation {
   void flush() { sorter_.flush(); }  ///< end of data
 
   const CompensationHealth& health() const { return compensation_.health(); }
+  /// Model in use of an axis.
+  const ModalModel& sensor(std::size_t axis) const { return compensation_.sensor(axis); }
   bool measuring() const { return measurement_.active(); }
   std::string waitingFor() const { return sorter_.waitingFor(); }
   std::size_t late() const { return sorter_.late(); }

@@ -1,0 +1,127 @@
+// rosrun smartmill_kalman reference: errors of the compensation in the project's reference cut, beside their
+// targets.
+
+#include <cmath>
+#include <cstdio>
+#include <functional>
+#include <iostream>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "smartmill_core/units.h"
+#include "smartmill_kalman/campaign_compensation.h"
+#include "smartmill_kalman/record_compensation.h"
+#include "smartmill_kalman/reference_case.h"
+
+namespace {
+
+using namespace smartmill;          // NOLINT
+using namespace smartmill::kalman;  // NOLINT
+
+struct Errors {
+  double to_3k = 0.0, to_5k = 0.0, entry_3k = 0.0, entry_5k = 0.0;  // [1]
+};
+
+using Estimator = std::function<std::vector<double>(const std::vector<double>&)>;
+
+Errors errorsOf(const ReferenceCase& reference, const ReferenceRecord& record, const Estimator& estimator) {
+  Errors worst;
+  const double rate = reference.sample_rate, revolution = units::TWO_PI / reference.spindle_speed;
+  const auto sample = [rate](double time) { return static_cast<std::size_t>(std::lround(time * rate)); };
+  const std::size_t from = sample(reference.engage_time + 0.1), to = record.time.size();
+  const std::size_t third = sample(reference.engage_time + 2.0 * revolution);
+  const std::size_t eighth = sample(reference.engage_time + 8.0 * revolution);
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    const std::vector<double> force = estimator(record.measured[axis]);
+    const auto error = [&](double band, std::size_t a, std::size_t b) {
+      return bandError(force, record.truth[axis], rate, a, b, band);
+    };
+    worst.to_3k = std::max(worst.to_3k, error(3000.0, from, to));
+    worst.to_5k = std::max(worst.to_5k, error(5000.0, from, to));
+    worst.entry_3k = std::max(worst.entry_3k, error(3000.0, third, eighth));
+    worst.entry_5k = std::max(worst.entry_5k, error(5000.0, third, eighth));
+  }
+  return worst;
+}
+
+void row(double rpm, const char* name, const Errors& e, const char* target) {
+  std::printf("%6.0f  %-30s %8.2f %8.2f %10.2f %8.2f   %s\n", rpm, name, 100.0 * e.to_3k, 100.0 * e.to_5k,
+              100.0 * e.entry_3k, 100.0 * e.entry_5k, target);
+}
+
+/// The plain augmented Kalman filter: the force is a random walk; its best intensity over a grid, by the
+/// truth.
+Errors randomWalk(const ReferenceCase& reference, const ReferenceRecord& record, bool smooth) {
+  Errors best;
+  best.to_5k = 1e9;
+  HarmonicFilterParameters parameters;
+  parameters.max_harmonics = 0;
+  for (double tau = 1e-6; tau < 1e-3; tau *= 2.0) {  // [s]
+    parameters.settling_revolutions = parameters.memory_revolutions =
+        tau * reference.spindle_speed / units::TWO_PI;
+    HarmonicFilter filter(reference.sensor, reference.spindle_speed, reference.sample_rate, parameters);
+    const Errors errors = errorsOf(reference, record, [&](const std::vector<double>& measured) {
+      filter.reset();
+      if (smooth) return filter.smooth(measured);
+      std::vector<double> force;
+      for (const double sample : measured) force.push_back(filter.step(sample));
+      return force;
+    });
+    if (errors.to_5k < best.to_5k) best = errors;
+  }
+  return best;
+}
+
+void run(const std::vector<double>& speeds, double duration) {
+  std::printf("reference cut: error of the force [%%], worst of x and y; targets to 3 / 5 kHz\n");
+  std::printf("   rpm  method                          to 3 kHz to 5 kHz   rev 3-8 (3k)   (5k)   target\n");
+  for (const double rpm : speeds) {
+    ReferenceCase reference;
+    reference.spindle_speed = units::radPerSecFromRpm(rpm);
+    reference.duration = duration;
+    std::fprintf(stderr, "%.0f rpm\n", rpm);
+    const ReferenceRecord record = simulate(reference);
+    HarmonicFilterParameters parameters;
+    parameters.max_harmonics = 200;
+    const auto with = [&](Method method, const ModalModel& sensor) {
+      return errorsOf(reference, record, [&](const std::vector<double>& measured) {
+        return compensateRecord(method, measured, sensor, reference.spindle_speed, reference.sample_rate,
+                                parameters);
+      });
+    };
+    row(rpm, "measured", errorsOf(reference, record, [](const std::vector<double>& m) { return m; }), "");
+    row(rpm, "kalman", with(Method::kalman, reference.sensor), "0.6 / 1.2, rev 3-8: 1");
+    row(rpm, "smoother", with(Method::smoother, reference.sensor), "0.5 / 1.0");
+    row(rpm, "inverse", with(Method::inverse, reference.sensor), "1.2 / 2.2");
+    const ReferenceTaps taps = simulateTaps(reference, 9);
+    const ModalFit fit =
+        identifySensor(taps.hammer, taps.response, reference.sample_rate, {100.0, 5000.0, 4});
+    row(rpm, "kalman, nine taps", with(Method::kalman, fit.model), "1.5");
+    row(rpm, "random walk, best q, causal", randomWalk(reference, record, false), "baseline");
+    row(rpm, "random walk, best q, smoothed", randomWalk(reference, record, true), "baseline");
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  std::vector<double> speeds{3000.0, 9000.0, 15000.0, 21750.0};
+  double duration = 1.0;
+  CLI::App app{"Errors of the force compensation in the reference cut, beside their targets."};
+  app.add_option("--speed-rpm", speeds, "spindle speeds")->check(CLI::Range(500.0, 60000.0));
+  app.add_option("--duration-s", duration, "length of a record")->check(CLI::Range(0.3, 100.0));
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? 0 : 2;
+  }
+  try {
+    run(speeds, duration);
+  } catch (const std::exception& e) {
+    std::cerr << "reference: " << e.what() << "\n";
+    return 1;
+  }
+  return 0;
+}
