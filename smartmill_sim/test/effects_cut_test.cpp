@@ -1,0 +1,194 @@
+// Effects of geometry, motion, cutting law and structure against their closed forms (catalogue of effects).
+
+#include <cmath>
+#include <map>
+
+#include <gtest/gtest.h>
+
+#include "smartmill_core/signal/statistics.h"
+#include "smartmill_sim/twin/regenerative_cut.h"
+
+#include "effects_rig.h"
+
+namespace smartmill::sim {
+namespace {
+
+using units::PI;
+using units::TWO_PI;
+
+// In a slot with a straight edge one tooth of two cuts at a time: Fz = (Kac h + Kae) a, so Fz tells the chip.
+double chipOf(double fz, const MachineModel& model, double depth) {
+  return (fz / depth - model.cutting->kae) / model.cutting->kac;
+}
+
+TEST(Effects, runoutMovesChipFromToothToTooth) {
+  const MachineModel model =
+      with(mill(3, 0.0), {effectEntry("runout", {{"offset_um", 12.0}, {"angle_deg", 70.0}})});
+  const double speed = RATE / 360.0 * TWO_PI, depth = 2e-3, feed = 1e-4;
+  const Record record = run(model, slotCut(RATE / 360.0 * 60.0, depth, feed), 0.1);
+  const auto radius = [](int j) { return 12e-6 * std::cos(units::radFromDeg(70.0 - 120.0 * (j % 3))); };
+  for (int j = 0; j < 3; ++j) {
+    // Tooth j, alone in cut, stands at 90 degrees; it cuts what tooth j + 1 left.
+    const double angle = units::radFromDeg(90.0 - 120.0 * j + (j > 0 ? 360.0 : 0.0));
+    const double chip = chipOf(at(record, "fz", angle, speed), model, depth);
+    EXPECT_NEAR(chip, feed + radius(j) - radius(j + 1), 1e-9) << j;
+  }
+}
+
+TEST(Effects, runoutBeyondTheFeedLeavesTheCutToOneTooth) {
+  const MachineModel model =
+      with(mill(2, 0.0), {effectEntry("runout", {{"offset_um", 60.0}, {"angle_deg", 0.0}})});
+  const Record record = run(model, slotCut(EVEN_RPM, 2e-3, 1e-4), 0.1);
+  // Tooth 1 takes the feed of the whole revolution: its own last pass is the nearest surface.
+  EXPECT_NEAR(chipOf(at(record, "fz", 0.5 * PI, EVEN_SPEED), model, 2e-3), 2e-4, 1e-9);
+  EXPECT_EQ(at(record, "fz", 1.5 * PI, EVEN_SPEED), 0.0);
+}
+
+TEST(Effects, edgeForcesAddToTheMeans) {
+  const double depth = 2e-3;
+  const Record without = run(mill(4, 30.0), slotCut(EVEN_RPM, depth), 5 * REVOLUTION);
+  const Record record =
+      run(with(mill(4, 30.0),
+               {effectEntry("edge_forces",
+                            {{"Kte_n_per_mm", 5.0}, {"Kre_n_per_mm", 7.0}, {"Kae_n_per_mm", 2.0}})}),
+          slotCut(EVEN_RPM, depth), 5 * REVOLUTION);
+  const auto added = [&](const char* c) { return mean(record.column(c)) - mean(without.column(c)); };
+  // Slot: N a Kre / pi and so on (Dunwoody eq. 3.19). 128 samples a tooth leave 1e-4 of the means.
+  EXPECT_NEAR(added("fx"), -4 * depth * 7e3 / PI, 0.01);
+  EXPECT_NEAR(added("fy"), 4 * depth * 5e3 / PI, 0.01);
+  EXPECT_NEAR(added("fz"), 4 * depth * 2e3 / 2.0, 0.01);
+  // A key left out is 0.
+  const Record radial_only = run(with(mill(4, 30.0), {effectEntry("edge_forces", {{"Kre_n_per_mm", 7.0}})}),
+                                 slotCut(EVEN_RPM, depth), REVOLUTION);
+  EXPECT_NEAR(radial_only.column("fz")[100], without.column("fz")[100], 1e-12);
+}
+
+TEST(Effects, sizeEffectMakesThinChipsCutHarder) {
+  const MachineModel model =
+      with(mill(2, 0.0), {effectEntry("size_effect", {{"exponent", 0.3}, {"reference_chip_um", 50.0}})});
+  const double depth = 2e-3, feed = 1e-4;
+  const Record record = run(model, slotCut(EVEN_RPM, depth, feed), 0.1);
+  for (const double angle : {0.125 * PI, 0.25 * PI, 0.5 * PI}) {
+    const double h = feed * std::sin(angle);
+    const double fz = (200e6 * std::pow(h / 50e-6, -0.3) * h + 3e3) * depth;
+    EXPECT_NEAR(at(record, "fz", angle, EVEN_SPEED), fz, 1e-6 * fz);
+  }
+}
+
+TEST(Effects, toolWearGrowsEveryEdgeForceWithCuttingTime) {
+  const MachineModel model = with(mill(2, 0.0), {effectEntry("tool_wear", {{"edge_growth_per_min", 0.5}}),
+                                                 effectEntry("edge_forces", {{"Kae_n_per_mm", 2.0}})});
+  const Record record = run(model, slotCut(EVEN_RPM, 2e-3, 1e-4), 0.5);
+  // 60 s cut before; 24 revolutions and a quarter into the record.
+  const double t = 24.25 * REVOLUTION, factor = 1.0 + 0.5 / 60.0 * (60.0 + t);
+  const double fz = (200e6 * 1e-4 + 5e3 * factor) * 2e-3;
+  EXPECT_NEAR(record.column("fz")[static_cast<std::size_t>(24.25 * 512)], fz, 1e-5 * fz);
+}
+
+TEST(Effects, cuttingSpeedScalesTheChipForceOnly) {
+  const MachineModel model =
+      with(mill(2, 0.0), {effectEntry("cutting_speed", {{"exponent", 0.2}, {"reference_m_per_min", 100.0}})});
+  const Record record = run(model, slotCut(EVEN_RPM, 2e-3, 1e-4), 0.1);
+  const double v = PI * 0.02 * EVEN_RPM;  // [m/min]
+  const double fz = (200e6 * 1e-4 * std::pow(v / 100.0, -0.2) + 3e3) * 2e-3;
+  EXPECT_NEAR(at(record, "fz", 0.5 * PI, EVEN_SPEED), fz, 1e-9 * fz);
+}
+
+TEST(Effects, unevenPitchSharesTheFeedByPitch) {
+  EffectEntry pitch;
+  pitch.name = "uneven_pitch";
+  pitch.pitch_deg = {157.5, 202.5};
+  const MachineModel model = with(mill(2, 0.0), {pitch});
+  const double depth = 2e-3, feed = 1e-4;
+  const Record record = run(model, slotCut(EVEN_RPM, depth, feed), 0.1);
+  EXPECT_NEAR(chipOf(at(record, "fz", 0.5 * PI, EVEN_SPEED), model, depth), 2 * feed * 157.5 / 360.0, 1e-9);
+  // Tooth 2 stands 157.5 degrees ahead of tooth 1.
+  EXPECT_NEAR(chipOf(at(record, "fz", units::radFromDeg(292.5), EVEN_SPEED), model, depth),
+              2 * feed * 202.5 / 360.0, 1e-9);
+  EffectEntry wrong = pitch;
+  wrong.pitch_deg = {100.0, 120.0, 140.0};
+  EXPECT_THROW(run(with(mill(2, 0.0), {wrong}), slotCut(EVEN_RPM), 0.1), std::runtime_error);
+}
+
+TEST(Effects, helixIsThatOfAnotherTool) {
+  const Record record =
+      run(with(mill(4, 10.0), {effectEntry("helix", {{"helix_deg", 45.0}})}), slotCut(EVEN_RPM), 0.05);
+  const MachineModel other = mill(4, 45.0);
+  const MechanisticForce closed(*other.tool, *other.cutting, *slotCut(EVEN_RPM).engagement);
+  for (const std::size_t i : {100u, 333u, 500u}) {
+    const CuttingForce f = closed.at(record.column("spindle_angle")[i]);
+    EXPECT_NEAR(record.column("fx")[i], f.fx, 0.01);
+    EXPECT_NEAR(record.column("fz")[i], f.fz, 0.01);
+  }
+}
+
+TEST(Effects, feedErrorScalesTheChip) {
+  const MachineModel model = with(mill(2, 0.0), {effectEntry("feed_error", {{"ratio", 1.07}})});
+  const Record record = run(model, slotCut(EVEN_RPM, 2e-3, 1e-4), 0.1);
+  EXPECT_NEAR(chipOf(at(record, "fz", 0.5 * PI, EVEN_SPEED), model, 2e-3), 1.07e-4, 1e-10);
+}
+
+TEST(Effects, depthTiltFollowsTheFeedPathFromEngagement) {
+  const MachineModel model = with(mill(2, 0.0), {effectEntry("depth_tilt", {{"slope_um_per_mm", -30.0}})});
+  CampaignTest test = slotCut(EVEN_RPM, 2e-3, 1e-4);
+  test.engage_time = 2.0 * REVOLUTION;
+  const Record record = run(model, test, 0.5);
+  const auto depthAt = [&](double revolutions) {
+    return record.column("fz")[static_cast<std::size_t>(512 * revolutions)] / (200e6 * 1e-4 + 3e3);
+  };
+  EXPECT_EQ(depthAt(1.25), 0.0);
+  // 0.2 mm a revolution from engagement; depth follows every 16 steps of a quarter sample: 1e-4 mm of path.
+  EXPECT_NEAR(depthAt(2.25), 2e-3 - 30e-3 * 0.25 * 2e-4, 1e-8);
+  EXPECT_NEAR(depthAt(20.25), 2e-3 - 30e-3 * 18.25 * 2e-4, 1e-8);
+}
+
+// A flexible tool bends by mean force over stiffness; regeneration does not change the mean chip.
+TEST(Effects, toolFlexibilityBendsTheTool) {
+  EffectEntry flexible;
+  flexible.name = "tool_flexibility";
+  flexible.flexibility.y.modes = {{900.0, 0.05, 1.0 / 30e6}};
+  CampaignTest test = slotCut(EVEN_RPM, 0.5e-3);
+  Record plan;
+  for (int i = 0; i < 51200; ++i) plan.time.push_back(i / RATE);
+  for (const char* c : {"spindle_angle", "fy", "tool_x", "tool_y"}) plan.add(c).assign(51200, 0.0);
+  for (std::size_t i = 0; i < plan.size(); ++i)
+    plan.add("spindle_angle")[i] = std::fmod(EVEN_SPEED * plan.time[i], TWO_PI);
+  SimulationOptions options;
+  options.noise = false;
+  const Record record = simulateTest(with(mill(4, 30.0), {flexible}), test, plan, options);
+  const auto late = [&](const char* c) {
+    const std::vector<double>& all = record.column(c);
+    return mean(std::vector<double>(all.end() - 512 * 40, all.end()));
+  };
+  const double fy = 4 * 0.5e-3 * (1e-4 * 800e6 / 4.0 + 20e3 / PI);
+  EXPECT_NEAR(late("fy"), fy, 2e-3 * fy);
+  EXPECT_NEAR(late("tool_y"), fy / 30e6, 2e-3 * fy / 30e6);
+  EXPECT_EQ(late("tool_x"), 0.0);
+}
+
+// Tip that moves into the work at v: radial C v / v_c per length of edge, tangential 0.3 of it.
+TEST(Effects, processDampingOpposesTheMotionIntoTheWork) {
+  const MachineModel model =
+      with(mill(1, 0.0), {effectEntry("process_damping", {{"coefficient_n_per_mm", 120.0}})});
+  TwinState damped;
+  damped.law.coefficients = *model.cutting;
+  CuttingLaw plain = damped.law;
+  EffectSet(model).update({}, damped);
+  const double dt = 1e-5, speed = 300.0, depth = 2e-3, v = 4e-3;
+  RegenerativeCut with_damping(*model.tool, damped.law, dt), without(*model.tool, plain, dt);
+  ToolMotion motion;
+  motion.speed = speed;
+  motion.velocity[0] = 1e-4 * speed / TWO_PI;
+  with_damping.engage({{0.0, PI, depth}}, motion);
+  without.engage({{0.0, PI, depth}}, motion);
+  // The tooth stands at 90 degrees, x is into the work.
+  const CuttingForce a = with_damping.at(0.5 * PI, {{v * dt, 0.0}}),
+                     b = without.at(0.5 * PI, {{v * dt, 0.0}});
+  const double force = 120e3 * v / (speed * 0.01) * depth;
+  EXPECT_NEAR(a.fx - b.fx, -force, 1e-6 * force);
+  EXPECT_NEAR(a.fy - b.fy, 0.3 * force, 1e-6 * force);
+  EXPECT_EQ(a.fz, b.fz);
+}
+
+}  // namespace
+}  // namespace smartmill::sim
