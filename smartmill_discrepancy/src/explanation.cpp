@@ -11,6 +11,7 @@
 namespace smartmill::discrepancy {
 namespace {
 
+constexpr double TWIN_ACCURACY = 2e-4;  // share of a value by which two faithful simulations differ
 constexpr double ALIKE = 10.0;  // difference of BIC below which two effects are not told apart
 
 double squaresOf(const std::vector<double>& v) {
@@ -87,7 +88,8 @@ std::vector<FoundParameter> parametersOf(const Member& member, const Eigen::Matr
   const Eigen::MatrixXd spread = gradient * covariance * gradient.transpose();
   for (std::size_t k = 0; k < numbers.size(); ++k) {
     const auto i = static_cast<Eigen::Index>(k);
-    parameters.push_back({numbers[k].first, numbers[k].second, std::sqrt(std::max(spread(i, i), 0.0))});
+    const double own = TWIN_ACCURACY * (numbers[k].first == "angle_deg" ? 57.3 : numbers[k].second);
+    parameters.push_back({numbers[k].first, numbers[k].second, std::sqrt(std::max(spread(i, i), 0.0) + own * own)});
   }
   return parameters;
 }
@@ -143,9 +145,11 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
 
   SearchResult found = search(quick_runner, quick, exact, hypotheses, s);
   result.ladder = found.ladder;
-  result.unexplained = findStructure(exact_runner, found.best.residual, options.structure);
+  StructureOptions structure = options.structure;
+  structure.squares_of_gap = std::max(found.null.chi2 - static_cast<double>(exact_runner.size()), 1.0);
+  result.unexplained = findStructure(exact_runner, found.best.residual, structure);
   // What the calibration of the nominal values takes away is no disagreement of their kind.
-  result.where = findStructure(exact_runner, found.null.residual, options.structure);
+  result.where = findStructure(exact_runner, found.null.residual, structure);
   // An effect that the tests do not agree on, or that is small beside what is left where it acts, stands for another cause.
   while (!result.unexplained.empty() && !found.best.state.members.empty()) {
     std::size_t worst = 0;
@@ -169,7 +173,7 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
     if (worst_score <= 1.0) break;
     say("  stands for another cause: " + found.best.state.members[worst].hypothesis->title());
     refine(quick_runner, quick, exact, without(found.best.state, worst), &found);
-    result.unexplained = findStructure(exact_runner, found.best.residual, options.structure);
+    result.unexplained = findStructure(exact_runner, found.best.residual, structure);
   }
 
   const Fit& best = found.best;

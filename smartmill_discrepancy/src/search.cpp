@@ -29,15 +29,24 @@ FitState without(const FitState& state, std::size_t member) {
 }  // namespace
 
 void refine(TwinRunner& quick_runner, const Fitter& quick, const Fitter& exact, const FitState& state, SearchResult* result) {
-  Fit best = exact.fit(state, nullptr, {5, 1e-6, true});
-  if (best.converged) result->best = std::move(best);
+  // The quick runner, made equal to the exact one at the state, finds the exact solution in a few passes.
+  NominalTangents tangents;
+  FitState from = state;
+  for (int pass = 0; pass < 3; ++pass) {
+    const MachineModel model = quick.model(from);
+    quick_runner.correctTo(model, exact.runner().simulate(model));
+    tangents = quick.nominalTangents(from);
+    Fit fit = quick.fit(from, &tangents, {6, 1e-8, true});
+    if (!fit.converged) break;
+    from = fit.state;
+    const bool settled = pass > 0 && std::abs(fit.bic - result->best.bic) < 1.0;
+    result->best = std::move(fit);
+    if (settled) break;
+  }
   const FitState& at = result->best.state;
   result->contribution.clear();
   result->rivals.clear();
   if (at.members.empty()) return;
-  const MachineModel model = quick.model(at);
-  quick_runner.correctTo(model, exact.runner().simulate(model));
-  const NominalTangents tangents = quick.nominalTangents(at);
   const double bic = result->best.bic;
   for (std::size_t m = 0; m < at.members.size(); ++m) {
     const FitState less = without(at, m);
@@ -104,6 +113,8 @@ SearchResult search(TwinRunner& quick_runner, const Fitter& quick, const Fitter&
                        p.hypothesis, tried.state.members.back().values});
       say(text("  promise %.4g, gain %.4g  ", p.gain, now.bic - tried.bic) + describe(tried.state.members.back()));
       if (tried.bic < best.bic) best = tried;
+      // Nothing that is left could make another hypothesis better.
+      if (fitted >= 2 && best.chi2 - samples < 0.01 * (now.chi2 - samples)) break;
     }
     const bool better = now.bic - best.bic > least;
     for (Rung& r : rungs) {

@@ -256,15 +256,18 @@ std::vector<double> falseDiscoveryRates(const std::vector<double>& p_values) {
 std::vector<Finding> findStructure(const TwinRunner& runner, const std::vector<double>& residual,
                                    const StructureOptions& options) {
   std::set<std::string> channels;
-  double all_squares = 0.0;
-  for (const double r : residual) all_squares += r * r;
-  const double all_excess = std::max(all_squares - static_cast<double>(residual.size()), 1.0);
+  double all_excess = options.squares_of_gap;
+  if (all_excess <= 0.0) {
+    double all_squares = 0.0;
+    for (const double r : residual) all_squares += r * r;
+    all_excess = std::max(all_squares - static_cast<double>(residual.size()), 1.0);
+  }
   for (const Block& b : runner.blocks()) channels.insert(b.channel);
   std::vector<Finding> found;
   std::vector<double> looks;  // p-values of every look that found nothing, for the control of false discovery
   for (const std::string& channel : channels) {
     std::vector<Stretch> stretches;
-    double samples = 0.0;
+    double samples = 0.0, floor = 0.0;
     for (std::size_t b = 0; b < runner.blocks().size(); ++b) {
       const Block& block = runner.blocks()[b];
       if (block.channel != channel) continue;
@@ -277,6 +280,10 @@ std::vector<Finding> findStructure(const TwinRunner& runner, const std::vector<d
       if (test.test.kind != TestKind::tap && test.record.has("spindle_angle"))
         s.angle = unwrapped(test.record.column("spindle_angle"), from);
       samples += static_cast<double>(s.values.size());
+      for (std::size_t i = block.offset; i < block.offset + block.size; ++i) {
+        const double trust = options.twin_accuracy * runner.measured()[i];
+        floor += trust * trust;
+      }
       stretches.push_back(std::move(s));
     }
     if (stretches.empty()) continue;
@@ -290,7 +297,7 @@ std::vector<Finding> findStructure(const TwinRunner& runner, const std::vector<d
         if (c.freedom > 0 && (!best || excess(c) > excess(*best))) best = &c;
       }
       const double p = p_values[static_cast<std::size_t>(best - all.data())];
-      if (p > options.p_value || best->squares < options.least_share * samples) {
+      if (p > options.p_value || best->squares < options.least_share * samples + floor) {
         looks.insert(looks.end(), p_values.begin(), p_values.end());
         break;
       }

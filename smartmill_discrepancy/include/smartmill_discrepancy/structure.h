@@ -24,7 +24,9 @@ struct Finding {
 struct StructureOptions {
   int most = 12;            ///< findings
   double p_value = 1e-6;    ///< false discovery rate
-  double least_share = 0.003;  ///< squares of a finding over the samples of its channel, below which twin and record agree
+  double twin_accuracy = 1e-4;  ///< [1] of the signal, below which the twin is not believed
+  double squares_of_gap = 0.0;  ///< what share_of_gap refers to; 0: the residual's own squares above the noise
+  double least_share = 0.005;  ///< squares of a finding over the samples of its channel, below which twin and record agree
 };
 
 /// Takes the residual apart, channel by channel: mean level, trend over the record, lines at orders of the spindle, lines at
