@@ -42,8 +42,9 @@ class TrueLimit {
                   " --entry-deg %.12g --exit-deg %.12g --speeds %.12g:%.12g:%zu --max-depth-mm 1000",
                   units::degFromRad(chart_.entry_angle), units::degFromRad(chart_.exit_angle),
                   units::rpmFromRadPerSec(low), units::rpmFromRadPerSec(high), count);
-    const std::string command = "rosrun smartmill_stability lobes " + shellQuoted(model_) + numbers + " -o " +
-                                shellQuoted(csv) + " >" + shellQuoted(log) + " 2>&1";
+    const std::string command = "rosrun smartmill_stability lobes " + shellQuoted(model_) + numbers +
+                                " --method zero_order -o " + shellQuoted(csv) + " >" + shellQuoted(log) +
+                                " 2>&1";
     if (std::system(command.c_str()) != 0) throw Error("lobes failed on the true machine, see " + log);
     return read(csv);
   }
