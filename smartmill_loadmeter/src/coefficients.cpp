@@ -24,7 +24,7 @@ using namespace smartmill::loadmeter;  // NOLINT
 struct Options {
   std::string source_path, source, model, means = "all", output, parameters, database;
   std::string tool, material;
-  double rake = NAN;
+  double rake = NAN, depth_percent = 0.0;
   bool spindle_uncertainty = false, plain_friction = false;
 };
 
@@ -187,6 +187,7 @@ void run(const Options& o) {
   LoadRecordOptions options;
   options.spindle_uncertainty = o.spindle_uncertainty;
   options.choose_terms = !o.plain_friction;
+  options.depth_uncertainty = o.depth_percent / 100.0;
   const LoadRecordResult found = identifyFromLoadRecords(campaign, model, options);
   for (const std::string& note : found.notes) std::fprintf(stderr, "coefficients: %s\n", note.c_str());
   fromLoad(o, found.set);
@@ -219,6 +220,9 @@ int main(int argc, char** argv) {
   app.add_flag("--spindle-uncertainty", o.spindle_uncertainty,
                "load_meter of a campaign: the model's stated uncertainty of the spindle holds for "
                "load_meter_v_per_w and the bandwidth too (default: both exact)");
+  app.add_option("--depth-uncertainty", o.depth_percent,
+                 "[%] load_meter of a campaign: standard deviation of the axial depth, common to all cuts")
+      ->check(CLI::Range(0.0, 100.0));
   app.add_flag("--plain-friction", o.plain_friction,
                "load_meter of a campaign: Coulomb and viscous friction only, nothing added by evidence");
   app.add_option("--params", o.parameters, "bag: parameter file of the node (launch/config/loadmeter.yaml)");

@@ -252,6 +252,15 @@ class Campaigns {
 
 LoadRecordResult identifyFromLoadRecords(const Campaign& campaign, const MachineModel& model,
                                          const LoadRecordOptions& options) {
+  std::vector<TestRecord> tests;
+  for (const CampaignTest& test : campaign.tests) {
+    if (test.kind != TestKind::tap) tests.push_back({test, readRecord(campaign, test)});
+  }
+  return identifyFromLoadRecords(tests, model, options, campaign.folder);
+}
+
+LoadRecordResult identifyFromLoadRecords(const std::vector<TestRecord>& tests, const MachineModel& model,
+                                         const LoadRecordOptions& options, const std::string& where) {
   const Spindle& spindle = model.needSpindle("read the load meter");
   const ToolGeometry& tool = model.needTool("identify cutting coefficients");
   const double stated = model.uncertainty.spindle / 100.0;
@@ -261,9 +270,7 @@ LoadRecordResult identifyFromLoadRecords(const Campaign& campaign, const Machine
   std::set<double> air_speeds;
   std::set<long> chips;
   int cuts = 0, airs = 0;
-  for (const CampaignTest& test : campaign.tests) {
-    if (test.kind == TestKind::tap) continue;
-    const Record record = readRecord(campaign, test);
+  for (const auto& [test, record] : tests) {
     if (!record.has("load_meter")) {
       result.notes.push_back(record.file + ": no load_meter column, left out");
       continue;
@@ -279,11 +286,11 @@ LoadRecordResult identifyFromLoadRecords(const Campaign& campaign, const Machine
     }
   }
   if (airs > 0 && air_speeds.size() < 2) {
-    throw Error(campaign.folder + ": friction: air cuts at two or more speeds are due, " +
+    throw Error(where + ": friction: air cuts at two or more speeds are due, " +
                 std::to_string(air_speeds.size()) + " usable");
   }
   if (chips.size() < 3) {
-    throw Error(campaign.folder + ": coefficients from torque: " + std::to_string(cuts) + " cuts at " +
+    throw Error(where + ": coefficients from torque: " + std::to_string(cuts) + " cuts at " +
                 std::to_string(chips.size()) + " different feeds; at least three are due");
   }
   all.slowest = all.fastest = all.records.front().speed;
@@ -296,7 +303,7 @@ LoadRecordResult identifyFromLoadRecords(const Campaign& campaign, const Machine
     if (r.cut) ages.insert(r.edge_age);
     samples += static_cast<double>(r.voltage.size());
   }
-  for (const CampaignTest& test : campaign.tests) timed = timed && test.start_time;
+  for (const TestRecord& t : tests) timed = timed && t.test.start_time;
   if (airs == 0) {
     // What the model believes is one observation of each friction term.
     const Friction known = modelFriction(spindle, model.uncertainty.spindle);
@@ -425,7 +432,8 @@ LoadRecordResult identifyFromLoadRecords(const Campaign& campaign, const Machine
   result.set.value = result.set.std_dev = NOT_IDENTIFIED;
   result.set.value.ktc = chosen.fit.value[at];
   result.set.value.kte = chosen.fit.value[at + 1];
-  const double scale = options.spindle_uncertainty ? stated : 0.0;  // of load_meter_v_per_w: both follow it
+  // Of load_meter_v_per_w and the depth: both coefficients follow them.
+  const double scale = std::hypot(options.spindle_uncertainty ? stated : 0.0, options.depth_uncertainty);
   const auto stdOf = [&](Eigen::Index i, double value) {
     return std::sqrt(total(i, i) + scale * scale * value * value);
   };
@@ -452,7 +460,7 @@ LoadRecordResult identifyFromLoadRecords(const Campaign& campaign, const Machine
                   "the records disagree by %.3f %% (chi2 %.1f a degree of freedom): something acts that the "
                   "model lacks, the coefficients carry its bias",
                   100.0 * chosen.share, chosen.misfit);
-    result.notes.push_back(campaign.folder + ": " + text);
+    result.notes.push_back(where + ": " + text);
   }
   result.set.source = "load_meter";
   result.set.tests = cuts;

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "smartmill_core/campaign/campaign.h"
+#include "smartmill_core/campaign/record.h"
 #include "smartmill_core/cutting/coefficient_set.h"
 #include "smartmill_core/cutting/regression.h"
 #include "smartmill_core/model/machine_model.h"
@@ -26,6 +27,8 @@ struct LoadRecordOptions {
   /// The model's stated uncertainty of the spindle section holds for load_meter_v_per_w and the bandwidth
   /// too; without it both are exact.
   bool spindle_uncertainty = false;
+  /// [1] relative standard deviation of the axial depth, common to all cuts (the tool's length).
+  double depth_uncertainty = 0.0;
   /// Stribeck, warm-up, edge growth and a slower load meter are tried where the records disagree.
   bool choose_terms = true;
 };
@@ -54,5 +57,14 @@ struct LoadRecordResult {
 /// @throws Error naming the file and what is missing.
 LoadRecordResult identifyFromLoadRecords(const Campaign& campaign, const MachineModel& model,
                                          const LoadRecordOptions& options);
+
+/// A test of a campaign with its record.
+struct TestRecord {
+  CampaignTest test;
+  Record record;
+};
+/// The same from records in memory. @param where names the source in messages.
+LoadRecordResult identifyFromLoadRecords(const std::vector<TestRecord>& tests, const MachineModel& model,
+                                         const LoadRecordOptions& options, const std::string& where);
 
 }  // namespace smartmill::loadmeter

@@ -1,0 +1,53 @@
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include <gtest/gtest.h>
+
+#include "smartmill_core/cutting/mechanistic.h"
+#include "smartmill_core/units.h"
+#include "study/machine_cases.h"
+
+namespace smartmill::loadmeter {
+namespace {
+
+TEST(Scene, torqueWithoutRunoutIsTheClosedForm) {
+  const ToolGeometry tool{3, 0.016, 0.5, {}};
+  const CuttingCoefficients k{900e6, 0, 0, 20e3, 0, 0};
+  const Engagement e{0.3, 2.5, 0.003, 8e-5};
+  const std::vector<double> torque = torqueOverARevolution(tool, e, k, 0.0, 0.0, 720);
+  const double mean = std::accumulate(torque.begin(), torque.end(), 0.0) / 720.0;
+  EXPECT_NEAR(mean, MechanisticForce(tool, k, e).mean().torque, 2e-3 * mean);  // angle steps
+  EXPECT_NEAR(torque[100], MechanisticForce(tool, k, e).at(100 * units::TWO_PI / 720).torque, 0.05 * mean);
+}
+
+TEST(Scene, runoutMovesMaterialFromToothToToothWhileAllCut) {
+  const ToolGeometry tool{4, 0.016, 0.0, {}};
+  const CuttingCoefficients k{900e6, 0, 0, 0, 0, 0};
+  const Engagement e{0.8, 2.3, 0.003, 1e-4};
+  const auto straight = torqueOverARevolution(tool, e, k, 0.0, 0.0, 720);
+  const auto offset = torqueOverARevolution(tool, e, k, 8e-6, 1.0, 720);
+  EXPECT_NEAR(std::accumulate(straight.begin(), straight.end(), 0.0),
+              std::accumulate(offset.begin(), offset.end(), 0.0), 1e-3 * 720);
+  EXPECT_NE(straight[200], offset[200]);
+}
+
+// The full study of 200 cases is the program loadmeter_study.
+TEST(Cases, ktcIsWithinThreeAndSixPercentAndHonest) {
+  const Faults faults;
+  std::vector<double> errors;
+  int inside = 0;
+  const int count = 30;
+  for (int i = 0; i < count; ++i) {
+    const CaseErrors e = judge(drawCase(static_cast<unsigned>(1000 + i), faults), faults);
+    errors.push_back(std::abs(e.ktc));
+    inside += std::abs(e.z_ktc) < 1.96;
+  }
+  std::sort(errors.begin(), errors.end());
+  EXPECT_LT(errors[count / 2], 0.03);
+  EXPECT_LT(errors[static_cast<std::size_t>(0.95 * count)], 0.06);
+  EXPECT_GE(inside, 24);  // 95 % of 30 less three sigma of the count
+}
+
+}  // namespace
+}  // namespace smartmill::loadmeter
