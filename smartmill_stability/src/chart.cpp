@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <memory>
 
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/units.h"
+#include "smartmill_stability/solver.h"
 
 namespace smartmill::stability {
 namespace {
@@ -65,6 +67,9 @@ void ChartParameters::validate() const {
   bound(speeds >= 2 && speeds <= 100000, "speeds", speeds, "2..100000");
   bound(frequency_low >= 0.0, "frequency_low", frequency_low, ">= 0 Hz");
   bound(frequency_high > frequency_low, "frequency_high", frequency_high, "above frequency_low");
+  bound(modes_error > 0.0, "modes_error", modes_error, "> 0");
+  if (method != "auto" && method != "collocation" && method != "zero_order")
+    throw Error("method: '" + method + "' is unknown (auto, collocation or zero_order)");
   bound(line_error > 0.0, "line_error", line_error, "> 0");
   bound(max_depth > 0.0, "max_depth", max_depth, "> 0 m");
   bound(depth_margin >= 0.0 && depth_margin < 1.0, "depth_margin", depth_margin, "0 <= value < 1");
@@ -97,11 +102,69 @@ FrequencyResponse certainLines(const FrequencyResponse& frf, double error) {
   return kept;
 }
 
+/// Limits at rising speeds, solved where a straight line between the neighbours would be off by more than a
+/// fraction of a percent, and interpolated elsewhere.
+StabilityLimit refinedLimits(const StabilitySolver& solver, const std::vector<double>& speeds,
+                             double max_depth) {
+  constexpr std::size_t STRIDE = 16;
+  constexpr double STRAIGHT = 3e-3;
+  StabilityLimit limit;
+  limit.spindle_speed = speeds;
+  limit.depth.assign(speeds.size(), NO_LIMIT);
+  limit.chatter_frequency.assign(speeds.size(), std::numeric_limits<double>::quiet_NaN());
+  const auto solve = [&](std::size_t i) {
+    const Limit found = solver.limit(speeds[i], max_depth);
+    limit.depth[i] = found.depth;
+    limit.chatter_frequency[i] = found.frequency;
+  };
+  const auto between = [&](std::size_t a, std::size_t b, std::size_t i, const std::vector<double>& values) {
+    const double share = (speeds[i] - speeds[a]) / (speeds[b] - speeds[a]);
+    return values[a] + share * (values[b] - values[a]);
+  };
+  const std::function<void(std::size_t, std::size_t)> fill = [&](std::size_t a, std::size_t b) {
+    if (b - a < 2) return;
+    const std::size_t middle = (a + b) / 2;
+    solve(middle);
+    const double expected = between(a, b, middle, limit.depth);
+    const double frequency = between(a, b, middle, limit.chatter_frequency);
+    const bool all_stable =
+        std::isinf(limit.depth[a]) && std::isinf(limit.depth[b]) && std::isinf(limit.depth[middle]);
+    const bool straight = std::abs(limit.depth[middle] - expected) <= STRAIGHT * expected &&
+                          std::abs(limit.chatter_frequency[middle] - frequency) <= STRAIGHT * frequency;
+    if (!all_stable && !(straight && std::isfinite(expected))) {
+      fill(a, middle);
+      fill(middle, b);
+      return;
+    }
+    if (all_stable) return;
+    for (const auto& [from, to] : {std::pair{a, middle}, {middle, b}}) {
+      for (std::size_t i = from + 1; i < to; ++i) {
+        limit.depth[i] = between(from, to, i, limit.depth);
+        limit.chatter_frequency[i] = between(from, to, i, limit.chatter_frequency);
+      }
+    }
+  };
+  solve(0);
+  for (std::size_t a = 0; a + 1 < speeds.size();) {
+    const std::size_t b = std::min(a + STRIDE, speeds.size() - 1);
+    solve(b);
+    fill(a, b);
+    a = b;
+  }
+  return limit;
+}
+
 }  // namespace
 
 struct ChartMaker::Basis {
   RegenerativeProcess process;
-  ToolTipResponse response;
+  ToolTipResponse response;                 // zero-order
+  std::unique_ptr<StabilitySolver> solver;  // collocation
+  double max_depth = 0.0;                   // [m] looked at by collocation
+
+  StabilityLimit limits(const std::vector<double>& speeds) const {
+    return solver ? refinedLimits(*solver, speeds, max_depth) : zeroOrderLimit(process, response, speeds);
+  }
 };
 
 ChartMaker::ChartMaker(const ChartParameters& parameters, const MachineModel& model)
@@ -146,14 +209,28 @@ std::string ChartMaker::missing() const {
     if (!there) list += (list.empty() ? "" : ", ") + what;
   };
   for (const std::string direction : {"x", "y"}) {
-    if (parameters_.use_modes) {
+    if (needsModes()) {
       need(modes_.count(direction) > 0, "modes in " + direction);
-    } else {
+    } else if (!byCollocation()) {
       need(frfs_.count(direction) > 0, "FRF in " + direction);
     }
   }
   need(coefficients_ && coefficients_->value.ktc > 0.0, "tangential coefficient");
   return list;
+}
+
+bool ChartMaker::needsModes() const {
+  return parameters_.method == "collocation" || (parameters_.method == "zero_order" && parameters_.use_modes);
+}
+
+bool ChartMaker::byCollocation() const {
+  if (parameters_.method != "auto") return parameters_.method == "collocation";
+  const auto good = [this](const char* direction) {
+    const auto found = modes_.find(direction);
+    return found != modes_.end() && !found->second.model.modes.empty() &&
+           found->second.relative_error <= parameters_.modes_error;
+  };
+  return good("x") && good("y");
 }
 
 ChartMaker::Basis ChartMaker::basis() const {
@@ -166,7 +243,23 @@ ChartMaker::Basis ChartMaker::basis() const {
   basis.process.exit = parameters_.exit;
   basis.process.kt = cutting.ktc;
   basis.process.kr = std::isfinite(cutting.krc) ? cutting.krc / cutting.ktc : parameters_.kr;
-  if (parameters_.use_modes) {
+  if (byCollocation()) {
+    RegenerativeSystem system;
+    system.modes = systemModes(modes_.at("x").model, modes_.at("y").model);
+    system.teeth = tool_geometry_.teeth;
+    system.pitch = tool_geometry_.pitch;
+    system.helix = tool_geometry_.helix;
+    system.diameter = tool_geometry_.diameter;
+    system.entry = parameters_.entry;
+    system.exit = parameters_.exit;
+    system.kt = cutting.ktc;
+    system.kr = basis.process.kr * cutting.ktc;
+    SolverOptions options;
+    options.tolerance = 1e-4;
+    basis.solver = makeSolver(Method::collocation, system, options);
+    // So deep that a limit beyond cannot hold a recommended cut down.
+    basis.max_depth = parameters_.max_depth / (1.0 - parameters_.depth_margin);
+  } else if (parameters_.use_modes) {
     constexpr std::size_t LINES = 20000;
     basis.response = responseOf(modes_.at("x").model, modes_.at("y").model,
                                 std::max(1.0, parameters_.frequency_low), parameters_.frequency_high, LINES);
@@ -232,14 +325,17 @@ Chart ChartMaker::chart() const {
                                  : i >= n ? high * (1.0 + part * (i - n + 1))
                                           : low + (high - low) * i / (n - 1));
   }
-  wide = zeroOrderLimit(given.process, given.response, wide.spindle_speed);
+  wide = given.limits(wide.spindle_speed);
   const auto inner = [&](const std::vector<double>& all) {
     return std::vector<double>(all.begin() + beyond, all.end() - beyond);
   };
   chart.limit = {inner(wide.spindle_speed), inner(wide.depth), inner(wide.chatter_frequency)};
   const std::vector<double>& speeds = chart.limit.spindle_speed;
   const auto shift = static_cast<std::size_t>(beyond);
-  chart.absolute_depth_limit = absoluteDepthLimit(given.process, given.response);
+  chart.method = given.solver ? nameOf(Method::collocation) : nameOf(Method::zero_order);
+  chart.absolute_depth_limit = given.solver
+                                   ? *std::min_element(chart.limit.depth.begin(), chart.limit.depth.end())
+                                   : absoluteDepthLimit(given.process, given.response);
 
   std::vector<ChartPoint> cuts, valleys;
   std::vector<double> carried;  // [m] by the spindle, with its reserve
@@ -288,7 +384,7 @@ Prediction ChartMaker::predict(double spindle_speed, double axial_depth) const {
     throw Error("axial_depth: " + std::to_string(axial_depth) + " m is not positive");
   }
   const Basis given = basis();
-  const StabilityLimit limit = zeroOrderLimit(given.process, given.response, {spindle_speed});
+  const StabilityLimit limit = given.limits({spindle_speed});
   const auto [torque, power] = loadLimits(spindle_speed);
   Prediction prediction;
   prediction.point = point(spindle_speed, axial_depth, limit.depth[0], limit.chatter_frequency[0]);

@@ -30,7 +30,7 @@ smartmill_msgs::StabilityChart toMsg(const Chart& chart, const ChartParameters& 
   message.header.stamp = fromSec(chart.stamp);
   message.tool = chart.tool;
   message.material = chart.material;
-  message.method = "zero_order";
+  message.method = chart.method;
   message.entry_angle = parameters.entry;
   message.exit_angle = parameters.exit;
   message.feed_per_tooth = parameters.feed_per_tooth;

@@ -17,6 +17,8 @@ NodeParameters readParameters(ParameterReader& reader, const std::string& model)
   reader.read("frequency_low", chart.frequency_low);
   reader.read("frequency_high", chart.frequency_high);
   reader.read("line_error", chart.line_error);
+  reader.read("method", chart.method);
+  reader.read("modes_error", chart.modes_error);
   reader.read("use_modes", chart.use_modes);
   reader.read("max_depth", chart.max_depth);
   reader.read("depth_margin", chart.depth_margin);

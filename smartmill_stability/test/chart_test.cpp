@@ -1,5 +1,6 @@
 #include "smartmill_stability/chart.h"
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 
@@ -72,6 +73,7 @@ TEST(ChartMaker, linesThatTheHammerDidNotExciteMakeNoPocket) {
 TEST(ChartMaker, modesGiveTheSameChartAsTheirFrf) {
   ChartParameters parameters = slot();
   parameters.kr = 1.0 / 3.0;
+  parameters.method = "zero_order";
   parameters.use_modes = true;
   parameters.frequency_high = 4000.0;
   ChartMaker maker(parameters, machine());
@@ -86,6 +88,50 @@ TEST(ChartMaker, modesGiveTheSameChartAsTheirFrf) {
   EXPECT_EQ(of_modes.tool, "end_mill");
   EXPECT_EQ(of_modes.material, "aluminium");
   EXPECT_EQ(of_modes.stamp, 20.0);
+}
+
+ChartMaker fromModes(ChartParameters parameters, double relative_error) {
+  parameters.kr = 1.0 / 3.0;
+  ChartMaker maker(parameters, machine());
+  for (const char* direction : {"x", "y"}) {
+    maker.handle(frf(direction, 1.0));
+    maker.handle(
+        MeasuredModes{10.0, "end_mill", POINT_TOOL_TIP, direction, "m/N", benchmark(), relative_error});
+  }
+  maker.handle(coefficients());
+  return maker;
+}
+
+// Where modes are known the chart comes from the default solver: the independent table of converged limits.
+TEST(ChartMaker, knownModesGiveTheConvergedLimits) {
+  ChartParameters parameters = slot();
+  parameters.speeds = 601;
+  const ChartMaker maker = fromModes(parameters, 0.01);
+  const double table[][2] = {{6000, 0.0483482}, {10000, 0.0714108}, {15000, 0.1144476}, {20000, 0.0632216}};
+  const Chart chart = maker.chart();
+  EXPECT_EQ(chart.method, "collocation");
+  for (const auto& row : table) {
+    const double speed = units::radPerSecFromRpm(row[0]);
+    EXPECT_NEAR(maker.predict(speed, 0.05e-3).point.depth_limit * 1e3 / row[1], 1.0, 3e-4)
+        << row[0] << " rpm";
+    // The chart interpolates between solved speeds.
+    const auto& speeds = chart.limit.spindle_speed;
+    auto k = static_cast<std::size_t>(std::lower_bound(speeds.begin(), speeds.end(), speed - 1e-9) -
+                                      speeds.begin());
+    ASSERT_NEAR(speeds[k], speed, 1e-6);
+    EXPECT_NEAR(chart.limit.depth[k] * 1e3 / row[1], 1.0, 5e-3) << row[0] << " rpm";
+  }
+  EXPECT_FALSE(chart.recommended.empty());
+  EXPECT_FALSE(chart.unstable.empty());
+}
+
+TEST(ChartMaker, modesThatFitBadlyLeaveTheChartToTheFrf) {
+  EXPECT_EQ(fromModes(slot(), 0.3).chart().method, "zero_order");
+  ChartParameters parameters = slot();
+  parameters.method = "zero_order";
+  EXPECT_EQ(fromModes(parameters, 0.01).chart().method, "zero_order");
+  parameters.method = "guess";
+  EXPECT_THROW(fromModes(parameters, 0.01), Error);
 }
 
 TEST(ChartMaker, spindleLimitsFollowTheMeanTorque) {

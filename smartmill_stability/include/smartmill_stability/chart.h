@@ -24,11 +24,15 @@ struct ChartParameters {
   int speeds = 1500;                ///< [1] 2..100000
   double frequency_low = 50.0;      ///< [Hz] >= 0, lines of measured FRFs below say little and are left out
   double frequency_high = 10000.0;  ///< [Hz] > frequency_low
-  double line_error = 0.05;   ///< [1] > 0, lines with a standard deviation above this share of the FRF's peak
-                              ///< are left out: the hammer's spectrum has zeros
-  bool use_modes = false;     ///< fitted modes instead of the measured FRFs
-  double max_depth = 0.02;    ///< [m] > 0, no deeper cut is recommended or proposed
-  double depth_margin = 0.2;  ///< [1] 0 <= value < 1, recommended depths stay this share below the limit
+  double line_error = 0.05;  ///< [1] > 0, lines with a standard deviation above this share of the FRF's peak
+                             ///< are left out: the hammer's spectrum has zeros
+  /// auto: collocation where modes of x and y are known and fit well, else zero_order; collocation;
+  /// zero_order.
+  std::string method = "auto";
+  double modes_error = 0.1;       ///< [1] > 0, relative error of the fit up to which auto trusts the modes
+  bool use_modes = false;         ///< zero_order from fitted modes instead of the measured FRFs
+  double max_depth = 0.02;        ///< [m] > 0, no deeper cut is recommended or proposed
+  double depth_margin = 0.2;      ///< [1] 0 <= value < 1, recommended depths stay this share below the limit
   double speed_margin = 0.01;     ///< [1] 0 <= value < 0.2, and below it for speeds this much off
   double load_share = 0.9;        ///< [1] 0 < value <= 1, of the spindle's torque and power that is used
   int recommended = 5;            ///< [1] 0..100 points
@@ -53,11 +57,12 @@ struct ChartPoint {
 struct Chart {
   double stamp = 0.0;  ///< [s] of the newest input
   std::string tool, material;
+  std::string method;  ///< zero_order or collocation
   StabilityLimit limit;
   std::vector<double>
       torque_depth_limit;                 ///< [m] +inf: no limit known; friction takes its part of the torque
   std::vector<double> power_depth_limit;  ///< [m]
-  double absolute_depth_limit = 0.0;      ///< [m] stable at any speed
+  double absolute_depth_limit = 0.0;      ///< [m] stable at any speed (collocation: of the chart)
   std::vector<ChartPoint> recommended;    ///< best removal rate first, one a pocket
   std::vector<ChartPoint> unstable;       ///< in the valleys, nearest to the best recommended speed first
 };
@@ -94,6 +99,8 @@ class ChartMaker {
  private:
   struct Basis;
   Basis basis() const;
+  bool byCollocation() const;
+  bool needsModes() const;
   void use(const std::string& tool, double stamp);
   /// Depth that the spindle carries at a speed: torque and power limit [m].
   std::array<double, 2> loadLimits(double speed) const;
