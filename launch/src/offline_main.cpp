@@ -91,7 +91,7 @@ Agreement compareForces(const SessionRecording& live, const fs::path& folder) {
     if (time.empty() || cut.compensated.empty()) continue;
     const std::uint64_t from = cut.compensated.indexAt(cut.condition.stamp + time.front());
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      agreement.add(cut.compensated.axis(axis, from, from + time.size()),
+      agreement.add(cut.compensated.axisWithGaps(axis, from, from + time.size()),
                     table.column(std::string("f") + "xyz"[axis]));
     }
   }
@@ -149,7 +149,9 @@ int run(const Request& request) {
     std::printf("%-14s %8.2f %10.1f %10zu %12.2g  %s%s\n", tool.name.c_str(), seconds, ratio,
                 agreement.compared, agreement.largest, same ? "same to printed digits" : "DIFFERENT",
                 fast ? "" : ", SLOW");
-    if (agreement.missing > 0) std::printf("%zu numbers are only on one side\n", agreement.missing);
+    if (agreement.missing > 0) {
+      std::printf("%14s %zu numbers are on one side only\n", "", agreement.missing);
+    }
     std::fflush(stdout);
     good = good && same && fast;
   }

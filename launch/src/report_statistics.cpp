@@ -55,22 +55,27 @@ void ForceTrack::add(const ForceBlock& block) {
   blocks_[block.first_index] = block;
 }
 
-std::vector<double> ForceTrack::axis(std::size_t axis, std::uint64_t from, std::uint64_t to) const {
-  std::vector<double> values;
-  values.reserve(to - from);
+std::vector<double> ForceTrack::axisWithGaps(std::size_t axis, std::uint64_t from, std::uint64_t to) const {
+  std::vector<double> values(to - from, NOT_A_NUMBER);
   auto block = blocks_.upper_bound(from);
   if (block != blocks_.begin()) --block;
-  for (std::uint64_t index = from; index < to;) {
-    if (block == blocks_.end() || index < block->first) {
-      throw Error("force sample " + std::to_string(index) + " is missing");
-    }
+  for (; block != blocks_.end() && block->first < to; ++block) {
     const std::vector<double>& source = block->second.force[axis];
-    for (; index < to && index - block->first < source.size(); ++index) {
-      values.push_back(source[index - block->first]);
+    for (std::uint64_t i = 0; i < source.size(); ++i) {
+      const std::uint64_t index = block->first + i;
+      if (index >= from && index < to) values[index - from] = source[i];
     }
-    ++block;
   }
   return values;
+}
+
+std::vector<double> ForceTrack::axis(std::size_t axis, std::uint64_t from, std::uint64_t to) const {
+  const auto [first, last] = covered(from, to);
+  if (first != from || last != to) {
+    throw Error("force samples between " + std::to_string(from) + " and " + std::to_string(to) +
+                " are missing");
+  }
+  return axisWithGaps(axis, from, to);
 }
 
 std::uint64_t ForceTrack::indexAt(double stamp) const {

@@ -95,6 +95,9 @@ TEST(ForceTrack, SamplesMeetByIndexAcrossBlocks) {
   for (std::size_t i = 0; i < y.size(); ++i) EXPECT_DOUBLE_EQ(y[i], 105.1 + static_cast<double>(i));
   EXPECT_THROW(track.axis(0, 115, 121), Error);
   EXPECT_THROW(track.axis(0, 95, 105), Error);
+  const std::vector<double> begin = track.axisWithGaps(0, 98, 102);
+  EXPECT_TRUE(std::isnan(begin[0]) && std::isnan(begin[1]));
+  EXPECT_DOUBLE_EQ(begin[3], 101.0);
 }
 
 TEST(ForceTrack, LongestStretchWithoutGapAndOfOneStatus) {

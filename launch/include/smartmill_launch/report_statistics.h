@@ -53,6 +53,8 @@ class ForceTrack {
 
   /// Samples of one axis [N] with from <= index < to. @throws Error when one is missing.
   std::vector<double> axis(std::size_t axis, std::uint64_t from, std::uint64_t to) const;
+  /// As axis(), NaN where a sample is missing.
+  std::vector<double> axisWithGaps(std::size_t axis, std::uint64_t from, std::uint64_t to) const;
   /// Index of the first sample not before a time [s]. @throws Error on an empty track.
   std::uint64_t indexAt(double stamp) const;
   /// Longest stretch without a gap inside from <= index < to; status, where given, must be that of every
