@@ -30,10 +30,10 @@ CuttingMachine::CuttingMachine(const MachineModel& model, double time_step, Feed
   model_ = std::move(setup.model);
 
   const double rate = 1.0 / time_step;
+  vibrates_ = !model_.tool_tip.x.modes.empty() || !model_.tool_tip.y.modes.empty();
   if (model_.tool) nominal_.radius = model_.tool->radius();
   if (model_.tool && model_.cutting) {
     nominal_.law.coefficients = model_.needCutting("simulate a cut");
-    vibrates_ = !model_.tool_tip.x.modes.empty() || !model_.tool_tip.y.modes.empty();
     if (feed == Feed::steady && !vibrates_) {
       rigid_.emplace(*model_.tool, nominal_.law, setup.radius_offset);
     } else if (feed == Feed::steady) {
@@ -129,6 +129,11 @@ void CuttingMachine::update(const Input& input) {
 
 CuttingMachine::Output CuttingMachine::step(const Input& input) {
   Output out;
+  step(input, out);
+  return out;
+}
+
+void CuttingMachine::step(const Input& input, Output& out) {
   if (!effects_.empty() && (steps_to_update_ <= 0 || input.motion.speed != now_.speed)) {
     update(input);
     steps_to_update_ = UPDATE_STEPS;
@@ -146,6 +151,7 @@ CuttingMachine::Output CuttingMachine::step(const Input& input) {
   now_.speed = input.motion.speed;
 
   ToolMotion motion = fed(input.motion);
+  out.force = {};
   if (rigid_) {
     out.force = rigid_->at(motion.angle);
   } else if (process_ || regenerative_) {
@@ -162,7 +168,7 @@ CuttingMachine::Output CuttingMachine::step(const Input& input) {
   if (effects_.has(Stage::sensor_force)) effects_.addForce(now_, out.applied);
   const std::array<double, 2> tip{{out.force.fx + input.tip_force[0], out.force.fy + input.tip_force[1]}};
   ChannelValues& channels = out.early;
-  for (std::size_t axis = 0; axis < 2; ++axis) {
+  for (std::size_t axis = 0; axis < 2 && vibrates_; ++axis) {
     const double before = tip[axis] - jump_ * ((axis == 0 ? out.force.fx : out.force.fy) - last_cut_[axis]);
     channels[TOOL_X + axis] = jump_ != 0.0 ? tip_[axis].jump(before, tip[axis]) : tip_[axis].step(before);
     // A jump does not go on.
@@ -176,6 +182,7 @@ CuttingMachine::Output CuttingMachine::step(const Input& input) {
         sign_ * (jump_ != 0.0 ? sensor_[axis].jump(before, out.applied[axis]) : sensor_[axis].step(before));
   }
   last_cut_ = cut;
+  channels[LOAD_METER] = 0.0;
   if (drive_) {
     const double mean_torque = last_torque_ + 0.5 * (1.0 - jump_) * (out.force.torque - last_torque_);
     channels[LOAD_METER] = drive_->step(mean_torque, input.motion.speed);
@@ -185,17 +192,24 @@ CuttingMachine::Output CuttingMachine::step(const Input& input) {
   engaged_ = false;
   if (effects_.has(Stage::sensor_output)) effects_.measure(Stage::sensor_output, now_, channels);
   for (auto& [channel, line] : delays_) channels[channel] = line.step(channels[channel]);
-  ChannelValues shown = channels;
-  if (effects_.has(Stage::signal)) effects_.measure(Stage::signal, now_, shown);
-  out.sensor = {{shown[FX], shown[FY], shown[FZ]}};
-  out.load_meter = shown[LOAD_METER];
-  out.displacement = {{shown[TOOL_X], shown[TOOL_Y]}};
+  const auto show = [&out](const ChannelValues& shown) {
+    out.sensor = {{shown[FX], shown[FY], shown[FZ]}};
+    out.load_meter = shown[LOAD_METER];
+    out.displacement = {{shown[TOOL_X], shown[TOOL_Y]}};
+  };
+  if (effects_.has(Stage::signal)) {
+    ChannelValues shown = channels;
+    effects_.measure(Stage::signal, now_, shown);
+    show(shown);
+  } else {
+    show(channels);
+  }
 
   now_.record_time += time_step_;
   if (clock_.record || cutting()) clock_.edge_time += time_step_;
   if (!clock_.record) clock_.start_time += time_step_;
-  if (cutting()) feed_path_ += time_step_ * std::hypot(motion.velocity[0], motion.velocity[1]);
-  return out;
+  if (state_.depth_slope != 0.0 && cutting())
+    feed_path_ += time_step_ * std::hypot(motion.velocity[0], motion.velocity[1]);
 }
 
 void CuttingMachine::finish(double record_time, ChannelValues& channels) const {

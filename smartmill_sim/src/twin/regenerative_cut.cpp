@@ -13,9 +13,9 @@ namespace {
 
 using units::TWO_PI;
 
-constexpr int REVOLUTIONS = 2;       // that a surface may wait for the next tooth that reaches it
-constexpr double CELL_ANGLE = 0.12;  // [rad] of the edge: two-point Gauss errs by 5e-8 of a smooth force
-constexpr double LEAST_LAG = 1e-6;   // [rad] over the depth; below it the edge is straight
+constexpr int REVOLUTIONS = 2;      // that a surface may wait for the next tooth that reaches it
+constexpr double CELL_ANGLE = 0.2;  // [rad] of the edge: two-point Gauss errs by 4e-7 of a smooth force
+constexpr double LEAST_LAG = 1e-6;  // [rad] over the depth; below it the edge is straight
 constexpr double TANGENTIAL_DAMPING = 0.3;  // [1] of the radial force
 
 }  // namespace
@@ -78,23 +78,42 @@ void RegenerativeCut::push(const std::array<double, 2>& displacement) {
   history_[newest_] = displacement;
 }
 
-double RegenerativeCut::chip(const std::vector<Plane>& planes, double sine, double cosine) {
+double RegenerativeCut::chip(double sine, double cosine) const {
   double least = 1e300;
-  for (const Plane& p : planes) least = std::min(least, p.offset + p.x * sine + p.y * cosine);
+  for (const Plane& p : near_) least = std::min(least, p.offset + p.x * sine + p.y * cosine);
   return least;
 }
 
+// Most passes lie deeper than the last one all along the edge: with m the middle and w the half width,
+// a sin + b cos >= min(C, C cos w) - |S| sin w, C and S its value and slope in the middle.
+void RegenerativeCut::keepNear(double from, double to) {
+  near_.assign(1, planes_.front());
+  const Plane& last = planes_.front();
+  const SineCosine middle = sineCosine(0.5 * (from + to)), half = sineCosine(0.5 * (to - from));
+  for (std::size_t k = 1; k < planes_.size(); ++k) {
+    const Plane& p = planes_[k];
+    const double x = p.x - last.x, y = p.y - last.y;
+    const double value = x * middle.sine + y * middle.cosine;
+    const double slope = std::abs(x * middle.cosine - y * middle.sine);
+    if (p.offset - last.offset + std::min(value, value * half.cosine) - slope * half.sine <= 0.0)
+      near_.push_back(p);
+  }
+}
+
 // Force over immersion angles that one edge holds [N m/rad of lag], all in the arc.
-void RegenerativeCut::cut(double from, double to, CuttingForce& sum, double& tangential) const {
+void RegenerativeCut::cut(double from, double to, CuttingForce& sum, double& tangential) {
+  keepNear(from, to);
   const CuttingCoefficients& k = law_.coefficients;
+  const double ktc = k.ktc * law_.chip_factor, krc = k.krc * law_.chip_factor, kac = k.kac * law_.chip_factor;
+  const double kte = k.kte * law_.edge_factor, kre = k.kre * law_.edge_factor, kae = k.kae * law_.edge_factor;
   const int cells = std::max(1, static_cast<int>(std::ceil((to - from) / CELL_ANGLE)));
   const double cell = (to - from) / cells;
   SineCosine left = sineCosine(from);
-  double chip_left = chip(planes_, left.sine, left.cosine);
+  double chip_left = chip(left.sine, left.cosine);
   for (int n = 0; n < cells; ++n) {
     const double start = from + n * cell;
     const SineCosine right = sineCosine(start + cell);
-    const double chip_right = chip(planes_, right.sine, right.cosine);
+    const double chip_right = chip(right.sine, right.cosine);
     double low = 0.0, high = 1.0;
     const bool contact = chip_left > 0.0 || chip_right > 0.0;
     if (contact && chip_left < 0.0) low = chip_left / (chip_left - chip_right);
@@ -104,15 +123,14 @@ void RegenerativeCut::cut(double from, double to, CuttingForce& sum, double& tan
     const double weight = 0.5 * (high - low) * cell, middle = 0.5 * (high + low);
     for (const double side : {-0.28867513459481287, 0.28867513459481287}) {
       const SineCosine at = sineCosine(start + (middle + side * (high - low)) * cell);
-      double h = std::max(chip(planes_, at.sine, at.cosine), 1e-15);
+      double h = std::max(chip(at.sine, at.cosine), 1e-15);
       if (law_.size_exponent != 0.0) h *= std::pow(h / law_.size_reference, -law_.size_exponent);
-      h *= law_.chip_factor;
       const double damping = damping_[0] * at.sine + damping_[1] * at.cosine;
-      const double ft = weight * (k.ktc * h + k.kte * law_.edge_factor + TANGENTIAL_DAMPING * damping);
-      const double fr = weight * (k.krc * h + k.kre * law_.edge_factor + damping);
+      const double ft = weight * (ktc * h + kte + TANGENTIAL_DAMPING * damping);
+      const double fr = weight * (krc * h + kre + damping);
       sum.fx += -ft * at.cosine - fr * at.sine;
       sum.fy += ft * at.sine - fr * at.cosine;
-      sum.fz += weight * (k.kac * h + k.kae * law_.edge_factor);
+      sum.fz += weight * (kac * h + kae);
       tangential += ft;
     }
   }

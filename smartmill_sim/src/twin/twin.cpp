@@ -140,11 +140,13 @@ void run(const MachineModel& model, const CampaignTest& test, const SimulationOp
     out[c] = &record.add(channelName(c));
     shown.push_back(c);
   }
+  CuttingMachine::Output now;
+  CuttingMachine::Output between;
   for (std::size_t i = 0; i < record.size(); ++i) {
-    const CuttingMachine::Output now = machine.step(input(i, 0.0));
+    machine.step(input(i, 0.0), now);
     for (const std::size_t c : shown) (*out[c])[i] = now.early[c];
     for (int s = 1; s < options.substeps; ++s) {
-      machine.step(input(i, static_cast<double>(s) / options.substeps));
+      machine.step(input(i, static_cast<double>(s) / options.substeps), between);
     }
   }
 

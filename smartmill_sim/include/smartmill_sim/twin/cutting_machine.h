@@ -70,6 +70,8 @@ class CuttingMachine {
   void resetLoadMeter(double spindle_speed);
 
   Output step(const Input& input);
+  /// The same into an Output that earlier steps may have filled.
+  void step(const Input& input, Output& output);
 
   /// Rounded to the load meter's resolution [V].
   double rounded(double voltage) const { return drive_ ? drive_->rounded(voltage) : voltage; }

@@ -48,8 +48,9 @@ class RegenerativeCut {
   struct Plane {  // chip = offset + x sin + y cos
     double offset, x, y;
   };
-  static double chip(const std::vector<Plane>& planes, double sine, double cosine);
-  void cut(double from, double to, CuttingForce& sum, double& tangential) const;
+  double chip(double sine, double cosine) const;
+  void keepNear(double from, double to);
+  void cut(double from, double to, CuttingForce& sum, double& tangential);
 
   ToolGeometry tool_;
   CuttingLaw law_;
@@ -60,7 +61,8 @@ class RegenerativeCut {
   std::vector<Delay> delays_;
   std::vector<std::array<double, 2>> history_;  // [m] ring; size a power of two
   std::size_t newest_ = 0;
-  std::vector<Plane> planes_;
+  std::vector<Plane> planes_;              // of all passes before one tooth
+  std::vector<Plane> near_;                // those that may give the chip of a part of its edge
   std::array<double, 2> feed_{{0, 0}};     // [m/rad]
   std::array<double, 2> damping_{{0, 0}};  // [N/m] radial force of process damping: x sin + y cos
   double speed_ = 0.0;
