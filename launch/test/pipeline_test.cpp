@@ -17,6 +17,7 @@
 #include <tf2_ros/transform_listener.h>
 
 #include "../src/session_parameters.h"
+#include "smartmill_core/error.h"
 #include "smartmill_core/model/machine_model.h"
 
 namespace {
