@@ -84,7 +84,8 @@ std::uint64_t ForceTrack::indexAt(double stamp) const {
   for (const auto& [index, block] : blocks_) {
     if (block.stamp <= stamp) nearest = &block;
   }
-  const double samples = std::ceil((stamp - nearest->stamp) * sample_rate_ - 1e-3);
+  // Stamps carry rounding of a few thousandths of a sample.
+  const double samples = std::ceil((stamp - nearest->stamp) * sample_rate_ - 0.05);
   return nearest->first_index + static_cast<std::uint64_t>(std::max(samples, 0.0));
 }
 
