@@ -12,6 +12,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "model_system.h"
 #include "picture.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/machine_model.h"
@@ -29,42 +30,9 @@ struct Request {
   bool errors = false;
 };
 
-std::vector<double> speedsOf(const std::string& text) {
-  double low = 0.0, high = 0.0;
-  int count = 0;
-  char rest = 0;
-  if (std::sscanf(text.c_str(), "%lf:%lf:%d%c", &low, &high, &count, &rest) != 3 || !(low > 0.0) ||
-      !(high >= low) || count < 1 || (count > 1 && high == low)) {
-    throw Error("--speeds " + text + ": LO:HI:N in rpm is due, 0 < LO < HI, N >= 1");
-  }
-  std::vector<double> speeds;
-  for (int i = 0; i < count; ++i) {
-    speeds.push_back(units::radPerSecFromRpm(count == 1 ? low : low + (high - low) * i / (count - 1)));
-  }
-  return speeds;
-}
-
 std::string axes(double max_depth_mm) {
   return "set xlabel 'Spindle speed [rpm]'\nset ylabel 'Axial depth [mm]'\nset yrange [0:" +
          std::to_string(max_depth_mm) + "]\n";
-}
-
-stability::RegenerativeSystem systemOf(const MachineModel& model, const Request& request) {
-  const ToolGeometry& tool = model.needTool("predict stability");
-  const CuttingCoefficients& cutting = model.needCutting("predict stability");
-  stability::RegenerativeSystem system;
-  system.modes = stability::systemModes(model.tool_tip.x, model.tool_tip.y);
-  if (system.modes.empty())
-    throw Error(request.model + ": tool_tip is missing (needed to predict stability)");
-  system.teeth = tool.teeth;
-  system.pitch = tool.pitch;
-  system.helix = tool.helix;
-  system.diameter = tool.diameter;
-  system.entry = units::radFromDeg(request.entry_deg);
-  system.exit = units::radFromDeg(request.exit_deg);
-  system.kt = cutting.ktc;
-  system.kr = cutting.krc;
-  return system;
 }
 
 /// [s] a limit may take before progress is shown.
@@ -126,8 +94,10 @@ void traceAll(const Request& request, const stability::FloquetSolver& solver,
 void run(const Request& request) {
   const stability::Method method = stability::methodOf(request.method);
   if (!(request.max_depth_mm > 0.0)) throw Error("--max-depth-mm: above 0 is due");
-  const std::vector<double> speeds = speedsOf(request.speeds);
-  const stability::RegenerativeSystem system = systemOf(readMachineModel(request.model), request);
+  std::vector<double> speeds = stability::rangeOf("--speeds", request.speeds);  // [rpm]
+  for (double& speed : speeds) speed = units::radPerSecFromRpm(speed);
+  const stability::RegenerativeSystem system =
+      stability::systemOf(readMachineModel(request.model), request.entry_deg, request.exit_deg);
   stability::SolverOptions options;
   options.estimate_error = request.errors;
   const auto solver = stability::makeSolver(method, system, options);
