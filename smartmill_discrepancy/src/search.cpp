@@ -88,9 +88,21 @@ SearchResult search(TwinRunner& quick_runner, const Fitter& quick, const Fitter&
     const MachineModel model = quick.model(at);
     quick_runner.correctTo(model, exact.runner().simulate(model));
   };
+  // Nominal values that are off far: tangents are taken anew where the fit went.
+  NominalTangents tangents;
+  Fit now;
+  for (int pass = 0; pass < 3; ++pass) {
+    correct(state);
+    tangents = quick.nominalTangents(state);
+    Fit fit = quick.fit(state, &tangents, {8, 1e-8, true});
+    const bool settled = pass > 0 && std::abs(now.bic - fit.bic) < std::max(1.0, 1e-3 * fit.bic);
+    now = std::move(fit);
+    state = now.state;
+    if (settled) break;
+  }
   correct(state);
-  NominalTangents tangents = quick.nominalTangents(state);
-  Fit now = quick.fit(state, &tangents, {});
+  tangents = quick.nominalTangents(state);
+  now = quick.fit(state, &tangents, {3, 1e-8, true});
   result.null = now;
   const double samples = static_cast<double>(quick.runner().size());
   say(text("nominal model, values free within their uncertainty: gap %.4f", std::sqrt(now.chi2 / samples), 0.0));
@@ -102,7 +114,7 @@ SearchResult search(TwinRunner& quick_runner, const Fitter& quick, const Fitter&
     std::size_t fitted = 0;
     std::vector<Rung> rungs;
     for (const Promise& p : promises) {
-      if (p.gain < least) break;
+      if (p.gain < least && (p.gain < 4.0 * options.least_prior_gain || now.penalty < 4.0 * options.least_prior_gain)) break;
       if (fitted >= 2 && p.gain < 0.02 * promises.front().gain) break;
       if (fitted >= options.fitted_per_round) break;
       FitState with = now.state;
@@ -116,7 +128,10 @@ SearchResult search(TwinRunner& quick_runner, const Fitter& quick, const Fitter&
       // Nothing that is left could make another hypothesis better.
       if (fitted >= 2 && best.chi2 - samples < 0.01 * (now.chi2 - samples)) break;
     }
-    const bool better = now.bic - best.bic > least;
+    // Nominal values pulled far off their stated uncertainty speak for an effect even where they could stand for it.
+    const bool better = now.bic - best.bic > least ||
+                        (now.bic - best.bic > options.least_prior_gain && now.penalty - best.penalty > 4.0 * options.least_prior_gain &&
+                         now.chi2 - samples < 0.01 * samples);
     for (Rung& r : rungs) {
       r.taken = better && r.effect == best.state.members.back().hypothesis->effect &&
                 r.variant == best.state.members.back().hypothesis->variant;
@@ -133,7 +148,7 @@ SearchResult search(TwinRunner& quick_runner, const Fitter& quick, const Fitter&
     // What was found earlier may have stood for what has been found now.
     for (std::size_t m = 0; m < now.state.members.size() && now.state.members.size() > 1;) {
       const Fit less = quick.fit(without(now.state, m), &tangents, {6, 1e-3, true});
-      if (less.bic - now.bic < options.least_gain) {
+      if (less.bic - now.bic < options.least_prior_gain) {
         say("  not needed any more: " + now.state.members[m].hypothesis->title());
         now = less;
       } else {
@@ -143,6 +158,14 @@ SearchResult search(TwinRunner& quick_runner, const Fitter& quick, const Fitter&
     say(text("gap %.4f with ", std::sqrt(now.chi2 / samples), 0.0) + describe(now.state.members.back()));
   }
   refine(quick_runner, quick, exact, now.state, &result);
+  // With everything settled an effect may turn out to be needed no more.
+  while (!result.contribution.empty()) {
+    const auto least = std::min_element(result.contribution.begin(), result.contribution.end());
+    if (*least >= options.least_prior_gain) break;
+    const auto m = static_cast<std::size_t>(least - result.contribution.begin());
+    say("  not needed any more: " + result.best.state.members[m].hypothesis->title());
+    refine(quick_runner, quick, exact, without(result.best.state, m), &result);
+  }
   for (const Member& m : result.best.state.members) say("found " + describe(m));
   return result;
 }

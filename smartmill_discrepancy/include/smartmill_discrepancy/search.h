@@ -18,6 +18,7 @@ struct SearchOptions {
   std::size_t fitted_per_round = 5;  ///< hypotheses that a round fits after screening
   std::size_t most_effects = 4;
   double least_gain = 30.0;          ///< [1] difference of BIC below which nothing is named
+  double least_prior_gain = 3.0;     ///< [1] the same where it comes from nominal values that need not be pulled off any more
   double least_share = 0.01;         ///< [1] of the squares above the noise that an effect must take
   std::function<void(const std::string&)> progress;
 };

@@ -1,0 +1,266 @@
+#include "smartmill_discrepancy/bench_campaign.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+
+#include "smartmill_core/campaign/campaign.h"
+#include "smartmill_core/campaign/record.h"
+#include "smartmill_core/error.h"
+#include "smartmill_core/units.h"
+#include "smartmill_discrepancy/hypothesis.h"
+#include "smartmill_sim/twin/cutting_machine.h"
+
+namespace smartmill::discrepancy {
+namespace {
+
+using Random = std::mt19937_64;
+
+double between(Random& random, double low, double high) {
+  return std::uniform_real_distribution<double>(low, high)(random);
+}
+
+double eitherSign(Random& random, double value) {
+  return between(random, -1.0, 1.0) < 0.0 ? -value : value;
+}
+
+template <class T>
+T oneOf(Random& random, const std::vector<T>& choices) {
+  return choices[std::uniform_int_distribution<std::size_t>(0, choices.size() - 1)(random)];
+}
+
+Mode modeOf(double frequency, double damping_ratio, double gain) {
+  Mode m;
+  m.frequency = frequency;
+  m.damping_ratio = damping_ratio;
+  m.gain = gain;
+  return m;
+}
+
+std::vector<CampaignTest> plan() {
+  std::vector<CampaignTest> tests;
+  double start = 0.0, cut_time = 0.0;
+  const auto add = [&](const std::string& name, TestKind kind, double rpm) -> CampaignTest& {
+    CampaignTest t;
+    t.name = name;
+    t.kind = kind;
+    t.file = name + ".csv";
+    t.sample_rate = 25600.0;
+    t.spindle_speed = units::radPerSecFromRpm(rpm);
+    t.start_time = start;
+    start += 45.0;
+    tests.push_back(t);
+    return tests.back();
+  };
+  for (const int rpm : {1000, 3000, 6000, 9000, 12000, 18000}) add("air_" + std::to_string(rpm), TestKind::air, rpm);
+  for (const char* axis : {"x", "y", "z"}) add(std::string("tap_") + axis, TestKind::tap, 0.0).direction = axis;
+  const auto cut = [&](const std::string& name, double rpm, double feed, double depth, double entry, double exit) {
+    CampaignTest& t = add(name, TestKind::cut, rpm);
+    t.engagement = Engagement{units::radFromDeg(entry), units::radFromDeg(exit), depth * units::MM, feed * units::MM};
+    t.engage_time = 0.02;
+    t.cut_time_before = cut_time;
+    cut_time += 20.0;
+  };
+  cut("slot_4500_030", 4500, 0.03, 2, 0, 180);
+  cut("slot_4500_060", 4500, 0.06, 2, 0, 180);
+  cut("slot_4500_100", 4500, 0.10, 2, 0, 180);
+  for (const int rpm : {1200, 3000, 7200, 9000, 13950}) cut("slot_" + std::to_string(rpm), rpm, 0.06, 2, 0, 180);
+  cut("up_4500", 4500, 0.08, 2, 0, 90);
+  cut("down_4500", 4500, 0.08, 2, 90, 180);
+  cut("slot_4500_deep", 4500, 0.06, 4, 0, 180);
+  cut("slot_4500_again", 4500, 0.06, 2, 0, 180);
+  return tests;
+}
+
+}  // namespace
+
+std::string OutsideCause::domain() const {
+  return kind == "tone" ? "frequency" : kind == "order" ? "order" : kind == "level" ? "level" : "time";
+}
+
+MachineModel drawMachine(Random& random, bool flexible) {
+  MachineModel m;
+  ToolGeometry tool;
+  tool.teeth = oneOf<int>(random, {2, 3, 4});
+  tool.diameter = oneOf<double>(random, {10e-3, 12e-3, 16e-3, 19.05e-3});
+  tool.helix = units::radFromDeg(oneOf<double>(random, {20, 30, 35, 40}));
+  m.tool = tool;
+  m.cutting = CuttingCoefficients{between(random, 650e6, 1000e6), between(random, 150e6, 400e6), between(random, 120e6, 250e6),
+                                  between(random, 10e3, 30e3),    between(random, 12e3, 35e3),   between(random, 0.6e3, 4e3)};
+  const std::array<double, 3> low{{900.0, 1000.0, 1900.0}}, high{{1500.0, 1900.0, 2800.0}};
+  for (std::size_t a = 0; a < 3; ++a) {
+    const double gain = a < 2 ? 0.9 : 0.95;
+    m.force_sensor.axis[a].modes = {modeOf(between(random, low[a], high[a]), between(random, 0.015, 0.04), gain)};
+    m.force_sensor.axis[a].direct = 1.0 - gain;
+  }
+  m.force_sensor.noise_rms = Axes3{{1.0, 1.0, 1.0}};
+  Spindle s;
+  s.viscous = between(random, 3.0e-4, 5.0e-4);
+  s.coulomb = between(random, 0.02, 0.08);
+  s.load_meter_gain = 3.88e-4;
+  s.load_meter_bandwidth = 7.0;
+  s.load_meter_resolution = 3e-4;
+  m.spindle = s;
+  if (flexible) {
+    m.tool_tip.x.modes = {modeOf(between(random, 900.0, 1800.0), between(random, 0.03, 0.05), 1e-6 / between(random, 25.0, 45.0))};
+    m.tool_tip.y.modes = {modeOf(between(random, 900.0, 1800.0), between(random, 0.03, 0.05), 1e-6 / between(random, 25.0, 45.0))};
+  }
+  return m;
+}
+
+MachineModel drawTruth(const MachineModel& nominal, Random& random) {
+  const NominalFreedom freedom(nominal);
+  std::normal_distribution<double> normal;
+  std::vector<double> values;
+  for (const Coordinate& c : freedom.coordinates()) values.push_back(c.prior_std * normal(random));
+  return freedom.apply(nominal, values);
+}
+
+EffectEntry drawEffect(const std::string& name, const MachineModel& machine, Random& random) {
+  EffectEntry e;
+  e.name = name;
+  auto& n = e.numbers;
+  const auto size = [&](double low, double high) { return eitherSign(random, between(random, low, high)); };
+  if (name == "runout") n = {{"offset_um", between(random, 5.0, 25.0)}, {"angle_deg", between(random, 0.0, 360.0)}};
+  if (name == "edge_forces")
+    n = {{"Kte_n_per_mm", between(random, 4.0, 15.0)}, {"Kre_n_per_mm", between(random, 4.0, 15.0)}, {"Kae_n_per_mm", between(random, 0.5, 4.0)}};
+  if (name == "size_effect") n = {{"exponent", between(random, 0.1, 0.35)}, {"reference_chip_um", between(random, 40.0, 120.0)}};
+  if (name == "tool_wear") n = {{"edge_growth_per_min", between(random, 0.1, 0.8)}};
+  if (name == "cutting_speed") n = {{"exponent", between(random, 0.05, 0.25)}, {"reference_m_per_min", between(random, 100.0, 300.0)}};
+  if (name == "uneven_pitch") {
+    double rest = 360.0;
+    for (int k = 0; k + 1 < machine.tool->teeth; ++k) {
+      e.pitch_deg.push_back(360.0 / machine.tool->teeth + size(1.0, 5.0));
+      rest -= e.pitch_deg.back();
+    }
+    e.pitch_deg.push_back(rest);
+  }
+  if (name == "helix") n = {{"helix_deg", units::degFromRad(machine.tool->helix) + size(3.0, 9.0)}};
+  if (name == "tool_flexibility") {
+    e.flexibility.x.modes = {modeOf(between(random, 800.0, 2200.0), between(random, 0.03, 0.06), 1e-6 / between(random, 25.0, 50.0))};
+    e.flexibility.y.modes = {modeOf(between(random, 800.0, 2200.0), between(random, 0.03, 0.06), 1e-6 / between(random, 25.0, 50.0))};
+  }
+  if (name == "process_damping") n = {{"coefficient_n_per_mm", between(random, 150.0, 800.0)}};
+  if (name == "extra_mode") {
+    e.words["axis"] = oneOf<std::string>(random, {"x", "y", "z"});
+    n = {{"frequency_hz", between(random, 300.0, 3500.0)}, {"damping_ratio", between(random, 0.01, 0.05)}, {"gain", between(random, 0.03, 0.09)}};
+  }
+  if (name == "mass_loading") n = {{"mass_ratio", between(random, 0.08, 0.4)}};
+  if (name == "speed_dependent_mode") n = {{"softening_per_krpm", between(random, 0.004, 0.015)}};
+  if (name == "cross_talk") {
+    for (const char* key : {"xy", "xz", "yx", "yz", "zx", "zy"}) {
+      if (between(random, 0.0, 1.0) < 0.5) n[key] = size(0.02, 0.08);
+    }
+    if (n.empty()) n["xy"] = size(0.02, 0.08);
+  }
+  if (name == "charge_drift") n = {{"rate_n_per_min", size(800.0, 4000.0)}, {"y_ratio", size(0.3, 1.5)}};
+  if (name == "mains_hum")
+    n = {{"frequency_hz", oneOf<double>(random, {50.0, 60.0})}, {"amplitude_n", between(random, 2.0, 12.0)}, {"y_ratio", size(0.3, 1.2)}};
+  if (name == "unbalance") n = {{"mass_eccentricity_g_mm", between(random, 4.0, 20.0)}, {"angle_deg", between(random, 0.0, 360.0)}};
+  if (name == "channel_delay") {
+    e.words["channel"] = oneOf<std::string>(random, {"fx", "fy", "fz"});
+    n = {{"delay_us", between(random, 30.0, 200.0)}};
+  }
+  if (name == "gain_error") {
+    e.words["channel"] = oneOf<std::string>(random, {"fx", "fy", "fz", "load_meter"});
+    n = {{"gain", 1.0 + size(0.06, 0.2)}};
+  }
+  if (name == "saturation") n = {{"limit_n", between(random, 150.0, 350.0)}};
+  if (name == "stribeck_friction") n = {{"breakaway_nm", between(random, 0.1, 0.6)}, {"speed_rpm", between(random, 1200.0, 4500.0)}};
+  if (name == "friction_warmup") n = {{"cold_ratio", between(random, 0.2, 0.8)}, {"time_constant_s", between(random, 120.0, 500.0)}};
+  if (name == "load_meter_lag") n = {{"bandwidth_hz", between(random, 1.5, 5.0)}};
+  if (name == "depth_tilt") n = {{"slope_um_per_mm", size(15.0, 60.0)}};
+  if (name == "feed_error") n = {{"ratio", 1.0 + size(0.12, 0.25)}};
+  return e;
+}
+
+OutsideCause drawOutside(Random& random) {
+  OutsideCause o;
+  o.kind = oneOf<std::string>(random, {"tone", "level", "order", "settling"});
+  o.channel = oneOf<std::string>(random, {"fx", "fy", "fz"});
+  o.amplitude = between(random, 3.0, 12.0);
+  o.place = o.kind == "tone"    ? between(random, 25.0, 45.0) + (between(random, 0.0, 1.0) < 0.5 ? 0.0 : 200.0)
+            : o.kind == "order" ? oneOf<double>(random, {0.5, 5.0, 7.0})
+                                : between(random, 0.03, 0.08);
+  return o;
+}
+
+void writeBenchCampaign(const MachineModel& nominal, const BenchTruth& truth, const std::string& folder,
+                        std::uint64_t seed, int substeps) {
+  std::error_code failed;
+  std::filesystem::create_directories(folder, failed);
+  if (failed) throw Error(folder + ": " + failed.message());
+  Campaign campaign;
+  campaign.folder = folder;
+  campaign.model_file = "model.yaml";
+  campaign.tests = plan();
+  writeMachineModel(nominal, folder + "/model.yaml");
+  writeCampaign(campaign, folder);
+  Random random(seed);
+  std::normal_distribution<double> normal;
+  for (const CampaignTest& test : campaign.tests) {
+    sim::CuttingMachine machine(truth.machine, 1.0 / (test.sample_rate * substeps));
+    machine.setClock({test.start_time.value_or(0.0), test.cut_time_before.value_or(0.0), true});
+    machine.resetLoadMeter(test.spindle_speed);
+    for (sim::Tone* tone : machine.tones()) tone->phase = between(random, 0.0, units::TWO_PI);
+    const bool tap = test.kind == TestKind::tap, cut = test.kind == TestKind::cut;
+    const double phase = between(random, 0.0, units::TWO_PI), own_phase = between(random, 0.0, units::TWO_PI);
+    const double feed = cut ? test.engagement->feed_per_tooth * truth.machine.tool->teeth * test.spindle_speed / units::TWO_PI : 0.0;
+    Record record;
+    const std::size_t samples = tap ? 3072 : cut ? (test.spindle_speed < 200.0 ? 7680 : 5120) : 3840;
+    std::vector<double> angles, hammer, load;
+    std::array<std::vector<double>, 3> force;
+    const double peak = between(random, 150.0, 300.0), width = 0.6e-3, hit = 5e-3;
+    bool engaged = false;
+    for (std::size_t i = 0; i < samples; ++i) {
+      sim::ChannelValues shown{};
+      for (int s = 0; s < substeps; ++s) {
+        const double t = (static_cast<double>(i) + static_cast<double>(s) / substeps) / test.sample_rate;
+        sim::CuttingMachine::Input input;
+        input.motion.angle = phase + test.spindle_speed * t;
+        input.motion.speed = test.spindle_speed;
+        input.motion.velocity[0] = feed;
+        input.motion.centre[0] = feed * t;
+        if (tap && t > hit && t < hit + width)
+          input.sensor_force[test.direction == "x" ? 0 : test.direction == "y" ? 1 : 2] = peak * std::sin(units::PI * (t - hit) / width);
+        if (cut && !engaged && t >= *test.engage_time - 1e-3 / test.sample_rate) {
+          machine.engage({{test.engagement->entry, test.engagement->exit, test.engagement->axial_depth}}, input.motion);
+          engaged = true;
+        }
+        const sim::CuttingMachine::Output out = machine.step(input);
+        if (s > 0) continue;
+        shown = out.early;
+        record.time.push_back(t);
+        angles.push_back(std::fmod(input.motion.angle, units::TWO_PI));
+        double blow = 0.0;
+        for (const double f : input.sensor_force) blow += f;
+        hammer.push_back(blow + 0.2 * normal(random));
+      }
+      const double t = static_cast<double>(i) / test.sample_rate;
+      if (truth.outside) {
+        const OutsideCause& o = *truth.outside;
+        const double wave = o.kind == "tone"    ? std::sin(units::TWO_PI * o.place * t + own_phase)
+                            : o.kind == "order" ? (tap ? 0.0 : std::sin(o.place * (test.spindle_speed * t + phase)))
+                            : o.kind == "level" ? 1.0
+                                                : std::exp(-t / o.place);
+        shown[sim::channelOf(o.channel)] += o.amplitude * wave;
+      }
+      machine.finish(t, shown);
+      for (std::size_t a = 0; a < 3; ++a) force[a].push_back(shown[a] + normal(random));
+      load.push_back(machine.rounded(shown[sim::LOAD_METER] + 2e-4 * normal(random)));
+    }
+    record.add("spindle_angle") = angles;
+    record.add("fx") = force[0];
+    record.add("fy") = force[1];
+    record.add("fz") = force[2];
+    if (tap) {
+      record.add("hammer") = hammer;
+    } else {
+      record.add("load_meter") = load;
+    }
+    writeCsv(record, folder + "/" + test.file);
+  }
+}
+
+}  // namespace smartmill::discrepancy
