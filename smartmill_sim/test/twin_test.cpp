@@ -1,10 +1,12 @@
 #include "smartmill_sim/twin/twin.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <iostream>
 #include <map>
+#include <string>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -93,6 +95,55 @@ TEST(Twin, nothingBeforeTheEngagement) {
   const Record record = simulateTest(machine(), test, 0.05, options);
   for (std::size_t i = 0; i < 512; ++i) ASSERT_EQ(record.column("fy")[i], 0.0);
   EXPECT_GT(std::abs(record.column("fy")[530]), 1.0);
+}
+
+// A smooth hit; a record that shows an answer of a channel says what was hit.
+Record tapOf(const std::string& answering) {
+  Record record;
+  const std::size_t samples = 4096, hit = 200;
+  for (std::size_t i = 0; i < samples; ++i) record.time.push_back(static_cast<double>(i) / 25600.0);
+  for (const char* c : {"hammer", "fx", "tool_x", "acceleration"}) {
+    std::vector<double>& column = record.add(c);
+    column.assign(samples, 0.0);
+    for (std::size_t i = 0; i < samples; ++i) column[i] = i % 2 == 0 ? 1e-9 : -1e-9;  // quiet, not dead
+    if (c == answering) column[hit + 5] = 1.0;
+  }
+  for (std::size_t i = 0; i < 20; ++i)
+    record.add("hammer")[hit + i] = 100.0 * std::pow(std::sin(units::PI * static_cast<double>(i) / 20.0), 2);
+  return record;
+}
+
+TEST(Twin, tapActsOnWhatAnswers) {
+  MachineModel model = machine();
+  model.tool_tip.x.modes = {{700.0, 0.03, 1.0 / 28e6}};
+  CampaignTest test = slot();
+  test.kind = TestKind::tap;
+  test.spindle_speed = 0.0;
+  test.engagement.reset();
+  test.direction = "x";
+  SimulationOptions options;
+  options.noise = false;
+  options.substeps = 8;
+  const Record sensor = simulateTest(model, test, tapOf("fx"), options);
+  EXPECT_NEAR(sensor.column("fx")[210], 100.0, 1e-6);
+  EXPECT_EQ(sensor.column("tool_x")[230], 0.0);
+  const Record tip = simulateTest(model, test, tapOf("tool_x"), options);
+  EXPECT_EQ(tip.column("fx")[210], 0.0);
+  // Impulse response of the mode after the hit: x = I / (m w_d) exp(-z w t) sin(w_d t), and its second
+  // derivative.
+  const double impulse = mean(tip.column("hammer")) * static_cast<double>(tip.size()) / 25600.0;
+  const double w = units::TWO_PI * 700.0, z = 0.03, wd = w * std::sqrt(1.0 - z * z);
+  // Of a 0.8 ms hit the mode sees a part, the hit's spectrum at its frequency: the same one in x and x''.
+  const std::vector<double>& x = tip.column("tool_x");
+  const std::vector<double>& a = tip.column("acceleration");
+  double largest = 0.0;
+  for (std::size_t i = 300; i < 1500; ++i) largest = std::max(largest, std::abs(x[i]));
+  EXPECT_LT(largest, impulse * w * w / 28e6 / wd);
+  EXPECT_GT(largest, 0.3 * impulse * w * w / 28e6 / wd);
+  for (std::size_t i = 300; i < 1500; i += 37) {
+    const double rate = (x[i + 1] - x[i - 1]) * 0.5 * 25600.0;  // second order: 0.5 % at 700 Hz
+    EXPECT_NEAR(a[i], -w * w * x[i] - 2.0 * z * w * rate, 1e-3 * w * w * largest) << i;
+  }
 }
 
 TEST(Twin, refusesWhatItCannotRun) {

@@ -174,6 +174,10 @@ void CuttingMachine::step(const Input& input, Output& out) {
     // A jump does not go on.
     tip_history_[axis] = {{tip[axis], engaged_ ? tip[axis] : tip_history_[axis][0]}};
   }
+  if (probe_) {
+    channels[DISPLACEMENT] = channels[TOOL_X + *probe_];
+    channels[ACCELERATION] = tip_[*probe_].acceleration();
+  }
   if (regenerative_) regenerative_->push({{channels[TOOL_X], channels[TOOL_Y]}});
   const std::array<double, 3> cut{{out.force.fx, out.force.fy, out.force.fz}};
   for (std::size_t axis = 0; axis < 3; ++axis) {

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <functional>
 #include <random>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -13,6 +12,7 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/effect_catalogue.h"
+#include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/signal/window.h"
 #include "smartmill_core/units.h"
 #include "smartmill_sim/twin/cutting_machine.h"
@@ -26,9 +26,17 @@ const std::array<const char*, 2> TIP{{"tool_x", "tool_y"}};
 // another program made): [1]
 constexpr double RISE = 1.0 / 6.0;
 
-// Columns that this twin can give.
-const std::set<std::string> KNOWN{"spindle_angle", "fx",     "fy",     "fz",
-                                  "load_meter",    "hammer", "tool_x", "tool_y"};
+// Columns that this twin gives: inputs and the channels of the measuring chain.
+bool gives(const std::string& column, const CampaignTest& test) {
+  if (column == "spindle_angle" || column == "hammer") return true;
+  // Where such a sensor stands is known of a tap only: where it is hit.
+  if (column == channelName(DISPLACEMENT) || column == channelName(ACCELERATION))
+    return test.kind == TestKind::tap && test.direction != "z";
+  for (std::size_t c = 0; c < CHANNELS; ++c) {
+    if (column == channelName(c)) return true;
+  }
+  return false;
+}
 
 // Catmull-Rom through the samples: smooth, exact at the samples.
 double interpolated(const std::vector<double>& samples, std::size_t i, double share) {
@@ -122,6 +130,39 @@ void findPhases(const MachineModel& model, const Record& recorded,
   }
 }
 
+// What a tap hits: the tool tip, the sensor or (when a program shows both answers in one record) both. A
+// channel answers when it stands out of its noise after the hit.
+struct TapTarget {
+  bool tip, sensor;
+};
+
+TapTarget targetOf(const Record& record, std::size_t axis) {
+  const std::vector<double>& hammer = record.column("hammer");
+  const auto louder = [](double a, double b) { return std::abs(a) < std::abs(b); };
+  const auto hit =
+      static_cast<std::size_t>(std::max_element(hammer.begin(), hammer.end(), louder) - hammer.begin());
+  const auto answers = [&](const char* channel) {
+    constexpr std::size_t LEAST_QUIET = 20;
+    if (!record.has(channel) || hit < 2 * LEAST_QUIET) return false;
+    const std::vector<double>& x = record.column(channel);
+    const auto quiet_end = x.begin() + static_cast<std::ptrdiff_t>(hit - LEAST_QUIET);
+    const double deviation = standardDeviation({x.begin(), quiet_end}), level = mean({x.begin(), quiet_end});
+    const auto peak = std::max_element(quiet_end, x.end(),
+                                       [&](double a, double b) { return louder(a - level, b - level); });
+    return std::abs(*peak - level) > 10.0 * deviation;
+  };
+  TapTarget target{false, answers(channelName(FX + axis))};
+  if (axis < 2)
+    target.tip = answers(channelName(TOOL_X + axis)) || answers("displacement") || answers("acceleration");
+  if (!target.tip && !target.sensor) {
+    // Silent channels: by what was measured at all.
+    target.tip =
+        axis < 2 && (record.has(TIP[axis]) || record.has("displacement") || record.has("acceleration"));
+    target.sensor = !target.tip;
+  }
+  return target;
+}
+
 // Runs the machine over the record, with substeps between the samples; recorded columns are kept.
 // input(i, share): what happens at a share 0..1 of the way from sample i to the next.
 // recorded: nullptr when there is none.
@@ -193,17 +234,15 @@ Record simulate(const MachineModel& model, const CampaignTest& test, const Recor
   if (test.kind == TestKind::tap) {
     const std::vector<double> hammer = contactForce(record.column("hammer"));
     const std::size_t axis = test.direction == "x" ? 0 : test.direction == "y" ? 1 : 2;
+    if (axis < 2) machine.setProbe(axis);
+    const TapTarget target = targetOf(recorded ? *recorded : record, axis);
     run(
         model, test, options, machine,
         [&](std::size_t i, double share) {
           CuttingMachine::Input input;
-          // A record of the tool's displacement is of a hit on the tool, any other of one on the sensor.
           const double force = interpolated(hammer, i, share);
-          if (axis < 2 && record.has(TIP[axis])) {
-            input.tip_force[axis] = force;
-          } else {
-            input.sensor_force[axis] = force;
-          }
+          if (target.tip) input.tip_force[axis] = force;
+          if (target.sensor) input.sensor_force[axis] = force;
           return input;
         },
         recorded, record);
@@ -258,7 +297,7 @@ Record simulateTest(const MachineModel& model, const CampaignTest& test, const R
   for (std::size_t i = 0; i < recorded.size(); ++i)
     record.time.push_back(recorded.time[0] + static_cast<double>(i) / test.sample_rate);
   for (const std::string& name : recorded.names) {
-    if (KNOWN.count(name) != 0) record.add(name) = recorded.column(name);
+    if (gives(name, test)) record.add(name) = recorded.column(name);
   }
   double phase = options.phase.value_or(0.0);
   if (!options.phase && recorded.has("spindle_angle") && test.kind != TestKind::tap)

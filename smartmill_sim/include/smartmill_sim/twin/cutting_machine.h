@@ -66,6 +66,9 @@ class CuttingMachine {
   /// Early channels to what is shown: drift, hum and saturation at a time since the record began [s].
   void finish(double record_time, ChannelValues& channels) const;
 
+  /// Displacement and acceleration sensors stand at the tip, in x (0) or y (1).
+  void setProbe(std::size_t axis) { probe_ = axis; }
+
   /// The load meter stands at the steady value of cutting air.
   void resetLoadMeter(double spindle_speed);
 
@@ -91,6 +94,7 @@ class CuttingMachine {
   std::optional<RigidCut> rigid_;                // instead of the process: steady, no modes
   std::optional<RegenerativeCut> regenerative_;  // the same: steady, modes
   bool vibrates_ = false;
+  std::optional<std::size_t> probe_;
   std::vector<ContactArc> arcs_;                     // as engaged, without tilt
   double feed_path_ = 0.0;                           // [m] since engagement
   std::optional<std::array<double, 2>> feed_start_;  // [m] where feed errors begin to count

@@ -28,8 +28,19 @@ ModalFilter::ModalFilter(const ModalModel& model, double sample_rate, Hold hold)
     joint(1, 2) = angle;
     joint(2, 3) = 1.0;
     const Eigen::MatrixXd e = matrixExponential(joint);
-    Section section{e(0, 0), e(0, 1) / w, e(1, 0) * w, e(1, 1), e(0, 2), e(1, 2) * w,
-                    0.0,     0.0,         mode.gain,   0.0,     0.0};
+    Section section{e(0, 0),
+                    e(0, 1) / w,
+                    e(1, 0) * w,
+                    e(1, 1),
+                    e(0, 2),
+                    e(1, 2) * w,
+                    0.0,
+                    0.0,
+                    mode.gain,
+                    0.0,
+                    0.0,
+                    w * w,
+                    2.0 * mode.damping_ratio * w};
     if (hold == Hold::first_order) {
       section.c1 = e(0, 3);
       section.c2 = e(1, 3) * w;
@@ -72,6 +83,12 @@ void ModalFilter::reset(double constant_input) {
     s.v = 0.0;
   }
   last_input_ = constant_input;
+}
+
+double ModalFilter::acceleration() const {
+  double sum = 0.0;
+  for (const Section& s : sections_) sum += s.gain * (s.stiffness * (last_input_ - s.x) - s.damping * s.v);
+  return sum;
 }
 
 void ModalFilter::continueFrom(const ModalFilter& before) {

@@ -30,6 +30,9 @@ class ModalFilter {
   /// At rest, or in the static state of a constant input.
   void reset(double constant_input = 0.0);
 
+  /// Second derivative of the modes' output at the last step [unit/s2 x unit of input].
+  double acceleration() const;
+
   /// Goes on from the state of a filter with as many modes in the same order (whose modes have moved since).
   void continueFrom(const ModalFilter& before);
 
@@ -40,6 +43,7 @@ class ModalFilter {
     double c1, c2;              // share of this input (first order hold)
     double gain;
     double x, v;
+    double stiffness, damping;  // x'' = stiffness (input - x) - damping x'
   };
   std::vector<Section> sections_;
   double direct_;
