@@ -1,6 +1,7 @@
 #include "smartmill_kalman/force_compensation.h"
 
 #include <algorithm>
+#include <climits>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -14,6 +15,8 @@ namespace {
 const std::array<const char*, 3> CHANNELS{{"fx", "fy", "fz"}};
 /// Gains are laid out at speeds this share apart and serve this far from their own (in points of that grid).
 constexpr double SPEED_GRID = 0.01, GRID_HYSTERESIS = 0.7;
+/// Modes may move by this share before the gains are laid out anew.
+constexpr double GAINS_BEAR = 0.01;
 /// The harmonics follow the spindle when its speed has moved by this share.
 constexpr double RETUNE = 1e-6;
 constexpr double STEADY_TIME = 0.05;  // [s] without a change of speed before filters are laid out
@@ -27,6 +30,8 @@ void require(const char* key, double value, bool good, const char* due) {
 
 void CompensationParameters::validate() const {
   filter.validate();
+  follower.validate();
+  require("follow_revolutions", follow_revolutions, follow_revolutions > 0, "above 0");
   require("least_speed", least_speed, least_speed > 0.0, "above 0 rad/s");
   require("speed_tolerance", speed_tolerance, speed_tolerance > 0.0 && speed_tolerance < 0.5, "0 .. 0.5");
   require("settling_periods", settling_periods, settling_periods >= 0.0, "at least 0");
@@ -40,7 +45,7 @@ ForceCompensation::ForceCompensation(const CompensationParameters& parameters, b
 }
 
 void ForceCompensation::setSensor(std::size_t axis, const ModalModel& sensor, double noise_rms) {
-  sensor_.at(axis) = sensor;
+  sensor_.at(axis) = told_.at(axis) = sensor;
   noise_rms_.at(axis) = noise_rms;
   filters_.clear();
   schedule_.clear();
@@ -63,10 +68,22 @@ void ForceCompensation::handle(const SpindleAngle& angle) {
     steady_speed_ = angle.speed;
   }
   speed_ = angle.speed;
+  angle_ = angle;
 }
 
-void ForceCompensation::handle(const CuttingCondition&) {
+void ForceCompensation::handle(const CuttingCondition& condition) {
   filters_.clear();
+  condition_ = condition;
+  forgetMoves();
+}
+
+// What one cut has moved does not reach the next: results depend on nothing before a condition.
+void ForceCompensation::forgetMoves() {
+  if (moves_ > 0) {
+    sensor_ = told_;
+    schedule_.clear();
+  }
+  moves_ = 0;
 }
 
 void ForceCompensation::reset() {
@@ -83,6 +100,10 @@ const std::vector<HarmonicGain>& ForceCompensation::gains(std::size_t axis, int 
   if (gains.empty()) {
     HarmonicFilterParameters parameters = parameters_.filter;
     parameters.noise_rms = noise_rms_[axis];
+    if (axis < 2) {
+      designed_for_[axis].clear();
+      for (const Mode& mode : sensor_[axis]->modes) designed_for_[axis].push_back(mode.frequency);
+    }
     gains = designGains(*sensor_[axis], std::exp(grid_point * SPEED_GRID), sample_rate, parameters);
   }
   return gains;
@@ -100,9 +121,49 @@ void ForceCompensation::design(double speed, double sample_rate) {
     filters_.emplace_back(scheduled, *sensor_[axis], speed, sample_rate);
     if (!before.empty()) filters_[axis].adopt(before[axis]);
   }
+  follower_.reset();
+  if (parameters_.follow && condition_ && condition_->kind == CuttingCondition::Kind::cut) {
+    const int harmonics = std::min(filters_[0].harmonics(), filters_[1].harmonics());
+    if (harmonics > 0)
+      follower_.emplace(condition_->tool, condition_->engagement, harmonics, parameters_.follower);
+    next_look_ = 0.0;
+  }
   if (before.empty()) {
     settling_left_ =
         parameters_.settling_periods * parameters_.filter.settling_revolutions * units::TWO_PI / speed;
+  }
+}
+
+void ForceCompensation::follow(double time, double sample_rate) {
+  const double revolution = units::TWO_PI / speed_;
+  if (next_look_ == 0.0) next_look_ = time + parameters_.follow_revolutions * revolution;
+  if (time < next_look_ || !filters_[0].settled() || !filters_[1].settled()) return;
+  next_look_ = time + parameters_.follow_revolutions * revolution;
+  const double angle = angle_.angle + speed_ * (time - angle_.stamp);
+  ModeFollower::Harmonics harmonics;
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    harmonics[axis] = filters_[axis].measuredHarmonics();
+    for (std::size_t n = 0; n < harmonics[axis].size(); ++n)
+      harmonics[axis][n] *= std::polar(1.0, -static_cast<double>(n) * angle);
+  }
+  const double memory = parameters_.filter.memory_revolutions * revolution * sample_rate;  // [samples]
+  const auto move = follower_->look(harmonics, std::max(noise_rms_[0], noise_rms_[1]) / std::sqrt(memory),
+                                    {*sensor_[0], *sensor_[1]}, speed_);
+  if (!move) return;
+  ++health_.moves;
+  ++moves_;
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    // The gains bear small moves.
+    bool far = designed_for_[axis].size() != move->sensor[axis].modes.size();
+    for (std::size_t k = 0; !far && k < designed_for_[axis].size(); ++k)
+      far = std::abs(move->sensor[axis].modes[k].frequency / designed_for_[axis][k] - 1.0) > GAINS_BEAR;
+    sensor_[axis] = move->sensor[axis];
+    std::vector<HarmonicGain> fresh;
+    if (far) {
+      schedule_.erase(schedule_.lower_bound({axis, INT_MIN}), schedule_.upper_bound({axis, INT_MAX}));
+      fresh = gains(axis, grid_point_, sample_rate);
+    }
+    filters_[axis].replaceSensor(*sensor_[axis], std::move(fresh));
   }
 }
 
@@ -165,6 +226,7 @@ void ForceCompensation::handle(const SampleBlock& block) {
   compensated.status = settling_left_ > 0.0 ? ForceBlock::Status::settling : ForceBlock::Status::compensated;
   settling_left_ -= static_cast<double>(block.size()) / block.sample_rate;
   output_(measured, compensated);
+  if (follower_) follow(block.timeOf(block.size()), block.sample_rate);
 }
 
 }  // namespace smartmill::kalman

@@ -21,6 +21,8 @@ using Complex = std::complex<double>;
 constexpr double OUT_OF_LINE = 5.0;
 /// Windows after a start that tell what is usual.
 constexpr std::size_t LEAST_WINDOWS = 12;
+/// A harmonic that a sensor passes by less is not told by it.
+constexpr double LEAST_PASSED = 1e-3;
 /// Revolutions at a memory before a longer one is tried.
 constexpr std::size_t DWELL = 2;
 /// The mean square of a revolution that still falls below this share of the last one's: not settled.
@@ -254,6 +256,37 @@ void HarmonicFilter::retune(const ModalModel& sensor, double spindle_speed) {
   layOut(sensor, spindle_speed);
   setState(now);
   setGains();
+}
+
+void HarmonicFilter::replaceSensor(const ModalModel& sensor, std::vector<HarmonicGain> gains) {
+  if (sensor.modes.size() != modes_) throw Error("Kalman filter: the number of modes cannot change");
+  for (int n = 0; n <= harmonics_; ++n) {
+    const double f = n * spindle_speed_ / units::TWO_PI;
+    const Complex was = sensor_.response(f), is = sensor.response(f);
+    if (std::abs(is) < LEAST_PASSED) continue;
+    const std::size_t i = modes_ + static_cast<std::size_t>(n);
+    Block& block = blocks_[i / 4];
+    const Complex force = Complex(block.re[i % 4], block.im[i % 4]) * was / is;
+    block.re[i % 4] = force.real();
+    block.im[i % 4] = n > 0 ? force.imag() : 0.0;
+  }
+  if (!gains.empty() && gains.front().filter.size() == design_.front().filter.size())
+    design_ = std::move(gains);
+  layOut(sensor, spindle_speed_);
+  level_ = std::min(level_, design_.size() - 1);
+  setGains();
+  expected_ = expectation();
+}
+
+std::vector<std::complex<double>> HarmonicFilter::measuredHarmonics() const {
+  std::vector<Complex> harmonics;
+  for (int n = 0; n <= harmonics_; ++n) {
+    const std::size_t i = modes_ + static_cast<std::size_t>(n);
+    const Block& block = blocks_[i / 4];
+    harmonics.push_back(Complex(block.c1[i % 4], -block.c2[i % 4]) *
+                        Complex(block.re[i % 4], block.im[i % 4]));
+  }
+  return harmonics;
 }
 
 void HarmonicFilter::adopt(const HarmonicFilter& other) {

@@ -15,6 +15,9 @@ NodeParameters readParameters(ParameterReader& reader) {
   reader.read("least_speed", compensation.least_speed);
   reader.read("speed_tolerance", compensation.speed_tolerance);
   reader.read("settling_periods", compensation.settling_periods);
+  reader.read("follow", compensation.follow);
+  reader.read("follow_revolutions", compensation.follow_revolutions);
+  reader.read("follow_misfit", compensation.follower.misfit);
   reader.read("saturation", compensation.saturation);
   TapParameters& taps = parameters.taps;
   reader.read("trigger_force", taps.trigger_force);

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <random>
 
-#include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/modal/modal_filter.h"
 #include "smartmill_core/signal/fourier.h"
@@ -14,10 +13,12 @@
 namespace smartmill::kalman {
 namespace {
 
-constexpr std::size_t TABLE = 16384;
 constexpr int FINER = 8;
 /// The sensor's parameters change in steps this short.
 constexpr double DRIFT_STEP = 1e-3;  // [s]
+
+const ToolGeometry TOOL{4, 16e-3, units::radFromDeg(30.0), {}};
+const Engagement SLOT{0.0, units::PI, 2e-3, 6e-5};
 
 ModalModel between(const ModalModel& a, const ModalModel& b, double share) {
   ModalModel model = a;
@@ -76,69 +77,6 @@ class MovingSensor {
 
 }  // namespace
 
-RunoutForce::RunoutForce(const ToolGeometry& tool, const CuttingCoefficients& k, const Engagement& engagement,
-                         double runout, double runout_angle) {
-  validate(tool);
-  validate(engagement);
-  // Force of one tooth's tip a unit of depth over its immersion angle, then its integral over the lag.
-  const double step = units::TWO_PI / TABLE;
-  const double lag = tool.lag() * engagement.axial_depth;
-  std::vector<double> radius;
-  for (int tooth = 0; tooth < tool.teeth; ++tooth) {
-    radius.push_back(runout * std::cos(tool.toothAngle(tooth) - runout_angle));
-  }
-  for (auto& axis : table_) axis.assign(TABLE + 1, 0.0);
-  for (int tooth = 0; tooth < tool.teeth; ++tooth) {
-    std::array<std::vector<double>, 2> integral;  // over two revolutions
-    for (auto& axis : integral) axis.assign(2 * TABLE + 1, 0.0);
-    std::array<double, 2> last{};
-    for (std::size_t i = 0; i <= 2 * TABLE; ++i) {
-      const double phi = std::fmod(static_cast<double>(i) * step, units::TWO_PI);
-      std::array<double, 2> force{};
-      if (phi >= engagement.entry && phi <= engagement.exit) {
-        double h = 1e9;
-        for (int j = 1; j <= tool.teeth; ++j) {
-          h = std::min(h, j * engagement.feed_per_tooth * std::sin(phi) + radius[tooth] -
-                              radius[(tooth + j) % tool.teeth]);
-        }
-        if (h > 0.0) {
-          const double ft = k.ktc * h + k.kte, fr = k.krc * h + k.kre;
-          force = {-ft * std::cos(phi) - fr * std::sin(phi), ft * std::sin(phi) - fr * std::cos(phi)};
-        }
-      }
-      for (std::size_t axis = 0; axis < 2; ++axis) {
-        if (i > 0) integral[axis][i] = integral[axis][i - 1] + 0.5 * step * (force[axis] + last[axis]);
-      }
-      last = force;
-    }
-    const double shift = tool.toothAngle(tooth) / step;
-    for (std::size_t axis = 0; axis < 2; ++axis) {
-      const auto value = [&](double at) {
-        at = std::fmod(at, static_cast<double>(TABLE));
-        if (at < 0.0) at += TABLE;
-        at += TABLE;
-        const auto read = [&](double x) {
-          const auto n = std::min(static_cast<std::size_t>(x), 2 * TABLE - 1);
-          return integral[axis][n] +
-                 (x - static_cast<double>(n)) * (integral[axis][n + 1] - integral[axis][n]);
-        };
-        if (lag < 1e-9) return (read(at + 0.5) - read(at - 0.5)) / step * engagement.axial_depth;
-        return (read(at) - read(at - lag / step)) / tool.lag();
-      };
-      for (std::size_t i = 0; i <= TABLE; ++i) table_[axis][i] += value(static_cast<double>(i) + shift);
-    }
-  }
-}
-
-std::array<double, 2> RunoutForce::at(double spindle_angle) const {
-  double at = std::fmod(spindle_angle, units::TWO_PI) / units::TWO_PI * TABLE;
-  if (at < 0.0) at += TABLE;
-  const auto n = std::min(static_cast<std::size_t>(at), TABLE - 1);
-  const double rest = at - static_cast<double>(n);
-  return {table_[0][n] + rest * (table_[0][n + 1] - table_[0][n]),
-          table_[1][n] + rest * (table_[1][n + 1] - table_[1][n])};
-}
-
 ModalModel ReferenceCase::exactSensor() {
   ModalModel model;
   model.modes = {{1450.0, 0.025, 0.7}, {2300.0, 0.03, 0.2}, {3600.0, 0.02, 0.1}};
@@ -146,8 +84,7 @@ ModalModel ReferenceCase::exactSensor() {
 }
 
 ReferenceRecord simulate(const ReferenceCase& reference) {
-  const RunoutForce force({4, 16e-3, units::radFromDeg(30.0), {}}, {800e6, 250e6, 0.0, 20e3, 20e3, 0.0},
-                          {0.0, units::PI, 2e-3, 6e-5}, 8e-6, units::radFromDeg(31.0));
+  const RunoutForce force(TOOL, {800e6, 250e6, 0.0, 20e3, 20e3, 0.0}, SLOT, 8e-6, units::radFromDeg(31.0));
   const double fine = FINER * reference.sample_rate;
   std::array<MovingSensor, 2> sensor{MovingSensor(fine), MovingSensor(fine)};
   for (MovingSensor& axis : sensor) axis.set(reference.sensor);
@@ -177,6 +114,46 @@ ReferenceRecord simulate(const ReferenceCase& reference) {
     }
   }
   return record;
+}
+
+std::array<std::vector<double>, 2> runCompensation(const ReferenceCase& reference,
+                                                   const ReferenceRecord& record, const ModalModel& believed,
+                                                   const CompensationParameters& parameters,
+                                                   std::size_t* moves) {
+  constexpr std::size_t BLOCK = 256;
+  std::array<std::vector<double>, 2> force;
+  ForceCompensation compensation(parameters, false, [&](const ForceBlock&, const ForceBlock& compensated) {
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      force[axis].insert(force[axis].end(), compensated.force[axis].begin(), compensated.force[axis].end());
+    }
+  });
+  compensation.setSensor(0, believed);
+  compensation.setSensor(1, believed);
+  ModalModel ideal;
+  ideal.direct = 1.0;
+  compensation.setSensor(2, ideal);
+  CuttingCondition condition;
+  condition.kind = CuttingCondition::Kind::cut;
+  condition.tool = TOOL;
+  condition.engagement = SLOT;
+  condition.spindle_speed = reference.spindle_speed;
+  compensation.handle(condition);
+  for (std::size_t at = 0; at + BLOCK <= record.time.size(); at += BLOCK) {
+    compensation.handle(SpindleAngle{record.time[at],
+                                     std::fmod(reference.spindle_speed * record.time[at], units::TWO_PI),
+                                     reference.spindle_speed});
+    SampleBlock block;
+    block.stamp = record.time[at];
+    block.sample_rate = reference.sample_rate;
+    block.first_index = at;
+    block.channels = {"fx", "fy", "fz"};
+    block.units = {"N", "N", "N"};
+    for (std::size_t i = at; i < at + BLOCK; ++i)
+      block.samples.insert(block.samples.end(), {record.measured[0][i], record.measured[1][i], 0.0});
+    compensation.handle(block);
+  }
+  if (moves) *moves = compensation.health().moves;
+  return force;
 }
 
 ReferenceTaps simulateTaps(const ReferenceCase& reference, int taps) {

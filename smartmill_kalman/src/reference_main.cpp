@@ -104,21 +104,108 @@ void run(const std::vector<double>& speeds, double duration) {
   }
 }
 
+/// Sensor that is not what it is believed to be.
+struct Wrong {
+  const char* name;
+  std::function<ModalModel(ModalModel)> change;  // of the sensor that measures
+  bool drifts;                                   // during the cut, from 0.3 to 0.8 s
+};
+
+const std::vector<Wrong>& wrongs() {
+  static const auto scale = [](double frequency, double damping) {
+    return [frequency, damping](ModalModel sensor) {
+      for (Mode& mode : sensor.modes) {
+        mode.frequency *= frequency;
+        mode.damping_ratio *= damping;
+      }
+      return sensor;
+    };
+  };
+  static const std::vector<Wrong> all{{"exact", scale(1.0, 1.0), false},
+                                      {"frequencies +1 %", scale(1.01, 1.0), false},
+                                      {"frequencies -1 %", scale(0.99, 1.0), false},
+                                      {"frequencies +3 %", scale(1.03, 1.0), false},
+                                      {"damping +30 %", scale(1.0, 1.3), false},
+                                      {"one more mode, 3000 Hz, gain 0.03",
+                                       [](ModalModel sensor) {
+                                         sensor.modes.push_back({3000.0, 0.03, 0.03});
+                                         sensor.modes[0].gain -= 0.03;
+                                         return sensor;
+                                       },
+                                       false},
+                                      {"first mode +1 % in the cut",
+                                       [](ModalModel sensor) {
+                                         sensor.modes[0].frequency *= 1.01;
+                                         return sensor;
+                                       },
+                                       true},
+                                      // Half the moving mass is the workpiece's.
+                                      {"workpiece 20 % lighter in the cut",
+                                       [](ModalModel sensor) {
+                                         for (Mode& mode : sensor.modes) mode.frequency /= std::sqrt(0.9);
+                                         return sensor;
+                                       },
+                                       true}};
+  return all;
+}
+
+void runErrors(const std::vector<double>& speeds, double duration) {
+  std::printf("model errors: error of the force up to 5 kHz [%%] over the last 0.3 s, worst of x and y\n");
+  std::printf("   rpm  the sensor is                        measured   frozen  following  moves\n");
+  for (const double rpm : speeds) {
+    for (const Wrong& wrong : wrongs()) {
+      ReferenceCase reference;
+      reference.spindle_speed = units::radPerSecFromRpm(rpm);
+      reference.duration = duration;
+      const ModalModel believed = reference.sensor;
+      reference.later = wrong.change(reference.sensor);
+      if (wrong.drifts) {
+        reference.drift_from = 0.3;
+        reference.drift_to = 0.8;
+      } else {
+        reference.sensor = reference.later;
+      }
+      const ReferenceRecord record = simulate(reference);
+      CompensationParameters parameters;
+      parameters.filter.max_harmonics = 200;
+      const auto frozen = runCompensation(reference, record, believed, parameters);
+      parameters.follow = true;
+      std::size_t moves = 0;
+      const auto following = runCompensation(reference, record, believed, parameters, &moves);
+      const auto error = [&](const std::array<std::vector<double>, 2>& force) {
+        const std::size_t to = following[0].size();
+        const auto from = to - static_cast<std::size_t>(0.3 * reference.sample_rate);
+        double worst = 0.0;
+        for (std::size_t axis = 0; axis < 2; ++axis) {
+          worst = std::max(
+              worst, bandError(force[axis], record.truth[axis], reference.sample_rate, from, to, 5000.0));
+        }
+        return 100.0 * worst;
+      };
+      std::printf("%6.0f  %-36s %8.2f %8.2f %10.2f %6zu\n", rpm, wrong.name, error(record.measured),
+                  error(frozen), error(following), moves);
+    }
+  }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   std::vector<double> speeds{3000.0, 9000.0, 15000.0, 21750.0};
   double duration = 1.0;
+  bool errors = false;
   CLI::App app{"Errors of the force compensation in the reference cut, beside their targets."};
   app.add_option("--speed-rpm", speeds, "spindle speeds")->check(CLI::Range(500.0, 60000.0));
   app.add_option("--duration-s", duration, "length of a record")->check(CLI::Range(0.3, 100.0));
+  app.add_flag("--model-errors", errors,
+               "a sensor that is not what it is believed to be: frozen and following");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? 0 : 2;
   }
   try {
-    run(speeds, duration);
+    errors ? runErrors(speeds, std::max(duration, 1.6)) : run(speeds, duration);
   } catch (const std::exception& e) {
     std::cerr << "reference: " << e.what() << "\n";
     return 1;

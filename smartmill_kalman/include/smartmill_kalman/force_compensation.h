@@ -14,6 +14,7 @@
 #include "smartmill_core/modal/modal_model.h"
 #include "smartmill_core/signal/streams.h"
 #include "smartmill_kalman/harmonic_filter.h"
+#include "smartmill_kalman/mode_follower.h"
 
 namespace smartmill::kalman {
 
@@ -25,7 +26,10 @@ struct CompensationParameters {
   /// pass
   double speed_tolerance = 0.002;
   double settling_periods =
-      5.0;                  ///< [1] >= 0 settling times after a start or gap that are marked as settling
+      5.0;                     ///< [1] >= 0 settling times after a start or gap that are marked as settling
+  bool follow = false;         ///< moves the sensor's modes where the cut says so (ModeFollower)
+  int follow_revolutions = 8;  ///< [1] > 0 between two looks
+  FollowParameters follower;
   double saturation = 0.0;  ///< [N] >= 0 a sample at or beyond it counts as clipped; 0: not watched
   /// @throws Error naming key and value.
   void validate() const;
@@ -36,6 +40,7 @@ struct CompensationHealth {
   std::size_t gaps = 0;        ///< jumps of the sample index
   std::size_t not_finite = 0;  ///< samples that are NaN or infinite
   std::size_t clipped = 0;     ///< samples at the saturation limit
+  std::size_t moves = 0;       ///< times that the sensor's modes were found moved
   double innovation_ratio =
       0;             ///< [1] RMS innovation over the design's, last compensated block; 1 when the model fits
   double speed = 0;  ///< [rad/s] of the running filters; 0: passing through
@@ -74,17 +79,25 @@ class ForceCompensation {
 
  private:
   void design(double speed, double sample_rate);
+  void follow(double time, double sample_rate);
+  void forgetMoves();
   const std::vector<HarmonicGain>& gains(std::size_t axis, int grid_point, double sample_rate);
 
   CompensationParameters parameters_;
   double sign_;
   Output output_;
-  std::array<std::optional<ModalModel>, 3> sensor_;
-  std::array<double, 3> noise_rms_{{0, 0, 0}};  // [N]
-  std::vector<HarmonicFilter> filters_;         // of the axes with a model, in order; empty: to be laid out
+  std::array<std::optional<ModalModel>, 3> sensor_, told_;  // in use, as set
+  std::array<double, 3> noise_rms_{{0, 0, 0}};              // [N]
+  std::vector<HarmonicFilter> filters_;  // of the axes with a model, in order; empty: to be laid out
   std::map<std::pair<std::size_t, int>, std::vector<HarmonicGain>>
       schedule_;  // by axis and point of the speed grid
   int grid_point_ = 0;
+  std::optional<CuttingCondition> condition_;
+  std::optional<ModeFollower> follower_;
+  std::array<std::vector<double>, 2> designed_for_;  // [Hz] modes' frequencies that the gains know
+  SpindleAngle angle_;
+  double next_look_ = 0.0;                  // [s]
+  std::size_t moves_ = 0;                   // in this cut
   double design_rate_ = 0.0;                // [Hz]
   double speed_ = 0.0, block_speed_ = 0.0;  // [rad/s] newest, at the block before
   double steady_speed_ = 0.0;               // [rad/s] from which readings are counted as a change

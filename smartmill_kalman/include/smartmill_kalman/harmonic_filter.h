@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <complex>
 #include <cstddef>
 #include <vector>
 
@@ -86,6 +87,13 @@ class HarmonicFilter {
   /// on, the gains stay.
   void retune(const ModalModel& sensor, double spindle_speed);
 
+  /// The sensor is another than was believed, same number of modes: what is expected to be measured goes on,
+  /// the force jumps to what explains it. @param gains of the other sensor; empty: the gains stay
+  void replaceSensor(const ModalModel& sensor, std::vector<HarmonicGain> gains);
+
+  /// Harmonics of the measured force at the next sample [N]: output = Re sum Y_n, n = 0..N.
+  std::vector<std::complex<double>> measuredHarmonics() const;
+
   /// Takes the force of another filter over (harmonics beyond its own: zero), so that a new layout starts
   /// without a jump. The sensor's modes must be as many.
   void adopt(const HarmonicFilter& other);
@@ -99,7 +107,8 @@ class HarmonicFilter {
   double innovationStd() const { return innovation_std_[level_]; }  ///< [N] expected by the design
   double spindleSpeed() const { return spindle_speed_; }            ///< [rad/s]
   int harmonics() const { return harmonics_; }
-  std::size_t level() const { return level_; }  ///< 0 quick .. LEVELS - 1 slow
+  std::size_t level() const { return level_; }                  ///< 0 quick .. LEVELS - 1 slow
+  bool settled() const { return level_ + 1 == gains_.size(); }  ///< at its longest memory
   std::size_t restarts() const {
     return restarts_;
   }  ///< times that an innovation was out of line: the memory begins anew

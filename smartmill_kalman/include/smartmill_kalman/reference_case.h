@@ -5,26 +5,11 @@
 #include <cstdint>
 #include <vector>
 
-#include "smartmill_core/cutting/tool.h"
 #include "smartmill_core/modal/modal_model.h"
+#include "smartmill_kalman/force_compensation.h"
+#include "smartmill_kalman/runout_force.h"
 
 namespace smartmill::kalman {
-
-/// Force of a rigid tool with runout, periodic with the revolution: linear edge-force model (formats.md),
-/// each tooth cuts the surface that the teeth before it have left, h = min over j of (j c sin(phi) + r_k -
-/// r_(k+j)), no force where h <= 0.
-class RunoutForce {
- public:
-  /// @param runout [m] offset of the tool's axis @param runout_angle [rad] from tooth 1
-  RunoutForce(const ToolGeometry& tool, const CuttingCoefficients& coefficients, const Engagement& engagement,
-              double runout, double runout_angle);
-
-  /// fx, fy [N] on the tool at a spindle angle [rad].
-  std::array<double, 2> at(double spindle_angle) const;
-
- private:
-  std::array<std::vector<double>, 2> table_;  // over a revolution, first point repeated at the end
-};
 
 /// The reference cut of the project's figures: slot, D 16 mm, 4 flutes, helix 30 deg, 2 mm deep, 0.06 mm a
 /// tooth, Ktc 800, Krc 250 N/mm2, Kte = Kre = 20 N/mm, runout 8 um; sensor modes 1450, 2300, 3600 Hz on each
@@ -52,6 +37,14 @@ struct ReferenceRecord {
 
 /// The sensor runs at eight times the sample rate, exactly for a force linear between those samples.
 ReferenceRecord simulate(const ReferenceCase& reference);
+
+/// The reference record through ForceCompensation in blocks of 256 samples, with its angle and cutting
+/// condition: force x and y. @param believed sensor @param moves counts the moves that were followed; may be
+/// null
+std::array<std::vector<double>, 2> runCompensation(const ReferenceCase& reference,
+                                                   const ReferenceRecord& record, const ModalModel& believed,
+                                                   const CompensationParameters& parameters,
+                                                   std::size_t* moves = nullptr);
 
 /// Taps with a hammer: sin^2 blows of 0.2 ms and 500 N, one record a tap of 0.2 s.
 struct ReferenceTaps {

@@ -1,0 +1,64 @@
+#pragma once
+
+#include <array>
+#include <complex>
+#include <optional>
+#include <vector>
+
+#include "smartmill_core/cutting/tool.h"
+#include "smartmill_core/modal/modal_model.h"
+
+namespace smartmill::kalman {
+
+struct FollowParameters {
+  double misfit = 0.01;         ///< [1] > 0 share of the force that the force model does not tell
+  double frequency_std = 0.02;  ///< [1] > 0 by which a mode may move between two looks
+  double damping_std = 0.1;     ///< [1] > 0 the same of its damping ratio
+  double evidence = 30.0;       ///< [1] > 0 fall of the sum of squares that counts as a move
+  /// @throws Error naming key and value.
+  void validate() const;
+};
+
+/// Finds from the cut itself that the sensor's modes have moved, without a new tap.
+///
+/// In the steady state a free harmonic force explains any periodic record, whatever the sensor: the
+/// harmonics' own innovations say nothing about it. What does is how the harmonics hang together: those of a
+/// helical end mill in a known engagement follow from a few numbers (tangential and radial pressure, and one
+/// edge or runout term a tooth), in x and in y alike. This force model sees the measured harmonics through
+/// the sensor; its innovations drive frequency and damping of each mode, by Gauss-Newton with both as
+/// unknowns. A move is taken only when the innovations fall by more than evidence, and given back when the
+/// first sensor explains the cut as well.
+class ModeFollower {
+ public:
+  using Harmonics = std::array<std::vector<std::complex<double>>, 2>;  ///< x, y; n = 0..N
+
+  /// @throws Error on an impossible tool or engagement.
+  ModeFollower(const ToolGeometry& tool, const Engagement& engagement, int harmonics,
+               const FollowParameters& parameters);
+
+  struct Move {
+    std::array<ModalModel, 2> sensor;  ///< as it is now
+    double before = 0.0, after = 0.0;  ///< [1] sum of squares of the innovations over their variance
+  };
+
+  /// @param measured [N] harmonics of the sensor's output: output = Re sum Y_n exp(i n angle), angle of tooth
+  /// 1
+  /// @param noise_std [N] of their real and imaginary parts @param now the sensor as believed now
+  /// @param spindle_speed [rad/s] @return nothing when the believed sensor explains them.
+  std::optional<Move> look(const Harmonics& measured, double noise_std, const std::array<ModalModel, 2>& now,
+                           double spindle_speed);
+
+ private:
+  static constexpr std::size_t TERMS = 4;  // tangential and radial, chip and edge
+  using Basis = std::array<std::array<std::vector<std::complex<double>>, 2>, TERMS>;  // n = 0..
+  Basis harmonicsOf(const ToolGeometry& tool, const std::vector<double>& radius) const;
+
+  ToolGeometry tool_;
+  Engagement engagement_;
+  int harmonics_;
+  std::vector<double> radius_;  // [m] of each tooth over the first's, as found last
+  FollowParameters parameters_;
+  std::optional<std::array<ModalModel, 2>> first_;
+};
+
+}  // namespace smartmill::kalman
