@@ -1,0 +1,171 @@
+#pragma once
+
+#include <deque>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "smartmill_core/modal/modal_filter.h"
+
+namespace smartmill::stability {
+
+/// Single-point turning after Kim: chip thickness a = a0 - y(t) + mu y(t - T), force K a, one mode, y = y_w -
+/// y_t the deflection y_w of the machine less the displacement y_t that an actuator gives to the tool (Kim
+/// eq. 1..4, 9).
+struct TurningProcess {
+  double stiffness_ratio = 0.1;      ///< [1] K / K_m, cutting over machine stiffness, > 0
+  double damping_ratio = 0.02;       ///< [1] 0 < value < 1
+  double natural_frequency = 350.0;  ///< [rad/s] > 0
+  double overlap = 1.0;              ///< [1] mu, 0..1
+  double period = 0.1;               ///< [s] T of a revolution, > 0
+  double chip = 1e-4;                ///< [m] a0, nominal chip thickness
+  /// @throws Error naming the quantity.
+  void validate() const;
+};
+
+/// Least K / K_m at which some speed chatters: 2 (zeta + zeta^2) (Kim eq. 7, Merritt).
+double merrittLimit(double damping_ratio);
+/// [rad/s] w_m sqrt(1 + 2 zeta), where the real part is least (Kim eq. 6).
+double criticalFrequency(double natural_frequency, double damping_ratio);
+/// [1/s] of the dominant root of the uncontrolled process; positive: chatter.
+double growthRate(const TurningProcess& process);
+
+/// Second-order machine as the controller believes it: y_w = gain w^2 / (s^2 + 2 zeta w s + w^2) a.
+struct SecondOrder {
+  double gain = 0.0;           ///< [1] K / K_m
+  double frequency = 0.0;      ///< [rad/s]
+  double damping_ratio = 0.0;  ///< [1]
+  /// Of gain, frequency, damping ratio; in their units.
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  std::complex<double> response(double w) const;  ///< [1] at w [rad/s]
+};
+
+/// Kim's spectral estimate: blocks of a segment under a Hamming window.
+struct EstimatorParameters {
+  double sample_rate = 1000.0;    ///< [Hz] of the segment's samples
+  int segment = 2048;             ///< [1] samples
+  int block = 512;                ///< [1] samples under one window, half overlapping; <= segment
+  double least_signal = 30.0;     ///< [1] power of a line over the noise floor from which it is used
+  double frequency_low = 5.0;     ///< [Hz] of the lines looked at
+  double frequency_high = 150.0;  ///< [Hz]; the noise floor is taken above
+};
+
+/// What one segment shows.
+struct SegmentEstimate {
+  bool informed = false;  ///< enough lines stand above the noise
+  int lines = 0;
+  SecondOrder model;  ///< fit of the lines
+  /// Ratio y_w / a line by line [1] at frequency [rad/s]: biased by leakage, as Kim's.
+  std::vector<double> frequency;
+  std::vector<std::complex<double>> ratio;
+};
+
+/// Estimates gain, frequency and damping of y_w over a from one segment. The fit compares the windowed
+/// spectra of the blocks with those of the model's own answer to the measured chip thickness, so the leakage
+/// of the window (2.7 Hz at 512 points, more than the half-power bandwidth of 2.2 Hz) is in both; the state
+/// at the segment's begin is free.
+/// @param start of the search, nullptr: searched over the band. @throws Error on wrong lengths.
+SegmentEstimate estimateSegment(const std::vector<double>& chip, const std::vector<double>& deflection,
+                                const EstimatorParameters& parameters, const SecondOrder* start = nullptr);
+
+/// Secant update of the controller's transfer function at one line (Kim eq. 16 with its indices mended, and
+/// motions over the force of their segment): G_j = G_1 + (H_w - H_1) / (H_1 - H_2) (G_1 - G_2), 1 and 2 the
+/// last segment and the one before.
+/// @param h_w deflection, @param h_1, h_2 tool displacement, each over the force
+std::complex<double> secantUpdate(std::complex<double> g_1, std::complex<double> g_2,
+                                  std::complex<double> h_w, std::complex<double> h_1,
+                                  std::complex<double> h_2);
+
+/// Kim eq. 10: least real part of K/K_m (G_m - K_m K_c G_c) over all frequencies; above -0.5 every speed is
+/// stable.
+double residualMargin(const SecondOrder& machine, const SecondOrder& controller);
+
+/// The least of that over the machine's uncertainty (corners at two standard deviations along each principal
+/// axis of the covariance).
+double worstMargin(const SecondOrder& machine, const SecondOrder& controller);
+
+struct ControllerParameters {
+  EstimatorParameters estimator;
+  double rate = 10000.0;  ///< [Hz] of the control loop, a whole multiple of the estimator's
+  double period = 0.1;    ///< [s] of a revolution
+  double overlap = 1.0;   ///< [1] mu
+  double chip = 1e-4;     ///< [m] nominal chip thickness
+  double drift = 0.01;    ///< [1] relative change a segment that the machine is granted, >= 0
+  double margin = -0.4;   ///< [1] least worstMargin of a controller that is let in, -0.5 < value < 0
+  /// @throws Error naming key and value.
+  void validate() const;
+};
+
+/// Feed-forward controller (Kim fig. 3, eq. 8..10): moves the tool as the machine is believed to deflect
+/// under the chip thickness, and learns the machine segment by segment. Needs the two displacement streams
+/// alone.
+class AdaptiveChatterController {
+ public:
+  /// @throws Error on bad parameters.
+  explicit AdaptiveChatterController(const ControllerParameters& parameters);
+
+  /// One sample of deflection and tool displacement [m]. @return tool displacement to make until the next
+  /// sample [m]; 0 before the first estimate.
+  double step(double deflection, double tool);
+
+  /// What each segment showed, in order.
+  const std::vector<SegmentEstimate>& segments() const { return segments_; }
+  /// The machine as believed after each segment; gain 0 before any information.
+  const std::vector<SecondOrder>& beliefs() const { return beliefs_; }
+  const SecondOrder& active() const { return active_; }  ///< controller in force; gain 0: none
+
+ private:
+  double pastMotion() const;
+  void learn();
+  void activate(const SecondOrder& model);
+
+  ControllerParameters parameters_;
+  std::deque<double> motion_, chips_;  // newest first, at the control rate
+  std::vector<double> segment_chip_, segment_deflection_;
+  int phase_ = 0;
+  SecondOrder believed_, active_;
+  std::unique_ptr<ModalFilter> filter_;
+  std::vector<SegmentEstimate> segments_;
+  std::vector<SecondOrder> beliefs_;
+};
+
+/// Actuator commands of the classical schemes. Each is called with deflection and tool displacement [m] and
+/// returns the tool displacement to make.
+using ControlLaw = std::function<double(double deflection, double tool)>;
+
+/// Displacement error (Mitchell and Harrison): the tool follows gain x the relative displacement through a
+/// lag of the first order. @param bandwidth [Hz]
+ControlLaw displacementErrorControl(double gain, double bandwidth, double rate);
+
+/// Cutting force (Nachtigal): a fixed model of the machine driven by the force, here the chip thickness; no
+/// learning.
+ControlLaw forceFeedbackControl(const SecondOrder& model, const TurningProcess& process, double rate);
+
+/// Integrates a headstock accelerometer to displacement above a corner frequency (the paper's own proposal
+/// for machines whose deflection cannot be measured). The ratio of deflection to chip thickness is not
+/// changed where both went through it.
+class AccelerationIntegrator {
+ public:
+  /// @param corner [Hz] @param rate [Hz]
+  AccelerationIntegrator(double corner, double rate);
+  double step(double acceleration);  ///< [m/s2] -> [m]
+
+ private:
+  ModalFilter filter_;
+};
+
+struct TurningRun {
+  std::vector<double> time;        ///< [s]
+  std::vector<double> motion;      ///< [m] y_w - y_t
+  std::vector<double> deflection;  ///< [m] y_w
+};
+
+/// Regenerative simulation, exact for chip thickness linear within a step. @param noise_rms [m] on both
+/// streams that the law sees
+/// @param duration [s] @param rate [Hz] @param law may be empty: no control
+TurningRun simulateTurning(const TurningProcess& process, double duration, double rate, double noise_rms,
+                           unsigned seed, const ControlLaw& law);
+
+}  // namespace smartmill::stability
