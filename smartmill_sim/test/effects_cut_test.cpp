@@ -75,6 +75,41 @@ TEST(Effects, sizeEffectMakesThinChipsCutHarder) {
   }
 }
 
+TEST(Effects, chipCoefficientsAddToTheNominal) {
+  const MachineModel model =
+      with(mill(2, 0.0), {effectEntry("chip_coefficients", {{"Kac_n_per_mm2", -50.0}})});
+  const Record record = run(model, slotCut(EVEN_RPM, 2e-3, 1e-4), 0.1);
+  EXPECT_NEAR(at(record, "fz", 0.5 * PI, EVEN_SPEED), (150e6 * 1e-4 + 3e3) * 2e-3, 1e-6);
+}
+
+// By all three laws of the twin.
+TEST(Effects, edgeBuildupGrowsWithTheChip) {
+  MachineModel model = with(mill(2, 0.0), {effectEntry("edge_buildup", {{"chip_um", 30.0}})});
+  const auto due = [](double h) { return (200e6 * h + 3e3 * (1.0 - std::exp(-h / 30e-6))) * 2e-3; };
+  const Record record = run(model, slotCut(EVEN_RPM, 2e-3, 1e-4), 0.1);
+  for (const double angle : {0.125 * PI, 0.5 * PI})
+    EXPECT_NEAR(at(record, "fz", angle, EVEN_SPEED), due(1e-4 * std::sin(angle)), 1e-6);
+  TwinState state;
+  state.law.coefficients = *model.cutting;
+  EffectSet(model).update({}, state);
+  const double speed = 300.0, dt = TWO_PI / speed / 4096.0;
+  ToolMotion motion;
+  motion.speed = speed;
+  motion.velocity[0] = 2e-4 * speed / TWO_PI;
+  RegenerativeCut regenerative(*model.tool, state.law, dt);
+  regenerative.engage({{0.0, PI, 2e-3}}, motion);
+  EXPECT_NEAR(regenerative.at(0.5 * PI, {{0, 0}}).fz, due(1e-4), 1e-6);
+  CuttingProcess process(*model.tool, state.law);
+  process.engage({{0.0, PI, 2e-3}}, motion);
+  CuttingForce force;
+  for (int i = 0; i <= 1024; ++i) {  // to 90 degrees
+    motion.angle = speed * i * dt;
+    motion.centre[0] = motion.velocity[0] * i * dt;
+    force = process.step(motion);
+  }
+  EXPECT_NEAR(force.fz, due(1e-4), 1e-3 * due(1e-4));
+}
+
 TEST(Effects, toolWearGrowsEveryEdgeForceWithCuttingTime) {
   const MachineModel model = with(mill(2, 0.0), {effectEntry("tool_wear", {{"edge_growth_per_min", 0.5}}),
                                                  effectEntry("edge_forces", {{"Kae_n_per_mm", 2.0}})});

@@ -52,5 +52,10 @@ EffectPtr makeChannelDelay(const EffectEntry& entry);
 EffectPtr makeChargeDrift(const EffectEntry& entry);
 EffectPtr makeMainsHum(const EffectEntry& entry);
 EffectPtr makeSaturation(const EffectEntry& entry);
+// Beyond the contract's list.
+EffectPtr makeChipCoefficients(const EffectEntry& entry);
+EffectPtr makeEdgeBuildup(const EffectEntry& entry);
+EffectPtr makeSpindleOrder(const EffectEntry& entry);
+EffectPtr makeZeroOffset(const EffectEntry& entry);
 
 }  // namespace smartmill::sim

@@ -171,10 +171,10 @@ void CuttingProcess::cut(Slice& slice, int tooth, double before, double angle, c
       const CuttingCoefficients& k = law_.coefficients;
       double kc = law_.chip_factor;
       if (law_.size_exponent != 0.0) kc *= std::pow(chip / law_.size_reference, -law_.size_exponent);
-      const double h = kc * chip;
-      double ft = (k.ktc * h + k.kte * law_.edge_factor) * length;
-      double fr = (k.krc * h + k.kre * law_.edge_factor) * length;
-      const double fa = (k.kac * h + k.kae * law_.edge_factor) * length;
+      const double h = kc * chip, edge = edgeShare(law_, chip);
+      double ft = (k.ktc * h + k.kte * edge) * length;
+      double fr = (k.krc * h + k.kre * edge) * length;
+      const double fa = (k.kac * h + k.kae * edge) * length;
       if (law_.damping != 0.0 && now.speed > 0.0 && moved_) {
         const double dt = wrapped(now.angle - last_.angle) / now.speed;
         const double rate = dt > 0.0 ? ((now.displacement[0] - last_.displacement[0]) * s +

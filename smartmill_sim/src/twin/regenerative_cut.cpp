@@ -105,7 +105,6 @@ void RegenerativeCut::cut(double from, double to, CuttingForce& sum, double& tan
   keepNear(from, to);
   const CuttingCoefficients& k = law_.coefficients;
   const double ktc = k.ktc * law_.chip_factor, krc = k.krc * law_.chip_factor, kac = k.kac * law_.chip_factor;
-  const double kte = k.kte * law_.edge_factor, kre = k.kre * law_.edge_factor, kae = k.kae * law_.edge_factor;
   const int cells = std::max(1, static_cast<int>(std::ceil((to - from) / CELL_ANGLE)));
   const double cell = (to - from) / cells;
   SineCosine left = sineCosine(from);
@@ -124,13 +123,14 @@ void RegenerativeCut::cut(double from, double to, CuttingForce& sum, double& tan
     for (const double side : {-0.28867513459481287, 0.28867513459481287}) {
       const SineCosine at = sineCosine(start + (middle + side * (high - low)) * cell);
       double h = std::max(chip(at.sine, at.cosine), 1e-15);
+      const double edge = edgeShare(law_, h);
       if (law_.size_exponent != 0.0) h *= std::pow(h / law_.size_reference, -law_.size_exponent);
       const double damping = damping_[0] * at.sine + damping_[1] * at.cosine;
-      const double ft = weight * (ktc * h + kte + TANGENTIAL_DAMPING * damping);
-      const double fr = weight * (krc * h + kre + damping);
+      const double ft = weight * (ktc * h + k.kte * edge + TANGENTIAL_DAMPING * damping);
+      const double fr = weight * (krc * h + k.kre * edge + damping);
       sum.fx += -ft * at.cosine - fr * at.sine;
       sum.fy += ft * at.sine - fr * at.cosine;
-      sum.fz += weight * (kac * h + kae);
+      sum.fz += weight * (kac * h + k.kae * edge);
       tangential += ft;
     }
   }

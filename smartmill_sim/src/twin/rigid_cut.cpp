@@ -57,8 +57,11 @@ RigidCut::Row RigidCut::elementary(double chip, double sine, double cosine) cons
   double h = chip;
   if (law_.size_exponent != 0.0) h *= std::pow(chip / law_.size_reference, -law_.size_exponent);
   const double ft = k.ktc * h, fr = k.krc * h;
-  return {-ft * cosine - fr * sine,       ft * sine - fr * cosine,       k.kac * h, ft,
-          -k.kte * cosine - k.kre * sine, k.kte * sine - k.kre * cosine, k.kae,     k.kte};
+  // The factor of the edge acts later.
+  const double edge = law_.edge_chip > 0.0 ? -std::expm1(-chip / law_.edge_chip) : 1.0;
+  const double te = k.kte * edge, re = k.kre * edge;
+  return {-ft * cosine - fr * sine, ft * sine - fr * cosine, k.kac * h,    ft,
+          -te * cosine - re * sine, te * sine - re * cosine, k.kae * edge, te};
 }
 
 void RigidCut::tabulate() {
@@ -110,8 +113,8 @@ void RigidCut::setDepths(const std::vector<double>& depths) {
 void RigidCut::setLaw(const CuttingLaw& law) {
   const CuttingCoefficients &a = law.coefficients, &b = law_.coefficients;
   const bool same = a.ktc == b.ktc && a.krc == b.krc && a.kac == b.kac && a.kte == b.kte && a.kre == b.kre &&
-                    a.kae == b.kae && law.size_exponent == law_.size_exponent &&
-                    law.size_reference == law_.size_reference;
+                    a.kae == b.kae && law.edge_chip == law_.edge_chip &&
+                    law.size_exponent == law_.size_exponent && law.size_reference == law_.size_reference;
   law_ = law;
   if (!same && !tables_[0].empty()) tabulate();
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <vector>
 
@@ -36,10 +37,16 @@ struct CuttingLaw {
   CuttingCoefficients coefficients;  ///< edge terms hold while there is a chip
   double chip_factor = 1.0;          ///< [1] on ktc, krc, kac
   double edge_factor = 1.0;          ///< [1] on kte, kre, kae
+  double edge_chip = 0.0;            ///< [m] kte, kre, kae times 1 - exp(-chip / edge_chip); 0: there at once
   double size_exponent = 0.0;        ///< [1] ktc, krc, kac times (chip / size_reference)^-size_exponent
   double size_reference = 1e-4;      ///< [m]
   double damping = 0.0;  ///< [N/m] per engaged edge: radial force damping * v_r / v_c, tangential 0.3 of it
 };
+
+/// [1] on the edge coefficients at a chip [m]; the factor of the law included.
+inline double edgeShare(const CuttingLaw& law, double chip) {
+  return law.edge_chip > 0.0 ? law.edge_factor * -std::expm1(-chip / law.edge_chip) : law.edge_factor;
+}
 
 /// Milling with regeneration: each tooth meets the surface that all teeth before it left, so that vibration,
 /// runout, uneven pitch and loss of contact come out of the geometry (Dunwoody 2.2 and 6.1 with the exact

@@ -26,6 +26,12 @@ EffectParameter angle(const char* key) {
   return number(key, "deg", {}, {0.0, 360.0, 0.0, 0.0, true});
 }
 
+EffectParameter angleOrZero(const char* key) {
+  EffectParameter p = angle(key);
+  p.optional = true;
+  return p;
+}
+
 EffectParameter oneOf(const char* key, std::vector<std::string> words) {
   EffectParameter p;
   p.key = key;
@@ -149,6 +155,28 @@ std::vector<EffectKind> makeCatalogue() {
   };
 }
 
+std::vector<EffectKind> makeFurther() {
+  const EffectPrior force{-300.0, 300.0, 0.0, 20.0};
+  return {
+      {"chip_coefficients",
+       {orZero("Ktc_n_per_mm2", "N/mm2", {-2000.0, 2000.0, 0.0, 150.0}),
+        orZero("Krc_n_per_mm2", "N/mm2", {-1500.0, 1500.0, 0.0, 100.0}),
+        orZero("Kac_n_per_mm2", "N/mm2", {-1000.0, 1000.0, 0.0, 100.0})},
+       "Dunwoody eq. 2.1: coefficients of another material, or of a regression that runout had bent"},
+      {"edge_buildup",
+       {number("chip_um", "um", Range::notNegative(), {0.0, 150.0, 0.0, 15.0})},
+       "Endres, DeVor & Kapoor 1995: ploughing needs some chip to build up"},
+      {"spindle_order",
+       {number("order", "1", Range::positive(), {0.1, 60.0}), orZero("x_n", "N", force),
+        orZero("y_n", "N", force), orZero("z_n", "N", force), angleOrZero("x_deg"), angleOrZero("y_deg"),
+        angleOrZero("z_deg")},
+       "bearings, drive and draw bar: lines locked to the spindle angle"},
+      {"zero_offset",
+       {orZero("x_n", "N", force), orZero("y_n", "N", force), orZero("z_n", "N", force)},
+       "Kistler, charge amplifiers: zero after the last reset"},
+  };
+}
+
 }  // namespace
 
 const std::vector<EffectKind>& effectCatalogue() {
@@ -156,9 +184,16 @@ const std::vector<EffectKind>& effectCatalogue() {
   return CATALOGUE;
 }
 
+const std::vector<EffectKind>& furtherEffects() {
+  static const std::vector<EffectKind> FURTHER = makeFurther();
+  return FURTHER;
+}
+
 const EffectKind* findEffect(const std::string& name) {
-  for (const EffectKind& kind : effectCatalogue()) {
-    if (kind.name == name) return &kind;
+  for (const std::vector<EffectKind>* list : {&effectCatalogue(), &furtherEffects()}) {
+    for (const EffectKind& kind : *list) {
+      if (kind.name == name) return &kind;
+    }
   }
   return nullptr;
 }

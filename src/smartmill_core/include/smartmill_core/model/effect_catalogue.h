@@ -45,7 +45,10 @@ struct EffectKind {
 /// use.
 const std::vector<EffectKind>& effectCatalogue();
 
-/// nullptr when the catalogue has no such effect.
+/// Effects beyond the contract's that measured data called for; files may name them as well.
+const std::vector<EffectKind>& furtherEffects();
+
+/// Of both lists; nullptr when there is no such effect.
 const EffectKind* findEffect(const std::string& name);
 
 /// nullptr when the effect has no such key.
