@@ -238,106 +238,103 @@ TEST(Effects, saturationClipsTheForces) {
 }
 
 TEST(Effects, spindleOrderIsLockedToTheSpindle) {
-  const MachineModel model = with(
-      mill(4, 30.0),
-      {effectEntry(
-          "spindle_order",
+  const EffectEntry entry = effectEntry(
+      "spindle_order", {{"order", 2.5}, {"x_n", 4.0}, {"z_n", 1.5}, {"x_deg", 20.0}, {"z_deg", -90.0}});
+  const MachineModel model = with(mill(4, 30.0), {entry});
   const Record record = run(model, airCut(EVEN_RPM), 0.1, 0.2);
   for (const std::size_t i : {3u, 400u}) {
-      const double a = 2.5 * (0.2 + EVEN_SPEED * record.time[i]);
-      EXPECT_NEAR(record.column("fx")[i], 4.0 * std::sin(a + units::radFromDeg(20.0)), 1e-9);
-      EXPECT_EQ(record.column("fy")[i], 0.0);
-      EXPECT_NEAR(record.column("fz")[i], -1.5 * std::cos(a), 1e-9);
+    const double a = 2.5 * (0.2 + EVEN_SPEED * record.time[i]);
+    EXPECT_NEAR(record.column("fx")[i], 4.0 * std::sin(a + units::radFromDeg(20.0)), 1e-9);
+    EXPECT_EQ(record.column("fy")[i], 0.0);
+    EXPECT_NEAR(record.column("fz")[i], -1.5 * std::cos(a), 1e-9);
   }
 }
 
 TEST(Effects, zeroOffsetIsOnEverySample) {
-    const Record record =
-        run(with(mill(4, 30.0), {effectEntry("zero_offset", {{"x_n", 2.5}, {"z_n", -1.0}})}), airCut(3000.0),
-            0.1);
-    EXPECT_EQ(record.column("fx")[0], 2.5);
-    EXPECT_EQ(record.column("fy")[99], 0.0);
-    EXPECT_EQ(record.column("fz")[2000], -1.0);
+  const Record record = run(with(mill(4, 30.0), {effectEntry("zero_offset", {{"x_n", 2.5}, {"z_n", -1.0}})}),
+                            airCut(3000.0), 0.1);
+  EXPECT_EQ(record.column("fx")[0], 2.5);
+  EXPECT_EQ(record.column("fy")[99], 0.0);
+  EXPECT_EQ(record.column("fz")[2000], -1.0);
 }
 
 std::vector<EffectKind> allEffects() {
-    std::vector<EffectKind> all = effectCatalogue();
-    all.insert(all.end(), furtherEffects().begin(), furtherEffects().end());
-    return all;
+  std::vector<EffectKind> all = effectCatalogue();
+  all.insert(all.end(), furtherEffects().begin(), furtherEffects().end());
+  return all;
 }
 
 // The catalogue (what files may say) and the registry (what the twin runs) are one list.
 TEST(Effects, everyNameOfTheCatalogueHasItsClass) {
-    EXPECT_EQ(effectRegistry().size(), allEffects().size());
-    for (const EffectKind& kind : allEffects()) {
-      ASSERT_NE(findEffectClass(kind.name), nullptr) << kind.name;
-      EXPECT_FALSE(kind.source.empty()) << kind.name;
-      for (const EffectParameter& p : kind.parameters) {
-        if (p.value != EffectValue::number) continue;
-        EXPECT_LT(p.prior.low, p.prior.high) << kind.name << "." << p.key;
-        EXPECT_TRUE(p.range.contains(p.prior.high)) << kind.name << "." << p.key;
-        if (p.prior.scale > 0.0) {
-          EXPECT_LE(p.prior.low, p.prior.neutral);
-          EXPECT_GE(p.prior.high, p.prior.neutral);
-        }
+  EXPECT_EQ(effectRegistry().size(), allEffects().size());
+  for (const EffectKind& kind : allEffects()) {
+    ASSERT_NE(findEffectClass(kind.name), nullptr) << kind.name;
+    EXPECT_FALSE(kind.source.empty()) << kind.name;
+    for (const EffectParameter& p : kind.parameters) {
+      if (p.value != EffectValue::number) continue;
+      EXPECT_LT(p.prior.low, p.prior.high) << kind.name << "." << p.key;
+      EXPECT_TRUE(p.range.contains(p.prior.high)) << kind.name << "." << p.key;
+      if (p.prior.scale > 0.0) {
+        EXPECT_LE(p.prior.low, p.prior.neutral);
+        EXPECT_GE(p.prior.high, p.prior.neutral);
       }
     }
-    for (std::size_t i = 1; i < effectRegistry().size(); ++i)
-      EXPECT_LE(effectRegistry()[i - 1].stage, effectRegistry()[i].stage);
+  }
+  for (std::size_t i = 1; i < effectRegistry().size(); ++i)
+    EXPECT_LE(effectRegistry()[i - 1].stage, effectRegistry()[i].stage);
 }
 
 /// An effect at the neutral value of its scaled keys, the usual one of the others.
 EffectEntry neutral(const EffectKind& kind) {
-    std::map<std::string, double> numbers;
-    std::map<std::string, std::string> words;
-    for (const EffectParameter& p : kind.parameters) {
-      if (p.value == EffectValue::word) words[p.key] = p.words.front();
-      if (p.value != EffectValue::number) continue;
-      numbers[p.key] = p.prior.scale > 0.0 ? p.prior.neutral : 0.5 * (p.prior.low + p.prior.high);
-      if (!p.choices.empty()) numbers[p.key] = p.choices.front();
-    }
-    return effectEntry(kind.name, numbers, words);
+  std::map<std::string, double> numbers;
+  std::map<std::string, std::string> words;
+  for (const EffectParameter& p : kind.parameters) {
+    if (p.value == EffectValue::word) words[p.key] = p.words.front();
+    if (p.value != EffectValue::number) continue;
+    numbers[p.key] = p.prior.scale > 0.0 ? p.prior.neutral : 0.5 * (p.prior.low + p.prior.high);
+    if (!p.choices.empty()) numbers[p.key] = p.choices.front();
+  }
+  return effectEntry(kind.name, numbers, words);
 }
 
 TEST(Effects, neutralValuesChangeNothing) {
-    const Record pure = run(sensorMill(), slotCut(4200.0), 0.03);
-    for (const EffectKind& kind : allEffects()) {
-      // These have no neutral value: they say what the helix, the pitch, the range or the bandwidth is.
-      if (kind.name == "helix" || kind.name == "uneven_pitch" || kind.name == "saturation" ||
-          kind.name == "load_meter_lag")
-        continue;
-      const Record record = run(with(sensorMill(), {neutral(kind)}), slotCut(4200.0), 0.03);
-      for (const char* c : {"fx", "fy", "fz", "load_meter"})
-        EXPECT_NEAR(record.column(c)[700], pure.column(c)[700], 1e-9) << kind.name << " " << c;
-    }
+  const Record pure = run(sensorMill(), slotCut(4200.0), 0.03);
+  for (const EffectKind& kind : allEffects()) {
+    // These have no neutral value: they say what the helix, the pitch, the range or the bandwidth is.
+    if (kind.name == "helix" || kind.name == "uneven_pitch" || kind.name == "saturation" ||
+        kind.name == "load_meter_lag")
+      continue;
+    const Record record = run(with(sensorMill(), {neutral(kind)}), slotCut(4200.0), 0.03);
+    for (const char* c : {"fx", "fy", "fz", "load_meter"})
+      EXPECT_NEAR(record.column(c)[700], pure.column(c)[700], 1e-9) << kind.name << " " << c;
+  }
 }
 
 TEST(Effects, orderInTheListDoesNotMatter) {
-    std::vector<EffectEntry> effects{
-        effectEntry("saturation", {{"limit_n", 200.0}}),
-        effectEntry("charge_drift", {{"rate_n_per_min", 900.0}, {"y_ratio", 0.3}}),
-        effectEntry("gain_error", {{"gain", 1.1}}, {{"channel", "fx"}}),
-        effectEntry("cross_talk", {{"yx", 0.1}}),
-        effectEntry("tool_wear", {{"edge_growth_per_min", 1.0}}),
-        effectEntry("edge_forces", {{"Kte_n_per_mm", 5.0}})};
-    const Record forward = run(with(sensorMill(), effects), slotCut(4200.0), 0.05);
-    std::reverse(effects.begin(), effects.end());
-    const Record backward = run(with(sensorMill(), effects), slotCut(4200.0), 0.05);
-    for (const char* c : {"fx", "fy", "fz"}) EXPECT_EQ(forward.column(c), backward.column(c)) << c;
+  std::vector<EffectEntry> effects{effectEntry("saturation", {{"limit_n", 200.0}}),
+                                   effectEntry("charge_drift", {{"rate_n_per_min", 900.0}, {"y_ratio", 0.3}}),
+                                   effectEntry("gain_error", {{"gain", 1.1}}, {{"channel", "fx"}}),
+                                   effectEntry("cross_talk", {{"yx", 0.1}}),
+                                   effectEntry("tool_wear", {{"edge_growth_per_min", 1.0}}),
+                                   effectEntry("edge_forces", {{"Kte_n_per_mm", 5.0}})};
+  const Record forward = run(with(sensorMill(), effects), slotCut(4200.0), 0.05);
+  std::reverse(effects.begin(), effects.end());
+  const Record backward = run(with(sensorMill(), effects), slotCut(4200.0), 0.05);
+  for (const char* c : {"fx", "fy", "fz"}) EXPECT_EQ(forward.column(c), backward.column(c)) << c;
 }
 
 TEST(Effects, entriesAreChecked) {
-    EXPECT_THROW(effectEntry("coolant", {}), Error);
-    EXPECT_THROW(effectEntry("runout", {{"offset_um", 3.0}}), Error);
-    EXPECT_THROW(effectEntry("runout", {{"offset_um", -3.0}, {"angle_deg", 0.0}}), Error);
-    EXPECT_THROW(effectEntry("runout", {{"offset_um", 3.0}, {"angle_deg", 0.0}, {"exponent", 1.0}}), Error);
-    EXPECT_THROW(effectEntry("gain_error", {{"gain", 1.0}}, {{"channel", "fq"}}), Error);
-    EXPECT_THROW(effectEntry("mains_hum", {{"frequency_hz", 55.0}, {"amplitude_n", 1.0}, {"y_ratio", 1.0}}),
-                 Error);
-    MachineModel model = mill(4, 30.0);
-    model.effects.push_back({});
-    model.effects[0].name = "runout";
-    EXPECT_THROW(run(model, slotCut(3000.0), 0.1), Error);
+  EXPECT_THROW(effectEntry("coolant", {}), Error);
+  EXPECT_THROW(effectEntry("runout", {{"offset_um", 3.0}}), Error);
+  EXPECT_THROW(effectEntry("runout", {{"offset_um", -3.0}, {"angle_deg", 0.0}}), Error);
+  EXPECT_THROW(effectEntry("runout", {{"offset_um", 3.0}, {"angle_deg", 0.0}, {"exponent", 1.0}}), Error);
+  EXPECT_THROW(effectEntry("gain_error", {{"gain", 1.0}}, {{"channel", "fq"}}), Error);
+  EXPECT_THROW(effectEntry("mains_hum", {{"frequency_hz", 55.0}, {"amplitude_n", 1.0}, {"y_ratio", 1.0}}),
+               Error);
+  MachineModel model = mill(4, 30.0);
+  model.effects.push_back({});
+  model.effects[0].name = "runout";
+  EXPECT_THROW(run(model, slotCut(3000.0), 0.1), Error);
 }
 
 }  // namespace
