@@ -26,6 +26,11 @@ bool TopicDifference::same() const {
   return different == 0 && contradictions == 0 && first_only == 0 && second_only == 0;
 }
 
+bool TopicDifference::sameButFor(double share) const {
+  const double missing = static_cast<double>(first_only + second_only);
+  return different == 0 && contradictions == 0 && missing <= share * (static_cast<double>(common) + missing);
+}
+
 std::string TopicDifference::text(const std::string& topic) const {
   char line[500];
   std::snprintf(line, sizeof line, "%-22s %-9s %7zu common, %zu different", topic.c_str(),

@@ -70,6 +70,13 @@ TEST(TopicComparison, AMissingBlockInTheMiddleIsADifference) {
   EXPECT_EQ(hole.first_ends, 0u);
 }
 
+TEST(TopicComparison, ABusyRecordersLossesMayBeForgivenDifferencesNot) {
+  const TopicDifference hole = compare({block(1), block(2), block(3)}, {block(1), block(3)}, 0.0);
+  EXPECT_TRUE(hole.sameButFor(0.34));  // one of three
+  EXPECT_FALSE(hole.sameButFor(0.33));
+  EXPECT_FALSE(compare({block(1), block(2)}, {block(1), block(2, 2.0)}, 0.0).sameButFor(1.0));
+}
+
 TEST(TopicComparison, NothingInCommonIsADifferenceNothingAtAllIsNot) {
   EXPECT_FALSE(compare({block(1)}, {}, 10.0).same());
   EXPECT_FALSE(compare({}, {block(1)}, 10.0).same());

@@ -27,6 +27,8 @@ struct TopicDifference {
   double scale = 0.0;                           ///< largest value of the topic
   std::string where;                            ///< key of the first difference
   bool same() const;
+  /// As same(), with up to this share of all results [1] missing on one side or the other.
+  bool sameButFor(double share) const;
   std::string text(const std::string& topic) const;  ///< one line
 };
 
