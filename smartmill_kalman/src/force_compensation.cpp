@@ -60,12 +60,14 @@ bool ForceCompensation::hasSensor() const {
 
 void ForceCompensation::handle(const SpindleAngle& angle) {
   // While the spindle speeds up or slows down there is no harmonic to follow: a layout would be out of date
-  // before it has settled.
+  // before it has settled. A slow drift is followed.
   if (steady_speed_ > 0.0 && std::abs(angle.speed / steady_speed_ - 1.0) > parameters_.speed_tolerance) {
     changing_until_ = angle.stamp + STEADY_TIME;
+    steady_since_ = -std::numeric_limits<double>::infinity();
+  }
+  if (steady_speed_ == 0.0 || angle.stamp - steady_since_ >= STEADY_TIME) {
     steady_speed_ = angle.speed;
-  } else if (steady_speed_ == 0.0) {
-    steady_speed_ = angle.speed;
+    steady_since_ = angle.stamp;
   }
   speed_ = angle.speed;
   angle_ = angle;
@@ -90,6 +92,8 @@ void ForceCompensation::reset() {
   filters_.clear();
   next_index_.reset();
   speed_ = steady_speed_ = 0.0;
+  condition_.reset();
+  forgetMoves();
   changing_until_ = -std::numeric_limits<double>::infinity();
   health_ = {};
 }

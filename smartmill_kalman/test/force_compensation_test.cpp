@@ -153,6 +153,44 @@ TEST(ForceCompensation, restartsAtAGapAndMarksIt) {
   EXPECT_EQ(runner.result.compensated[50].status, ForceBlock::Status::settling);
 }
 
+// A spindle that gains 4 % in 2 s: the harmonics follow it, the gains change at the points of their grid.
+TEST(ForceCompensation, followsASlowChangeOfSpeedWithoutAJump) {
+  const ModalModel model = sensor();
+  ModalFilter dynamometer(model, 4.0 * RATE, Hold::first_order);
+  std::vector<double> truth, found;
+  ForceCompensation compensation({}, false, [&](const ForceBlock&, const ForceBlock& c) {
+    found.insert(found.end(), c.force[0].begin(), c.force[0].end());
+  });
+  for (std::size_t axis = 0; axis < 3; ++axis) compensation.setSensor(axis, model);
+  double angle = 0.0;
+  for (std::size_t b = 0; b < 200; ++b) {
+    const auto speedAt = [](double t) { return 900.0 * (1.0 + 0.02 * t); };
+    SampleBlock block;
+    block.stamp = 0.01 * static_cast<double>(b);
+    block.sample_rate = RATE;
+    block.first_index = 256 * b;
+    block.channels = {"fx", "fy", "fz"};
+    block.units = {"N", "N", "N"};
+    compensation.handle(SpindleAngle{block.stamp, std::fmod(angle, units::TWO_PI), speedAt(block.stamp)});
+    for (std::size_t i = 0; i < 256; ++i) {
+      double measured = 0.0, force = 0.0;
+      for (int fine = 1; fine <= 4; ++fine) {
+        angle += speedAt(block.timeOf(i)) / (4.0 * RATE);
+        force = 60.0 + 100.0 * std::cos(4.0 * angle) + 30.0 * std::sin(angle) +
+                20.0 * std::cos(8.0 * angle + 1.0);
+        measured = dynamometer.step(force);
+      }
+      truth.push_back(force);
+      block.samples.insert(block.samples.end(), {measured, 0.0, 0.0});
+    }
+    compensation.handle(block);
+  }
+  double worst = 0.0;
+  for (std::size_t i = 12800; i < truth.size(); ++i) worst = std::max(worst, std::abs(found[i] - truth[i]));
+  // 0.02 % of speed a block is 0.1 % of a revolution of the eighth harmonic a turn.
+  EXPECT_LT(worst, 2.0);
+}
+
 TEST(ForceCompensation, bridgesSamplesThatAreNotNumbers) {
   Session s = session(60);
   for (std::size_t i = 0; i < 5; ++i) s.blocks[50].samples[3 * (100 + i)] = NAN;

@@ -22,7 +22,7 @@ namespace smartmill::kalman {
 struct CompensationParameters {
   HarmonicFilterParameters filter;
   double least_speed = 20.0;  ///< [rad/s] > 0; slower than this the samples pass through
-  /// [1] > 0; a spindle whose speed changes by more than this share between two blocks is not steady: samples
+  /// [1] > 0; a spindle whose speed changes by more than this share within 50 ms is not steady: samples
   /// pass
   double speed_tolerance = 0.002;
   double settling_periods =
@@ -96,11 +96,12 @@ class ForceCompensation {
   std::optional<ModeFollower> follower_;
   std::array<std::vector<double>, 2> designed_for_;  // [Hz] modes' frequencies that the gains know
   SpindleAngle angle_;
-  double next_look_ = 0.0;                  // [s]
-  std::size_t moves_ = 0;                   // in this cut
-  double design_rate_ = 0.0;                // [Hz]
-  double speed_ = 0.0, block_speed_ = 0.0;  // [rad/s] newest, at the block before
-  double steady_speed_ = 0.0;               // [rad/s] from which readings are counted as a change
+  double next_look_ = 0.0;     // [s]
+  std::size_t moves_ = 0;      // in this cut
+  double design_rate_ = 0.0;   // [Hz]
+  double speed_ = 0.0;         // [rad/s] newest
+  double steady_speed_ = 0.0;  // [rad/s] from which readings are counted as a change
+  double steady_since_ = -std::numeric_limits<double>::infinity();    // [s] of that reading
   double changing_until_ = -std::numeric_limits<double>::infinity();  // [s]
   std::optional<std::uint64_t> next_index_;
   double settling_left_ = 0.0;  // [s]
