@@ -32,6 +32,7 @@ void run(const std::string& folder, const std::string& model_file, const std::st
   if (failed) throw Error(out + ": " + failed.message());
   const Explanation explanation = explain(data, options, out);
   writeReport(explanation, out);
+  writeHtml(explanation, std::filesystem::path(folder).filename().string(), drawPictures(explanation, out), out);
   std::printf("verdict: %s\n", explanation.verdict.c_str());
   for (const FoundEffect& e : explanation.effects) {
     std::printf("%s:", e.name.c_str());

@@ -8,6 +8,9 @@
 
 #include <Eigen/Core>
 
+#include "smartmill_core/error.h"
+#include "smartmill_discrepancy/labels.h"
+
 namespace smartmill::discrepancy {
 namespace {
 
@@ -126,6 +129,11 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
   };
   Explanation result;
   result.notes = data.notes;
+  if (const std::vector<std::string> wrong = wrongLabels(data, options.search.threads); !wrong.empty()) {
+    std::string all;
+    for (const std::string& w : wrong) all += (all.empty() ? "" : "; ") + w;
+    throw Error(data.campaign.folder + ": " + all);
+  }
   const std::vector<Hypothesis> hypotheses = catalogueHypotheses(data, &result.notes);
   std::vector<std::size_t> fitted, heldout;
   for (std::size_t t = 0; t < data.tests.size(); ++t) (data.tests[t].heldout ? heldout : fitted).push_back(t);
@@ -235,6 +243,8 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
   };
   addGaps(exact_runner, before, after, false);
   addGaps(heldout_runner, before_heldout, after_heldout, true);
+
+  addCurves(exact_runner, before, after, &result);
 
   if (result.effects.empty()) {
     result.verdict = result.unexplained.empty() ? "no_disagreement" : "unknown_effect";

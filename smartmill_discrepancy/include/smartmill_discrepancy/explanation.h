@@ -37,6 +37,19 @@ struct BlockGap {
   double std_dev = 0.0;  ///< of a gap at the noise floor, by chance alone
 };
 
+/// One channel of one test over the spindle angle: the mean of the record's revolutions in bins.
+struct RevolutionCurve {
+  std::string test, channel;
+  std::vector<double> angle_deg, measured, nominal, improved;  ///< [deg], [unit of the channel]
+};
+
+/// Amplitude spectrum of what measurement and model differ by.
+struct SpectrumCurve {
+  std::string test, channel;
+  double order_hz = 0.0;  ///< one order of the spindle; 0 while it stands
+  std::vector<double> frequency_hz, before, after;  ///< [Hz], [unit of the channel]
+};
+
 struct GapPair {
   double fit = 0.0, heldout = 0.0;
 };
@@ -52,7 +65,9 @@ struct Explanation {
   std::vector<BlockGap> gaps;
   std::vector<Rung> ladder;
   std::vector<std::string> notes;
-  MachineModel model;                ///< the improved one, as written
+  std::vector<RevolutionCurve> revolutions;
+  std::vector<SpectrumCurve> spectra;
+  MachineModel model;  ///< the improved one, as written
   double seconds = 0.0;
 };
 
@@ -65,6 +80,18 @@ struct ExplainOptions {
 /// The whole workflow. Writes FOLDER/model.yaml and measures the gap after from that file.
 /// @throws Error on a campaign or model that cannot be worked with.
 Explanation explain(const Dataset& data, const ExplainOptions& options, const std::string& folder);
+
+/// Curves of the test and channels in which nominal model and records differ most.
+void addCurves(const TwinRunner& runner, const std::vector<double>& before, const std::vector<double>& after,
+               Explanation* explanation);
+
+/// Writes FOLDER/gaps.png, revolution.png, spectra.png, ladder.png, remains.png with gnuplot; returns the files' names.
+/// @throws Error.
+std::vector<std::string> drawPictures(const Explanation& explanation, const std::string& folder);
+
+/// Writes FOLDER/report.html, which holds the pictures of the folder.
+void writeHtml(const Explanation& explanation, const std::string& campaign, const std::vector<std::string>& pictures,
+               const std::string& folder);
 
 /// Writes FOLDER/report.json (smartmill-report/1).
 void writeReport(const Explanation& explanation, const std::string& folder);
