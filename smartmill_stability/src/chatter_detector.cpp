@@ -183,6 +183,7 @@ void ChatterDetector::judge(double from, double to) {
   double all = 0.0, outside = 0.0;
   std::vector<double> power(n / 2 + 1, 0.0);
   const std::vector<double> taper = hannWindow(n);
+  std::vector<double> outside_of_turn(turns, 0.0);
   std::vector<double> times(n);
   for (std::size_t i = 0; i < n; ++i) {
     times[i] = timeAt(from + units::TWO_PI * static_cast<double>(i) / static_cast<double>(bins));
@@ -208,6 +209,7 @@ void ChatterDetector::judge(double from, double to) {
       all += (force[i] - mean) * (force[i] - mean) / static_cast<double>(n);
       force[i] -= repeated[i % bins];
       outside += share * force[i] * force[i] / static_cast<double>(n);
+      outside_of_turn[i / bins] += share * force[i] * force[i] / static_cast<double>(bins);
       force[i] *= taper[i];
     }
     const auto spectrum = fourier(force);
@@ -225,6 +227,11 @@ void ChatterDetector::judge(double from, double to) {
   state.frequency = (static_cast<double>(peak) + shift) / (stop - start);
   state.chatter =
       state.energy_ratio > parameters_.energy_ratio && state.severity > parameters_.least_severity;
+  if (state.chatter) {
+    std::size_t turn = turns - 1;
+    while (turn > 0 && outside_of_turn[turn - 1] > parameters_.energy_ratio * all) --turn;
+    state.onset = times[turn * bins];
+  }
   said_invalid_ = false;
   output_(state);
 }

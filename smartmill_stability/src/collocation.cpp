@@ -429,7 +429,7 @@ class Collocation : public FloquetSolver {
     }
 
    private:
-    const RegenerativeSystem& system_;
+    RegenerativeSystem system_;
     double speed_;
     Shapes shapes_;
   };

@@ -232,25 +232,29 @@ class SemiDiscretization : public FloquetSolver {
 
   class Speed : public AtSpeed {
    public:
-    Speed(const SemiDiscretization& solver, double speed) : solver_(solver), speed_(speed) {}
+    Speed(const RegenerativeSystem& system, const SolverOptions& options, double speed)
+        : system_(system), options_(options), speed_(speed) {}
 
     CharacteristicMultiplier multiplier(double depth) override {
-      return semiDiscretizationMultiplier(delayedSystem(solver_.system_, speed_, depth),
-                                          solver_.options_.steps, solver_.options_.order);
+      return semiDiscretizationMultiplier(delayedSystem(system_, speed_, depth), options_.steps,
+                                          options_.order);
     }
 
     double chatterFrequency(double depth) override {
-      const DelayedSystem delayed = delayedSystem(solver_.system_, speed_, depth);
-      StepMap map(delayed, solver_.options_.steps, solver_.options_.order);
-      return map.strongest(map.dominant(true), highestOf(solver_.system_));
+      const DelayedSystem delayed = delayedSystem(system_, speed_, depth);
+      StepMap map(delayed, options_.steps, options_.order);
+      return map.strongest(map.dominant(true), highestOf(system_));
     }
 
    private:
-    const SemiDiscretization& solver_;
+    RegenerativeSystem system_;
+    SolverOptions options_;
     double speed_;
   };
 
-  std::unique_ptr<AtSpeed> at(double speed) const override { return std::make_unique<Speed>(*this, speed); }
+  std::unique_ptr<AtSpeed> at(double speed) const override {
+    return std::make_unique<Speed>(system_, options_, speed);
+  }
 
   std::unique_ptr<FloquetSolver> refined() const override {
     SolverOptions finer = options_;

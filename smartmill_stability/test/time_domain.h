@@ -45,6 +45,9 @@ class TimeDomain {
         slice[static_cast<std::size_t>(i)] = -feed_ * std::sin(units::TWO_PI * i / steps_);
   }
 
+  /// Radial offset of each tooth [m], outwards.
+  void setRunout(std::vector<double> runout) { runout_ = std::move(runout); }
+
   /// One step of the spindle. @return displacement x, y [m]; force() that made it.
   std::array<double, 2> step() {
     // Displacement with the force as it was, force with that displacement, then the true step.
@@ -73,13 +76,14 @@ class TimeDomain {
     // Feed made so far, along x.
     const double fed = feed_ * system_.teeth * static_cast<double>(count_) / steps_;
     for (std::size_t s = 0; s < surface_.size(); ++s) {
-      for (const int offset : tooth_) {
+      for (std::size_t k = 0; k < tooth_.size(); ++k) {
+        const int offset = tooth_[k];
         const long at = ((count_ + offset - lag_[s]) % steps_ + steps_) % steps_;
         const double phi = units::TWO_PI * static_cast<double>(at) / steps_;
         double& left = surface_[s][static_cast<std::size_t>(at)];
         if (phi <= system_.entry || phi >= system_.exit) continue;
         const double si = std::sin(phi), co = std::cos(phi);
-        const double reach = (u[0] + fed) * si + u[1] * co;
+        const double reach = (u[0] + fed) * si + u[1] * co + (runout_.empty() ? 0.0 : runout_[k]);
         const double chip = reach - left;
         if (chip <= 0.0 && may_leave_) continue;
         if (leave) left = reach;
@@ -100,6 +104,7 @@ class TimeDomain {
   double feed_, slice_depth_ = 0.0;
   ModalFilter x_, y_;
   std::vector<int> lag_, tooth_;
+  std::vector<double> runout_;
   std::vector<std::vector<double>> surface_;
   std::array<double, 2> force_{{0.0, 0.0}};
   long count_ = 0;

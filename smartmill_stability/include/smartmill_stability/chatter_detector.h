@@ -36,6 +36,9 @@ struct ChatterState {
   double frequency = std::numeric_limits<double>::quiet_NaN();  ///< [Hz]
   double energy_ratio = 0.0;  ///< [1] outside the spindle's harmonics over all, without the mean
   double severity = 0.0;      ///< [N] root mean square outside the harmonics, all axes together
+  /// [s] begin of the first revolution from which the force repeats no more to the end of the window; NaN
+  /// without chatter
+  double onset = std::numeric_limits<double>::quiet_NaN();
 };
 
 /// Tells chatter from forced vibration in the compensated force: what repeats every revolution (teeth,

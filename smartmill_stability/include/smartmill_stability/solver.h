@@ -122,7 +122,7 @@ class StabilitySolver {
 /// A solver in the time domain, which knows the multipliers at any depth (Floquet).
 class FloquetSolver : public StabilitySolver {
  public:
-  /// Of one speed; remembers what does not depend on the depth.
+  /// Of one speed; remembers what does not depend on the depth, and may outlive its solver.
   class AtSpeed {
    public:
     virtual ~AtSpeed() = default;
