@@ -15,6 +15,7 @@ namespace {
 const std::array<const char*, 3> CHANNELS{{"fx", "fy", "fz"}};
 /// Gains are laid out at speeds this share apart and serve this far from their own (in points of that grid).
 constexpr double SPEED_GRID = 0.01, GRID_HYSTERESIS = 0.7;
+constexpr double ZERO_TIME = 2.0;  // [s] over which the sensor's zero is told
 /// Modes may move by this share before the gains are laid out anew.
 constexpr double GAINS_BEAR = 0.01;
 /// The harmonics follow the spindle when its speed has moved by this share.
@@ -171,6 +172,18 @@ void ForceCompensation::follow(double time, double sample_rate) {
   }
 }
 
+// A piezoelectric sensor drifts; without cutting its mean is its zero.
+void ForceCompensation::watchZero(const ForceBlock& measured) {
+  if (!condition_ || condition_->kind == CuttingCondition::Kind::cut || measured.force[0].empty()) return;
+  const double length = static_cast<double>(measured.force[0].size());
+  const double share = std::min(1.0, length / measured.sample_rate / ZERO_TIME);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    double mean = 0.0;
+    for (const double force : measured.force[axis]) mean += std::isfinite(force) ? force / length : 0.0;
+    health_.zero[axis] += share * (mean - health_.zero[axis]);
+  }
+}
+
 void ForceCompensation::handle(const SampleBlock& block) {
   std::array<std::size_t, 3> column{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -200,6 +213,7 @@ void ForceCompensation::handle(const SampleBlock& block) {
       force.push_back(sign_ * sample);
     }
   }
+  watchZero(measured);
   ForceBlock compensated = measured;
   if (!hasSensor() || speed_ < parameters_.least_speed || block.stamp < changing_until_) {
     filters_.clear();
@@ -216,14 +230,20 @@ void ForceCompensation::handle(const SampleBlock& block) {
   }
   health_.speed = filters_.front().spindleSpeed();
   double squares = 0.0;
+  health_.colour = 0.0;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     HarmonicFilter& filter = filters_[axis];
+    double last = 0.0, own = 0.0, neighbours = 0.0;
     for (double& force : compensated.force[axis]) {
       // A sample that is not a number is bridged by the model, never passed on.
       force = std::isfinite(force) ? filter.step(force) : filter.coast();
-      squares +=
-          filter.innovation() * filter.innovation() / (filter.innovationStd() * filter.innovationStd());
+      const double innovation = filter.innovation() / filter.innovationStd();
+      own += innovation * innovation;
+      neighbours += innovation * last;
+      last = innovation;
     }
+    squares += own;
+    if (own > 0.0) health_.colour = std::max(health_.colour, std::abs(neighbours / own));
   }
   health_.innovation_ratio =
       block.size() == 0 ? 0.0 : std::sqrt(squares / (3.0 * static_cast<double>(block.size())));

@@ -1,6 +1,7 @@
 #include "node.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include <geometry_msgs/WrenchStamped.h>
 #include <smartmill_msgs/CuttingCondition.h>
@@ -19,6 +20,7 @@ namespace smartmill::kalman {
 namespace {
 
 constexpr std::size_t QUEUE = 2000;  // 20 s of blocks
+constexpr double COLOURED = 0.5;     // [1] correlation of neighbouring innovations
 
 }  // namespace
 
@@ -176,6 +178,16 @@ void KalmanNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
   } else if (health.innovation_ratio > 3.0) {
     status.summary(diagnostic_msgs::DiagnosticStatus::WARN,
                    "innovations larger than the sensor model explains");
+  } else if (health.speed > 0.0 && health.colour > COLOURED) {
+    status.summary(diagnostic_msgs::DiagnosticStatus::WARN,
+                   "innovations are not white: something of the force or of the sensor is not in the model");
+  } else if (parameters_.drift_limit > 0.0 &&
+             std::max({std::abs(health.zero[0]), std::abs(health.zero[1]), std::abs(health.zero[2])}) >
+                 parameters_.drift_limit) {
+    status.summary(diagnostic_msgs::DiagnosticStatus::WARN, "the sensor's zero has drifted");
+  } else if (parameters_.model_max_age > 0.0 && sorted_.modesAge() > parameters_.model_max_age) {
+    status.summary(diagnostic_msgs::DiagnosticStatus::WARN,
+                   "the taps in use are old: measure the sensor again");
   } else {
     status.summary(diagnostic_msgs::DiagnosticStatus::OK, sorted_.measuring()  ? "measuring the sensor"
                                                           : health.speed > 0.0 ? "compensating"
@@ -183,6 +195,10 @@ void KalmanNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
   }
   status.add("spindle speed of the filters [rad/s]", health.speed);
   status.add("innovation over design [1]", health.innovation_ratio);
+  status.add("colour of the innovations [1]", health.colour);
+  status.addf("zero of the sensor [N]", "%.2f %.2f %.2f", health.zero[0], health.zero[1], health.zero[2]);
+  status.add("age of the taps in use [s]", sorted_.modesAge());
+  status.add("moves of the sensor's modes", health.moves);
   status.add("gaps", health.gaps);
   status.add("samples not numbers", health.not_finite);
   status.add("samples clipped", health.clipped);

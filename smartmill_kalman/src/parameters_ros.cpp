@@ -39,12 +39,16 @@ NodeParameters readParameters(ParameterReader& reader) {
   reader.read("command_machine", parameters.command_machine);
   reader.read("hold_back", parameters.hold_back);
   reader.read("wrench_rate", parameters.wrench_rate);
+  reader.read("drift_limit", parameters.drift_limit);
+  reader.read("model_max_age", parameters.model_max_age);
   reader.read("input_timeout", parameters.input_timeout);
   reader.finish();
   compensation.validate();
   taps.validate();
   if (!(parameters.hold_back >= 0.0)) throw Error("hold_back: at least 0 s is due");
   if (!(parameters.wrench_rate > 0.0)) throw Error("wrench_rate: above 0 Hz is due");
+  if (!(parameters.drift_limit >= 0.0)) throw Error("drift_limit: at least 0 N is due");
+  if (!(parameters.model_max_age >= 0.0)) throw Error("model_max_age: at least 0 s is due");
   if (!(parameters.input_timeout > 0.0)) throw Error("input_timeout: above 0 s is due");
   return parameters;
 }

@@ -15,6 +15,8 @@ struct NodeParameters {
   bool command_machine = true;  ///< false: replay; no blow is asked for, the recorded ones answer
   double hold_back = 0.05;      ///< [s] >= 0
   double wrench_rate = 100.0;   ///< [Hz] > 0
+  double drift_limit = 0.0;     ///< [N] >= 0 zero of the sensor that raises a diagnostic; 0: not watched
+  double model_max_age = 0.0;   ///< [s] >= 0 age of the taps that raises a diagnostic; 0: not watched
   double input_timeout = 1.0;   ///< [s] > 0 silence of the sensor that raises a diagnostic
 };
 

@@ -121,6 +121,14 @@ void SortedCompensation::push(const MeasuredModes& modes) {
   });
 }
 
+double SortedCompensation::modesAge() const {
+  double age = 0.0;
+  for (const double stamp : identified_) {
+    if (std::isfinite(stamp)) age = std::max(age, newest_ - stamp);
+  }
+  return age;
+}
+
 void SortedCompensation::hammerLost(const std::string& text) {
   if (measurement_.active()) {
     measurement_.lost(text);

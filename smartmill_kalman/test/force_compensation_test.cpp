@@ -191,6 +191,41 @@ TEST(ForceCompensation, followsASlowChangeOfSpeedWithoutAJump) {
   EXPECT_LT(worst, 2.0);
 }
 
+TEST(ForceCompensation, tellsTheZeroOfTheSensorAndTheColourOfTheInnovations) {
+  ForceCompensation compensation({}, false, [](const ForceBlock&, const ForceBlock&) {});
+  for (std::size_t axis = 0; axis < 3; ++axis) compensation.setSensor(axis, sensor());
+  std::mt19937 random(4);
+  std::normal_distribution<double> noise;
+  CuttingCondition air;
+  air.kind = CuttingCondition::Kind::air;
+  compensation.handle(air);
+  const auto feed = [&](std::size_t from, double colour) {
+    double last = 0.0;
+    for (std::size_t b = from; b < from + 1000; ++b) {
+      SampleBlock block;
+      block.stamp = 0.01 * static_cast<double>(b);
+      block.sample_rate = RATE;
+      block.first_index = 256 * b;
+      block.channels = {"fx", "fy", "fz"};
+      block.units = {"N", "N", "N"};
+      compensation.handle(SpindleAngle{block.stamp, 0.0, 1200.0});
+      for (std::size_t i = 0; i < 256; ++i) {
+        last = colour * last + std::sqrt(1.0 - colour * colour) * noise(random);
+        block.samples.insert(block.samples.end(), {5.0 + last, -2.0 + noise(random), noise(random)});
+      }
+      compensation.handle(block);
+    }
+  };
+  feed(0, 0.0);
+  // Mean over 2 s of 1 N noise: 5 mN; the zero comes in with that time constant, 10 s of it.
+  EXPECT_NEAR(compensation.health().zero[0], 5.0, 0.05);
+  EXPECT_NEAR(compensation.health().zero[1], -2.0, 0.05);
+  EXPECT_LT(compensation.health().colour, 0.3);  // 1 / sqrt(256) a block, and what the filter takes out
+  EXPECT_NEAR(compensation.health().innovation_ratio, 1.0, 0.2);
+  feed(1000, 0.9);
+  EXPECT_GT(compensation.health().colour, 0.5);
+}
+
 TEST(ForceCompensation, bridgesSamplesThatAreNotNumbers) {
   Session s = session(60);
   for (std::size_t i = 0; i < 5; ++i) s.blocks[50].samples[3 * (100 + i)] = NAN;

@@ -23,6 +23,8 @@ std::size_t allocations = 0;
 
 }  // namespace
 
+// The compiler inlines these and then takes malloc and delete for a mismatch.
+#pragma GCC diagnostic ignored "-Wmismatched-new-delete"
 void* operator new(std::size_t size) {
   ++allocations;
   if (void* p = std::malloc(size)) return p;

@@ -42,7 +42,12 @@ struct CompensationHealth {
   std::size_t clipped = 0;     ///< samples at the saturation limit
   std::size_t moves = 0;       ///< times that the sensor's modes were found moved
   double innovation_ratio =
-      0;             ///< [1] RMS innovation over the design's, last compensated block; 1 when the model fits
+      0;  ///< [1] RMS innovation over the design's, last compensated block; 1 when the model fits
+  /// [1] largest correlation of an axis' innovations with the ones before, last compensated block; 0 when the
+  /// model tells all that can be told, beyond 0.3 something is left in them
+  double colour = 0;
+  std::array<double, 3> zero{
+      {0, 0, 0}};    ///< [N] mean of the sensor without cutting (condition AIR or NONE), over seconds
   double speed = 0;  ///< [rad/s] of the running filters; 0: passing through
 };
 
@@ -80,6 +85,7 @@ class ForceCompensation {
  private:
   void design(double speed, double sample_rate);
   void follow(double time, double sample_rate);
+  void watchZero(const ForceBlock& measured);
   void forgetMoves();
   const std::vector<HarmonicGain>& gains(std::size_t axis, int grid_point, double sample_rate);
 

@@ -53,6 +53,9 @@ class SortedCompensation {
   const CompensationHealth& health() const { return compensation_.health(); }
   /// Model in use of an axis.
   const ModalModel& sensor(std::size_t axis) const { return compensation_.sensor(axis); }
+  /// Age of the oldest modes in use that taps have told, at the newest input [s]; 0 when all are the model
+  /// file's.
+  double modesAge() const;
   bool measuring() const { return measurement_.active(); }
   std::string waitingFor() const { return sorter_.waitingFor(); }
   std::size_t late() const { return sorter_.late(); }
