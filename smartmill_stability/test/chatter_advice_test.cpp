@@ -56,13 +56,13 @@ Study cutOnce(const RegenerativeSystem& system, double speed, double depth, unsi
   double state_due = 30.0 * turn, angle_due = 0.0;  // in full engagement after 30 turns
   std::array<std::vector<double>, 2> late;
   std::vector<std::array<double, 2>> before(STEPS, {{0.0, 0.0}});
+  double change = 0.0, all = 0.0;
   for (int i = 0; i < STEPS * (TURNS + AIR); ++i) {
     const double t = turn * i / STEPS;
     const bool cutting = i < STEPS * TURNS;
     if (cutting) run.step();
     const std::array<double, 2> force = cutting ? run.force() : std::array<double, 2>{{0.0, 0.0}};
     // Turn by turn: what does not repeat against what there is.
-    static thread_local double change, all;
     if (i % STEPS == 0) change = all = 0.0;
     auto& old = before[static_cast<std::size_t>(i % STEPS)];
     for (std::size_t a = 0; a < 2; ++a) {
