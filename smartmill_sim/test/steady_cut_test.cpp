@@ -91,6 +91,7 @@ TEST(SteadyCut, isWhatTheStoredSurfaceGives) {
     if (flexible) {
       model.tool_tip.x.modes = {{1210.0, 0.031, 1.0 / 28e6}};
       model.tool_tip.y.modes = {{1180.0, 0.029, 1.0 / 31e6}};
+      model.effects.push_back(effectEntry("process_damping", {{"coefficient_n_per_mm", 200.0}}));
     }
     const double speed = units::radPerSecFromRpm(4500.0), dt = 1.0 / 204800.0;
     CuttingMachine steady(model, dt, Feed::steady), any(model, dt);
