@@ -2,6 +2,7 @@
 // targets.
 
 #include <cmath>
+#include <complex>
 #include <cstdio>
 #include <functional>
 #include <iostream>
@@ -188,23 +189,89 @@ void runErrors(const std::vector<double>& speeds, double duration) {
   }
 }
 
+/// Burzoni's tables 8..15: what a filter laid out from the taps alone loses against the one with the best q,
+/// told by the truth of the cut.
+void runTuning(double duration) {
+  std::printf("sensor from nine taps; q as laid out, and the best of a fixed q, by the truth of the cut\n");
+  std::printf(
+      "   rpm   RMSE [N]   best q: RMSE [N]   amplitude error of tooth harmonics [%%]: as laid out   best "
+      "q\n");
+  for (const double rpm : {1000.0, 3700.0, 6500.0, 9300.0, 12000.0, 14800.0, 17600.0}) {
+    ReferenceCase reference;
+    reference.spindle_speed = units::radPerSecFromRpm(rpm);
+    reference.duration = duration;
+    const ReferenceTaps taps = simulateTaps(reference, 9);
+    const ModalModel sensor =
+        identifySensor(taps.hammer, taps.response, reference.sample_rate, {100.0, 5000.0, 4}).model;
+    const ReferenceRecord record = simulate(reference);
+    const double rate = reference.sample_rate, revolution = units::TWO_PI / reference.spindle_speed;
+    const double revolutions = std::floor((duration - 0.2) / revolution);
+    const std::size_t to = record.time.size();
+    const std::size_t from = to - static_cast<std::size_t>(std::lround(revolutions * revolution * rate));
+    struct Score {
+      double rmse = 0.0, amplitude = 0.0;
+    };
+    const auto scored = [&](HarmonicFilter filter) {
+      Score score;
+      for (std::size_t axis = 0; axis < 2; ++axis) {
+        filter.reset();
+        std::vector<double> force;
+        for (const double sample : record.measured[axis]) force.push_back(filter.step(sample));
+        double squares = 0.0;
+        for (std::size_t i = from; i < to; ++i) squares += std::pow(force[i] - record.truth[axis][i], 2);
+        score.rmse = std::max(score.rmse, std::sqrt(squares / static_cast<double>(to - from)));
+        double largest = 0.0;
+        for (int n = 4; n * reference.spindle_speed < units::TWO_PI * 3000.0; n += 4) {
+          std::complex<double> is = 0.0, found = 0.0;
+          for (std::size_t i = from; i < to; ++i) {
+            const auto turn = std::polar(1.0, -n * reference.spindle_speed * record.time[i]);
+            is += turn * record.truth[axis][i];
+            found += turn * force[i];
+          }
+          largest = std::max(largest, std::abs(is));
+          // A harmonic below a fiftieth of the largest is no amplitude to be right about.
+          if (std::abs(is) > 0.02 * largest)
+            score.amplitude = std::max(score.amplitude, std::abs(std::abs(found) / std::abs(is) - 1.0));
+        }
+      }
+      return score;
+    };
+    HarmonicFilterParameters parameters;
+    const Score own = scored(HarmonicFilter(sensor, reference.spindle_speed, rate, parameters));
+    Score best;
+    best.rmse = 1e9;
+    for (double memory = 0.1; memory < 10.0; memory *= 2.0) {
+      parameters.settling_revolutions = parameters.memory_revolutions = memory;
+      const Score fixed = scored(HarmonicFilter(sensor, reference.spindle_speed, rate, parameters));
+      if (fixed.rmse < best.rmse) best = fixed;
+    }
+    std::printf("%6.0f  %9.3f %18.3f %53.2f %8.2f\n", rpm, own.rmse, best.rmse, 100.0 * own.amplitude,
+                100.0 * best.amplitude);
+  }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   std::vector<double> speeds{3000.0, 9000.0, 15000.0, 21750.0};
   double duration = 1.0;
-  bool errors = false;
+  bool errors = false, tuning = false;
   CLI::App app{"Errors of the force compensation in the reference cut, beside their targets."};
   app.add_option("--speed-rpm", speeds, "spindle speeds")->check(CLI::Range(500.0, 60000.0));
   app.add_option("--duration-s", duration, "length of a record")->check(CLI::Range(0.3, 100.0));
   app.add_flag("--model-errors", errors,
                "a sensor that is not what it is believed to be: frozen and following");
+  app.add_flag("--tuning", tuning, "seven speeds: laid out from the taps against the best q of the cut");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? 0 : 2;
   }
   try {
+    if (tuning) {
+      runTuning(duration);
+      return 0;
+    }
     errors ? runErrors(speeds, std::max(duration, 1.6)) : run(speeds, duration);
   } catch (const std::exception& e) {
     std::cerr << "reference: " << e.what() << "\n";

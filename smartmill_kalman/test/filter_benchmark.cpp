@@ -1,9 +1,14 @@
 // Cost of a sample: 3 modes and 12 harmonics, beside the same filter as one dense fixed-size product.
 
+#include <algorithm>
+#include <chrono>
+#include <vector>
+
 #include <benchmark/benchmark.h>
 #include <Eigen/Core>
 
 #include "smartmill_core/units.h"
+#include "smartmill_kalman/force_compensation.h"
 #include "smartmill_kalman/harmonic_filter.h"
 #include "smartmill_kalman/reference_case.h"
 
@@ -46,6 +51,37 @@ void denseFixedSize(benchmark::State& state) {
   }
 }
 BENCHMARK(denseFixedSize);
+
+// From block in to block out: three axes at 50 kHz, 10 ms a block.
+void blockOfThreeAxesAt50kHz(benchmark::State& state) {
+  constexpr double FAST = 50000.0;
+  constexpr std::size_t SAMPLES = 500;
+  ForceCompensation compensation(
+      {}, false, [](const ForceBlock&, const ForceBlock& c) { benchmark::DoNotOptimize(c.force[0].data()); });
+  for (std::size_t axis = 0; axis < 3; ++axis) compensation.setSensor(axis, ReferenceCase::exactSensor());
+  SampleBlock block;
+  block.sample_rate = FAST;
+  block.channels = {"fx", "fy", "fz"};
+  block.units = {"N", "N", "N"};
+  for (std::size_t i = 0; i < SAMPLES; ++i) {
+    const double force = static_cast<double>(i % 83);
+    block.samples.insert(block.samples.end(), {force, -force, 1.0});
+  }
+  compensation.handle(SpindleAngle{0.0, 0.0, SPEED});
+  compensation.handle(block);  // lays out
+  std::vector<double> took;
+  for (auto _ : state) {
+    const auto begin = std::chrono::steady_clock::now();
+    block.first_index += SAMPLES;
+    block.stamp += 0.01;
+    compensation.handle(block);
+    took.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
+  }
+  std::sort(took.begin(), took.end());
+  state.counters["median_us"] = 1e6 * took[took.size() / 2];
+  state.counters["p99_us"] = 1e6 * took[took.size() * 99 / 100];
+}
+BENCHMARK(blockOfThreeAxesAt50kHz);
 
 }  // namespace
 }  // namespace smartmill::kalman
