@@ -24,7 +24,7 @@ using namespace smartmill::loadmeter;  // NOLINT
 struct Options {
   std::string source_path, source, model, means = "all", output, parameters, database;
   std::string tool, material;
-  double rake = NAN, depth_percent = 0.0;
+  double rake = NAN, depth_percent = 0.0, runout_um = 0.0;
   bool spindle_uncertainty = false, plain_friction = false;
 };
 
@@ -148,6 +148,7 @@ void printTerms(const Options& o, const LoadRecordResult& found) {
   }
   if (found.edge_growth != 0.0)
     std::printf("  Kte x (1 + %.4f per minute of cut)\n", 60.0 * found.edge_growth);
+  if (found.runout != 0.0) std::printf("  effective runout %.2f um\n", found.runout / units::UM);
   if (!o.spindle_uncertainty && !found.terms.empty() && found.terms.back() == "load meter's lag") {
     std::printf("  load meter's bandwidth %.4f Hz\n", found.bandwidth);
   }
@@ -187,6 +188,7 @@ void run(const Options& o) {
   LoadRecordOptions options;
   options.spindle_uncertainty = o.spindle_uncertainty;
   options.choose_terms = !o.plain_friction;
+  options.runout_uncertainty = o.runout_um * units::UM;
   options.depth_uncertainty = o.depth_percent / 100.0;
   const LoadRecordResult found = identifyFromLoadRecords(campaign, model, options);
   for (const std::string& note : found.notes) std::fprintf(stderr, "coefficients: %s\n", note.c_str());
@@ -222,6 +224,9 @@ int main(int argc, char** argv) {
                "load_meter_v_per_w and the bandwidth too (default: both exact)");
   app.add_option("--depth-uncertainty", o.depth_percent,
                  "[%] load_meter of a campaign: standard deviation of the axial depth, common to all cuts")
+      ->check(CLI::Range(0.0, 100.0));
+  app.add_option("--runout-uncertainty", o.runout_um,
+                 "[um] load_meter of a campaign: standard deviation of the cutter axis' offset")
       ->check(CLI::Range(0.0, 100.0));
   app.add_flag("--plain-friction", o.plain_friction,
                "load_meter of a campaign: Coulomb and viscous friction only, nothing added by evidence");

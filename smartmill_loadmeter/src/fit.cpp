@@ -42,7 +42,8 @@ struct Cost {
 
 }  // namespace
 
-FitResult fit(const Residuals& residuals, std::size_t count, const std::vector<FitParameter>& parameters) {
+FitResult fit(const Residuals& residuals, std::size_t count, const std::vector<FitParameter>& parameters,
+              double tolerance) {
   const Cost cost{residuals, parameters, freeOf(parameters)};
   const std::size_t n = cost.free.size();
   std::vector<double> x(std::max<std::size_t>(n, 1));
@@ -74,7 +75,7 @@ FitResult fit(const Residuals& residuals, std::size_t count, const std::vector<F
     ceres::Solver::Options options;
     options.linear_solver_type = ceres::DENSE_QR;
     options.max_num_iterations = 200;
-    options.function_tolerance = 1e-14;
+    options.function_tolerance = tolerance;
     options.parameter_tolerance = 1e-12;
     options.gradient_tolerance = 1e-16;
     options.logging_type = ceres::SILENT;

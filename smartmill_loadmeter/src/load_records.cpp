@@ -51,6 +51,9 @@ struct LoadRecord {
   std::array<double, 2> mean{{0, 0}};
   std::array<std::vector<double>, 2> torque;  // from `first` on
 
+  // Mean torque with the cutter axis off by k steps over that without, per Ktc and Kte.
+  std::array<std::vector<double>, 2> runout;
+
   // Condensed: V = watt (columns x quantities).
   Eigen::Matrix4d normal;
   Eigen::Vector4d right;
@@ -61,6 +64,50 @@ struct LoadRecord {
   double saturated = 0.0;  // [V2] squares left by the record's own best fit
   double rounding = 0.0;   // [V] of its level
 };
+
+constexpr double OFFSET_STEP = 2e-6;  // [m]
+constexpr std::size_t OFFSETS = 41;
+
+// Runout moves material from tooth to tooth, which leaves the mean torque as it is until a tooth misses part
+// of its arc. h is the least distance to any surface that earlier teeth left; offset towards tooth 1.
+std::array<std::vector<double>, 2> runoutShares(const ToolGeometry& tool, const Engagement& e) {
+  constexpr int STEPS = 256;
+  const double low = std::max(e.entry, 0.0), high = std::min(e.exit, units::PI);
+  std::array<std::vector<double>, 2> shares;
+  std::array<double, 2> straight{};
+  for (std::size_t o = 0; o < OFFSETS; ++o) {
+    const double offset = OFFSET_STEP * static_cast<double>(o);
+    double chip = 0.0, arc = 0.0;
+    for (int t = 0; t < tool.teeth; ++t) {
+      for (int i = 0; i < STEPS; ++i) {
+        const double s = std::sin(low + (high - low) * (i + 0.5) / STEPS);
+        double h = 1e9, feed = 0.0;
+        for (int m = 1; m <= tool.teeth; ++m) {
+          feed += e.feed_per_tooth * tool.teeth * tool.pitchOf((t + m - 1) % tool.teeth) / units::TWO_PI;
+          h = std::min(h, feed * s + offset * (std::cos(tool.toothAngle(t)) -
+                                               std::cos(tool.toothAngle((t + m) % tool.teeth))));
+        }
+        // A tooth that misses does so in part of the step: smooth over the step.
+        const double width = e.feed_per_tooth * (high - low) / STEPS;
+        const double share = std::clamp(0.5 + h / width, 0.0, 1.0);
+        arc += share;
+        chip += share * std::max(h, 0.0);
+      }
+    }
+    if (o == 0) straight = {chip, arc};
+    shares[0].push_back(chip / straight[0]);
+    shares[1].push_back(arc / straight[1]);
+  }
+  return shares;
+}
+
+// Continued oddly below zero, so that a fit may stand at zero and know its standard deviation.
+double shareAt(const std::vector<double>& shares, double offset) {
+  const double at = std::min(std::abs(offset) / OFFSET_STEP, static_cast<double>(OFFSETS) - 1.001);
+  const std::size_t i = static_cast<std::size_t>(at);
+  const double change = shares[i] + (shares[i + 1] - shares[i]) * (at - static_cast<double>(i)) - 1.0;
+  return offset < 0.0 ? 1.0 - change : 1.0 + change;
+}
 
 LoadRecord prepare(const CampaignTest& test, const Record& record, const ToolGeometry& tool) {
   LoadRecord r;
@@ -77,6 +124,7 @@ LoadRecord prepare(const CampaignTest& test, const Record& record, const ToolGeo
   r.lead = static_cast<double>(r.first) * r.dt - engage;
   r.edge_age =
       test.cut_time_before.value_or(0.0) + 0.5 * (static_cast<double>(record.size()) * r.dt - engage);
+  r.runout = runoutShares(tool, *test.engagement);
   const std::vector<double>* angle = record.has("spindle_angle") ? &record.column("spindle_angle") : nullptr;
   for (std::size_t u = 0; u < 2; ++u) {
     const MechanisticForce force(
@@ -168,8 +216,10 @@ void condense(LoadRecord& r, double gain, double time_constant, double ktc, doub
 /// Which unknowns take part beyond viscous, coulomb, Ktc, Kte.
 struct Terms {
   FrictionShape friction;
-  bool growth = false, lag = false;
-  std::size_t count() const { return friction.unknowns() + 2 + (growth ? 1 : 0) + (lag ? 1 : 0); }
+  bool growth = false, runout = false, lag = false;
+  std::size_t count() const {
+    return friction.unknowns() + 2 + (growth ? 1 : 0) + (runout ? 1 : 0) + (lag ? 1 : 0);
+  }
 };
 
 // Neither a machine nor an integrator follows the model more closely: what the records disagree by below this
@@ -196,13 +246,14 @@ class Campaigns {
   double zero_below = 0.0;  // [rad/s]
   double slowest = 0.0, fastest = 0.0;
   std::vector<Prior> friction_priors;
-  double lag_prior = 0.0;  // std of the log time constant; 0: none
-  double lag_at = 0.0;     // log of (time constant of the condensed records / the model's)
+  double runout_prior = 0.0;  // [m]; 0: none
+  double lag_prior = 0.0;     // std of the log time constant; 0: none
+  double lag_at = 0.0;        // log of (time constant of the condensed records / the model's)
 
   std::size_t ktcAt(const Terms& t) const { return t.friction.unknowns(); }
 
   std::size_t residualCount() const {
-    std::size_t n = friction_priors.size() + (lag_prior > 0.0 ? 1 : 0);
+    std::size_t n = friction_priors.size() + (lag_prior > 0.0 ? 1 : 0) + (runout_prior > 0.0 ? 1 : 0);
     for (const LoadRecord& r : records) n += static_cast<std::size_t>(r.target.size());
     return n;
   }
@@ -211,19 +262,21 @@ class Campaigns {
     const FrictionLaw law = FrictionLaw::fromValues(terms.friction, v.data(), zero_below);
     std::size_t at = ktcAt(terms);
     const double ktc = v[at++], kte = v[at++];
-    const double growth = terms.growth ? v[at++] : 0.0, log_lag = terms.lag ? v[at++] : lag_at;
+    const double growth = terms.growth ? v[at++] : 0.0, offset = terms.runout ? v[at++] : 0.0;
+    const double log_lag = terms.lag ? v[at++] : lag_at;
     for (const LoadRecord& r : records) {
       Eigen::Vector4d quantity = Eigen::Vector4d::Zero();
       quantity[IDLE] = law.torque(r.speed, r.start_time);
       if (r.cut) {
-        quantity[KTC] = ktc;
-        quantity[KTE] = kte * (1.0 + growth * r.edge_age);
+        quantity[KTC] = ktc * shareAt(r.runout[0], offset);
+        quantity[KTE] = kte * (1.0 + growth * r.edge_age) * shareAt(r.runout[1], offset);
         quantity[LAG] = log_lag - lag_at;
       }
       const Eigen::VectorXd rest = (r.rows * quantity.cwiseQuotient(UNIT) - r.target) / noise;
       for (Eigen::Index i = 0; i < rest.size(); ++i) *out++ = rest[i];
     }
     for (const Prior& p : friction_priors) *out++ = (v[p.unknown] - p.value) / p.std_dev;
+    if (runout_prior > 0.0) *out++ = offset / runout_prior;
     if (lag_prior > 0.0) *out++ = log_lag / lag_prior;
   }
 
@@ -232,6 +285,7 @@ class Campaigns {
     unknowns.push_back({ktc, -1e12, 1e12, 1e9});
     unknowns.push_back({kte, -1e8, 1e8, 1e4});
     if (terms.growth) unknowns.push_back({0.0, -0.1, 1.0, 0.01});
+    if (terms.runout) unknowns.push_back({5e-6, -6e-5, 6e-5, 1e-5});
     if (terms.lag) unknowns.push_back({lag_at, -3.0, 3.0, 0.1});
     Solution s;
     s.terms = terms;
@@ -311,6 +365,7 @@ LoadRecordResult identifyFromLoadRecords(const std::vector<TestRecord>& tests, c
     all.friction_priors = {{0, known.viscous, std::sqrt(known.covariance[0]) + smallest / all.fastest},
                            {1, known.coulomb, std::sqrt(known.covariance[3]) + smallest}};
   }
+  all.runout_prior = options.runout_uncertainty;
   if (options.spindle_uncertainty) all.lag_prior = std::max(stated, 1e-6);
 
   const double nominal_lag = timeConstant(spindle.load_meter_bandwidth);
@@ -347,6 +402,7 @@ LoadRecordResult identifyFromLoadRecords(const std::vector<TestRecord>& tests, c
 
   Terms terms;
   terms.lag = options.spindle_uncertainty;
+  terms.runout = options.runout_uncertainty > 0.0;
   Solution chosen = settle(terms);
   // Terms are added while the records disagree by more than chance would (chi2 per degree of freedom of some
   // forty: 1.6 has a probability below 1 %), each one that the evidence favours by more than ten.
@@ -362,6 +418,7 @@ LoadRecordResult identifyFromLoadRecords(const std::vector<TestRecord>& tests, c
     }
     if (!chosen.terms.friction.warmup && timed) with([](Terms& t) { t.friction.warmup = true; });
     if (!chosen.terms.growth && ages.size() >= 3) with([](Terms& t) { t.growth = true; });
+    if (!chosen.terms.runout && tool.teeth > 1) with([](Terms& t) { t.runout = true; });
     if (!chosen.terms.lag) with([](Terms& t) { t.lag = true; });
     std::optional<Solution> best;
     for (const Terms& t : tries) {
@@ -447,12 +504,14 @@ LoadRecordResult identifyFromLoadRecords(const std::vector<TestRecord>& tests, c
   }
   result.bandwidth = spindle.load_meter_bandwidth / std::exp(all.lag_at);
   if (chosen.terms.growth) result.edge_growth = chosen.fit.value[at + 2];
+  if (chosen.terms.runout) result.runout = chosen.fit.value[at + 2 + (chosen.terms.growth ? 1 : 0)];
   result.noise = all.noise;
   result.misfit = chosen.misfit;
   result.disagreement = chosen.share;
   if (chosen.terms.friction.stribeck) result.terms.push_back("Stribeck friction");
   if (chosen.terms.friction.warmup) result.terms.push_back("friction warm-up");
   if (chosen.terms.growth) result.terms.push_back("edge growth");
+  if (chosen.terms.runout && !(options.runout_uncertainty > 0.0)) result.terms.push_back("runout");
   if (chosen.terms.lag && !options.spindle_uncertainty) result.terms.push_back("load meter's lag");
   if (chosen.misfit > 1.6 && chosen.share > MODEL_SHARE) {
     char text[200];

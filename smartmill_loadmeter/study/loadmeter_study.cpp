@@ -11,6 +11,7 @@
 
 #include "smartmill_core/signal/statistics.h"
 #include "study/machine_cases.h"
+#include "study/turning_scene.h"
 
 namespace {
 
@@ -56,6 +57,40 @@ void machines(unsigned first, int count) {
   std::printf("\n");
 }
 
+void split(const char* name, const VarianceSplit& s, double process, double sensor) {
+  std::printf(
+      "%s: dynamometer %.1f N, %.0f N2 (put in %.0f); current %.1f N, %.0f N2; its share %.0f N2 (put in "
+      "%.0f);"
+      " F of the means %.2f, p %.3f; p of the variances %.2g\n",
+      name, s.process_mean, s.process_variance, process, s.current_mean, s.current_variance,
+      s.sensor_variance, sensor, s.f_means, s.p_means, s.p_variances);
+}
+
+void turning(unsigned seed) {
+  const TurningVariances v;
+  const TurningResult r = studyTurning(seed, v, 12);
+  std::printf("\nturning centre, 120 calibration and 300 prediction tests, noise of Table 2\n");
+  std::printf(
+      "Fx = %.2f Ix + %.1f (paper -198.45, 258; R2 %.3f, paper 0.94); Fz = %.1f Iz + %.1f (215.9, 0.003;"
+      " R2 %.3f, 0.943); torque law R2 %.3f (0.98)\n",
+      r.x.slope.value, r.x.level.value, r.fit_x, r.z.slope.value, r.z.level.value, r.fit_z, r.fit_y);
+  std::printf("%-34s %6s %6s %6s\n", "RMSE of prediction [N]", "Fx", "Fy", "Fz");
+  std::printf("%-34s %6.0f %6.0f %6.0f   (tests %d, %d, %d)\n", "regression", r.regression.rmse[0],
+              r.regression.rmse[1], r.regression.rmse[2], r.regression.count[0], r.regression.count[1],
+              r.regression.count[2]);
+  std::printf("%-34s %6d %6d %6d\n", "  paper, Table 1", 29, 36, 27);
+  std::printf("%-34s %6s %6.0f %6.0f   (inputs %s, %s)\n", "ANFIS", "-", r.anfis.rmse[1], r.anfis.rmse[2],
+              r.fy_inputs.c_str(), r.fz_inputs.c_str());
+  std::printf("%-34s %6s %6d %6d\n", "  paper, Table 1", "-", 34, 21);
+  std::printf("12 replications, as Table 2:\n");
+  split("Fy", r.fy, v.process[1], v.sensor[1]);
+  split("Fz", r.fz, v.process[2], v.sensor[2]);
+  const TurningResult many = studyTurning(seed, v, 400);
+  std::printf("400 replications:\n");
+  split("Fy", many.fy, v.process[1], v.sensor[1]);
+  split("Fz", many.fz, v.process[2], v.sensor[2]);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -71,6 +106,7 @@ int main(int argc, char** argv) {
   }
   try {
     machines(first, count);
+    turning(first);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "loadmeter_study: %s\n", error.what());
     return 1;

@@ -226,7 +226,7 @@ struct CampaignCase {
 TEST(ExampleCampaigns, hiddenFrictionAndWearAreFoundAndOthersSaidToBias) {
   const std::vector<CampaignCase> cases{{"cross_talk", {}, true},
                                         {"outside_catalogue", {}, true},
-                                        {"runout", {}, false},
+                                        {"runout", {"runout"}, false},
                                         {"stribeck_friction", {"Stribeck friction"}, true},
                                         {"tool_wear_and_unbalance", {"edge growth"}, true}};
   for (const CampaignCase& c : cases) {
@@ -242,8 +242,10 @@ TEST(ExampleCampaigns, hiddenFrictionAndWearAreFoundAndOthersSaidToBias) {
       EXPECT_NEAR(k.set.value.kte, model.cutting->kte, 5e-3 * model.cutting->kte) << c.name;
       EXPECT_LT(k.set.std_dev.ktc, 3e-4 * model.cutting->ktc) << c.name;
     } else {
-      // Teeth that miss the cut: biased, and the standard deviation says that it is not to be trusted.
-      EXPECT_GT(k.set.std_dev.ktc, 0.02 * model.cutting->ktc) << c.name;
+      // Teeth that miss part of the cut: the mean torque tells of the offset, the ripple stays unexplained.
+      EXPECT_NEAR(k.set.value.ktc, model.cutting->ktc, 5e-3 * model.cutting->ktc) << c.name;
+      EXPECT_NEAR(k.set.value.kte, model.cutting->kte, 2e-2 * model.cutting->kte) << c.name;
+      EXPECT_NEAR(k.runout, 21.08e-6, 2e-6);
     }
     EXPECT_NEAR(k.set.value.ktc, model.cutting->ktc, 4.0 * k.set.std_dev.ktc) << c.name;
   }

@@ -24,9 +24,10 @@ struct FitResult {
 };
 
 /// Least squares of residuals(value) within bounds (Ceres, central differences).
+/// @param tolerance [1] relative change of the squares at which it ends.
 /// @param residuals fills `count` numbers. @throws Error when they are not finite at the start.
 FitResult fit(const std::function<void(const std::vector<double>& value, double* residuals)>& residuals,
-              std::size_t count, const std::vector<FitParameter>& parameters);
+              std::size_t count, const std::vector<FitParameter>& parameters, double tolerance = 1e-14);
 
 /// Bayesian information criterion of a fit whose residuals are weighted to variance 1 when
 /// `known_variance`, else of unknown variance, estimated from `squares`.

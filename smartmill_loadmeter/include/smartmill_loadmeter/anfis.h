@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+namespace smartmill::loadmeter {
+
+/// Adaptive neuro-fuzzy inference (Jang 1993): first-order Sugeno rules over a grid of bell-shaped membership
+/// functions mu = 1 / (1 + |(x - c) / a|^(2 b)), learnt by the hybrid rule: least squares for the rules'
+/// lines, gradient descent with adaptive step for the memberships. Inputs are scaled to 0..1 of the training
+/// data.
+class Anfis {
+ public:
+  struct Parameters {
+    int memberships = 2;  ///< 2..5 an input
+    int epochs = 40;      ///< >= 1
+    double step = 0.02;   ///< > 0, first length of a step of the memberships, of the range
+    double ridge = 1e-4;  ///< >= 0, keeps rules that hardly fire near nothing
+  };
+
+  /// @param inputs one vector a sample. @throws Error with fewer samples than a rule has unknowns, unequal
+  /// lengths, or a parameter out of range.
+  Anfis(const std::vector<std::vector<double>>& inputs, const std::vector<double>& outputs,
+        const Parameters& parameters);
+
+  double operator()(const std::vector<double>& input) const;
+  double trainingRms() const { return rms_; }
+
+ private:
+  struct Bell {
+    double a, b, c;
+  };
+  std::size_t rules() const;
+  std::vector<double> scaled(const std::vector<double>& input) const;
+  void fire(const std::vector<double>& x, std::vector<double>* normalised) const;
+  void solveLines(const std::vector<std::vector<double>>& x, const std::vector<double>& y, double ridge);
+  double squares(const std::vector<std::vector<double>>& x, const std::vector<double>& y) const;
+
+  std::size_t inputs_;
+  std::size_t memberships_;
+  std::vector<double> low_, span_;
+  double out_middle_ = 0.0, out_span_ = 1.0;
+  std::vector<Bell> bells_;  // input by input
+  std::vector<double> lines_;
+  double rms_ = 0.0;
+};
+
+}  // namespace smartmill::loadmeter

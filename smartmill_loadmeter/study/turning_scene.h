@@ -1,0 +1,69 @@
+#pragma once
+
+#include <array>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "smartmill_loadmeter/motor_current.h"
+
+namespace smartmill::loadmeter {
+
+/// The turning centre of Cheng & Venuvinod: X slide inclined, its weight aiding the infeed; Y the spindle, 11
+/// kW, base speed 1570 rpm; Z horizontal. Phase currents at 1000 Hz with harmonics and Hall-sensor noise.
+struct TurningVariances {
+  std::array<double, 3> process{{100.0, 84.0, 320.0}};  ///< [N2] Fx, Fy, Fz; Table 2 (Fx: not given, assumed)
+  std::array<double, 3> sensor{{260.0, 383.0, 260.0}};  ///< [N2] Table 2 (Fx: as Fz)
+};
+
+/// One cut as the machine and the dynamometer saw it.
+struct TurningCut {
+  bool moves_x = false, moves_z = false;
+  double speed_rpm = 0.0, feed = 0.0, depth = 0.0;  ///< [rpm], [m/rev], [m]
+  double radius = 0.0;                              ///< [m] of the work
+  std::array<double, 3> force{};                    ///< [N] dynamometer: Fx, Fy, Fz
+  std::array<double, 3> current{};  ///< [A] phase ranges X, Y, Z out of the signal chain; NaN: axis at rest
+  double spindle_air = 0.0;         ///< [A] range of the spindle's current in air at this speed
+};
+
+class TurningCentre {
+ public:
+  TurningCentre(unsigned seed, const TurningVariances& variances);
+
+  /// Longitudinal and facing cuts, one material, two tools (Table 1: 105 and 13 + 2).
+  std::vector<TurningCut> calibrationTests(std::size_t count);
+  /// Three materials, three tools; tapers and contours, where all axes move, too.
+  std::vector<TurningCut> predictionTests(std::size_t count);
+  /// The cut of Table 2: 1000 rpm, 2 mm, 0.2 mm/rev, again and again.
+  std::vector<TurningCut> replications(std::size_t count);
+
+  static constexpr double BASE_SPEED = 1570.0;  ///< [rpm]
+
+ private:
+  TurningCut cut(double kc, bool x, bool z, double speed_rpm, double feed, double depth, double radius);
+  double measured(double range, double frequency);
+
+  std::mt19937 random_;
+  std::normal_distribution<double> normal_;
+  TurningVariances variances_;
+};
+
+/// RMSE [N] and coefficient of determination of Fx, Fy, Fz over the cuts in which the axis moves.
+struct Agreement {
+  std::array<double, 3> rmse{}, r_squared{};
+  std::array<int, 3> count{};
+};
+
+/// RMSE is that of the two thirds of the prediction tests that took no part in a choice.
+/// Everything the paper does with one calibration and one prediction set.
+struct TurningResult {
+  Line x, z;                                     ///< F = m I + c
+  Agreement regression;                          ///< of the prediction tests
+  Agreement anfis;                               ///< Fy and Fz (0, 1, 2 as above; Fx: the line)
+  std::string fy_inputs, fz_inputs;              ///< the arrays that a third of the prediction tests chose
+  double fit_x = 0.0, fit_y = 0.0, fit_z = 0.0;  ///< R2 of the calibration
+  VarianceSplit fy, fz;                          ///< of the replications
+};
+TurningResult studyTurning(unsigned seed, const TurningVariances& variances, std::size_t replications);
+
+}  // namespace smartmill::loadmeter
