@@ -18,6 +18,7 @@
 namespace smartmill::session {
 namespace {
 
+const ros::Duration GOAL_LEAD(0.2);    // a goal is with its node when its time comes
 constexpr double POLL = 0.01;          // [s]
 constexpr double FRESH = 0.5;          // [s] since the last message of a sensor
 constexpr double CANCEL_WAIT = 0.8;    // [s] for a cancelled goal to end
@@ -219,7 +220,7 @@ template <class Action, class Goal>
 auto Session::call(Client<Action>& client, const std::string& name, Goal goal, double timeout) {
   checkStop();
   if (!client.isServerConnected()) throw Error(name + ": its node is gone");
-  goal.header.stamp = ros::Time::now();
+  goal.header.stamp = ros::Time::now() + GOAL_LEAD;
   client.sendGoal(goal);
   bool ended = false;
   std::string fault;

@@ -174,6 +174,9 @@ void BridgeParameters::validate() const {
       refuse(key, value, "above 0");
     }
   }
+  if (!(condition_lead >= 0.0 && condition_lead <= 10.0)) {
+    refuse("condition_lead", condition_lead, "within 0 .. 10");
+  }
   limits.validate();
 }
 
@@ -779,8 +782,11 @@ class Bridge::Impl {
     piece_.text +=
         "#" + std::to_string(parameters_.marker_macro) + "=" + std::to_string(piece_.marker) + "\n";
     enter(Phase::sending);
+    // Told ahead: it is with everybody when its time has come, and nothing of it has begun before.
+    condition_from_ = now_;
     if (piece_.condition) {
-      piece_.condition->stamp = now_;
+      condition_from_ += parameters_.condition_lead;
+      piece_.condition->stamp = condition_from_;
       conditions_.push_back(*piece_.condition);
     }
     advanceSending();
@@ -788,6 +794,10 @@ class Bridge::Impl {
 
   /// Text that the controller does not take now waits for the next step.
   void advanceSending() {
+    if (now_ < condition_from_) {
+      progressed_ = now_;
+      return;
+    }
     try {
       const std::size_t taken = client_.dncSend(piece_.text.data() + sent_, piece_.text.size() - sent_);
       sent_ += taken;
@@ -822,7 +832,17 @@ class Bridge::Impl {
     if (!still_since_) {
       still_since_ = now_;
     }
-    if (now_ - *still_since_ >= parameters_.settle_time) {
+    if (now_ - *still_since_ < parameters_.settle_time) {
+      return;
+    }
+    if (piece_.condition) {
+      // Its end is told ahead too; the outcome waits for it, so that whoever asks for results asks after it.
+      CuttingCondition none;
+      none.stamp = condition_to_ = now_ + parameters_.condition_lead;
+      conditions_.push_back(none);
+      piece_.condition.reset();
+    }
+    if (now_ >= condition_to_) {
       finish({MotionCode::ok, piece_.name + ": done"});
     }
   }
@@ -866,7 +886,7 @@ class Bridge::Impl {
     if (piece_.condition &&
         (phase_ == Phase::sending || phase_ == Phase::running || phase_ == Phase::stopping)) {
       CuttingCondition none;
-      none.stamp = now_;
+      none.stamp = std::max(now_, condition_from_ + 1e-3);
       conditions_.push_back(none);
     }
     if (outcome.code != MotionCode::ok && outcome.code != MotionCode::lost) {
@@ -909,6 +929,7 @@ class Bridge::Impl {
   Outcome stopping_outcome_;
   std::optional<Outcome> outcome_;
   std::vector<CuttingCondition> conditions_;
+  double condition_from_ = 0.0, condition_to_ = 0.0;  // [s] of the running piece
   std::vector<Note> notes_;
 };
 

@@ -22,6 +22,7 @@ NodeParameters readParameters(ParameterReader& reader) {
   reader.read("marker_macro", bridge.marker_macro);
   reader.read("orient_macro", bridge.orient_macro);
   reader.read("settle_time", bridge.settle_time);
+  reader.read("condition_lead", bridge.condition_lead);
   reader.read("standstill_speed", bridge.standstill_speed);
   reader.read("stall_timeout", bridge.stall_timeout);
   reader.read("stop_timeout", bridge.stop_timeout);

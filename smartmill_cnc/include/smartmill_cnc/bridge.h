@@ -25,6 +25,7 @@ struct BridgeParameters {
   double stall_timeout = 60.0;     ///< [s] without any progress (feed hold excepted) end a motion
   double stop_timeout = 5.0;       ///< [s] a cancelled motion may take to stop
   double open_timeout = 3.0;       ///< [s] the controller may put off a new DNC session after a cancelled one
+  double condition_lead = 0.3;     ///< [s] >= 0 by which a cutting condition is told before it begins or ends
   MotionLimits limits;
 
   /// @throws Error naming key and value.
