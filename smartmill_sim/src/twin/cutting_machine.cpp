@@ -150,11 +150,10 @@ void CuttingMachine::step(const Input& input, Output& out) {
   now_.angle = input.motion.angle;
   now_.speed = input.motion.speed;
 
-  ToolMotion motion = fed(input.motion);
-  out.force = {};
   if (rigid_) {
-    out.force = rigid_->at(motion.angle);
+    out.force = rigid_->at(input.motion.angle);
   } else if (process_ || regenerative_) {
+    ToolMotion motion = fed(input.motion);
     // The tip's place needs this step's force and the force needs the place: the force is first taken to go
     // on in a straight line, which errs by the square of the step.
     for (std::size_t axis = 0; axis < 2 && vibrates_; ++axis) {
@@ -162,6 +161,8 @@ void CuttingMachine::step(const Input& input, Output& out) {
       motion.displacement[axis] = tip_[axis].peek(2.0 * f[0] - f[1]);
     }
     out.force = process_ ? process_->step(motion) : regenerative_->at(motion.angle, motion.displacement);
+  } else {
+    out.force = {};
   }
   out.applied = {{out.force.fx + input.sensor_force[0], out.force.fy + input.sensor_force[1],
                   out.force.fz + input.sensor_force[2]}};
@@ -196,24 +197,19 @@ void CuttingMachine::step(const Input& input, Output& out) {
   engaged_ = false;
   if (effects_.has(Stage::sensor_output)) effects_.measure(Stage::sensor_output, now_, channels);
   for (auto& [channel, line] : delays_) channels[channel] = line.step(channels[channel]);
-  const auto show = [&out](const ChannelValues& shown) {
-    out.sensor = {{shown[FX], shown[FY], shown[FZ]}};
-    out.load_meter = shown[LOAD_METER];
-    out.displacement = {{shown[TOOL_X], shown[TOOL_Y]}};
-  };
-  if (effects_.has(Stage::signal)) {
-    ChannelValues shown = channels;
-    effects_.measure(Stage::signal, now_, shown);
-    show(shown);
-  } else {
-    show(channels);
-  }
+  ChannelValues shown = channels;
+  if (effects_.has(Stage::signal)) effects_.measure(Stage::signal, now_, shown);
+  out.sensor = {{shown[FX], shown[FY], shown[FZ]}};
+  out.load_meter = shown[LOAD_METER];
+  out.displacement = {{shown[TOOL_X], shown[TOOL_Y]}};
 
   now_.record_time += time_step_;
   if (clock_.record || cutting()) clock_.edge_time += time_step_;
   if (!clock_.record) clock_.start_time += time_step_;
-  if (state_.depth_slope != 0.0 && cutting())
-    feed_path_ += time_step_ * std::hypot(motion.velocity[0], motion.velocity[1]);
+  if (state_.depth_slope != 0.0 && cutting()) {
+    const std::array<double, 2>& v = input.motion.velocity;
+    feed_path_ += time_step_ * state_.feed_ratio * std::hypot(v[0], v[1]);
+  }
 }
 
 void CuttingMachine::finish(double record_time, ChannelValues& channels) const {

@@ -170,7 +170,7 @@ void CuttingProcess::cut(Slice& slice, int tooth, double before, double angle, c
     if (slice.chip[j] > -NO_GAP) {
       const CuttingCoefficients& k = law_.coefficients;
       double kc = law_.chip_factor;
-      if (law_.size_exponent != 0.0) kc *= std::pow(chip / law_.size_reference, -law_.size_exponent);
+      if (law_.size_exponent != 0.0 && chip > 0.0) kc *= std::pow(chip / law_.size_reference, -law_.size_exponent);
       const double h = kc * chip, edge = edgeShare(law_, chip);
       double ft = (k.ktc * h + k.kte * edge) * length;
       double fr = (k.krc * h + k.kre * edge) * length;

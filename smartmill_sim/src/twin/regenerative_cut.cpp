@@ -13,9 +13,10 @@ namespace {
 
 using units::TWO_PI;
 
-constexpr int REVOLUTIONS = 2;      // that a surface may wait for the next tooth that reaches it
-constexpr double CELL_ANGLE = 0.2;  // [rad] of the edge: two-point Gauss errs by 4e-7 of a smooth force
-constexpr double LEAST_LAG = 1e-6;  // [rad] over the depth; below it the edge is straight
+constexpr int REVOLUTIONS = 2;        // that a surface may wait for the next tooth that reaches it
+constexpr double CELL_ANGLE = 0.2;    // [rad] of the edge: two-point Gauss errs by 4e-7 of a smooth force
+constexpr double LEAST_CHIP = 1e-15;  // [m] at the ends of a contact, which still rub
+constexpr double LEAST_LAG = 1e-6;    // [rad] over the depth; below it the edge is straight
 constexpr double TANGENTIAL_DAMPING = 0.3;  // [1] of the radial force
 
 }  // namespace
@@ -62,6 +63,8 @@ void RegenerativeCut::engage(const std::vector<ContactArc>& arcs, const ToolMoti
       }
     }
   }
+  planes_.resize(teeth * REVOLUTIONS);
+  near_.resize(planes_.size());
   std::size_t size = 1;
   while (size < longest + 4) size *= 2;
   history_.assign(size, {{0, 0}});
@@ -79,59 +82,77 @@ void RegenerativeCut::push(const std::array<double, 2>& displacement) {
 }
 
 double RegenerativeCut::chip(double sine, double cosine) const {
-  double least = 1e300;
-  for (const Plane& p : near_) least = std::min(least, p.offset + p.x * sine + p.y * cosine);
+  double least = near_[0].offset + near_[0].x * sine + near_[0].y * cosine;
+  for (std::size_t k = 1; k < near_count_; ++k)
+    least = std::min(least, near_[k].offset + near_[k].x * sine + near_[k].y * cosine);
   return least;
 }
 
-// Most passes lie deeper than the last one all along the edge: with m the middle and w the half width,
-// a sin + b cos >= min(C, C cos w) - |S| sin w, C and S its value and slope in the middle.
-void RegenerativeCut::keepNear(double from, double to) {
-  near_.assign(1, planes_.front());
-  const Plane& last = planes_.front();
-  const SineCosine middle = sineCosine(0.5 * (from + to)), half = sineCosine(0.5 * (to - from));
+void RegenerativeCut::spread(double half) {
+  if (half == spread_.half) return;
+  const double gauss = half * 0.57735026918962576;
+  spread_ = {half, std::sin(half), std::cos(half), std::sin(gauss), std::cos(gauss)};
+}
+
+// Most passes lie deeper than the last one all along a cell. Within w of its middle
+// a sin + b cos >= min(C, C cos w) - |S| sin w, with C and S its value and slope in the middle.
+void RegenerativeCut::keepNear(double sine, double cosine) {
+  const Plane last = planes_[0];
+  near_[0] = last;
+  near_count_ = 1;
   for (std::size_t k = 1; k < planes_.size(); ++k) {
     const Plane& p = planes_[k];
     const double x = p.x - last.x, y = p.y - last.y;
-    const double value = x * middle.sine + y * middle.cosine;
-    const double slope = std::abs(x * middle.cosine - y * middle.sine);
-    if (p.offset - last.offset + std::min(value, value * half.cosine) - slope * half.sine <= 0.0)
-      near_.push_back(p);
+    const double value = x * sine + y * cosine, slope = std::abs(x * cosine - y * sine);
+    if (p.offset - last.offset + std::min(value, value * spread_.end_cosine) - slope * spread_.end_sine <=
+        0.0)
+      near_[near_count_++] = p;
   }
+}
+
+// Elementary force at one angle.
+void RegenerativeCut::add(double sine, double cosine, double weight, CuttingForce& sum,
+                          double& tangential) const {
+  const CuttingCoefficients& k = law_.coefficients;
+  const double thickness = std::max(chip(sine, cosine), LEAST_CHIP);
+  const double edge = edgeShare(law_, thickness);
+  double h = law_.chip_factor * thickness;
+  if (law_.size_exponent != 0.0) h *= std::pow(thickness / law_.size_reference, -law_.size_exponent);
+  const double damping = damping_[0] * sine + damping_[1] * cosine;
+  const double ft = weight * (k.ktc * h + k.kte * edge + TANGENTIAL_DAMPING * damping);
+  const double fr = weight * (k.krc * h + k.kre * edge + damping);
+  sum.fx += -ft * cosine - fr * sine;
+  sum.fy += ft * sine - fr * cosine;
+  sum.fz += weight * (k.kac * h + k.kae * edge);
+  tangential += ft;
 }
 
 // Force over immersion angles that one edge holds [N m/rad of lag], all in the arc.
 void RegenerativeCut::cut(double from, double to, CuttingForce& sum, double& tangential) {
-  keepNear(from, to);
-  const CuttingCoefficients& k = law_.coefficients;
-  const double ktc = k.ktc * law_.chip_factor, krc = k.krc * law_.chip_factor, kac = k.kac * law_.chip_factor;
   const int cells = std::max(1, static_cast<int>(std::ceil((to - from) / CELL_ANGLE)));
-  const double cell = (to - from) / cells;
-  SineCosine left = sineCosine(from);
-  double chip_left = chip(left.sine, left.cosine);
+  spread((to - from) / (2.0 * cells));
+  const double half = spread_.half;
   for (int n = 0; n < cells; ++n) {
-    const double start = from + n * cell;
-    const SineCosine right = sineCosine(start + cell);
-    const double chip_right = chip(right.sine, right.cosine);
-    double low = 0.0, high = 1.0;
-    const bool contact = chip_left > 0.0 || chip_right > 0.0;
-    if (contact && chip_left < 0.0) low = chip_left / (chip_left - chip_right);
-    if (contact && chip_right < 0.0) high = chip_left / (chip_left - chip_right);
-    chip_left = chip_right;
-    if (!contact) continue;
-    const double weight = 0.5 * (high - low) * cell, middle = 0.5 * (high + low);
-    for (const double side : {-0.28867513459481287, 0.28867513459481287}) {
-      const SineCosine at = sineCosine(start + (middle + side * (high - low)) * cell);
-      double h = std::max(chip(at.sine, at.cosine), 1e-15);
-      const double edge = edgeShare(law_, h);
-      if (law_.size_exponent != 0.0) h *= std::pow(h / law_.size_reference, -law_.size_exponent);
-      const double damping = damping_[0] * at.sine + damping_[1] * at.cosine;
-      const double ft = weight * (ktc * h + k.kte * edge + TANGENTIAL_DAMPING * damping);
-      const double fr = weight * (krc * h + k.kre * edge + damping);
-      sum.fx += -ft * at.cosine - fr * at.sine;
-      sum.fy += ft * at.sine - fr * at.cosine;
-      sum.fz += weight * (kac * h + k.kae * edge);
-      tangential += ft;
+    const double middle = from + (2 * n + 1) * half;
+    const auto [s, c] = sineCosine(middle);
+    keepNear(s, c);
+    const double s_end = c * spread_.end_sine, c_end = s * spread_.end_sine;
+    const double left = chip(s * spread_.end_cosine - s_end, c * spread_.end_cosine + c_end);
+    const double right = chip(s * spread_.end_cosine + s_end, c * spread_.end_cosine - c_end);
+    if (left <= 0.0 && right <= 0.0) continue;
+    if (left >= 0.0 && right >= 0.0) {
+      const double s_gauss = c * spread_.gauss_sine, c_gauss = s * spread_.gauss_sine;
+      add(s * spread_.gauss_cosine - s_gauss, c * spread_.gauss_cosine + c_gauss, half, sum, tangential);
+      add(s * spread_.gauss_cosine + s_gauss, c * spread_.gauss_cosine - c_gauss, half, sum, tangential);
+      continue;
+    }
+    // Contact begins or ends in the cell, the chip nearly straight there.
+    const double zero = middle + half * (left + right) / (left - right);
+    const double low = left < 0.0 ? zero : middle - half, high = left < 0.0 ? middle + half : zero;
+    const double part = 0.5 * (high - low), gauss = part * 0.57735026918962576;
+    for (const double side : {-gauss, gauss}) {
+      const SineCosine at = sineCosine(0.5 * (high + low) + side);
+      add(at.sine, at.cosine, part, sum, tangential);
     }
   }
 }
@@ -166,11 +187,11 @@ CuttingForce RegenerativeCut::at(double angle, const std::array<double, 2>& disp
         const double from = std::max(low, arc.entry), to = std::min(tip, arc.exit);
         const bool in = straight ? tip >= arc.entry && tip < arc.exit : to > from;
         if (in && !ready) {
-          planes_.clear();
-          for (const Pass& p : passes_[j]) {
-            const std::array<double, 2>& before = delays_[p.delay].value;
-            planes_.push_back({p.offset, displacement[0] - before[0] + feed_[0] * p.ahead,
-                               displacement[1] - before[1] + feed_[1] * p.ahead});
+          const std::vector<Pass>& passes = passes_[j];
+          for (std::size_t k = 0; k < passes.size(); ++k) {
+            const std::array<double, 2>& before = delays_[passes[k].delay].value;
+            planes_[k] = {passes[k].offset, displacement[0] - before[0] + feed_[0] * passes[k].ahead,
+                          displacement[1] - before[1] + feed_[1] * passes[k].ahead};
           }
           ready = true;
         }

@@ -7,8 +7,11 @@
 
 namespace smartmill::sim {
 
+/// 0 <= result <= 2 pi. By whole numbers: floor() is a call where the processor's own rounding may not be used.
 inline double wrapped(double angle) {
-  return angle - std::floor(angle * (1.0 / units::TWO_PI)) * units::TWO_PI;
+  const double turns = angle * (1.0 / units::TWO_PI);
+  const auto whole = static_cast<long>(turns);
+  return angle - static_cast<double>(whole - (turns < static_cast<double>(whole) ? 1 : 0)) * units::TWO_PI;
 }
 
 struct SineCosine {

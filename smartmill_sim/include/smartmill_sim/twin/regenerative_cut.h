@@ -48,8 +48,14 @@ class RegenerativeCut {
   struct Plane {  // chip = offset + x sin + y cos
     double offset, x, y;
   };
+  struct Spread {        // rotations from the middle of a cell to its ends and to its Gauss points
+    double half = -1.0;  // [rad]
+    double end_sine, end_cosine, gauss_sine, gauss_cosine;
+  };
+  void spread(double half);
   double chip(double sine, double cosine) const;
-  void keepNear(double from, double to);
+  void keepNear(double sine, double cosine);
+  void add(double sine, double cosine, double weight, CuttingForce& sum, double& tangential) const;
   void cut(double from, double to, CuttingForce& sum, double& tangential);
 
   ToolGeometry tool_;
@@ -61,8 +67,9 @@ class RegenerativeCut {
   std::vector<Delay> delays_;
   std::vector<std::array<double, 2>> history_;  // [m] ring; size a power of two
   std::size_t newest_ = 0;
-  std::vector<Plane> planes_;              // of all passes before one tooth
-  std::vector<Plane> near_;                // those that may give the chip of a part of its edge
+  std::vector<Plane> planes_, near_;  // of all passes before one tooth; those that may give a cell's chip
+  std::size_t near_count_ = 0;
+  Spread spread_;
   std::array<double, 2> feed_{{0, 0}};     // [m/rad]
   std::array<double, 2> damping_{{0, 0}};  // [N/m] radial force of process damping: x sin + y cos
   double speed_ = 0.0;
