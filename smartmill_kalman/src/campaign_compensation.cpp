@@ -25,10 +25,11 @@ void SensorFitParameters::validate() const {
   }
 }
 
-ModalFit identifySensor(const std::vector<std::vector<double>>& hammer,
-                        const std::vector<std::vector<double>>& response, double sample_rate,
-                        const SensorFitParameters& parameters) {
-  parameters.validate();
+namespace {
+
+/// H1 over all hits, hammer force windowed.
+FrequencyResponse averaged(const std::vector<std::vector<double>>& hammer,
+                           const std::vector<std::vector<double>>& response, double sample_rate) {
   if (hammer.empty() || hammer.size() != response.size()) throw Error("sensor identification: no hits");
   FrfEstimator estimator(sample_rate, hammer.front().size());
   for (std::size_t i = 0; i < hammer.size(); ++i) {
@@ -52,12 +53,42 @@ ModalFit identifySensor(const std::vector<std::vector<double>>& hammer,
     }
     estimator.add(force, response[i]);
   }
+  return estimator.h1("1");
+}
+
+struct Taps {
+  std::vector<std::vector<double>> hammer;
+  std::array<std::vector<std::vector<double>>, 3> response;  // of fx, fy, fz
+  double rate = 0.0;                                         // [Hz]
+};
+
+Taps tapsAlong(const Campaign& campaign, std::size_t axis) {
+  Taps taps;
+  for (const CampaignTest& test : campaign.tests) {
+    if (test.kind != TestKind::tap || test.direction != DIRECTIONS[axis]) continue;
+    const Record record = readRecord(campaign, test);
+    if (taps.rate != 0.0 && (taps.rate != test.sample_rate || record.size() != taps.hammer.front().size())) {
+      throw Error(record.file + ": taps of one direction need one rate and one length");
+    }
+    taps.rate = test.sample_rate;
+    taps.hammer.push_back(record.column("hammer"));
+    for (std::size_t i = 0; i < 3; ++i) taps.response[i].push_back(record.column(FORCES[i]));
+  }
+  return taps;
+}
+
+}  // namespace
+
+ModalFit identifySensor(const std::vector<std::vector<double>>& hammer,
+                        const std::vector<std::vector<double>>& response, double sample_rate,
+                        const SensorFitParameters& parameters) {
+  parameters.validate();
   ModalFitOptions options;
   options.low = parameters.low;
   options.high = std::min(parameters.high, 0.45 * sample_rate);
   options.max_modes = parameters.max_modes;
   options.unit_static_gain = true;
-  return fitModes(estimator.h1("1"), options);
+  return fitModes(averaged(hammer, response, sample_rate), options);
 }
 
 std::array<ModalModel, 3> identifySensor(const Campaign& campaign, const SensorFitParameters& parameters) {
@@ -65,21 +96,10 @@ std::array<ModalModel, 3> identifySensor(const Campaign& campaign, const SensorF
   bool any = false;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     sensor[axis].direct = 1.0;
-    std::vector<std::vector<double>> hammer, response;
-    double rate = 0.0;
-    for (const CampaignTest& test : campaign.tests) {
-      if (test.kind != TestKind::tap || test.direction != DIRECTIONS[axis]) continue;
-      const Record record = readRecord(campaign, test);
-      if (rate != 0.0 && (rate != test.sample_rate || record.size() != hammer.front().size())) {
-        throw Error(record.file + ": taps of one direction need one rate and one length");
-      }
-      rate = test.sample_rate;
-      hammer.push_back(record.column("hammer"));
-      response.push_back(record.column(FORCES[axis]));
-    }
-    if (hammer.empty()) continue;
+    const Taps taps = tapsAlong(campaign, axis);
+    if (taps.hammer.empty()) continue;
     any = true;
-    sensor[axis] = identifySensor(hammer, response, rate, parameters).model;
+    sensor[axis] = identifySensor(taps.hammer, taps.response[axis], taps.rate, parameters).model;
   }
   if (!any) throw Error(campaign.folder + ": the campaign has no taps to identify the force sensor from");
   return sensor;
@@ -96,6 +116,40 @@ std::array<std::vector<double>, 3> compensate(const Record& record, const std::a
       for (double& sample : measured) sample = -sample;
     }
     force[axis] = compensateRecord(method, measured, sensor[axis], spindle_speed, sample_rate, parameters);
+  }
+  return force;
+}
+
+SensorMatrix identifySensorMatrix(const Campaign& campaign, const SensorFitParameters& parameters) {
+  SensorMatrix sensor;
+  std::array<Taps, 3> taps;
+  for (std::size_t j = 0; j < 3; ++j) {
+    taps[j] = tapsAlong(campaign, j);
+    if (taps[j].hammer.empty())
+      throw Error(campaign.folder + ": cross-talk needs taps along " + DIRECTIONS[j] + " too");
+    sensor.h[j][j] = identifySensor(taps[j].hammer, taps[j].response[j], taps[j].rate, parameters).model;
+  }
+  for (std::size_t j = 0; j < 3; ++j) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      if (i == j) continue;
+      sensor.h[i][j] =
+          fitCrossTalk(averaged(taps[j].hammer, taps[j].response[i], taps[j].rate), sensor.h[j][j],
+                       sensor.h[i][i], parameters.low, std::min(parameters.high, 0.45 * taps[j].rate));
+    }
+  }
+  return sensor;
+}
+
+std::array<std::vector<double>, 3> compensate(const Record& record, const SensorMatrix& sensor,
+                                              double spindle_speed, double sample_rate,
+                                              const HarmonicFilterParameters& parameters) {
+  CoupledFilter filter(sensor, spindle_speed, sample_rate, parameters);
+  std::array<std::vector<double>, 3> force;
+  const std::array<const std::vector<double>*, 3> measured{
+      {&record.column("fx"), &record.column("fy"), &record.column("fz")}};
+  for (std::size_t i = 0; i < record.size(); ++i) {
+    const auto found = filter.step({(*measured[0])[i], (*measured[1])[i], (*measured[2])[i]});
+    for (std::size_t axis = 0; axis < 3; ++axis) force[axis].push_back(found[axis]);
   }
   return force;
 }

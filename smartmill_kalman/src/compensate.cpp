@@ -2,6 +2,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cctype>
 #include <chrono>
@@ -29,7 +30,7 @@ constexpr std::array<const char*, 3> AXES{{"x", "y", "z"}};
 
 struct Request {
   std::string source, out, model, parameters, method = "kalman";
-  bool identify = false;
+  bool identify = false, coupled = false;
   std::optional<double> bandwidth, noise, settling;
   kalman::SensorFitParameters fit;
 };
@@ -80,11 +81,23 @@ kalman::NodeParameters parametersOf(const Request& request) {
 }
 
 void fromCampaign(const Request& request) {
+  if (request.coupled && request.method != "kalman") throw Error("--coupled goes with --method kalman");
   const Campaign campaign = readCampaign(request.source);
   const kalman::NodeParameters parameters = parametersOf(request);
   std::array<ModalModel, 3> sensor;
+  std::optional<kalman::SensorMatrix> matrix;
   bool workpiece = false;
-  if (request.identify) {
+  if (request.coupled) {
+    matrix = kalman::identifySensorMatrix(campaign, request.fit);
+    for (std::size_t axis = 0; axis < 3; ++axis) sensor[axis] = matrix->h[axis][axis];
+    double worst = 1.0;
+    for (double f = 0.0; f <= request.fit.high; f += 5.0) worst = std::max(worst, matrix->condition(f));
+    std::printf(
+        "static cross-talk [%%]: xy %.2f xz %.2f yx %.2f yz %.2f zx %.2f zy %.2f; condition at most %.1f\n",
+        100.0 * matrix->h[0][1].staticGain(), 100.0 * matrix->h[0][2].staticGain(),
+        100.0 * matrix->h[1][0].staticGain(), 100.0 * matrix->h[1][2].staticGain(),
+        100.0 * matrix->h[2][0].staticGain(), 100.0 * matrix->h[2][1].staticGain(), worst);
+  } else if (request.identify) {
     sensor = kalman::identifySensor(campaign, request.fit);
   } else {
     const MachineModel model = readMachineModel(request.model.empty() ? campaign.modelPath() : request.model);
@@ -97,8 +110,11 @@ void fromCampaign(const Request& request) {
     if (test.kind != TestKind::cut) continue;
     std::fprintf(stderr, "compensating %s\n", test.name.c_str());
     const Record record = readRecord(campaign, test);
-    const auto force = kalman::compensate(record, sensor, workpiece, test.spindle_speed, test.sample_rate,
-                                          parameters.compensation.filter, kalman::methodOf(request.method));
+    const auto force =
+        matrix ? kalman::compensate(record, *matrix, test.spindle_speed, test.sample_rate,
+                                    parameters.compensation.filter)
+               : kalman::compensate(record, sensor, workpiece, test.spindle_speed, test.sample_rate,
+                                    parameters.compensation.filter, kalman::methodOf(request.method));
     write(request.out, test.name, record.time, force);
     printRange(test.name, forces(record), force);
     ++cuts;
@@ -119,8 +135,10 @@ std::string fileName(std::string name, std::set<std::string>& used) {
 }
 
 void fromBag(const Request& request) {
-  if (request.identify) {
-    throw Error("--identify is for campaigns: the taps in a bag count from their goals on, as in the node");
+  if (request.identify || request.coupled) {
+    throw Error(
+        "--identify and --coupled are for campaigns: the taps in a bag count from their goals on, as in the "
+        "node");
   }
   const kalman::NodeParameters parameters = parametersOf(request);
   const std::string model_file = request.model.empty() ? parameters.model : request.model;
@@ -178,6 +196,9 @@ int main(int argc, char** argv) {
   app.add_option("--model", request.model, "model file with the force sensor (default: the campaign's)");
   app.add_option("--params", request.parameters, "parameter file of the node (launch/config/kalman.yaml)");
   app.add_flag("--identify", request.identify, "campaign: take the sensor's modes from its own taps");
+  app.add_flag(
+      "--coupled", request.coupled,
+      "campaign: sensor with its cross-talk from the campaign's own taps along x, y and z; method kalman");
   app.add_option("--method", request.method, "kalman (causal, as the node), smoother or inverse")
       ->check(CLI::IsMember({"kalman", "smoother", "inverse"}))
       ->capture_default_str();

@@ -7,6 +7,7 @@
 #include "smartmill_core/campaign/campaign.h"
 #include "smartmill_core/campaign/record.h"
 #include "smartmill_core/modal/modal_fit.h"
+#include "smartmill_kalman/coupled_filter.h"
 #include "smartmill_kalman/record_compensation.h"
 
 namespace smartmill::kalman {
@@ -31,6 +32,14 @@ ModalFit identifySensor(const std::vector<std::vector<double>>& hammer,
 /// Sensor models from a campaign's own tap tests. An axis without taps is ideal.
 /// @throws Error when the campaign has no taps at all.
 std::array<ModalModel, 3> identifySensor(const Campaign& campaign, const SensorFitParameters& parameters);
+
+/// Sensor with its cross-talk, from taps along x, y and z. @throws Error when a direction has no taps.
+SensorMatrix identifySensorMatrix(const Campaign& campaign, const SensorFitParameters& parameters);
+
+/// Force on the tool of one cut through a sensor with cross-talk [N]; causal.
+std::array<std::vector<double>, 3> compensate(const Record& record, const SensorMatrix& sensor,
+                                              double spindle_speed, double sample_rate,
+                                              const HarmonicFilterParameters& parameters);
 
 /// Force on the tool of one cut, at the record's sample times [N]; any latency is taken out.
 /// @param measures_workpiece the sensor shows the reaction: turned here.

@@ -94,6 +94,12 @@ class HarmonicFilter {
   /// Harmonics of the measured force at the next sample [N]: output = Re sum Y_n, n = 0..N.
   std::vector<std::complex<double>> measuredHarmonics() const;
 
+  /// Harmonic n of the applied force at the next sample [N], 0 the constant: force = Re sum.
+  std::complex<double> forceHarmonic(std::size_t n) const {
+    const std::size_t i = modes_ + n;
+    return {blocks_[i / 4].re[i % 4], blocks_[i / 4].im[i % 4]};
+  }
+
   /// Takes the force of another filter over (harmonics beyond its own: zero), so that a new layout starts
   /// without a jump. The sensor's modes must be as many.
   void adopt(const HarmonicFilter& other);
