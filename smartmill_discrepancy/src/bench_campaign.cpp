@@ -53,11 +53,15 @@ std::vector<CampaignTest> plan() {
     tests.push_back(t);
     return tests.back();
   };
-  for (const int rpm : {1000, 3000, 6000, 9000, 12000, 18000}) add("air_" + std::to_string(rpm), TestKind::air, rpm);
-  for (const char* axis : {"x", "y", "z"}) add(std::string("tap_") + axis, TestKind::tap, 0.0).direction = axis;
-  const auto cut = [&](const std::string& name, double rpm, double feed, double depth, double entry, double exit) {
+  for (const int rpm : {1000, 3000, 6000, 9000, 12000, 18000})
+    add("air_" + std::to_string(rpm), TestKind::air, rpm);
+  for (const char* axis : {"x", "y", "z"})
+    add(std::string("tap_") + axis, TestKind::tap, 0.0).direction = axis;
+  const auto cut = [&](const std::string& name, double rpm, double feed, double depth, double entry,
+                       double exit) {
     CampaignTest& t = add(name, TestKind::cut, rpm);
-    t.engagement = Engagement{units::radFromDeg(entry), units::radFromDeg(exit), depth * units::MM, feed * units::MM};
+    t.engagement =
+        Engagement{units::radFromDeg(entry), units::radFromDeg(exit), depth * units::MM, feed * units::MM};
     t.engage_time = 0.02;
     t.cut_time_before = cut_time;
     cut_time += 20.0;
@@ -65,7 +69,8 @@ std::vector<CampaignTest> plan() {
   cut("slot_4500_030", 4500, 0.03, 2, 0, 180);
   cut("slot_4500_060", 4500, 0.06, 2, 0, 180);
   cut("slot_4500_100", 4500, 0.10, 2, 0, 180);
-  for (const int rpm : {1200, 3000, 7200, 9000, 13950}) cut("slot_" + std::to_string(rpm), rpm, 0.06, 2, 0, 180);
+  for (const int rpm : {1200, 3000, 7200, 9000, 13950})
+    cut("slot_" + std::to_string(rpm), rpm, 0.06, 2, 0, 180);
   cut("up_4500", 4500, 0.08, 2, 0, 90);
   cut("down_4500", 4500, 0.08, 2, 90, 180);
   cut("slot_4500_deep", 4500, 0.06, 4, 0, 180);
@@ -86,12 +91,14 @@ MachineModel drawMachine(Random& random, bool flexible) {
   tool.diameter = oneOf<double>(random, {10e-3, 12e-3, 16e-3, 19.05e-3});
   tool.helix = units::radFromDeg(oneOf<double>(random, {20, 30, 35, 40}));
   m.tool = tool;
-  m.cutting = CuttingCoefficients{between(random, 650e6, 1000e6), between(random, 150e6, 400e6), between(random, 120e6, 250e6),
-                                  between(random, 10e3, 30e3),    between(random, 12e3, 35e3),   between(random, 0.6e3, 4e3)};
+  m.cutting = CuttingCoefficients{between(random, 650e6, 1000e6), between(random, 150e6, 400e6),
+                                  between(random, 120e6, 250e6),  between(random, 10e3, 30e3),
+                                  between(random, 12e3, 35e3),    between(random, 0.6e3, 4e3)};
   const std::array<double, 3> low{{900.0, 1000.0, 1900.0}}, high{{1500.0, 1900.0, 2800.0}};
   for (std::size_t a = 0; a < 3; ++a) {
     const double gain = a < 2 ? 0.9 : 0.95;
-    m.force_sensor.axis[a].modes = {modeOf(between(random, low[a], high[a]), between(random, 0.015, 0.04), gain)};
+    m.force_sensor.axis[a].modes = {
+        modeOf(between(random, low[a], high[a]), between(random, 0.015, 0.04), gain)};
     m.force_sensor.axis[a].direct = 1.0 - gain;
   }
   m.force_sensor.noise_rms = Axes3{{1.0, 1.0, 1.0}};
@@ -103,8 +110,10 @@ MachineModel drawMachine(Random& random, bool flexible) {
   s.load_meter_resolution = 3e-4;
   m.spindle = s;
   if (flexible) {
-    m.tool_tip.x.modes = {modeOf(between(random, 900.0, 1800.0), between(random, 0.03, 0.05), 1e-6 / between(random, 25.0, 45.0))};
-    m.tool_tip.y.modes = {modeOf(between(random, 900.0, 1800.0), between(random, 0.03, 0.05), 1e-6 / between(random, 25.0, 45.0))};
+    m.tool_tip.x.modes = {modeOf(between(random, 900.0, 1800.0), between(random, 0.03, 0.05),
+                                 1e-6 / between(random, 25.0, 45.0))};
+    m.tool_tip.y.modes = {modeOf(between(random, 900.0, 1800.0), between(random, 0.03, 0.05),
+                                 1e-6 / between(random, 25.0, 45.0))};
   }
   return m;
 }
@@ -122,12 +131,17 @@ EffectEntry drawEffect(const std::string& name, const MachineModel& machine, Ran
   e.name = name;
   auto& n = e.numbers;
   const auto size = [&](double low, double high) { return eitherSign(random, between(random, low, high)); };
-  if (name == "runout") n = {{"offset_um", between(random, 5.0, 25.0)}, {"angle_deg", between(random, 0.0, 360.0)}};
+  if (name == "runout")
+    n = {{"offset_um", between(random, 5.0, 25.0)}, {"angle_deg", between(random, 0.0, 360.0)}};
   if (name == "edge_forces")
-    n = {{"Kte_n_per_mm", between(random, 4.0, 15.0)}, {"Kre_n_per_mm", between(random, 4.0, 15.0)}, {"Kae_n_per_mm", between(random, 0.5, 4.0)}};
-  if (name == "size_effect") n = {{"exponent", between(random, 0.1, 0.35)}, {"reference_chip_um", between(random, 40.0, 120.0)}};
+    n = {{"Kte_n_per_mm", between(random, 4.0, 15.0)},
+         {"Kre_n_per_mm", between(random, 4.0, 15.0)},
+         {"Kae_n_per_mm", between(random, 0.5, 4.0)}};
+  if (name == "size_effect")
+    n = {{"exponent", between(random, 0.1, 0.35)}, {"reference_chip_um", between(random, 40.0, 120.0)}};
   if (name == "tool_wear") n = {{"edge_growth_per_min", between(random, 0.1, 0.8)}};
-  if (name == "cutting_speed") n = {{"exponent", between(random, 0.05, 0.25)}, {"reference_m_per_min", between(random, 100.0, 300.0)}};
+  if (name == "cutting_speed")
+    n = {{"exponent", between(random, 0.05, 0.25)}, {"reference_m_per_min", between(random, 100.0, 300.0)}};
   if (name == "uneven_pitch") {
     double rest = 360.0;
     for (int k = 0; k + 1 < machine.tool->teeth; ++k) {
@@ -138,13 +152,17 @@ EffectEntry drawEffect(const std::string& name, const MachineModel& machine, Ran
   }
   if (name == "helix") n = {{"helix_deg", units::degFromRad(machine.tool->helix) + size(3.0, 9.0)}};
   if (name == "tool_flexibility") {
-    e.flexibility.x.modes = {modeOf(between(random, 800.0, 2200.0), between(random, 0.03, 0.06), 1e-6 / between(random, 25.0, 50.0))};
-    e.flexibility.y.modes = {modeOf(between(random, 800.0, 2200.0), between(random, 0.03, 0.06), 1e-6 / between(random, 25.0, 50.0))};
+    e.flexibility.x.modes = {modeOf(between(random, 800.0, 2200.0), between(random, 0.03, 0.06),
+                                    1e-6 / between(random, 25.0, 50.0))};
+    e.flexibility.y.modes = {modeOf(between(random, 800.0, 2200.0), between(random, 0.03, 0.06),
+                                    1e-6 / between(random, 25.0, 50.0))};
   }
   if (name == "process_damping") n = {{"coefficient_n_per_mm", between(random, 150.0, 800.0)}};
   if (name == "extra_mode") {
     e.words["axis"] = oneOf<std::string>(random, {"x", "y", "z"});
-    n = {{"frequency_hz", between(random, 300.0, 3500.0)}, {"damping_ratio", between(random, 0.01, 0.05)}, {"gain", between(random, 0.03, 0.09)}};
+    n = {{"frequency_hz", between(random, 300.0, 3500.0)},
+         {"damping_ratio", between(random, 0.01, 0.05)},
+         {"gain", between(random, 0.03, 0.09)}};
   }
   if (name == "mass_loading") n = {{"mass_ratio", between(random, 0.08, 0.4)}};
   if (name == "speed_dependent_mode") n = {{"softening_per_krpm", between(random, 0.004, 0.015)}};
@@ -156,8 +174,11 @@ EffectEntry drawEffect(const std::string& name, const MachineModel& machine, Ran
   }
   if (name == "charge_drift") n = {{"rate_n_per_min", size(800.0, 4000.0)}, {"y_ratio", size(0.3, 1.5)}};
   if (name == "mains_hum")
-    n = {{"frequency_hz", oneOf<double>(random, {50.0, 60.0})}, {"amplitude_n", between(random, 2.0, 12.0)}, {"y_ratio", size(0.3, 1.2)}};
-  if (name == "unbalance") n = {{"mass_eccentricity_g_mm", between(random, 4.0, 20.0)}, {"angle_deg", between(random, 0.0, 360.0)}};
+    n = {{"frequency_hz", oneOf<double>(random, {50.0, 60.0})},
+         {"amplitude_n", between(random, 2.0, 12.0)},
+         {"y_ratio", size(0.3, 1.2)}};
+  if (name == "unbalance")
+    n = {{"mass_eccentricity_g_mm", between(random, 4.0, 20.0)}, {"angle_deg", between(random, 0.0, 360.0)}};
   if (name == "channel_delay") {
     e.words["channel"] = oneOf<std::string>(random, {"fx", "fy", "fz"});
     n = {{"delay_us", between(random, 30.0, 200.0)}};
@@ -167,8 +188,10 @@ EffectEntry drawEffect(const std::string& name, const MachineModel& machine, Ran
     n = {{"gain", 1.0 + size(0.06, 0.2)}};
   }
   if (name == "saturation") n = {{"limit_n", between(random, 150.0, 350.0)}};
-  if (name == "stribeck_friction") n = {{"breakaway_nm", between(random, 0.1, 0.6)}, {"speed_rpm", between(random, 1200.0, 4500.0)}};
-  if (name == "friction_warmup") n = {{"cold_ratio", between(random, 0.2, 0.8)}, {"time_constant_s", between(random, 120.0, 500.0)}};
+  if (name == "stribeck_friction")
+    n = {{"breakaway_nm", between(random, 0.1, 0.6)}, {"speed_rpm", between(random, 1200.0, 4500.0)}};
+  if (name == "friction_warmup")
+    n = {{"cold_ratio", between(random, 0.2, 0.8)}, {"time_constant_s", between(random, 120.0, 500.0)}};
   if (name == "load_meter_lag") n = {{"bandwidth_hz", between(random, 1.5, 5.0)}};
   if (name == "depth_tilt") n = {{"slope_um_per_mm", size(15.0, 60.0)}};
   if (name == "feed_error") n = {{"ratio", 1.0 + size(0.12, 0.25)}};
@@ -180,7 +203,7 @@ OutsideCause drawOutside(Random& random) {
   o.kind = oneOf<std::string>(random, {"tone", "level", "order", "settling"});
   o.channel = oneOf<std::string>(random, {"fx", "fy", "fz"});
   o.amplitude = between(random, 3.0, 12.0);
-  o.place = o.kind == "tone"    ? between(random, 25.0, 45.0) + (between(random, 0.0, 1.0) < 0.5 ? 0.0 : 200.0)
+  o.place = o.kind == "tone" ? between(random, 25.0, 45.0) + (between(random, 0.0, 1.0) < 0.5 ? 0.0 : 200.0)
             : o.kind == "order" ? oneOf<double>(random, {0.5, 5.0, 7.0})
                                 : between(random, 0.03, 0.08);
   return o;
@@ -206,7 +229,9 @@ void writeBenchCampaign(const MachineModel& nominal, const BenchTruth& truth, co
     for (sim::Tone* tone : machine.tones()) tone->phase = between(random, 0.0, units::TWO_PI);
     const bool tap = test.kind == TestKind::tap, cut = test.kind == TestKind::cut;
     const double phase = between(random, 0.0, units::TWO_PI), own_phase = between(random, 0.0, units::TWO_PI);
-    const double feed = cut ? test.engagement->feed_per_tooth * truth.machine.tool->teeth * test.spindle_speed / units::TWO_PI : 0.0;
+    const double feed =
+        cut ? test.engagement->feed_per_tooth * truth.machine.tool->teeth * test.spindle_speed / units::TWO_PI
+            : 0.0;
     Record record;
     const std::size_t samples = tap ? 3072 : cut ? (test.spindle_speed < 200.0 ? 7680 : 5120) : 3840;
     std::vector<double> angles, hammer, load;
@@ -223,9 +248,12 @@ void writeBenchCampaign(const MachineModel& nominal, const BenchTruth& truth, co
         input.motion.velocity[0] = feed;
         input.motion.centre[0] = feed * t;
         if (tap && t > hit && t < hit + width)
-          input.sensor_force[test.direction == "x" ? 0 : test.direction == "y" ? 1 : 2] = peak * std::sin(units::PI * (t - hit) / width);
+          input.sensor_force[test.direction == "x"   ? 0
+                             : test.direction == "y" ? 1
+                                                     : 2] = peak * std::sin(units::PI * (t - hit) / width);
         if (cut && !engaged && t >= *test.engage_time - 1e-3 / test.sample_rate) {
-          machine.engage({{test.engagement->entry, test.engagement->exit, test.engagement->axial_depth}}, input.motion);
+          machine.engage({{test.engagement->entry, test.engagement->exit, test.engagement->axial_depth}},
+                         input.motion);
           engaged = true;
         }
         const sim::CuttingMachine::Output out = machine.step(input);
@@ -240,8 +268,9 @@ void writeBenchCampaign(const MachineModel& nominal, const BenchTruth& truth, co
       const double t = static_cast<double>(i) / test.sample_rate;
       if (truth.outside) {
         const OutsideCause& o = *truth.outside;
-        const double wave = o.kind == "tone"    ? std::sin(units::TWO_PI * o.place * t + own_phase)
-                            : o.kind == "order" ? (tap ? 0.0 : std::sin(o.place * (test.spindle_speed * t + phase)))
+        const double wave = o.kind == "tone" ? std::sin(units::TWO_PI * o.place * t + own_phase)
+                            : o.kind == "order"
+                                ? (tap ? 0.0 : std::sin(o.place * (test.spindle_speed * t + phase)))
                             : o.kind == "level" ? 1.0
                                                 : std::exp(-t / o.place);
         shown[sim::channelOf(o.channel)] += o.amplitude * wave;

@@ -1,4 +1,5 @@
-// rosrun smartmill_discrepancy bench: hides causes in drawn machines, lets explain find them, opens the seal and scores.
+// rosrun smartmill_discrepancy bench: hides causes in drawn machines, lets explain find them, opens the seal
+// and scores.
 
 #include <algorithm>
 #include <cmath>
@@ -42,7 +43,8 @@ bool needsFlexible(const Case& c) {
 std::vector<Case> drawCases(const Options& o, std::mt19937_64& random) {
   std::vector<std::string> names;
   for (const EffectKind& kind : effectCatalogue()) {
-    if (o.only.empty() || ("," + o.only + ",").find("," + kind.name + ",") != std::string::npos) names.push_back(kind.name);
+    if (o.only.empty() || ("," + o.only + ",").find("," + kind.name + ",") != std::string::npos)
+      names.push_back(kind.name);
   }
   std::vector<Case> cases;
   for (int k = 0; k < o.singles; ++k) {
@@ -125,7 +127,8 @@ void run(const Options& o) {
               e.unexplained.front().domain == truth.outside->domain();
       for (const Finding& f : e.unexplained) found += " [" + f.channel + " " + f.domain + "]";
     } else {
-      right = c.names.empty() ? e.verdict == "no_disagreement" : e.verdict == "explained" && e.effects.size() == c.names.size();
+      right = c.names.empty() ? e.verdict == "no_disagreement"
+                              : e.verdict == "explained" && e.effects.size() == c.names.size();
       for (std::size_t k = 0; k < c.names.size(); ++k) {
         const auto same = [&](const FoundEffect& f) { return f.name == c.names[k]; };
         const auto at = std::find_if(e.effects.begin(), e.effects.end(), same);
@@ -137,8 +140,9 @@ void run(const Options& o) {
     score[c.kind].first += right;
     ++score[c.kind].second;
     char line[600];
-    std::snprintf(line, sizeof line, "%d,%s,%s,%s,%s,%d,%.2f,%.3f,%.4f,%.4f,%.1f", number, c.kind.c_str(), expected.c_str(),
-                  e.verdict.c_str(), found.c_str(), right ? 1 : 0, largest, e.before.fit, e.after.fit, e.after.heldout, e.seconds);
+    std::snprintf(line, sizeof line, "%d,%s,%s,%s,%s,%d,%.2f,%.3f,%.4f,%.4f,%.1f", number, c.kind.c_str(),
+                  expected.c_str(), e.verdict.c_str(), found.c_str(), right ? 1 : 0, largest, e.before.fit,
+                  e.after.fit, e.after.heldout, e.seconds);
     table << line << std::endl;
     std::printf("%s\n", line);
     std::fflush(stdout);
@@ -148,7 +152,8 @@ void run(const Options& o) {
   std::ofstream matrix(o.out + "/confusion.csv");
   matrix << "truth,found,cases\n";
   for (const auto& [key, count] : confusion) matrix << key.first << "," << key.second << "," << count << "\n";
-  for (const auto& [kind, counts] : score) std::printf("%s: %d of %d right\n", kind.c_str(), counts.first, counts.second);
+  for (const auto& [kind, counts] : score)
+    std::printf("%s: %d of %d right\n", kind.c_str(), counts.first, counts.second);
 }
 
 }  // namespace
@@ -164,7 +169,8 @@ int main(int argc, char** argv) {
   app.add_option("--only", o.only, "effects to draw from, comma separated");
   app.add_option("--seed", o.seed, "of everything drawn");
   app.add_option("--threads", o.threads, "threads")->check(CLI::Range(1, 64));
-  app.add_option("--substeps", o.substeps, "integration steps a sample of the hidden machine")->check(CLI::Range(2, 64));
+  app.add_option("--substeps", o.substeps, "integration steps a sample of the hidden machine")
+      ->check(CLI::Range(2, 64));
   app.add_flag("--keep", o.keep, "keep the campaigns of right cases too");
   app.add_flag("--exact-nominal", o.exact_nominal, "nominal values are true");
   try {

@@ -14,8 +14,8 @@ double squaresOf(const std::vector<double>& v, const Block& b) {
   return s / static_cast<double>(b.size);
 }
 
-RevolutionCurve overRevolution(const TwinRunner& runner, const Block& block, const std::vector<double>& before,
-                               const std::vector<double>& after) {
+RevolutionCurve overRevolution(const TwinRunner& runner, const Block& block,
+                               const std::vector<double>& before, const std::vector<double>& after) {
   constexpr std::size_t BINS = 180;
   const TestData& test = runner.data().tests[block.test];
   RevolutionCurve curve{test.test.name, block.channel, {}, {}, {}, {}};
@@ -63,7 +63,8 @@ void addCurves(const TwinRunner& runner, const std::vector<double>& before, cons
     s.test = test.test.name;
     s.channel = channel;
     s.order_hz = test.test.spindle_speed / units::TWO_PI;
-    const auto from = static_cast<std::ptrdiff_t>(worst->offset), to = from + static_cast<std::ptrdiff_t>(worst->size);
+    const auto from = static_cast<std::ptrdiff_t>(worst->offset),
+               to = from + static_cast<std::ptrdiff_t>(worst->size);
     const auto b = fourier({before.begin() + from, before.begin() + to});
     const auto a = fourier({after.begin() + from, after.begin() + to});
     const double scale = 2.0 * worst->noise / static_cast<double>(worst->size);

@@ -8,6 +8,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/signal/fourier.h"
 #include "smartmill_core/signal/statistics.h"
+#include "smartmill_discrepancy/phase.h"
 
 namespace smartmill::discrepancy {
 namespace {
@@ -50,7 +51,8 @@ void checkChannel(const TestData& data, const std::string& channel) {
   if (channel == "load_meter") return;  // rounded and slow: repeats by nature
   if (const std::size_t run = longestRunAtExtreme(values); run >= CLIPPED_RUN) {
     throw Error(data.record.file + ": " + channel + " is clipped: " + std::to_string(run) +
-                " equal readings in a row at its extreme (range " + number(*low) + " to " + number(*high) + ")");
+                " equal readings in a row at its extreme (range " + number(*low) + " to " + number(*high) +
+                ")");
   }
 }
 
@@ -140,9 +142,9 @@ void chooseHeldout(std::vector<TestData>& tests) {
   }
   // Conditions of a cut. A test alone at the end of any range stays for the fit.
   const auto conditions = [](const TestData& t) {
-    return std::vector<double>{t.test.spindle_speed,        t.test.engagement->feed_per_tooth,
+    return std::vector<double>{t.test.spindle_speed,           t.test.engagement->feed_per_tooth,
                                t.test.engagement->axial_depth, t.test.engagement->entry,
-                               t.test.engagement->exit,     t.test.cut_time_before.value_or(0.0)};
+                               t.test.engagement->exit,        t.test.cut_time_before.value_or(0.0)};
   };
   std::vector<TestData*> inside;
   for (TestData* t : cuts) {
@@ -165,7 +167,7 @@ void chooseHeldout(std::vector<TestData>& tests) {
     }
     if (!alone) inside.push_back(t);
   }
-  const std::size_t due = cuts.size() >= 4 ? std::min(inside.size(), (cuts.size() + 1) / 4) : 0;
+  const std::size_t due = cuts.size() >= 4 ? std::min(inside.size(), (cuts.size() + 3) / 4) : 0;
   for (std::size_t k = 0; k < due; ++k) inside[(2 * k + 1) * inside.size() / (2 * due)]->heldout = true;
   if (air.size() >= 4) {
     std::sort(air.begin(), air.end(), [](const TestData* a, const TestData* b) {
@@ -191,8 +193,9 @@ Dataset loadDataset(const Campaign& campaign, const MachineModel& nominal) {
     for (const std::string& name : t.record.names) {
       if (std::find(COUNTING.begin(), COUNTING.end(), name) != COUNTING.end()) {
         if (name == "load_meter" && (!nominal.spindle || test.kind == TestKind::tap)) {
-          aside.insert(test.kind == TestKind::tap ? "load_meter of taps is not compared"
-                                                  : "load_meter is not compared: the model has no spindle section");
+          aside.insert(test.kind == TestKind::tap
+                           ? "load_meter of taps is not compared"
+                           : "load_meter is not compared: the model has no spindle section");
           continue;
         }
         t.channels.push_back(name);
@@ -211,6 +214,7 @@ Dataset loadDataset(const Campaign& campaign, const MachineModel& nominal) {
   if (data.tests.empty()) throw Error(campaign.folder + ": no tests");
   data.notes.assign(aside.begin(), aside.end());
   data.noise = noiseOf(data);
+  for (const std::string& note : estimatePhases(data)) data.notes.push_back(note);
   chooseHeldout(data.tests);
   return data;
 }

@@ -32,12 +32,14 @@ void run(const std::string& folder, const std::string& model_file, const std::st
   if (failed) throw Error(out + ": " + failed.message());
   const Explanation explanation = explain(data, options, out);
   writeReport(explanation, out);
-  writeHtml(explanation, std::filesystem::path(folder).filename().string(), drawPictures(explanation, out), out);
+  writeHtml(explanation, std::filesystem::path(folder).filename().string(), drawPictures(explanation, out),
+            out);
   std::printf("verdict: %s\n", explanation.verdict.c_str());
   for (const FoundEffect& e : explanation.effects) {
     std::printf("%s:", e.name.c_str());
     for (const auto& [key, word] : e.words) std::printf(" %s %s", key.c_str(), word.c_str());
-    for (const FoundParameter& p : e.parameters) std::printf(" %s %.5g +- %.2g", p.key.c_str(), p.value, p.std_dev);
+    for (const FoundParameter& p : e.parameters)
+      std::printf(" %s %.5g +- %.2g", p.key.c_str(), p.value, p.std_dev);
     std::printf("\n");
   }
   for (const Finding& f : explanation.unexplained) {

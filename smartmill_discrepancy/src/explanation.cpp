@@ -15,7 +15,7 @@ namespace smartmill::discrepancy {
 namespace {
 
 constexpr double TWIN_ACCURACY = 2e-4;  // share of a value by which two faithful simulations differ
-constexpr double ALIKE = 10.0;  // difference of BIC below which two effects are not told apart
+constexpr double ALIKE = 10.0;          // difference of BIC below which two effects are not told apart
 
 double squaresOf(const std::vector<double>& v) {
   double s = 0.0;
@@ -75,9 +75,12 @@ FitState without(const FitState& state, std::size_t member) {
 std::vector<FoundParameter> parametersOf(const Member& member, const Eigen::MatrixXd& covariance) {
   const auto numbers = numbersOf(member.hypothesis->entry(member.values));
   std::vector<FoundParameter> parameters;
-  Eigen::MatrixXd gradient = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(numbers.size()), covariance.cols());
+  Eigen::MatrixXd gradient =
+      Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(numbers.size()), covariance.cols());
   for (std::size_t c = 0; c < member.values.size(); ++c) {
-    const double step = 1e-3 * std::max(std::sqrt(covariance(static_cast<Eigen::Index>(c), static_cast<Eigen::Index>(c))), 1e-12);
+    const double step =
+        1e-3 *
+        std::max(std::sqrt(covariance(static_cast<Eigen::Index>(c), static_cast<Eigen::Index>(c))), 1e-12);
     std::vector<double> moved = member.values;
     moved[c] += step;
     const auto other = numbersOf(member.hypothesis->entry(moved));
@@ -92,7 +95,8 @@ std::vector<FoundParameter> parametersOf(const Member& member, const Eigen::Matr
   for (std::size_t k = 0; k < numbers.size(); ++k) {
     const auto i = static_cast<Eigen::Index>(k);
     const double own = TWIN_ACCURACY * (numbers[k].first == "angle_deg" ? 57.3 : numbers[k].second);
-    parameters.push_back({numbers[k].first, numbers[k].second, std::sqrt(std::max(spread(i, i), 0.0) + own * own)});
+    parameters.push_back(
+        {numbers[k].first, numbers[k].second, std::sqrt(std::max(spread(i, i), 0.0) + own * own)});
   }
   return parameters;
 }
@@ -107,7 +111,8 @@ void writeStdDevs(EffectEntry& entry, const std::vector<FoundParameter>& paramet
       for (const FoundParameter& p : parameters) {
         if (p.key == name + "frequency_hz") modes.modes[k].frequency_std = p.std_dev;
         if (p.key == name + "damping_ratio") modes.modes[k].damping_ratio_std = p.std_dev;
-        if (p.key == name + "stiffness_n_per_um") modes.modes[k].gain_std = modes.modes[k].gain * p.std_dev / p.value;
+        if (p.key == name + "stiffness_n_per_um")
+          modes.modes[k].gain_std = modes.modes[k].gain * p.std_dev / p.value;
       }
     }
   };
@@ -148,7 +153,8 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
   const std::vector<double> before_heldout = residualOf(heldout_runner, data.nominal);
   result.before = {gapOf(before), gapOf(before_heldout)};
   char line[200];
-  std::snprintf(line, sizeof line, "gap of the nominal model: %.4f, held out %.4f", result.before.fit, result.before.heldout);
+  std::snprintf(line, sizeof line, "gap of the nominal model: %.4f, held out %.4f", result.before.fit,
+                result.before.heldout);
   say(line);
 
   SearchResult found = search(quick_runner, quick, exact, hypotheses, s);
@@ -158,7 +164,8 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
   result.unexplained = findStructure(exact_runner, found.best.residual, structure);
   // What the calibration of the nominal values takes away is no disagreement of their kind.
   result.where = findStructure(exact_runner, found.null.residual, structure);
-  // An effect that the tests do not agree on, or that is small beside what is left where it acts, stands for another cause.
+  // An effect that the tests do not agree on, or that is small beside what is left where it acts, stands for
+  // another cause.
   while (!result.unexplained.empty() && !found.best.state.members.empty()) {
     std::size_t worst = 0;
     double worst_score = 1.0;
@@ -169,9 +176,11 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
         const auto at = trace.squares.find(f.channel);
         if (at != trace.squares.end() && at->second > 0.01 * trace.total) rest += f.squares;
       }
-      const double score = std::max(trace.evenness / options.least_evenness, 2.0 * rest / std::max(found.contribution[m], 1.0));
+      const double score = std::max(trace.evenness / options.least_evenness,
+                                    2.0 * rest / std::max(found.contribution[m], 1.0));
       std::snprintf(line, sizeof line, "  %s: tests differ by %.3g, rest %.3g, contribution %.3g",
-                    found.best.state.members[m].hypothesis->title().c_str(), trace.evenness, rest, found.contribution[m]);
+                    found.best.state.members[m].hypothesis->title().c_str(), trace.evenness, rest,
+                    found.contribution[m]);
       say(line);
       if (score > worst_score) {
         worst_score = score;
@@ -214,7 +223,8 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
     const double without_it = squaresOf(residualOf(heldout_runner, exact.model(without(best.state, m))));
     const auto floor = static_cast<double>(heldout_runner.size());
     effect.heldout_gap_reduction =
-        without_it > floor ? std::clamp(1.0 - std::max(with - floor, 0.0) / (without_it - floor), -1.0, 1.0) : 0.0;
+        without_it > floor ? std::clamp(1.0 - std::max(with - floor, 0.0) / (without_it - floor), -1.0, 1.0)
+                           : 0.0;
     for (const Rival& rival : found.rivals) {
       if (rival.member != m) continue;
       effect.alternatives.emplace_back(rival.effect, rival.delta_bic);
@@ -233,12 +243,14 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
   const std::vector<double> after = residualOf(exact_runner, result.model);
   const std::vector<double> after_heldout = residualOf(heldout_runner, result.model);
   result.after = {gapOf(after), gapOf(after_heldout)};
-  const auto addGaps = [&](const TwinRunner& runner, const std::vector<double>& b, const std::vector<double>& a, bool held) {
+  const auto addGaps = [&](const TwinRunner& runner, const std::vector<double>& b,
+                           const std::vector<double>& a, bool held) {
     for (const Block& block : runner.blocks()) {
-      const auto from = static_cast<std::ptrdiff_t>(block.offset), to = from + static_cast<std::ptrdiff_t>(block.size);
+      const auto from = static_cast<std::ptrdiff_t>(block.offset),
+                 to = from + static_cast<std::ptrdiff_t>(block.size);
       result.gaps.push_back({data.tests[block.test].test.name, block.channel, held,
-                             gapOf({b.begin() + from, b.begin() + to}), gapOf({a.begin() + from, a.begin() + to}),
-                             floorDeviation(block.size)});
+                             gapOf({b.begin() + from, b.begin() + to}),
+                             gapOf({a.begin() + from, a.begin() + to}), floorDeviation(block.size)});
     }
   };
   addGaps(exact_runner, before, after, false);
@@ -253,8 +265,9 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
   }
   if (result.verdict == "no_disagreement") result.where.clear();
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  std::snprintf(line, sizeof line, "verdict %s; gap %.4f -> %.4f, held out %.4f -> %.4f", result.verdict.c_str(),
-                result.before.fit, result.after.fit, result.before.heldout, result.after.heldout);
+  std::snprintf(line, sizeof line, "verdict %s; gap %.4f -> %.4f, held out %.4f -> %.4f",
+                result.verdict.c_str(), result.before.fit, result.after.fit, result.before.heldout,
+                result.after.heldout);
   say(line);
   return result;
 }

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <limits>
 
+#include <ceres/ceres.h>
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
-#include <ceres/ceres.h>
 
 #include "smartmill_core/error.h"
 
@@ -23,7 +23,8 @@ class CampaignCost : public ceres::CostFunction {
     if (nominal_free) coordinates_ = fitter.freedom().coordinates();
     nominal_ = coordinates_.size();
     for (const Member& m : start.members)
-      coordinates_.insert(coordinates_.end(), m.hypothesis->coordinates.begin(), m.hypothesis->coordinates.end());
+      coordinates_.insert(coordinates_.end(), m.hypothesis->coordinates.begin(),
+                          m.hypothesis->coordinates.end());
     samples_ = fitter.runner().size();
     set_num_residuals(static_cast<int>(samples_ + coordinates_.size()));
     mutable_parameter_block_sizes()->push_back(static_cast<int>(coordinates_.size()));
@@ -85,7 +86,8 @@ class CampaignCost : public ceres::CostFunction {
     for (std::size_t i = 0; i < samples_; ++i) residuals[i] = last_simulated_[i] - measured[i];
     if (frozen_ && nominal_ > 0) {
       Eigen::VectorXd shift(static_cast<Eigen::Index>(nominal_));
-      for (std::size_t c = 0; c < nominal_; ++c) shift[static_cast<Eigen::Index>(c)] = now[c] - frozen_->at[c];
+      for (std::size_t c = 0; c < nominal_; ++c)
+        shift[static_cast<Eigen::Index>(c)] = now[c] - frozen_->at[c];
       r.noalias() += frozen_->columns * shift;
     }
     for (std::size_t i = 0; i < samples_; ++i) {

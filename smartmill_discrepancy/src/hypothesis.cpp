@@ -84,10 +84,10 @@ Hypothesis planar(const std::string& effect, const std::string& size_key, double
   return h;
 }
 
-// An amplitude and a scale: exponent and reference, breakaway and speed, cold ratio and time constant. The fit moves the
-// scale's logarithm.
-Hypothesis scaled(const std::string& effect, const Coordinate& amplitude, double reach, const std::string& scale_key,
-                  const Values& scales, double low, double high, double prior) {
+// An amplitude and a scale: exponent and reference, breakaway and speed, cold ratio and time constant. The
+// fit moves the scale's logarithm.
+Hypothesis scaled(const std::string& effect, const Coordinate& amplitude, double reach,
+                  const std::string& scale_key, const Values& scales, double low, double high, double prior) {
   Hypothesis h;
   h.effect = effect;
   const double middle = std::log(scales[scales.size() / 2]);
@@ -159,8 +159,10 @@ Hypothesis flexibility(const std::string& axis) {
   h.variant = axis;
   for (const char a : axis) {
     const std::string name(1, a);
-    h.coordinates.push_back({"ln " + name + " frequency_hz", std::log(1200.0), std::log(100.0), std::log(8000.0), 1e-3, 1.0});
-    h.coordinates.push_back({"ln " + name + " damping_ratio", std::log(0.04), std::log(0.003), std::log(0.4), 0.02, 1.0});
+    h.coordinates.push_back(
+        {"ln " + name + " frequency_hz", std::log(1200.0), std::log(100.0), std::log(8000.0), 1e-3, 1.0});
+    h.coordinates.push_back(
+        {"ln " + name + " damping_ratio", std::log(0.04), std::log(0.003), std::log(0.4), 0.02, 1.0});
     h.coordinates.push_back({name + " compliance_um_per_kn", 0.0, 0.0, 1000.0, 0.2, 100.0});
   }
   h.entry = [axis](const Values& v) {
@@ -209,16 +211,18 @@ std::vector<Hypothesis> catalogueHypotheses(const Dataset& data, std::vector<std
     } else {
       leaveOut("tool_wear", "cut_time_before_s is not stated");
     }
-    all.push_back(scaled("cutting_speed", {"exponent", 0.0, -1.0, 1.0, 0.002, 0.3}, 0.05, "reference_m_per_min",
-                         {150.0}, 1.0, 5000.0, 1.0));
+    all.push_back(scaled("cutting_speed", {"exponent", 0.0, -1.0, 1.0, 0.002, 0.3}, 0.05,
+                         "reference_m_per_min", {150.0}, 1.0, 5000.0, 1.0));
     if (model.tool && model.tool->teeth > 1) all.push_back(unevenPitch(*model.tool));
     if (model.tool) {
       const double helix = units::degFromRad(model.tool->helix);
-      all.push_back(amplitudes("helix", {{"helix_deg", helix, 0.0, 75.0, 0.1, 8.0}}, helix > 60.0 ? -1.0 : 1.0));
+      all.push_back(
+          amplitudes("helix", {{"helix_deg", helix, 0.0, 75.0, 0.1, 8.0}}, helix > 60.0 ? -1.0 : 1.0));
     }
     for (const char* axis : {"x", "y", "xy"}) all.push_back(flexibility(axis));
     if (!model.tool_tip.x.modes.empty() || !model.tool_tip.y.modes.empty()) {
-      all.push_back(amplitudes("process_damping", {{"coefficient_n_per_mm", 0.0, -1e4, 1e6, 5.0, 2000.0}}, 50.0));
+      all.push_back(
+          amplitudes("process_damping", {{"coefficient_n_per_mm", 0.0, -1e4, 1e6, 5.0, 2000.0}}, 50.0));
     } else {
       leaveOut("process_damping", "the model's tool is rigid");
     }
@@ -240,10 +244,10 @@ std::vector<Hypothesis> catalogueHypotheses(const Dataset& data, std::vector<std
     for (const char* pair : {"xy", "xz", "yx", "yz", "zx", "zy"})
       pairs.push_back({pair, 0.0, -0.9, 0.9, 0.002, 0.1});
     all.push_back(amplitudes("cross_talk", pairs, 0.01));
-    Hypothesis drift = amplitudes("charge_drift",
-                                  {{"rate_n_per_min", 0.0, -1e5, 1e5, 1.0, 500.0},
-                                   {"y rate_n_per_min", 0.0, -1e5, 1e5, 1.0, 500.0}},
-                                  20.0);
+    Hypothesis drift = amplitudes(
+        "charge_drift",
+        {{"rate_n_per_min", 0.0, -1e5, 1e5, 1.0, 500.0}, {"y rate_n_per_min", 0.0, -1e5, 1e5, 1.0, 500.0}},
+        20.0);
     drift.entry = [](const Values& v) {
       EffectEntry e;
       e.name = "charge_drift";
@@ -256,7 +260,9 @@ std::vector<Hypothesis> catalogueHypotheses(const Dataset& data, std::vector<std
     all.push_back(std::move(drift));
     for (const double frequency : {50.0, 60.0}) {
       if (!scope.channels.count("fx") && !scope.channels.count("fy")) break;
-      Hypothesis hum = amplitudes("mains_hum", {{"amplitude_n", 0.0, 0.0, 1e4, 0.02, 10.0}, {"y_ratio", 0.5, -20.0, 20.0, 0.005, 1.0}}, 1.0);
+      Hypothesis hum = amplitudes(
+          "mains_hum",
+          {{"amplitude_n", 0.0, 0.0, 1e4, 0.02, 10.0}, {"y_ratio", 0.5, -20.0, 20.0, 0.005, 1.0}}, 1.0);
       hum.variant = frequency == 50.0 ? "50 Hz" : "60 Hz";
       // The twin takes each record's phase from the record, for which the amplitude must not be zero.
       hum.probes.clear();
@@ -274,7 +280,8 @@ std::vector<Hypothesis> catalogueHypotheses(const Dataset& data, std::vector<std
     Hypothesis saturation;
     saturation.effect = "saturation";
     saturation.coordinates = {{"limit_n", 4.0 * limit, 0.02 * limit, 8.0 * limit, 2e-4 * limit, 4.0 * limit}};
-    for (const double share : {0.99, 0.97}) saturation.probes.push_back({{4.0 * limit}, {{share * limit}}, true});
+    for (const double share : {0.99, 0.97})
+      saturation.probes.push_back({{4.0 * limit}, {{share * limit}}, true});
     saturation.entry = [](const Values& v) {
       EffectEntry e;
       e.name = "saturation";
@@ -285,19 +292,20 @@ std::vector<Hypothesis> catalogueHypotheses(const Dataset& data, std::vector<std
   }
   for (const std::string& channel : scope.channels) {
     const bool slow = channel == "load_meter";
-    all.push_back(withWord(amplitudes("channel_delay",
-                                      {{"delay_us", 0.0, 0.0, slow ? 2e5 : 5000.0, slow ? 50.0 : 1.0,
-                                        slow ? 10000.0 : 200.0}},
-                                      slow ? 500.0 : 10.0),
-                           "channel", channel));
-    all.push_back(withWord(amplitudes("gain_error", {{"gain", 1.0, 0.05, 5.0, 0.002, 0.2}}, 0.02), "channel", channel));
+    all.push_back(withWord(
+        amplitudes("channel_delay",
+                   {{"delay_us", 0.0, 0.0, slow ? 2e5 : 5000.0, slow ? 50.0 : 1.0, slow ? 10000.0 : 200.0}},
+                   slow ? 500.0 : 10.0),
+        "channel", channel));
+    all.push_back(
+        withWord(amplitudes("gain_error", {{"gain", 1.0, 0.05, 5.0, 0.002, 0.2}}, 0.02), "channel", channel));
   }
   if (scope.channels.count("load_meter")) {
-    all.push_back(scaled("stribeck_friction", {"breakaway_nm", 0.0, -20.0, 20.0, 0.005, 0.5}, 0.05, "speed_rpm",
-                         {400.0, 1200.0, 3500.0}, 50.0, 30000.0, 1.0));
+    all.push_back(scaled("stribeck_friction", {"breakaway_nm", 0.0, -20.0, 20.0, 0.005, 0.5}, 0.05,
+                         "speed_rpm", {400.0, 1200.0, 3500.0}, 50.0, 30000.0, 1.0));
     if (scope.moved_starts) {
-      all.push_back(scaled("friction_warmup", {"cold_ratio", 0.0, -0.9, 20.0, 0.005, 0.5}, 0.05, "time_constant_s",
-                           {80.0, 250.0, 700.0}, 2.0, 20000.0, 1.0));
+      all.push_back(scaled("friction_warmup", {"cold_ratio", 0.0, -0.9, 20.0, 0.005, 0.5}, 0.05,
+                           "time_constant_s", {80.0, 250.0, 700.0}, 2.0, 20000.0, 1.0));
     } else {
       leaveOut("friction_warmup", "start_time_s is not stated");
     }

@@ -16,12 +16,13 @@ namespace smartmill::discrepancy {
 namespace {
 
 const std::array<std::string, 3> FORCES{{"fx", "fy", "fz"}};
-constexpr double FAR = 5.0;            // gap beyond which a label is doubted
-constexpr double SWAPPED = 0.1;        // share of the squares that a swap leaves
-constexpr double RELABELLED = 0.35;    // the same with another test's label, when it then fits as well as that test does
+constexpr double FAR = 5.0;      // gap beyond which a label is doubted
+constexpr double SWAPPED = 0.1;  // share of the squares that a swap leaves
+constexpr double RELABELLED =
+    0.35;  // the same with another test's label, when it then fits as well as that test does
 constexpr double AS_WELL = 1.5;
 constexpr double SPEED_TOLERANCE = 0.02;
-constexpr double UNIT = 30.0;          // factor that no gain error reaches
+constexpr double UNIT = 30.0;  // factor that no gain error reaches
 
 double squaresBetween(const std::vector<double>& a, const std::vector<double>& b) {
   double s = 0.0;
@@ -39,7 +40,8 @@ std::string joined(const std::vector<std::string>& names) {
 double turningSpeed(const TestData& t) {
   const std::vector<double>& angle = t.record.column("spindle_angle");
   double turned = 0.0;
-  for (std::size_t i = 1; i < angle.size(); ++i) turned += std::remainder(angle[i] - angle[i - 1], units::TWO_PI);
+  for (std::size_t i = 1; i < angle.size(); ++i)
+    turned += std::remainder(angle[i] - angle[i - 1], units::TWO_PI);
   return turned / (static_cast<double>(angle.size() - 1) / t.test.sample_rate);
 }
 
@@ -60,8 +62,10 @@ std::vector<std::string> wrongLabels(const Dataset& data, int threads) {
     if (t.test.kind == TestKind::tap || t.phase_estimated || !t.record.has("spindle_angle")) continue;
     const double speed = turningSpeed(t);
     if (std::abs(speed / t.test.spindle_speed - 1.0) > SPEED_TOLERANCE) {
-      std::snprintf(line, sizeof line, "test %s looks mislabelled: its spindle turns at %.0f rpm, spindle_speed_rpm says %.0f",
-                    t.test.name.c_str(), units::rpmFromRadPerSec(speed), units::rpmFromRadPerSec(t.test.spindle_speed));
+      std::snprintf(line, sizeof line,
+                    "test %s looks mislabelled: its spindle turns at %.0f rpm, spindle_speed_rpm says %.0f",
+                    t.test.name.c_str(), units::rpmFromRadPerSec(speed),
+                    units::rpmFromRadPerSec(t.test.spindle_speed));
       wrong.push_back(line);
     }
   }
@@ -80,7 +84,9 @@ std::vector<std::string> wrongLabels(const Dataset& data, int threads) {
   for (const auto& [channel, noise] : data.noise) {
     double product = 0.0, square = 0.0;
     for (std::size_t i = 0; i < count; ++i) {
-      if (data.tests[i].test.kind != TestKind::cut || !data.tests[i].record.has(channel) || !own[i].has(channel)) continue;
+      if (data.tests[i].test.kind != TestKind::cut || !data.tests[i].record.has(channel) ||
+          !own[i].has(channel))
+        continue;
       const auto &m = data.tests[i].record.column(channel), &s = own[i].column(channel);
       for (std::size_t k = 0; k < m.size(); ++k) {
         product += m[k] * s[k];
@@ -90,7 +96,9 @@ std::vector<std::string> wrongLabels(const Dataset& data, int threads) {
     if (square <= noise * noise) continue;
     const double factor = std::abs(product / square);
     if (factor > UNIT || (factor < 1.0 / UNIT && product * product / square > 100.0 * noise * noise)) {
-      std::snprintf(line, sizeof line, "%s reads %.3g times what the model says in every cut: its unit looks wrong", channel.c_str(), factor);
+      std::snprintf(line, sizeof line,
+                    "%s reads %.3g times what the model says in every cut: its unit looks wrong",
+                    channel.c_str(), factor);
       wrong.push_back(line);
     }
   }
@@ -106,9 +114,12 @@ std::vector<std::string> wrongLabels(const Dataset& data, int threads) {
       for (std::size_t b = a + 1; b < 3; ++b) {
         const std::string &x = FORCES[a], &y = FORCES[b];
         if (!t.record.has(x) || !t.record.has(y)) continue;
-        const double as_is = squaresBetween(t.record.column(x), own[i].column(x)) + squaresBetween(t.record.column(y), own[i].column(y));
-        const double swap = squaresBetween(t.record.column(x), own[i].column(y)) + squaresBetween(t.record.column(y), own[i].column(x));
-        const double floor = static_cast<double>(t.record.size()) * (std::pow(data.noise.at(x), 2) + std::pow(data.noise.at(y), 2));
+        const double as_is = squaresBetween(t.record.column(x), own[i].column(x)) +
+                             squaresBetween(t.record.column(y), own[i].column(y));
+        const double swap = squaresBetween(t.record.column(x), own[i].column(y)) +
+                            squaresBetween(t.record.column(y), own[i].column(x));
+        const double floor = static_cast<double>(t.record.size()) *
+                             (std::pow(data.noise.at(x), 2) + std::pow(data.noise.at(y), 2));
         if (as_is > FAR * floor && swap - floor < SWAPPED * (as_is - floor)) {
           swapped[{a, b}].push_back(t.test.name);
           doubted[i] = true;
@@ -117,7 +128,8 @@ std::vector<std::string> wrongLabels(const Dataset& data, int threads) {
     }
   }
   for (const auto& [pair, tests] : swapped)
-    wrong.push_back(FORCES[pair.first] + " and " + FORCES[pair.second] + " look swapped in tests " + joined(tests));
+    wrong.push_back(FORCES[pair.first] + " and " + FORCES[pair.second] + " look swapped in tests " +
+                    joined(tests));
   if (!wrong.empty()) return wrong;
 
   // A cut that another cut's label fits far better than its own, while the others fit theirs.
@@ -139,7 +151,8 @@ std::vector<std::string> wrongLabels(const Dataset& data, int threads) {
       if (other.test.kind != TestKind::cut || other.test.name == t.test.name) continue;
       CampaignTest test = t.test;
       test.engagement = other.test.engagement;
-      const double gap = forceSquares(t, sim::simulateTest(data.nominal, test, t.record, options)) / static_cast<double>(t.record.size());
+      const double gap = forceSquares(t, sim::simulateTest(data.nominal, test, t.record, options)) /
+                         static_cast<double>(t.record.size());
       if (gap < best) {
         best = gap;
         theirs = gaps[k];
@@ -147,7 +160,8 @@ std::vector<std::string> wrongLabels(const Dataset& data, int threads) {
       }
     }
     if (best < RELABELLED * gaps[i] && best < AS_WELL * std::max(theirs, 6.0))
-      wrong.push_back("test " + t.test.name + " looks mislabelled: feed, depth or immersion of " + name + " fit its record");
+      wrong.push_back("test " + t.test.name + " looks mislabelled: feed, depth or immersion of " + name +
+                      " fit its record");
   }
   return wrong;
 }

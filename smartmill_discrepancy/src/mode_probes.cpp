@@ -32,10 +32,12 @@ ModalModel oneMode(double frequency, double damping_ratio, double gain) {
   return m;
 }
 
-// Force per m of outward motion of the tool along x and y at a spindle angle: rows fx fy fz, columns x y [N/m].
+// Force per m of outward motion of the tool along x and y at a spindle angle: rows fx fy fz, columns x y
+// [N/m].
 using Stiffness = std::array<std::array<double, 2>, 3>;
 
-std::vector<Stiffness> cuttingStiffness(const MachineModel& model, const Engagement& engagement, std::size_t points) {
+std::vector<Stiffness> cuttingStiffness(const MachineModel& model, const Engagement& engagement,
+                                        std::size_t points) {
   const ToolGeometry& tool = *model.tool;
   const CuttingCoefficients& k = *model.cutting;
   constexpr int SLICES = 24;
@@ -44,7 +46,8 @@ std::vector<Stiffness> cuttingStiffness(const MachineModel& model, const Engagem
   for (std::size_t p = 0; p < points; ++p) {
     for (int j = 0; j < tool.teeth; ++j) {
       for (int s = 0; s < SLICES; ++s) {
-        const double tip = units::TWO_PI * static_cast<double>(p) / static_cast<double>(points) + tool.toothAngle(j);
+        const double tip =
+            units::TWO_PI * static_cast<double>(p) / static_cast<double>(points) + tool.toothAngle(j);
         double phi = std::fmod(tip - tool.lag() * (s + 0.5) * dz, units::TWO_PI);
         if (phi < 0.0) phi += units::TWO_PI;
         if (phi < engagement.entry || phi >= engagement.exit) continue;
@@ -82,7 +85,8 @@ std::vector<double> ModeProbes::sensorMode(std::size_t axis, double frequency, d
     if (b.channel != FORCES[axis]) continue;
     ModalFilter filter(oneMode(frequency, damping_ratio, 1.0), runner_.data().tests[b.test].test.sample_rate,
                        Hold::first_order);
-    for (std::size_t i = b.offset; i < b.offset + b.size; ++i) column[i] = filter.step(applied_[i]) - applied_[i];
+    for (std::size_t i = b.offset; i < b.offset + b.size; ++i)
+      column[i] = filter.step(applied_[i]) - applied_[i];
   }
   return column;
 }
@@ -109,14 +113,16 @@ std::vector<double> ModeProbes::tipMode(std::size_t axis, double frequency, doub
     }
     for (std::size_t b = first; b < end && !displacement.empty(); ++b) {
       if (blocks[b].channel != TIP[axis]) continue;
-      for (std::size_t i = 0; i < blocks[b].size; ++i) column[blocks[b].offset + i] = displacement[i] / blocks[b].noise;
+      for (std::size_t i = 0; i < blocks[b].size; ++i)
+        column[blocks[b].offset + i] = displacement[i] / blocks[b].noise;
     }
     if (data.test.kind == TestKind::cut && !displacement.empty() && data.record.has("spindle_angle")) {
       const std::vector<Stiffness> table = cuttingStiffness(model_, *data.test.engagement, POINTS);
       const double period = units::TWO_PI / model_.tool->teeth / data.test.spindle_speed * rate;  // [samples]
       const std::vector<double>& angle = data.record.column("spindle_angle");
       for (std::size_t b = first; b < end; ++b) {
-        const auto a = static_cast<std::size_t>(std::find(FORCES.begin(), FORCES.end(), blocks[b].channel) - FORCES.begin());
+        const auto a = static_cast<std::size_t>(std::find(FORCES.begin(), FORCES.end(), blocks[b].channel) -
+                                                FORCES.begin());
         if (a >= 3) continue;
         ModalFilter sensor(model_.force_sensor.axis[a], rate, Hold::first_order);
         for (std::size_t i = 0; i < blocks[b].size; ++i) {

@@ -25,15 +25,17 @@ NominalFreedom::NominalFreedom(const MachineModel& nominal) {
           [c](MachineModel& m, double factor) { (*m.cutting).*c *= factor; });
     }
   }
-  const auto addModes = [&](const std::string& name, const std::vector<Mode>& modes, auto get, bool stiffness) {
+  const auto addModes = [&](const std::string& name, const std::vector<Mode>& modes, auto get,
+                            bool stiffness) {
     for (std::size_t k = 0; k < modes.size(); ++k) {
       const std::string mode = name + "[" + std::to_string(k) + "].";
       add(mode + "frequency_hz", modes[k].frequency, u.frequency,
           [get, k](MachineModel& m, double factor) { get(m)[k].frequency *= factor; });
-      add(mode + "damping_ratio", modes[k].damping_ratio, u.damping, [get, k](MachineModel& m, double factor) {
-        double& damping = get(m)[k].damping_ratio;
-        damping = std::min(damping * factor, 0.99);
-      });
+      add(mode + "damping_ratio", modes[k].damping_ratio, u.damping,
+          [get, k](MachineModel& m, double factor) {
+            double& damping = get(m)[k].damping_ratio;
+            damping = std::min(damping * factor, 0.99);
+          });
       if (stiffness) {
         add(mode + "stiffness_n_per_um", modes[k].gain, u.stiffness,
             [get, k](MachineModel& m, double factor) { get(m)[k].gain /= factor; });
@@ -42,13 +44,16 @@ NominalFreedom::NominalFreedom(const MachineModel& nominal) {
   };
   const char* const AXES[] = {"x", "y", "z"};
   for (std::size_t a = 0; a < 3; ++a) {
-    addModes(std::string("force_sensor.") + AXES[a], nominal.force_sensor.axis[a].modes,
-             [a](MachineModel& m) -> std::vector<Mode>& { return m.force_sensor.axis[a].modes; }, false);
+    addModes(
+        std::string("force_sensor.") + AXES[a], nominal.force_sensor.axis[a].modes,
+        [a](MachineModel& m) -> std::vector<Mode>& { return m.force_sensor.axis[a].modes; }, false);
   }
-  addModes("tool_tip.x", nominal.tool_tip.x.modes,
-           [](MachineModel& m) -> std::vector<Mode>& { return m.tool_tip.x.modes; }, true);
-  addModes("tool_tip.y", nominal.tool_tip.y.modes,
-           [](MachineModel& m) -> std::vector<Mode>& { return m.tool_tip.y.modes; }, true);
+  addModes(
+      "tool_tip.x", nominal.tool_tip.x.modes,
+      [](MachineModel& m) -> std::vector<Mode>& { return m.tool_tip.x.modes; }, true);
+  addModes(
+      "tool_tip.y", nominal.tool_tip.y.modes,
+      [](MachineModel& m) -> std::vector<Mode>& { return m.tool_tip.y.modes; }, true);
   if (nominal.spindle) {
     const Spindle& s = *nominal.spindle;
     add("spindle.viscous_nm_s_per_rad", s.viscous, u.spindle,

@@ -63,12 +63,13 @@ void writeReport(const Explanation& e, const std::string& folder) {
                    {"after", {{"fit", rounded(e.after.fit)}, {"heldout", rounded(e.after.heldout)}}}};
   report["gaps"] = Json::array();
   for (const BlockGap& g : e.gaps) {
-    report["gaps"].push_back({{"test", g.test},
-                              {"channel", g.channel},
-                              {"heldout", g.heldout},
-                              {"before", rounded(g.before)},
-                              {"after", rounded(g.after)},
-                              {"interval", {rounded(g.after - 1.96 * g.std_dev), rounded(g.after + 1.96 * g.std_dev)}}});
+    report["gaps"].push_back(
+        {{"test", g.test},
+         {"channel", g.channel},
+         {"heldout", g.heldout},
+         {"before", rounded(g.before)},
+         {"after", rounded(g.after)},
+         {"interval", {rounded(g.after - 1.96 * g.std_dev), rounded(g.after + 1.96 * g.std_dev)}}});
   }
   report["notes"] = e.notes;
   report["seconds"] = rounded(e.seconds);

@@ -25,7 +25,8 @@ class Projection {
       for (std::size_t c = 0; c < coordinates.size(); ++c) {
         FitState moved = now.state;
         double& value = moved.members[m].values[c];
-        const double step = value + coordinates[c].step > coordinates[c].high ? -coordinates[c].step : coordinates[c].step;
+        const double step =
+            value + coordinates[c].step > coordinates[c].high ? -coordinates[c].step : coordinates[c].step;
         value += step;
         steps.push_back(step);
         models.push_back(fitter.model(moved));
@@ -109,8 +110,8 @@ std::vector<double> bestFrequencies(const Projection& projection, const std::vec
 }
 
 // Where to try a mode whose frequency nobody knows.
-std::vector<Hypothesis::Probe> modeProbes(const Hypothesis& h, const Projection& projection, const ModeProbes& probes,
-                                          const TwinRunner& runner) {
+std::vector<Hypothesis::Probe> modeProbes(const Hypothesis& h, const Projection& projection,
+                                          const ModeProbes& probes, const TwinRunner& runner) {
   std::vector<Hypothesis::Probe> found;
   double rate = 0.0;
   for (const TestData& t : runner.data().tests) rate = std::max(rate, t.test.sample_rate);
@@ -189,10 +190,12 @@ std::vector<Promise> screen(const Fitter& fitter, const Fit& now, const NominalT
       best.gain = gain;
       best.signature = std::move(signature);
       best.start = std::move(start);
+      best.null = probe.from_points ? std::vector<double>{} : probe.null;
     }
     promises.push_back(std::move(best));
   }
-  std::stable_sort(promises.begin(), promises.end(), [](const Promise& a, const Promise& b) { return a.gain > b.gain; });
+  std::stable_sort(promises.begin(), promises.end(),
+                   [](const Promise& a, const Promise& b) { return a.gain > b.gain; });
   return promises;
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 
 namespace smartmill::discrepancy {
 namespace {
@@ -26,9 +27,40 @@ FitState without(const FitState& state, std::size_t member) {
   return less;
 }
 
+// The promise is linear: of shorter ways from the null point to its start the one that fits best.
+std::vector<double> startOf(const Fitter& fitter, const Fit& now, const Promise& promise) {
+  if (promise.null.empty()) return promise.start;
+  std::vector<std::vector<double>> starts;
+  std::vector<MachineModel> models;
+  for (const double share : {1.0, 0.5, 0.2, 0.05}) {
+    std::vector<double> start = promise.null;
+    for (std::size_t c = 0; c < start.size(); ++c) start[c] += share * (promise.start[c] - promise.null[c]);
+    FitState with = now.state;
+    with.members.push_back({promise.hypothesis, start});
+    starts.push_back(std::move(start));
+    models.push_back(fitter.model(with));
+  }
+  const auto simulated = fitter.runner().simulate(models);
+  std::size_t best = 0;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t k = 0; k < simulated.size(); ++k) {
+    double squares = 0.0;
+    for (std::size_t i = 0; i < simulated[k].size(); ++i) {
+      const double r = fitter.runner().measured()[i] - simulated[k][i];
+      squares += r * r;
+    }
+    if (squares < least) {
+      least = squares;
+      best = k;
+    }
+  }
+  return starts[best];
+}
+
 }  // namespace
 
-void refine(TwinRunner& quick_runner, const Fitter& quick, const Fitter& exact, const FitState& state, SearchResult* result) {
+void refine(TwinRunner& quick_runner, const Fitter& quick, const Fitter& exact, const FitState& state,
+            SearchResult* result) {
   // The quick runner, made equal to the exact one at the state, finds the exact solution in a few passes.
   NominalTangents tangents;
   FitState from = state;
@@ -76,8 +108,8 @@ void refine(TwinRunner& quick_runner, const Fitter& quick, const Fitter& exact, 
   }
 }
 
-SearchResult search(TwinRunner& quick_runner, const Fitter& quick, const Fitter& exact, const std::vector<Hypothesis>& hypotheses,
-                    const SearchOptions& options) {
+SearchResult search(TwinRunner& quick_runner, const Fitter& quick, const Fitter& exact,
+                    const std::vector<Hypothesis>& hypotheses, const SearchOptions& options) {
   const auto say = [&](const std::string& line) {
     if (options.progress) options.progress(line);
   };
@@ -105,7 +137,8 @@ SearchResult search(TwinRunner& quick_runner, const Fitter& quick, const Fitter&
   now = quick.fit(state, &tangents, {3, 1e-8, true});
   result.null = now;
   const double samples = static_cast<double>(quick.runner().size());
-  say(text("nominal model, values free within their uncertainty: gap %.4f", std::sqrt(now.chi2 / samples), 0.0));
+  say(text("nominal model, values free within their uncertainty: gap %.4f", std::sqrt(now.chi2 / samples),
+           0.0));
   for (std::size_t round = 0; round < options.most_effects; ++round) {
     const std::vector<Promise> promises = screen(quick, now, tangents, hypotheses);
     // A trifle beside what is left is not what is missing.
@@ -114,24 +147,29 @@ SearchResult search(TwinRunner& quick_runner, const Fitter& quick, const Fitter&
     std::size_t fitted = 0;
     std::vector<Rung> rungs;
     for (const Promise& p : promises) {
-      if (p.gain < least && (p.gain < 4.0 * options.least_prior_gain || now.penalty < 4.0 * options.least_prior_gain)) break;
+      if (p.gain < least &&
+          (p.gain < 4.0 * options.least_prior_gain || now.penalty < 4.0 * options.least_prior_gain))
+        break;
       if (fitted >= 2 && p.gain < 0.02 * promises.front().gain) break;
       if (fitted >= options.fitted_per_round) break;
       FitState with = now.state;
-      with.members.push_back({p.hypothesis, p.start});
+      with.members.push_back({p.hypothesis, startOf(quick, now, p)});
       const Fit tried = quick.fit(with, &tangents, {6, 1e-3, true});
       ++fitted;
       rungs.push_back({round, p.hypothesis->effect, p.hypothesis->variant, p.gain, now.bic - tried.bic, false,
                        p.hypothesis, tried.state.members.back().values});
-      say(text("  promise %.4g, gain %.4g  ", p.gain, now.bic - tried.bic) + describe(tried.state.members.back()));
+      say(text("  promise %.4g, gain %.4g  ", p.gain, now.bic - tried.bic) +
+          describe(tried.state.members.back()));
       if (tried.bic < best.bic) best = tried;
       // Nothing that is left could make another hypothesis better.
       if (fitted >= 2 && best.chi2 - samples < 0.01 * (now.chi2 - samples)) break;
     }
-    // Nominal values pulled far off their stated uncertainty speak for an effect even where they could stand for it.
-    const bool better = now.bic - best.bic > least ||
-                        (now.bic - best.bic > options.least_prior_gain && now.penalty - best.penalty > 4.0 * options.least_prior_gain &&
-                         now.chi2 - samples < 0.01 * samples);
+    // Nominal values pulled far off their stated uncertainty speak for an effect even where they could stand
+    // for it.
+    const bool better =
+        now.bic - best.bic > least ||
+        (now.bic - best.bic > options.least_prior_gain &&
+         now.penalty - best.penalty > 4.0 * options.least_prior_gain && now.chi2 - samples < 0.01 * samples);
     for (Rung& r : rungs) {
       r.taken = better && r.effect == best.state.members.back().hypothesis->effect &&
                 r.variant == best.state.members.back().hypothesis->variant;

@@ -10,7 +10,8 @@ namespace smartmill::discrepancy {
 namespace {
 
 // RMS difference of two models over the noise in one test.
-double separation(const Dataset& data, const CampaignTest& test, const MachineModel& a, const MachineModel& b) {
+double separation(const Dataset& data, const CampaignTest& test, const MachineModel& a,
+                  const MachineModel& b) {
   sim::SimulationOptions options;
   options.noise = false;
   options.substeps = 2;
@@ -56,7 +57,8 @@ std::optional<std::string> separatingTest(const Dataset& data, const MachineMode
           char text[300];
           if (test.engagement) {
             std::snprintf(text, sizeof text,
-                          "a cut at %.0f rpm, %.3g mm a tooth, %.3g mm deep, from %.0f to %.0f deg: the two predictions "
+                          "a cut at %.0f rpm, %.3g mm a tooth, %.3g mm deep, from %.0f to %.0f deg: the two "
+                          "predictions "
                           "differ there by %.2g times the noise",
                           units::rpmFromRadPerSec(test.spindle_speed), test.engagement->feed_per_tooth * 1e3,
                           test.engagement->axial_depth * 1e3, units::degFromRad(test.engagement->entry),

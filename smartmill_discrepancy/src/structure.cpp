@@ -71,14 +71,15 @@ enum class Kind { level, trend, order, frequency };
 
 struct Candidate {
   Kind kind = Kind::level;
-  double place = 0.0;        // order or Hz
-  double squares = 0.0;      // over all stretches
+  double place = 0.0;    // order or Hz
+  double squares = 0.0;  // over all stretches
   std::size_t freedom = 0;
-  double looks = 1.0;        // independent places looked at
+  double looks = 1.0;  // independent places looked at
 };
 
 double excess(const Candidate& c) {
-  return (c.squares - static_cast<double>(c.freedom)) / std::sqrt(2.0 * static_cast<double>(std::max<std::size_t>(c.freedom, 1)));
+  return (c.squares - static_cast<double>(c.freedom)) /
+         std::sqrt(2.0 * static_cast<double>(std::max<std::size_t>(c.freedom, 1)));
 }
 
 double meanOf(const std::vector<double>& v) {
@@ -141,13 +142,15 @@ std::vector<Candidate> candidatesOf(const std::vector<Stretch>& stretches) {
     double place = static_cast<double>(top);
     const double a = sum[top - 1], b = sum[top], c = sum[top + 1];
     if (2.0 * b - a - c > 0.0) place += 0.5 * (c - a) / (2.0 * b - a - c);
-    all.push_back({Kind::frequency, place * rate / PADDED, sum[top], 2 * used, 0.5 * static_cast<double>(longest)});
+    all.push_back(
+        {Kind::frequency, place * rate / PADDED, sum[top], 2 * used, 0.5 * static_cast<double>(longest)});
   }
   return all;
 }
 
 // Rank of association of the line's amplitudes with the tests' conditions.
-std::vector<std::string> dependence(const std::vector<const TestData*>& tests, const std::vector<double>& amplitudes,
+std::vector<std::string> dependence(const std::vector<const TestData*>& tests,
+                                    const std::vector<double>& amplitudes,
                                     const std::vector<double>& std_devs) {
   std::vector<std::string> names;
   std::vector<double> cut, rest;
@@ -175,7 +178,8 @@ std::vector<std::string> dependence(const std::vector<const TestData*>& tests, c
     }
   }
   std::vector<Condition> conditions{{"speed", {}}, {"time", {}}};
-  if (among_cuts) conditions = {{"speed", {}}, {"chip_load", {}}, {"depth", {}}, {"immersion", {}}, {"time", {}}};
+  if (among_cuts)
+    conditions = {{"speed", {}}, {"chip_load", {}}, {"depth", {}}, {"immersion", {}}, {"time", {}}};
   for (const std::size_t t : chosen) {
     const CampaignTest& test = tests[t]->test;
     for (Condition& c : conditions) {
@@ -183,8 +187,9 @@ std::vector<std::string> dependence(const std::vector<const TestData*>& tests, c
       c.values.push_back(name == "speed"       ? test.spindle_speed
                          : name == "chip_load" ? test.engagement->feed_per_tooth
                          : name == "depth"     ? test.engagement->axial_depth
-                         : name == "immersion" ? test.engagement->exit - test.engagement->entry + test.engagement->entry / 7.0
-                                               : test.start_time.value_or(0.0));
+                         : name == "immersion"
+                             ? test.engagement->exit - test.engagement->entry + test.engagement->entry / 7.0
+                             : test.start_time.value_or(0.0));
     }
   }
   const std::size_t n = chosen.size();
@@ -215,8 +220,10 @@ std::vector<std::string> dependence(const std::vector<const TestData*>& tests, c
     if (xx <= 0.0 || yy <= 0.0) continue;
     const double r = std::abs(xy) / std::sqrt(xx * yy);
     // Fisher's z against chance among n tests and as many looks as there are conditions.
-    const double z = std::atanh(std::min(r, 0.999999)) * std::sqrt(std::max(static_cast<double>(n) - 3.0, 1.0));
-    if (std::erfc(z / std::sqrt(2.0)) * static_cast<double>(conditions.size()) < 0.05) strengths.emplace_back(-r, c.name);
+    const double z =
+        std::atanh(std::min(r, 0.999999)) * std::sqrt(std::max(static_cast<double>(n) - 3.0, 1.0));
+    if (std::erfc(z / std::sqrt(2.0)) * static_cast<double>(conditions.size()) < 0.05)
+      strengths.emplace_back(-r, c.name);
   }
   std::sort(strengths.begin(), strengths.end());
   for (const auto& s : strengths) names.push_back(s.second);
@@ -232,7 +239,8 @@ double chiSquareTail(double value, std::size_t freedom) {
   double largest = -1e308, sum = 0.0;
   std::vector<double> logs;
   for (std::size_t k = 0; k < std::max<std::size_t>(freedom / 2, 1); ++k) {
-    logs.push_back(static_cast<double>(k) * std::log(half) - std::lgamma(static_cast<double>(k) + 1.0) - half);
+    logs.push_back(static_cast<double>(k) * std::log(half) - std::lgamma(static_cast<double>(k) + 1.0) -
+                   half);
     largest = std::max(largest, logs.back());
   }
   for (const double l : logs) sum += std::exp(l - largest);
@@ -243,7 +251,8 @@ std::vector<double> falseDiscoveryRates(const std::vector<double>& p_values) {
   const std::size_t n = p_values.size();
   std::vector<std::size_t> order(n);
   std::iota(order.begin(), order.end(), std::size_t{0});
-  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return p_values[a] < p_values[b]; });
+  std::sort(order.begin(), order.end(),
+            [&](std::size_t a, std::size_t b) { return p_values[a] < p_values[b]; });
   std::vector<double> rates(n);
   double least = 1.0;
   for (std::size_t k = n; k-- > 0;) {
@@ -291,7 +300,8 @@ std::vector<Finding> findStructure(const TwinRunner& runner, const std::vector<d
       const std::vector<Candidate> all = candidatesOf(stretches);
       std::vector<double> p_values;
       for (const Candidate& c : all)
-        p_values.push_back(std::min(1.0, c.freedom ? c.looks * chiSquareTail(c.squares, c.freedom + c.freedom % 2) : 1.0));
+        p_values.push_back(
+            std::min(1.0, c.freedom ? c.looks * chiSquareTail(c.squares, c.freedom + c.freedom % 2) : 1.0));
       const Candidate* best = nullptr;
       for (const Candidate& c : all) {
         if (c.freedom > 0 && (!best || excess(c) > excess(*best))) best = &c;
@@ -303,7 +313,10 @@ std::vector<Finding> findStructure(const TwinRunner& runner, const std::vector<d
       }
       Finding f;
       f.channel = channel;
-      f.domain = best->kind == Kind::level ? "level" : best->kind == Kind::trend ? "time" : best->kind == Kind::order ? "order" : "frequency";
+      f.domain = best->kind == Kind::level   ? "level"
+                 : best->kind == Kind::trend ? "time"
+                 : best->kind == Kind::order ? "order"
+                                             : "frequency";
       if (best->kind == Kind::order) f.location["order"] = best->place;
       if (best->kind == Kind::frequency) f.location["frequency_hz"] = best->place;
       if (best->kind == Kind::trend) f.location["time_s"] = 0.0;
@@ -352,10 +365,13 @@ std::vector<Finding> findStructure(const TwinRunner& runner, const std::vector<d
   for (const Finding& f : found) p_values.push_back(f.p_value);
   const std::vector<double> rates = falseDiscoveryRates(p_values);
   for (std::size_t k = 0; k < found.size(); ++k) found[k].p_value = rates[looks.size() + k];
-  found.erase(std::remove_if(found.begin(), found.end(), [&](const Finding& f) { return f.p_value > options.p_value; }),
+  found.erase(std::remove_if(found.begin(), found.end(),
+                             [&](const Finding& f) { return f.p_value > options.p_value; }),
               found.end());
-  std::stable_sort(found.begin(), found.end(), [](const Finding& a, const Finding& b) { return a.share_of_gap > b.share_of_gap; });
-  if (found.size() > 2 * static_cast<std::size_t>(options.most)) found.resize(2 * static_cast<std::size_t>(options.most));
+  std::stable_sort(found.begin(), found.end(),
+                   [](const Finding& a, const Finding& b) { return a.share_of_gap > b.share_of_gap; });
+  if (found.size() > 2 * static_cast<std::size_t>(options.most))
+    found.resize(2 * static_cast<std::size_t>(options.most));
   return found;
 }
 

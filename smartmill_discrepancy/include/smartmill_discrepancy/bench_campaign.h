@@ -13,10 +13,10 @@ namespace smartmill::discrepancy {
 
 /// A cause that the catalogue does not list.
 struct OutsideCause {
-  std::string kind;     ///< tone, level, order, settling
-  std::string channel;  ///< fx, fy, fz
-  double amplitude = 0.0;  ///< [N]
-  double place = 0.0;      ///< [Hz], order, or time constant [s]
+  std::string kind;            ///< tone, level, order, settling
+  std::string channel;         ///< fx, fy, fz
+  double amplitude = 0.0;      ///< [N]
+  double place = 0.0;          ///< [Hz], order, or time constant [s]
   std::string domain() const;  ///< where a report should see it
 };
 
@@ -37,9 +37,9 @@ EffectEntry drawEffect(const std::string& name, const MachineModel& machine, std
 
 OutsideCause drawOutside(std::mt19937_64& random);
 
-/// Writes a campaign of 21 tests (air cuts, taps, slots over feed, speed and depth, up- and down-milling) into a folder.
-/// The records come from the process of cut surfaces in fine steps, not from the tables that explain uses for rigid tools;
-/// phase and noise are drawn.
+/// Writes a campaign of 21 tests (air cuts, taps, slots over feed, speed and depth, up- and down-milling)
+/// into a folder. The records come from the process of cut surfaces in fine steps, not from the tables that
+/// explain uses for rigid tools; phase and noise are drawn.
 /// @throws Error.
 void writeBenchCampaign(const MachineModel& nominal, const BenchTruth& truth, const std::string& folder,
                         std::uint64_t seed, int substeps);

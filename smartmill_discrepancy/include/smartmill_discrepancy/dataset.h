@@ -14,7 +14,7 @@ namespace smartmill::discrepancy {
 /// One test with its record, ready to be compared with the twin.
 struct TestData {
   CampaignTest test;
-  Record record;                      ///< forces on the tool; has spindle_angle for cuts, estimated where the file has none
+  Record record;  ///< forces on the tool; has spindle_angle for cuts, estimated where the file has none
   std::vector<std::string> channels;  ///< that count and that the twin gives
   bool heldout = false;               ///< takes no part in any fit or choice
   bool phase_estimated = false;       ///< the record has no spindle angle
@@ -33,17 +33,19 @@ struct Dataset {
   std::size_t samples() const;  ///< sum over tests of channels x samples
 };
 
-/// Reads every record and estimates the noise: the model's noise_rms_n where stated, else the parts of the records before
-/// any force, else what the upper half of the band of the records' spectra holds between the lines.
-/// @throws Error on what cannot be worked with, one line naming file and cause: missing file or column, wrong unit, clipped
-/// channel, no noise estimate possible.
+/// Reads every record and estimates the noise: the model's noise_rms_n where stated, else the parts of the
+/// records before any force, else what the upper half of the band of the records' spectra holds between the
+/// lines.
+/// @throws Error on what cannot be worked with, one line naming file and cause: missing file or column, wrong
+/// unit, clipped channel, no noise estimate possible.
 Dataset loadDataset(const Campaign& campaign, const MachineModel& nominal);
 
-/// Marks the held-out tests: about a quarter of the cuts and one air cut, at conditions inside the range of the others.
+/// Marks the held-out tests: about a quarter of the cuts and one air cut, at conditions inside the range of
+/// the others.
 void chooseHeldout(std::vector<TestData>& tests);
 
-/// Noise RMS of a series that holds lines and slow courses beside white noise: median of the upper half of its
-/// periodogram. @throws Error below 64 samples.
+/// Noise RMS of a series that holds lines and slow courses beside white noise: median of the upper half of
+/// its periodogram. @throws Error below 64 samples.
 double noiseBetweenLines(const std::vector<double>& values);
 
 }  // namespace smartmill::discrepancy

@@ -23,9 +23,11 @@ struct FoundEffect {
   std::string name, variant;
   std::map<std::string, std::string> words;
   std::vector<FoundParameter> parameters;
-  double delta_bic = 0.0;              ///< BIC that is lost without it
-  double heldout_gap_reduction = 0.0;  ///< [1] share of the held-out squares above the noise that it takes away
-  double evenness = 0.0;  ///< [1] variance over the tests of the size in which each test shows it; 0 where all agree
+  double delta_bic = 0.0;  ///< BIC that is lost without it
+  double heldout_gap_reduction =
+      0.0;  ///< [1] share of the held-out squares above the noise that it takes away
+  double evenness =
+      0.0;  ///< [1] variance over the tests of the size in which each test shows it; 0 where all agree
   std::vector<std::pair<std::string, double>> alternatives;  ///< other effects in its place: name, delta_bic
 };
 
@@ -46,7 +48,7 @@ struct RevolutionCurve {
 /// Amplitude spectrum of what measurement and model differ by.
 struct SpectrumCurve {
   std::string test, channel;
-  double order_hz = 0.0;  ///< one order of the spindle; 0 while it stands
+  double order_hz = 0.0;                            ///< one order of the spindle; 0 while it stands
   std::vector<double> frequency_hz, before, after;  ///< [Hz], [unit of the channel]
 };
 
@@ -74,7 +76,8 @@ struct Explanation {
 struct ExplainOptions {
   SearchOptions search;
   StructureOptions structure;
-  double least_evenness = 0.04;  ///< an effect whose size differs more from test to test stands for another cause
+  double least_evenness =
+      0.04;  ///< an effect whose size differs more from test to test stands for another cause
 };
 
 /// The whole workflow. Writes FOLDER/model.yaml and measures the gap after from that file.
@@ -85,13 +88,14 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
 void addCurves(const TwinRunner& runner, const std::vector<double>& before, const std::vector<double>& after,
                Explanation* explanation);
 
-/// Writes FOLDER/gaps.png, revolution.png, spectra.png, ladder.png, remains.png with gnuplot; returns the files' names.
+/// Writes FOLDER/gaps.png, revolution.png, spectra.png, ladder.png, remains.png with gnuplot; returns the
+/// files' names.
 /// @throws Error.
 std::vector<std::string> drawPictures(const Explanation& explanation, const std::string& folder);
 
 /// Writes FOLDER/report.html, which holds the pictures of the folder.
-void writeHtml(const Explanation& explanation, const std::string& campaign, const std::vector<std::string>& pictures,
-               const std::string& folder);
+void writeHtml(const Explanation& explanation, const std::string& campaign,
+               const std::vector<std::string>& pictures, const std::string& folder);
 
 /// Writes FOLDER/report.json (smartmill-report/1).
 void writeReport(const Explanation& explanation, const std::string& folder);

@@ -24,19 +24,20 @@ struct FitState {
 
 struct Fit {
   FitState state;
-  double chi2 = 0.0;     ///< sum of squares of residuals over noise
-  double penalty = 0.0;  ///< of the priors
-  double bic = 0.0;      ///< chi2 + penalty + effect coordinates x ln(samples)
+  double chi2 = 0.0;             ///< sum of squares of residuals over noise
+  double penalty = 0.0;          ///< of the priors
+  double bic = 0.0;              ///< chi2 + penalty + effect coordinates x ln(samples)
   std::vector<double> residual;  ///< (measured - simulated) / noise at the state
-  /// Covariance of nominal coordinates, then members' in their order: inverse of Fisher information with priors.
+  /// Covariance of nominal coordinates, then members' in their order: inverse of Fisher information with
+  /// priors.
   Eigen::MatrixXd covariance;
   bool converged = false;
 };
 
 /// Tangents of the nominal coordinates about a state.
 struct NominalTangents {
-  std::vector<double> at;    ///< nominal coordinates
-  Eigen::MatrixXd columns;   ///< samples x coordinates
+  std::vector<double> at;   ///< nominal coordinates
+  Eigen::MatrixXd columns;  ///< samples x coordinates
 };
 
 struct FitOptions {
@@ -45,8 +46,8 @@ struct FitOptions {
   bool nominal_free = true;
 };
 
-/// Fits models to a campaign by Ceres: nominal values under their Gaussian priors, effects within bounds and weak priors;
-/// tangents by one simulation a coordinate.
+/// Fits models to a campaign by Ceres: nominal values under their Gaussian priors, effects within bounds and
+/// weak priors; tangents by one simulation a coordinate.
 class Fitter {
  public:
   /// Both must outlive this.

@@ -13,14 +13,14 @@ namespace smartmill::discrepancy {
 /// A number of the model that a fit may move.
 struct Coordinate {
   std::string name;
-  double null = 0.0;       ///< value that changes nothing (nominal: 0; prior mean)
+  double null = 0.0;  ///< value that changes nothing (nominal: 0; prior mean)
   double low = 0.0, high = 0.0;
   double step = 0.0;       ///< of numeric tangents
   double prior_std = 0.0;  ///< Gaussian prior about null
 };
 
-/// Values of the nominal model, free within their stated uncertainty: each coordinate is the natural logarithm of value
-/// over nominal value.
+/// Values of the nominal model, free within their stated uncertainty: each coordinate is the natural
+/// logarithm of value over nominal value.
 class NominalFreedom {
  public:
   explicit NominalFreedom(const MachineModel& nominal);
@@ -37,7 +37,8 @@ class NominalFreedom {
 
 /// One way in which an effect of the catalogue may be present, e.g. gain_error of fx.
 struct Hypothesis {
-  /// Points from which the effect is tried: with amplitudes a_k the effect stands at null + sum a_k (points[k] - null).
+  /// Points from which the effect is tried: with amplitudes a_k the effect stands at null + sum a_k
+  /// (points[k] - null).
   struct Probe {
     std::vector<double> null;                 ///< the effect does nothing here
     std::vector<std::vector<double>> points;  ///< each shows one direction

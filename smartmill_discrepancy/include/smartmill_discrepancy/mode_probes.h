@@ -11,7 +11,8 @@
 
 namespace smartmill::discrepancy {
 
-/// What a mode of one frequency would add to the simulated channels, to first order, for a quick look over many frequencies.
+/// What a mode of one frequency would add to the simulated channels, to first order, for a quick look over
+/// many frequencies.
 class ModeProbes {
  public:
   /// @param model what the search stands at. @param runner must outlive this

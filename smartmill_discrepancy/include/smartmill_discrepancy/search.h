@@ -17,9 +17,10 @@ struct SearchOptions {
   int final_substeps = 8;
   std::size_t fitted_per_round = 5;  ///< hypotheses that a round fits after screening
   std::size_t most_effects = 4;
-  double least_gain = 30.0;          ///< [1] difference of BIC below which nothing is named
-  double least_prior_gain = 3.0;     ///< [1] the same where it comes from nominal values that need not be pulled off any more
-  double least_share = 0.01;         ///< [1] of the squares above the noise that an effect must take
+  double least_gain = 30.0;  ///< [1] difference of BIC below which nothing is named
+  double least_prior_gain =
+      3.0;  ///< [1] the same where it comes from nominal values that need not be pulled off any more
+  double least_share = 0.01;  ///< [1] of the squares above the noise that an effect must take
   std::function<void(const std::string&)> progress;
 };
 
@@ -43,23 +44,24 @@ struct Rival {
 };
 
 struct SearchResult {
-  Fit null;          ///< nominal values only, on the fit tests
-  Fit best;          ///< with the effects found
+  Fit null;  ///< nominal values only, on the fit tests
+  Fit best;  ///< with the effects found
   std::vector<Rung> ladder;
   std::vector<double> contribution;  ///< of each member: BIC that is lost without it, others fitted again
   std::vector<Rival> rivals;
 };
 
-/// Fits a state with every value free and simulated exactly, and measures what each member contributes and how its best
-/// rivals do in its place.
-void refine(TwinRunner& quick_runner, const Fitter& quick, const Fitter& exact, const FitState& state, SearchResult* result);
+/// Fits a state with every value free and simulated exactly, and measures what each member contributes and
+/// how its best rivals do in its place.
+void refine(TwinRunner& quick_runner, const Fitter& quick, const Fitter& exact, const FitState& state,
+            SearchResult* result);
 
 /// The cut or air cut, among variations of the campaign's tests, in which two models differ most.
 std::optional<std::string> separatingTest(const Dataset& data, const MachineModel& a, const MachineModel& b);
 
 /// Forward addition of effects with re-fitting and pruning, on the tests of the runner.
 /// @param quick_runner the runner of quick, kept equal to the exact one at the state the search stands at
-SearchResult search(TwinRunner& quick_runner, const Fitter& quick, const Fitter& exact, const std::vector<Hypothesis>& hypotheses,
-                    const SearchOptions& options);
+SearchResult search(TwinRunner& quick_runner, const Fitter& quick, const Fitter& exact,
+                    const std::vector<Hypothesis>& hypotheses, const SearchOptions& options);
 
 }  // namespace smartmill::discrepancy

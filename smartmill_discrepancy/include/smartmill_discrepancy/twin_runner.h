@@ -19,8 +19,8 @@ struct Block {
   double noise = 0.0;  ///< [unit of the channel]
 };
 
-/// Simulates tests of a campaign for many models at once. Vectors over the campaign hold all channels of the chosen
-/// tests one after the other, each over its noise.
+/// Simulates tests of a campaign for many models at once. Vectors over the campaign hold all channels of the
+/// chosen tests one after the other, each over its noise.
 class TwinRunner {
  public:
   /// @param tests indices into data.tests, in the order of the vectors
@@ -37,8 +37,8 @@ class TwinRunner {
 
   int threads() const { return threads_; }
 
-  /// Makes simulate() of the reference model give exactly this; what other models differ from it stays as it is. Takes the
-  /// error of few substeps out, which is nearly alike for models nearby.
+  /// Makes simulate() of the reference model give exactly this; what other models differ from it stays as it
+  /// is. Takes the error of few substeps out, which is nearly alike for models nearby.
   void correctTo(const MachineModel& reference, const std::vector<double>& exact);
 
   /// What each model says. @throws Error of the twin.

@@ -1,0 +1,154 @@
+#include "smartmill_discrepancy/phase.h"
+
+#include <array>
+#include <cmath>
+#include <complex>
+#include <cstdio>
+
+#include "smartmill_core/units.h"
+#include "smartmill_sim/twin/twin.h"
+
+namespace smartmill::discrepancy {
+namespace {
+
+using units::TWO_PI;
+const std::array<std::string, 3> FORCES{{"fx", "fy", "fz"}};
+
+std::complex<double> lineAt(const std::vector<double>& values, std::size_t from, double step) {
+  std::complex<double> sum = 0.0, turn = std::polar(1.0, -step),
+                       at = std::polar(1.0, -step * static_cast<double>(from));
+  for (std::size_t i = from; i < values.size(); ++i) {
+    sum += values[i] * at;
+    at *= turn;
+  }
+  return sum / static_cast<double>(values.size() - from);
+}
+
+void setAngle(TestData& t, double phase) {
+  std::vector<double>& angle = t.record.add("spindle_angle");
+  angle.resize(t.record.size());
+  for (std::size_t i = 0; i < angle.size(); ++i) {
+    const double a =
+        std::fmod(phase + t.test.spindle_speed * static_cast<double>(i) / t.test.sample_rate, TWO_PI);
+    angle[i] = a < 0.0 ? a + TWO_PI : a;
+  }
+}
+
+}  // namespace
+
+double refinedSpeed(const TestData& test, int teeth, double share) {
+  const double nominal = test.test.spindle_speed / test.test.sample_rate;  // [rad/sample]
+  const auto power = [&](double speed) {
+    double sum = 0.0;
+    for (const std::string& channel : FORCES) {
+      if (!test.record.has(channel)) continue;
+      for (int k = 1; k <= 3; ++k) {
+        if (k * teeth * speed > 0.9 * units::PI) break;
+        sum += std::norm(lineAt(test.record.column(channel), test.first_cut, k * teeth * speed));
+      }
+    }
+    return sum;
+  };
+  const double resolution =
+      TWO_PI / static_cast<double>(test.record.size() - test.first_cut) / (3 * teeth) / 8.0;
+  double best = nominal, largest = -1.0;
+  for (double s = nominal * (1.0 - share); s <= nominal * (1.0 + share); s += resolution) {
+    const double p = power(s);
+    if (p > largest) {
+      largest = p;
+      best = s;
+    }
+  }
+  const double a = power(best - resolution), c = power(best + resolution), curve = 2.0 * largest - a - c;
+  if (curve > 0.0) best += 0.5 * resolution * (c - a) / curve;
+  return best * test.test.sample_rate;
+}
+
+std::vector<std::string> estimatePhases(Dataset& data) {
+  constexpr double SPEED_SHARE = 0.01;
+  constexpr int PHASES = 240;
+  std::vector<std::string> notes;
+  std::vector<TestData*> turned;
+  for (TestData& t : data.tests) {
+    if (!t.phase_estimated) continue;
+    if (t.test.kind != TestKind::cut || !data.nominal.tool) {
+      setAngle(t, 0.0);
+      continue;
+    }
+    const int teeth = data.nominal.tool->teeth;
+    t.test.spindle_speed = refinedSpeed(t, teeth, SPEED_SHARE);
+    sim::SimulationOptions options;
+    options.noise = false;
+    options.substeps = 2;
+    // One tooth period of phases; of the lines of the tooth passing only the phase turns.
+    setAngle(t, 0.0);
+    const Record model = sim::simulateTest(data.nominal, t.test, t.record, options);
+    const double step = t.test.spindle_speed / t.test.sample_rate;
+    double best = 0.0, largest = -1e300;
+    for (int p = 0; p < PHASES; ++p) {
+      const double phase = TWO_PI / teeth * p / PHASES;
+      double match = 0.0;
+      for (const std::string& channel : FORCES) {
+        if (!t.record.has(channel)) continue;
+        const double noise = data.noise.at(channel);
+        for (int k = 1; k <= 4 && k * teeth * step < 0.9 * units::PI; ++k) {
+          const auto measured = lineAt(t.record.column(channel), t.first_cut, k * teeth * step);
+          const auto expected = lineAt(model.column(channel), t.first_cut, k * teeth * step) *
+                                std::polar(1.0, k * teeth * phase);
+          match += std::real(std::conj(expected) * measured) / (noise * noise);
+        }
+      }
+      if (match > largest) {
+        largest = match;
+        best = phase;
+      }
+    }
+    setAngle(t, best);
+    turned.push_back(&t);
+    char text[200];
+    std::snprintf(text, sizeof text,
+                  "%s: no spindle angle; speed %.2f rpm and phase %.1f deg estimated from the forces",
+                  t.test.name.c_str(), units::rpmFromRadPerSec(t.test.spindle_speed),
+                  units::degFromRad(best));
+    notes.push_back(text);
+  }
+  if (turned.size() < 2) return notes;
+  // Lines of once a revolution against the spindle angle, all records turned like the strongest.
+  const int teeth = data.nominal.tool->teeth;
+  const auto once = [&](const TestData& t) {
+    std::array<std::complex<double>, 3> line{};
+    const double phase = t.record.column("spindle_angle").front();
+    for (std::size_t a = 0; a < 3; ++a) {
+      if (t.record.has(FORCES[a]))
+        line[a] = lineAt(t.record.column(FORCES[a]), t.first_cut, t.test.spindle_speed / t.test.sample_rate) *
+                  std::polar(1.0, -phase);
+    }
+    return line;
+  };
+  const auto strength = [](const std::array<std::complex<double>, 3>& l) {
+    return std::norm(l[0]) + std::norm(l[1]) + std::norm(l[2]);
+  };
+  std::array<std::complex<double>, 3> reference{};
+  for (const TestData* t : turned) {
+    const auto line = once(*t);
+    if (strength(line) > strength(reference)) reference = line;
+  }
+  for (TestData* t : turned) {
+    const auto line = once(*t);
+    int best = 0;
+    double largest = -1e300;
+    for (int k = 0; k < teeth; ++k) {
+      double match = 0.0;
+      for (std::size_t a = 0; a < 3; ++a)
+        match += std::real(std::conj(reference[a]) * line[a] * std::polar(1.0, -TWO_PI * k / teeth));
+      if (match > largest) {
+        largest = match;
+        best = k;
+      }
+    }
+    if (best != 0) setAngle(*t, t->record.column("spindle_angle").front() + TWO_PI * best / teeth);
+  }
+  return notes;
+}
+
+}  // namespace smartmill::discrepancy
