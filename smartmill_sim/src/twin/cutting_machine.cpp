@@ -79,7 +79,8 @@ void CuttingMachine::engage(const std::vector<ContactArc>& arcs, const ToolMotio
   input.motion = now;
   update(input);
   if (arcs_.empty()) feed_path_ = 0.0;
-  engaged_ = true;
+  // Contact that only moves on changes the force little by little.
+  engaged_ = arcs_.empty() != arcs.empty();
   jump_ = 1.0 - rise;
   arcs_ = arcs;
   std::vector<ContactArc> tilted = arcs;

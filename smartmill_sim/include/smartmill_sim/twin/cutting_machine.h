@@ -106,7 +106,7 @@ class CuttingMachine {
   std::array<std::array<double, 2>, 2> tip_history_{};  // [N] total force on the tip one and two steps ago
   std::array<double, 3> last_cut_{{0, 0, 0}};           // [N] force of the cut at the last step
   double last_torque_ = 0.0;
-  bool engaged_ = false;  // since the last step
+  bool engaged_ = false;  // or left the cut since the last step
   double jump_ = 0.0;     // [1] share of the change in force that comes on at once at this step
   double sign_;
 };
