@@ -54,7 +54,7 @@ TEST(Replay, OfAShortSessionIsTheSameToTheLastDigit) {
           " bag:=" + live + " summary:=" + summary + " session_params:=" + SHORT_SESSION,
       log);
   ASSERT_NE(contentOf(summary).find("\"completed\": true"), std::string::npos) << contentOf(log);
-  run("roslaunch -p " + freePort() + " smartmill_launch replay.launch rate:=2 bag:=" + live +
+  run("roslaunch -p " + freePort() + " smartmill_launch replay.launch rate:=3 bag:=" + live +
           " out:=" + again,
       log);
   const std::string replayed = contentOf(log);

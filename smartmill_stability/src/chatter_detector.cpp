@@ -73,6 +73,8 @@ void ChatterDetector::notSteady(double stamp) {
 void ChatterDetector::handle(const CuttingCondition& condition) {
   condition_ = condition;
   said_invalid_ = false;
+  // Turns are counted from here on: the digits of a verdict must not depend on how long the node has run.
+  if (!angles_.empty()) angles_.assign(1, {angles_.back().time, angles_.back().shown, angles_.back().shown});
   notSteady(condition.stamp);
 }
 
@@ -95,7 +97,7 @@ void ChatterDetector::handle(const SpindleAngle& angle) {
     dropWindow();
   }
   if (angles_.empty()) {
-    angles_.push_back({angle.stamp, angle.angle});
+    angles_.push_back({angle.stamp, angle.angle, angle.angle});
     return;
   }
   const Angle last = angles_.back();
@@ -103,7 +105,8 @@ void ChatterDetector::handle(const SpindleAngle& angle) {
   // The speed tells how many full turns lie between two readings.
   const double expected = last.turned + angle.speed * (angle.stamp - last.time);
   const double turns = std::round((expected - angle.angle) / units::TWO_PI);
-  angles_.push_back({angle.stamp, std::max(last.turned, angle.angle + units::TWO_PI * turns)});
+  angles_.push_back(
+      {angle.stamp, std::max(last.turned, angle.angle + units::TWO_PI * turns), angle.angle});
   evaluate();
 }
 

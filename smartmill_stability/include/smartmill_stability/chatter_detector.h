@@ -64,7 +64,7 @@ class ChatterDetector {
     std::array<double, 3> force;
   };
   struct Angle {
-    double time, turned;  // [s], [rad] counted on over full turns
+    double time, turned, shown;  // [s], [rad] counted on over full turns, [rad] as it came
   };
   void dropWindow();
   void notSteady(double stamp);
