@@ -14,6 +14,7 @@ using units::TWO_PI;
 
 constexpr std::size_t NODES = TURN_NODES;  // linear between them errs by 1e-6 of the integrand
 constexpr double NODE_ANGLE = TURN_NODE_ANGLE;
+constexpr int MOST_JOINS = 3;         // of tables with the factors of one moment
 constexpr double LEAST_CHIP = 1e-15;  // [m] at the ends of a contact, which still rub
 constexpr double LEAST_LAG = 1e-6;    // [rad] over the depth; below it the edge is straight
 
@@ -65,6 +66,7 @@ RigidCut::Row RigidCut::elementary(double chip, double sine, double cosine) cons
 }
 
 void RigidCut::tabulate() {
+  joined_now_ = false;
   const SineCosine* node = turnTable();
   for (std::size_t j = 0; j < tables_.size(); ++j) {
     std::vector<Row>& table = tables_[j];
@@ -115,65 +117,75 @@ void RigidCut::setLaw(const CuttingLaw& law) {
   const bool same = a.ktc == b.ktc && a.krc == b.krc && a.kac == b.kac && a.kte == b.kte && a.kre == b.kre &&
                     a.kae == b.kae && law.edge_chip == law_.edge_chip &&
                     law.size_exponent == law_.size_exponent && law.size_reference == law_.size_reference;
+  if (law.chip_factor != law_.chip_factor || law.edge_factor != law_.edge_factor) {
+    joined_now_ = false;
+    ++factor_changes_;
+  }
   law_ = law;
   if (!same && !tables_[0].empty()) tabulate();
 }
 
-void RigidCut::add(const std::vector<Row>& table, double from, double to, CuttingForce& sum,
-                   double& tangential) const {
+void RigidCut::join() {
+  const double c = law_.chip_factor, e = law_.edge_factor;
+  joined_.resize(tables_.size());
+  for (std::size_t t = 0; t < tables_.size(); ++t) {
+    joined_[t].resize(tables_[t].size());
+    for (std::size_t n = 0; n < tables_[t].size(); ++n) {
+      for (std::size_t k = 0; k < 4; ++k) joined_[t][n][k] = c * tables_[t][n][k] + e * tables_[t][n][k + 4];
+    }
+  }
+  joined_now_ = true;
+}
+
+void RigidCut::add(std::size_t table, double from, double to, Sum& sum) const {
   const double pa = from * (1.0 / NODE_ANGLE), pb = to * (1.0 / NODE_ANGLE);
   const auto ia = std::min(static_cast<std::size_t>(pa), NODES - 1);
   const auto ib = std::min(static_cast<std::size_t>(pb), NODES - 1);
   const double sa = pa - static_cast<double>(ia), sb = pb - static_cast<double>(ib);
-  const Row &a0 = table[ia], &a1 = table[ia + 1], &b0 = table[ib], &b1 = table[ib + 1];
-  Row d;
-  for (std::size_t k = 0; k < d.size(); ++k)
-    d[k] = b0[k] + sb * (b1[k] - b0[k]) - a0[k] - sa * (a1[k] - a0[k]);
-  const double c = law_.chip_factor, e = law_.edge_factor;
-  sum.fx += c * d[0] + e * d[4];
-  sum.fy += c * d[1] + e * d[5];
-  sum.fz += c * d[2] + e * d[6];
-  tangential += c * d[3] + e * d[7];
+  const auto between = [&](const auto& rows, std::size_t k) {
+    return rows[ib][k] + sb * (rows[ib + 1][k] - rows[ib][k]) - rows[ia][k] -
+           sa * (rows[ia + 1][k] - rows[ia][k]);
+  };
+  if (joined_now_) {
+    for (std::size_t k = 0; k < 4; ++k) sum[k] += between(joined_[table], k);
+  } else {
+    for (std::size_t k = 0; k < 4; ++k)
+      sum[k] +=
+          law_.chip_factor * between(tables_[table], k) + law_.edge_factor * between(tables_[table], k + 4);
+  }
 }
 
-CuttingForce RigidCut::at(double angle) const {
-  CuttingForce sum;
-  double tangential = 0.0;
+CuttingForce RigidCut::at(double angle) {
+  // Factors that change all the time (wear) are not worth a table.
+  if (!joined_now_ && factor_changes_ <= MOST_JOINS && !arcs_.empty()) join();
+  Sum sum{};
   for (const ContactArc& arc : arcs_) {
     const double spread = lag_ * arc.depth;
+    Sum part{};
     if (spread < LEAST_LAG) {
       for (std::size_t j = 0; j < offset_.size(); ++j) {
         const double phi = wrapped(angle + tooth_angle_[j]);
         if (phi < arc.entry || phi >= arc.exit) continue;
         const double s = std::sin(phi), c = std::cos(phi);
         const Row row = elementary(chip(j, s, c), s, c);
-        const double chip_part = law_.chip_factor * arc.depth, edge_part = law_.edge_factor * arc.depth;
-        sum.fx += chip_part * row[0] + edge_part * row[4];
-        sum.fy += chip_part * row[1] + edge_part * row[5];
-        sum.fz += chip_part * row[2] + edge_part * row[6];
-        tangential += chip_part * row[3] + edge_part * row[7];
+        for (std::size_t k = 0; k < 4; ++k)
+          part[k] += law_.chip_factor * row[k] + law_.edge_factor * row[k + 4];
       }
-      continue;
-    }
-    CuttingForce part;
-    double part_tangential = 0.0;
-    for (std::size_t j = 0; j < offset_.size(); ++j) {
-      // The edge covers low..tip; a whole turn back it may reach into the arc again.
-      double tip = wrapped(angle + tooth_angle_[j]);
-      for (double low = tip - spread;; tip += TWO_PI, low += TWO_PI) {
-        const double from = std::max(low, arc.entry), to = std::min(tip, arc.exit);
-        if (to > from) add(tableOf(j), from, to, part, part_tangential);
-        if (low + TWO_PI >= arc.exit) break;
+    } else {
+      for (std::size_t j = 0; j < offset_.size(); ++j) {
+        // The edge covers low..tip; a whole turn back it may reach into the arc again.
+        double tip = wrapped(angle + tooth_angle_[j]);
+        for (double low = tip - spread;; tip += TWO_PI, low += TWO_PI) {
+          const double from = std::max(low, arc.entry), to = std::min(tip, arc.exit);
+          if (to > from) add(tables_.size() == 1 ? 0 : j, from, to, part);
+          if (low + TWO_PI >= arc.exit) break;
+        }
       }
     }
-    const double height = 1.0 / lag_;  // [m/rad]
-    sum.fx += part.fx * height;
-    sum.fy += part.fy * height;
-    sum.fz += part.fz * height;
-    tangential += part_tangential * height;
+    const double height = spread < LEAST_LAG ? arc.depth : 1.0 / lag_;  // [m], [m/rad]
+    for (std::size_t k = 0; k < 4; ++k) sum[k] += part[k] * height;
   }
-  sum.torque = tangential * tool_.radius();
-  return sum;
+  return {sum[0], sum[1], sum[2], sum[3] * tool_.radius()};
 }
 
 }  // namespace smartmill::sim

@@ -28,7 +28,7 @@ class RigidCut {
   void setLaw(const CuttingLaw& law);
 
   /// Force on the tool when tooth 1 stands at an angle [rad].
-  CuttingForce at(double angle) const;
+  CuttingForce at(double angle);
 
   /// Chip of a tooth at an immersion angle [m], <= 0: no contact.
   double chip(int tooth, double angle) const;
@@ -38,11 +38,9 @@ class RigidCut {
   Row elementary(double chip, double sine, double cosine) const;
   void tabulate();
   double chip(std::size_t tooth, double sine, double cosine) const;
-  const std::vector<Row>& tableOf(std::size_t tooth) const {
-    return tables_[tables_.size() == 1 ? 0 : tooth];
-  }
-  void add(const std::vector<Row>& table, double from, double to, CuttingForce& sum,
-           double& tangential) const;
+  using Sum = std::array<double, 4>;  // fx fy fz ft
+  void join();
+  void add(std::size_t table, double from, double to, Sum& sum) const;
 
   ToolGeometry tool_;
   CuttingLaw law_;
@@ -51,8 +49,11 @@ class RigidCut {
   std::vector<ContactArc> arcs_;
   std::array<double, 2> feed_{{0, 0}};       // [m/rad]
   std::vector<std::array<double, 2>> gaps_;  // of a tooth to each before it: [m] offset, [rad] ahead
-  std::vector<std::vector<Row>>
-      tables_;  // integrals from 0 to each node [N/m rad]; one when all teeth are alike
+  // Integrals from 0 to each node [N/m rad]; one table when all teeth are alike.
+  std::vector<std::vector<Row>> tables_;
+  std::vector<std::vector<Sum>> joined_;  // with the factors of chip and edge, while these stand
+  bool joined_now_ = false;
+  int factor_changes_ = 0;
 };
 
 }  // namespace smartmill::sim
