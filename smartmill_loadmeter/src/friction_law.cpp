@@ -116,6 +116,8 @@ std::vector<FittedFriction> fitFrictionLaws(const std::vector<TimedAirCut>& air_
     const double variance = weighted ? std::max(1.0, scatter) : scatter;
     for (std::size_t i = 0; i < unknowns; ++i)
       f.std_dev.push_back(std::sqrt(variance * best.covarianceOf(i, i)));
+    f.value = best.value;
+    for (const double c : best.covariance) f.covariance.push_back(variance * c);
     f.bic = informationCriterion(best.squares, used.size(), unknowns, weighted);
     double rest2 = 0.0;
     for (const TimedAirCut& a : used) {

@@ -9,6 +9,7 @@
 #include "smartmill_core/cutting/regression.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/units.h"
+#include "smartmill_loadmeter/friction_law.h"
 
 namespace smartmill::loadmeter {
 
@@ -48,6 +49,8 @@ void IdentificationParameters::validate() const {
   require(guard_time >= 0.0 && guard_time <= 10.0, "guard_time", guard_time, "0 <= value <= 10");
   require(path_tolerance > 0.0 && path_tolerance <= 1.0, "path_tolerance", path_tolerance, "0 < value <= 1");
   require(minimum_readings >= 2, "minimum_readings", minimum_readings, ">= 2");
+  require(production_memory > 0.0 && production_memory <= 1e7, "production_memory", production_memory,
+          "0 < value <= 1e7");
   require(maximum_gap > 0.0 && maximum_gap <= 60.0, "maximum_gap", maximum_gap, "0 < value <= 60");
 }
 
@@ -73,6 +76,7 @@ void LoadMeterIdentification::reset() {
   cuts_.clear();
   dropped_.clear();
   bad_data_.clear();
+  production_.reset();
 }
 
 bool LoadMeterIdentification::onPath(const CncState& state) const {
@@ -173,11 +177,42 @@ void LoadMeterIdentification::closeTest() {
                                  stepOf(voltages, spindle_.load_meter_resolution));
       test.readings = static_cast<int>(n);
       test.stamp = readings_.back().stamp;
+      test.duration = readings_.back().stamp - readings_.front().stamp;
       (condition_->kind == CuttingCondition::Kind::air ? air_cuts_ : cuts_).push_back(test);
+      if (condition_->kind == CuttingCondition::Kind::cut) follow(test);
       if (test_) test_(test);
     }
   }
   readings_.clear();
+}
+
+void LoadMeterIdentification::follow(const LoadTest& cut) {
+  TorqueReading reading;
+  try {
+    const IdleTorque idle = idleTorque(air_cuts_, spindle_, spindle_uncertainty_);
+    const double watt = spindle_.load_meter_gain * cut.speed;
+    reading.torque = cut.voltage.mean / watt - idle.torque(cut);
+    const std::vector<double> gradient = idle.gradient(cut);
+    double variance = std::pow(cut.torqueStdAsVoltage() / watt, 2);
+    for (std::size_t i = 0; i < idle.unknowns; ++i) {
+      for (std::size_t j = 0; j < idle.unknowns; ++j) {
+        variance += gradient[i] * idle.covariance[i * idle.unknowns + j] * gradient[j];
+      }
+    }
+    reading.torque_std = std::sqrt(variance);
+  } catch (const Error&) {
+    return;  // one air cut so far: the friction is not known yet
+  }
+  if (!(reading.torque_std > 0.0)) return;
+  const std::string of = cut.condition.tool_name + "\n" + cut.condition.material;
+  if (!production_ || of != production_of_) {
+    production_.emplace(RecursiveCoefficients::Start(), parameters_.production_memory);
+    production_of_ = of;
+  }
+  reading.tool = cut.condition.tool;
+  reading.engagement = cut.condition.engagement;
+  reading.cutting_time = cut.duration;
+  production_->update(reading);
 }
 
 void LoadMeterIdentification::handle(const IdentifyGoal& goal) {
@@ -249,30 +284,81 @@ double LoadTest::torqueStdAsVoltage() const {
   return std::hypot(voltage.std_dev, voltage.mean * speed_std / speed);
 }
 
+IdleTorque idleTorque(const std::vector<LoadTest>& air_cuts, const Spindle& spindle,
+                      double spindle_uncertainty_percent) {
+  IdleTorque idle;
+  Friction friction = modelFriction(spindle, spindle_uncertainty_percent);
+  if (!air_cuts.empty()) {
+    std::vector<AirCut> air;
+    std::vector<TimedAirCut> timed;
+    double first = air_cuts.front().stamp;
+    for (const LoadTest& test : air_cuts) first = std::min(first, test.stamp);
+    bool weighted = true;
+    for (const LoadTest& test : air_cuts) {
+      air.push_back({test.speed, test.voltage.mean, test.torqueStdAsVoltage()});
+      timed.push_back({air.back(), test.stamp - first});
+      weighted = weighted && air.back().voltage_std > 0.0;
+    }
+    friction = fitFriction(air, spindle.load_meter_gain, spindle.friction_zero_below);
+    idle.viscous = friction.viscous;
+    idle.coulomb = friction.coulomb;
+    if (weighted && air.size() > FrictionShape{true, false}.unknowns()) {
+      const FittedFriction best =
+          fitFrictionLaws(timed, spindle.load_meter_gain, spindle.friction_zero_below).front();
+      if (best.shape.unknowns() > 2) {
+        idle.viscous = best.law.viscous;
+        idle.coulomb = best.law.coulomb;
+        idle.unknowns = best.shape.unknowns();
+        idle.covariance = best.covariance;
+        idle.torque = [best, first](const LoadTest& t) { return best.law.torque(t.speed, t.stamp - first); };
+        idle.gradient = [best, first](const LoadTest& t) {
+          std::vector<double> slope;
+          for (std::size_t i = 0; i < best.value.size(); ++i) {
+            std::vector<double> v = best.value;
+            const double step = 1e-5 * (std::abs(v[i]) + 1e-6);
+            const auto at = [&](double value) {
+              v[i] = value;
+              return FrictionLaw::fromValues(best.shape, v.data(), best.law.zero_below)
+                  .torque(t.speed, t.stamp - first);
+            };
+            slope.push_back((at(best.value[i] + step) - at(best.value[i] - step)) / (2.0 * step));
+          }
+          return slope;
+        };
+        return idle;
+      }
+    }
+  }
+  idle.unknowns = 2;
+  idle.covariance.assign(friction.covariance.begin(), friction.covariance.end());
+  idle.torque = [friction](const LoadTest& t) { return friction.torque(t.speed); };
+  idle.gradient = [friction](const LoadTest& t) {
+    const std::array<double, 2> g = friction.gradient(t.speed);
+    return std::vector<double>{g[0], g[1]};
+  };
+  return idle;
+}
+
 CoefficientRecord identifyFromTests(const std::vector<LoadTest>& air_cuts, const std::vector<LoadTest>& cuts,
                                     const Spindle& spindle, double spindle_uncertainty_percent) {
   CoefficientRecord record;
   CoefficientSet& result = record.set;
-  Friction friction = modelFriction(spindle, spindle_uncertainty_percent);
-  if (!air_cuts.empty()) {
-    std::vector<AirCut> air;
-    for (const LoadTest& test : air_cuts)
-      air.push_back({test.speed, test.voltage.mean, test.torqueStdAsVoltage()});
-    friction = fitFriction(air, spindle.load_meter_gain, spindle.friction_zero_below);
-    result.friction_viscous = friction.viscous;
-    result.friction_coulomb = friction.coulomb;
-  }
+  const IdleTorque idle = idleTorque(air_cuts, spindle, spindle_uncertainty_percent);
+  result.friction_viscous = idle.viscous;
+  result.friction_coulomb = idle.coulomb;
+  const std::size_t n = idle.unknowns;
   std::vector<MeanTorqueTest> torques;
-  std::array<std::vector<MeanTorqueTest>, 2> by_friction;  // torque that one unit of each friction term takes
+  std::vector<std::vector<MeanTorqueTest>> by_friction(
+      n);  // torque that one unit of each friction term takes
   for (const LoadTest& test : cuts) {
     MeanTorqueTest t;
     t.tool = test.condition.tool;
     t.engagement = test.condition.engagement;
-    t.torque = cuttingTorque(test.voltage.mean, test.speed, spindle.load_meter_gain, friction);
+    t.torque = test.voltage.mean / (spindle.load_meter_gain * test.speed) - idle.torque(test);
     t.torque_std = test.torqueStdAsVoltage() / (spindle.load_meter_gain * test.speed);
     torques.push_back(t);
-    const std::array<double, 2> gradient = friction.gradient(test.speed);
-    for (std::size_t i = 0; i < 2; ++i) {
+    const std::vector<double> gradient = idle.gradient(test);
+    for (std::size_t i = 0; i < n; ++i) {
       t.torque = -gradient[i];
       by_friction[i].push_back(t);
     }
@@ -285,21 +371,23 @@ CoefficientRecord identifyFromTests(const std::vector<LoadTest>& air_cuts, const
   result.std_dev = found.std_dev;
   // The estimate is linear in the torques: the regression of a friction term's torque is how the coefficients
   // follow it.
-  const CuttingCoefficients per_viscous = identifyFromTorque(by_friction[0]).value;
-  const CuttingCoefficients per_coulomb = identifyFromTorque(by_friction[1]).value;
-  const auto shared = [&](double v1, double c1, double v2, double c2) {
-    return v1 * v2 * friction.covariance[0] + (v1 * c2 + v2 * c1) * friction.covariance[1] +
-           c1 * c2 * friction.covariance[3];
+  std::vector<CuttingCoefficients> per_unit;
+  for (const auto& tests : by_friction) per_unit.push_back(identifyFromTorque(tests).value);
+  const auto shared = [&](double CuttingCoefficients::*a, double CuttingCoefficients::*b) {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < n; ++i) {
+      for (std::size_t j = 0; j < n; ++j)
+        sum += per_unit[i].*a * idle.covariance[i * n + j] * (per_unit[j].*b);
+    }
+    return sum;
   };
   const auto covariance = [&](std::size_t i, std::size_t j) -> double& {
     return record.covariance[CoefficientRecord::covarianceIndex(i, j)];
   };
-  covariance(0, 0) =
-      found.covariance(0, 0) + shared(per_viscous.ktc, per_coulomb.ktc, per_viscous.ktc, per_coulomb.ktc);
-  covariance(0, 3) =
-      found.covariance(0, 3) + shared(per_viscous.ktc, per_coulomb.ktc, per_viscous.kte, per_coulomb.kte);
-  covariance(3, 3) =
-      found.covariance(3, 3) + shared(per_viscous.kte, per_coulomb.kte, per_viscous.kte, per_coulomb.kte);
+  constexpr auto KTC = &CuttingCoefficients::ktc, KTE = &CuttingCoefficients::kte;
+  covariance(0, 0) = found.covariance(0, 0) + shared(KTC, KTC);
+  covariance(0, 3) = found.covariance(0, 3) + shared(KTC, KTE);
+  covariance(3, 3) = found.covariance(3, 3) + shared(KTE, KTE);
   result.std_dev.ktc = std::sqrt(covariance(0, 0));
   result.std_dev.kte = std::sqrt(covariance(3, 3));
   result.source = "load_meter";

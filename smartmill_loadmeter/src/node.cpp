@@ -3,6 +3,7 @@
 #include <boost/function.hpp>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/units.h"
 #include "smartmill_msgs/CncState.h"
 #include "smartmill_msgs/CuttingCoefficients.h"
 #include "smartmill_msgs/CuttingCondition.h"
@@ -177,6 +178,13 @@ void LoadMeterNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status
   LoadMeterIdentification& identification = identification_.identification();
   status.add("air cuts", identification.airCuts().size());
   status.add("cuts", identification.cuts().size());
+  if (const auto& production = identification.production()) {
+    status.addf("production Ktc [N/mm2]", "%.1f +- %.1f", production->ktc() / units::N_PER_MM2,
+                production->ktcStd() / units::N_PER_MM2);
+    status.addf("production Kte [N/mm]", "%.2f +- %.2f", production->kte() / units::N_PER_MM,
+                production->kteStd() / units::N_PER_MM);
+    status.addf("last cut's surprise", "%.1f sigma", production->surprise());
+  }
   status.add("late inputs", identification_.late());
   status.add("waiting for", identification_.waitingFor());
   status.add("last result", last_message_);

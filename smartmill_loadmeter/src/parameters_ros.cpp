@@ -15,6 +15,7 @@ NodeParameters readParameters(ParameterReader& reader) {
   reader.read("path_tolerance", identification.path_tolerance);
   reader.read("minimum_readings", identification.minimum_readings);
   reader.read("maximum_gap", identification.maximum_gap);
+  reader.read("production_memory", identification.production_memory);
   reader.read("hold_back", parameters.hold_back);
   reader.read("input_timeout", parameters.input_timeout);
   reader.finish();

@@ -103,6 +103,7 @@ TEST(Parameters, theShippedFileIsTheDefaultsAndWrongOnesAreNamed) {
   EXPECT_EQ(p.identification.path_tolerance, defaults.path_tolerance);
   EXPECT_EQ(p.identification.minimum_readings, defaults.minimum_readings);
   EXPECT_EQ(p.identification.maximum_gap, defaults.maximum_gap);
+  EXPECT_EQ(p.identification.production_memory, defaults.production_memory);
   EXPECT_EQ(p.hold_back, NodeParameters().hold_back);
   EXPECT_EQ(p.input_timeout, NodeParameters().input_timeout);
   const TemporaryFolder folder;

@@ -11,6 +11,7 @@
 #include "session.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/signal/stream_sorter.h"
+#include "smartmill_loadmeter/friction_law.h"
 
 namespace smartmill::loadmeter {
 namespace {
@@ -169,6 +170,58 @@ TEST(LoadMeterIdentification, refusesWhatItCannotUse) {
   } catch (const Error& error) {
     EXPECT_THAT(error.what(), HasSubstr("settle_time_constants: 2 is out of range"));
   }
+}
+
+// Five and more air cuts let the evidence choose the friction law; a straight line would bias the cuts.
+TEST(Tests, theFrictionLawIsChosenByEvidence) {
+  const Spindle spindle = *model().spindle;
+  FrictionLaw law;
+  law.viscous = VISCOUS;
+  law.coulomb = COULOMB;
+  law.breakaway = 0.4;
+  law.stribeck_speed = units::radPerSecFromRpm(2500.0);
+  std::mt19937 random(8);
+  std::normal_distribution<double> normal;
+  std::vector<LoadTest> air, cuts;
+  const auto add = [&](double rpm, double feed) {
+    LoadTest t;
+    t.condition.tool = ToolGeometry{3, 0.012, 0.6, {}};
+    t.condition.engagement = {0.0, units::PI, 0.002, feed};
+    t.speed = units::radPerSecFromRpm(rpm);
+    t.stamp = 10.0 * static_cast<double>(air.size() + cuts.size());
+    const double torque =
+        feed > 0.0 ? MechanisticForce(t.condition.tool, TRUTH, t.condition.engagement).mean().torque : 0.0;
+    t.voltage = {
+        spindle.load_meter_gain * t.speed * (torque + law.torque(t.speed, t.stamp)) + 2e-5 * normal(random),
+        2e-5};
+    (feed > 0.0 ? cuts : air).push_back(t);
+  };
+  for (const double rpm : {1000.0, 2000.0, 3000.0, 4500.0, 6000.0, 9000.0, 12000.0}) add(rpm, 0.0);
+  for (const double feed : {3e-5, 6e-5, 1e-4}) add(2500.0, feed);
+  const CoefficientSet k = identifyFromTests(air, cuts, spindle, 3.0).set;
+  EXPECT_NEAR(k.value.ktc, TRUTH.ktc, 3.0 * k.std_dev.ktc);
+  EXPECT_NEAR(k.value.kte, TRUTH.kte, 3.0 * k.std_dev.kte);
+  EXPECT_LT(k.std_dev.kte, 0.02 * TRUTH.kte);
+  EXPECT_NEAR(k.friction_viscous, VISCOUS, 0.02 * VISCOUS);
+}
+
+TEST(Production, cutsOfASessionAreFollowedWithoutAGoal) {
+  LoadMeterIdentification identification(model(), {});
+  Session session(5, 2e-4);
+  session.state = [&](const CncState& s) { identification.handle(s); };
+  session.load = [&](const LoadSample& l) { identification.handle(l); };
+  session.condition = [&](const CuttingCondition& c) { identification.handle(c); };
+  EXPECT_FALSE(identification.production());
+  takeThrough(session);
+  ASSERT_TRUE(identification.production());
+  const RecursiveCoefficients& k = *identification.production();
+  EXPECT_EQ(k.readings(), 3);
+  EXPECT_NEAR(k.ktc(), TRUTH.ktc, 4.0 * k.ktcStd());
+  EXPECT_NEAR(k.kte(), TRUTH.kte, 4.0 * k.kteStd());
+  EXPECT_LT(k.ktcStd(), 0.05 * TRUTH.ktc);
+  session.tool = "another";
+  session.slot(6000.0, 5e-5, 4.0);
+  EXPECT_EQ(identification.production()->readings(), 1);
 }
 
 }  // namespace

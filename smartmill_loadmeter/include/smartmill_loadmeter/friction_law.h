@@ -50,9 +50,11 @@ struct TimedAirCut {
 struct FittedFriction {
   FrictionShape shape;
   FrictionLaw law;
-  std::vector<double> std_dev;  ///< of the unknowns of the shape
-  double bic = 0.0;             ///< lower is better
-  double rms = 0.0;             ///< [N m] of what is left
+  std::vector<double> std_dev;     ///< of the unknowns of the shape
+  std::vector<double> value;       ///< of the unknowns
+  std::vector<double> covariance;  ///< of the unknowns, row by row
+  double bic = 0.0;                ///< lower is better
+  double rms = 0.0;                ///< [N m] of what is left
 };
 
 /// All shapes the air cuts can carry (more cuts than unknowns), best first by the Bayesian information

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -11,6 +12,7 @@
 #include "smartmill_core/signal/streams.h"
 #include "smartmill_loadmeter/database.h"
 #include "smartmill_loadmeter/load_meter.h"
+#include "smartmill_loadmeter/production.h"
 
 namespace smartmill::loadmeter {
 
@@ -19,9 +21,10 @@ struct IdentificationParameters {
   double settle_time_constants = 8.0;  ///< [1] >= 5, waited after a change; 8 leave 0.03 % of a step
   double guard_time =
       0.05;  ///< [s] >= 0, readings dropped before steadiness is lost (stamps are replies' times)
-  double path_tolerance = 1.0e-3;  ///< [m] distance from the line of the steady cut
-  int minimum_readings = 10;       ///< [1] >= 2, of a test
-  double maximum_gap = 0.5;        ///< [s] > 0, without controller state or load: steadiness is lost
+  double path_tolerance = 1.0e-3;     ///< [m] distance from the line of the steady cut
+  int minimum_readings = 10;          ///< [1] >= 2, of a test
+  double production_memory = 1800.0;  ///< [s] > 0 of cutting after which a production cut counts 1/e
+  double maximum_gap = 0.5;           ///< [s] > 0, without controller state or load: steadiness is lost
 
   /// @throws Error naming key and value.
   void validate() const;
@@ -53,7 +56,8 @@ struct LoadTest {
   double speed_std = 0.0;  ///< [rad/s] of the mean
   MeanVoltage voltage;
   int readings = 0;
-  double stamp = 0.0;  ///< [s] of its last reading
+  double stamp = 0.0;     ///< [s] of its last reading
+  double duration = 0.0;  ///< [s] steady
 
   /// Standard deviation of the mean torque at the motor as one of the voltage: meter and speed [V].
   double torqueStdAsVoltage() const;
@@ -81,6 +85,10 @@ class LoadMeterIdentification {
   /// As new: a bag was restarted.
   void reset();
 
+  /// Ktc and Kte followed cut by cut since the tool or the material changed; empty before a cut with known
+  /// friction.
+  const std::optional<RecursiveCoefficients>& production() const { return production_; }
+
   const std::vector<LoadTest>& airCuts() const { return air_cuts_; }
   const std::vector<LoadTest>& cuts() const { return cuts_; }
 
@@ -91,6 +99,7 @@ class LoadMeterIdentification {
   bool onPath(const CncState& state) const;
   void dropAfter(double stamp);
   void closeTest();
+  void follow(const LoadTest& cut);
   IdentifyResult identify(const IdentifyGoal& goal) const;
 
   std::string file_;
@@ -105,9 +114,25 @@ class LoadMeterIdentification {
   double last_reading_ = 0.0, last_state_ = 0.0;    // [s]
   std::vector<Reading> readings_;
   std::vector<LoadTest> air_cuts_, cuts_;
+  std::optional<RecursiveCoefficients> production_;
+  std::string production_of_;         // tool and material
   std::vector<std::string> dropped_;  // why tests were not used
   std::string bad_data_;
 };
+
+/// Friction torque in a test, and how it hangs on what was found in the air cuts.
+struct IdleTorque {
+  std::function<double(const LoadTest&)> torque;                 ///< [N m]
+  std::function<std::vector<double>(const LoadTest&)> gradient;  ///< to the unknowns
+  std::size_t unknowns = 0;
+  std::vector<double> covariance;                             ///< of the unknowns, row by row
+  double viscous = std::numeric_limits<double>::quiet_NaN();  ///< [N m s/rad] found in the air cuts
+  double coulomb = std::numeric_limits<double>::quiet_NaN();  ///< [N m]
+};
+/// From the air cuts, the law by evidence (Coulomb and viscous; Stribeck, warm-up from five air cuts on); the
+/// model's without any. @throws Error with air cuts at fewer than two speeds.
+IdleTorque idleTorque(const std::vector<LoadTest>& air_cuts, const Spindle& spindle,
+                      double spindle_uncertainty_percent);
 
 /// Coefficients and their standard deviations from means: friction from the air cuts (the model's without
 /// any), torque (eq. 3.5), regression (eq. 3.19 generalised); the standard deviations carry the friction's
