@@ -20,6 +20,7 @@
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/units.h"
+#include "smartmill_kalman/blind_mode.h"
 #include "smartmill_kalman/campaign_compensation.h"
 
 namespace {
@@ -30,7 +31,8 @@ constexpr std::array<const char*, 3> AXES{{"x", "y", "z"}};
 
 struct Request {
   std::string source, out, model, parameters, method = "kalman";
-  bool identify = false, coupled = false;
+  bool identify = false, coupled = false, blind = false;
+  double blind_low = 600.0, blind_high = 1500.0;  // [Hz]
   std::optional<double> bandwidth, noise, settling;
   kalman::SensorFitParameters fit;
 };
@@ -61,6 +63,22 @@ void write(const std::string& folder, const std::string& name, const std::vector
 /// What is said about the samples' times.
 const char* latency(const Request& request) {
   return request.method == "inverse" ? "its latency of 256 samples taken out" : "no latency";
+}
+
+/// What a cut says about the sensor without a tap.
+void printBlind(const std::string& name, const Record& record, const CampaignTest& test,
+                const Request& request) {
+  for (const char* channel : {"fx", "fy", "fz"}) {
+    const kalman::BlindMode found = kalman::findBlindMode(
+        record.column(channel), test.sample_rate, test.spindle_speed, request.blind_low, request.blind_high);
+    if (found.likelihood < 10.0) {
+      std::printf("%s %s: no mode shows between the lines of the spindle\n", name.c_str(), channel);
+    } else {
+      std::printf("%s %s: a mode shows at %.1f +- %.1f Hz, damping %.4f +- %.4f\n", name.c_str(), channel,
+                  found.mode.frequency, found.mode.frequency_std, found.mode.damping_ratio,
+                  found.mode.damping_ratio_std);
+    }
+  }
 }
 
 std::array<std::vector<double>, 3> forces(const Record& record) {
@@ -110,6 +128,7 @@ void fromCampaign(const Request& request) {
     if (test.kind != TestKind::cut) continue;
     std::fprintf(stderr, "compensating %s\n", test.name.c_str());
     const Record record = readRecord(campaign, test);
+    if (request.blind) printBlind(test.name, record, test, request);
     const auto force =
         matrix ? kalman::compensate(record, *matrix, test.spindle_speed, test.sample_rate,
                                     parameters.compensation.filter)
@@ -120,6 +139,12 @@ void fromCampaign(const Request& request) {
     ++cuts;
   }
   if (cuts == 0) throw Error(campaign.folder + ": the campaign has no cuts");
+  if (request.blind) {
+    std::printf(
+        "a mode shown by a cut may be the tool's, the workpiece's or the sensor's, and with which share it "
+        "stands "
+        "in the force it does not tell: it is not used; a tap tells\n");
+  }
   std::printf("%zu cuts written to %s (%s)\n", cuts, request.out.c_str(), latency(request));
 }
 
