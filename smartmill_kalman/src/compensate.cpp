@@ -160,9 +160,10 @@ std::string fileName(std::string name, std::set<std::string>& used) {
 }
 
 void fromBag(const Request& request) {
-  if (request.identify || request.coupled) {
+  if (request.identify || request.coupled || request.blind) {
     throw Error(
-        "--identify and --coupled are for campaigns: the taps in a bag count from their goals on, as in the "
+        "--identify, --coupled and --blind are for campaigns: the taps in a bag count from their goals on, "
+        "as in the "
         "node");
   }
   const kalman::NodeParameters parameters = parametersOf(request);
@@ -221,6 +222,10 @@ int main(int argc, char** argv) {
   app.add_option("--model", request.model, "model file with the force sensor (default: the campaign's)");
   app.add_option("--params", request.parameters, "parameter file of the node (launch/config/kalman.yaml)");
   app.add_flag("--identify", request.identify, "campaign: take the sensor's modes from its own taps");
+  app.add_flag("--blind", request.blind,
+               "campaign: say what the cuts show of the sensor's modes without a tap");
+  app.add_option("--blind-low-hz", request.blind_low, "band of --blind")->capture_default_str();
+  app.add_option("--blind-high-hz", request.blind_high, "band of --blind")->capture_default_str();
   app.add_flag(
       "--coupled", request.coupled,
       "campaign: sensor with its cross-talk from the campaign's own taps along x, y and z; method kalman");
