@@ -256,6 +256,7 @@ ChartMaker::Basis ChartMaker::basis() const {
     system.kr = basis.process.kr * cutting.ktc;
     SolverOptions options;
     options.tolerance = 1e-4;
+    options.nodes = 10;  // 1e-6 of the depth, enough for a chart
     basis.solver = makeSolver(Method::collocation, system, options);
     // So deep that a limit beyond cannot hold a recommended cut down.
     basis.max_depth = parameters_.max_depth / (1.0 - parameters_.depth_margin);

@@ -262,7 +262,10 @@ class PeriodMap {
     ends.push_back(period_);
     std::sort(ends.begin(), ends.end());
     double fastest = 0.0;
+    // What a heavily damped mode far above the others adds (a residual compliance) follows the force at once.
+    constexpr double FOLLOWS = 0.4;
     for (const SystemMode& mode : system.modes) {
+      if (mode.damping_ratio >= FOLLOWS && system.modes.size() > 1) continue;
       const double w = units::TWO_PI * mode.frequency;
       const double added = system.stiffness * std::hypot(mode.input[0], mode.input[1]) *
                            std::hypot(mode.output[0], mode.output[1]);
