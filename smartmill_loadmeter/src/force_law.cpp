@@ -7,6 +7,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/units.h"
 #include "smartmill_loadmeter/fit.h"
+#include "smartmill_loadmeter/runout.h"
 
 namespace smartmill::loadmeter {
 
@@ -208,12 +209,7 @@ void forces(const ToolGeometry& tool, const Engagement& e, const CuttingCoeffici
         const double phi =
             wrapped(spindle + tooth[static_cast<std::size_t>(t)] - tool.lag() * (s + 0.5) * dz);
         if (phi < e.entry || phi > e.exit) continue;
-        double h = 1e9, feed = 0.0;
-        for (int m = 1; m <= tool.teeth; ++m) {
-          feed += e.feed_per_tooth * tool.teeth * tool.pitchOf((t + m - 1) % tool.teeth) / TWO_PI;
-          h = std::min(h, feed * std::sin(phi) + radius[static_cast<std::size_t>(t)] -
-                              radius[static_cast<std::size_t>((t + m) % tool.teeth)]);
-        }
+        const double h = chipThickness(tool, e.feed_per_tooth, std::sin(phi), radius, t);
         if (h <= 0.0) continue;
         const double chip =
             exponent == 0.0 ? h : h * std::pow(std::max(h, THINNEST_CHIP) / REFERENCE_CHIP, -exponent);

@@ -10,6 +10,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/units.h"
 #include "smartmill_loadmeter/campaign_identification.h"
+#include "smartmill_loadmeter/runout.h"
 
 namespace smartmill::loadmeter {
 
@@ -78,15 +79,12 @@ std::array<std::vector<double>, 2> runoutShares(const ToolGeometry& tool, const 
   for (std::size_t o = 0; o < OFFSETS; ++o) {
     const double offset = OFFSET_STEP * static_cast<double>(o);
     double chip = 0.0, arc = 0.0;
+    std::vector<double> radius;
+    for (int t = 0; t < tool.teeth; ++t) radius.push_back(offset * std::cos(tool.toothAngle(t)));
     for (int t = 0; t < tool.teeth; ++t) {
       for (int i = 0; i < STEPS; ++i) {
         const double s = std::sin(low + (high - low) * (i + 0.5) / STEPS);
-        double h = 1e9, feed = 0.0;
-        for (int m = 1; m <= tool.teeth; ++m) {
-          feed += e.feed_per_tooth * tool.teeth * tool.pitchOf((t + m - 1) % tool.teeth) / units::TWO_PI;
-          h = std::min(h, feed * s + offset * (std::cos(tool.toothAngle(t)) -
-                                               std::cos(tool.toothAngle((t + m) % tool.teeth))));
-        }
+        const double h = chipThickness(tool, e.feed_per_tooth, s, radius, t);
         // A tooth that misses does so in part of the step: smooth over the step.
         const double width = e.feed_per_tooth * (high - low) / STEPS;
         const double share = std::clamp(0.5 + h / width, 0.0, 1.0);

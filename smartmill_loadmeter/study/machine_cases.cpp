@@ -6,6 +6,7 @@
 
 #include "smartmill_core/units.h"
 #include "smartmill_loadmeter/machine_calibration.h"
+#include "smartmill_loadmeter/runout.h"
 
 namespace smartmill::loadmeter {
 
@@ -40,13 +41,7 @@ std::vector<double> torqueOverARevolution(const ToolGeometry& tool, const Engage
         double phi = TWO_PI * static_cast<double>(i) / static_cast<double>(steps) + tool.toothAngle(t) - lag;
         phi -= TWO_PI * std::floor(phi / TWO_PI);
         if (phi < e.entry || phi > e.exit) continue;
-        double h = 1e9, feed = 0.0;
-        // Tooth t cuts what tooth t + 1, t + 2, ... ahead of it left, at last what it left itself.
-        for (int m = 1; m <= tool.teeth; ++m) {
-          feed += e.feed_per_tooth * tool.teeth * tool.pitchOf((t + m - 1) % tool.teeth) / TWO_PI;
-          const double ahead = radius[static_cast<std::size_t>((t + m) % tool.teeth)];
-          h = std::min(h, feed * std::sin(phi) + radius[static_cast<std::size_t>(t)] - ahead);
-        }
+        const double h = chipThickness(tool, e.feed_per_tooth, std::sin(phi), radius, t);
         if (h > 0.0) torque[i] += (k.ktc * h + k.kte) * dz * tool.radius();
       }
     }
