@@ -42,7 +42,7 @@ ControlStreamParameters readControl(ros::NodeHandle private_nh) {
 ControlNode::ControlNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
     : stream_(readControl(private_nh), [this](const LearntMachine& learnt) { publish(learnt); }),
       diagnostics_(ros::NodeHandle(), private_nh) {
-  command_ = nh.advertise<smartmill_msgs::SampleBlock>("control/command", 100);
+  command_ = nh.advertise<smartmill_msgs::SampleBlock>("control/command", QUEUE);
   machine_ = nh.advertise<smartmill_msgs::ModalModel>("control/machine", 10, true);
   const boost::function<void(const smartmill_msgs::SpindleAngle&)> on_angle =
       [this](const smartmill_msgs::SpindleAngle& message) { stream_.handle(fromMsg(message)); };

@@ -47,17 +47,17 @@ int points(int few) {
 }
 
 TEST(TimeDomain, agreesOutsideTheBand) {
-  EXPECT_GE(agreement(benchmarkSystem(0.5, true, true), true, points(40), 1), 0.98);
+  EXPECT_GE(agreement(benchmarkSystem(0.5, true, true), true, points(16), 1), 0.98);
 }
 
 TEST(TimeDomain, agreesInASlot) {
-  EXPECT_GE(agreement(benchmarkSystem(1.0, true, false), false, points(40), 2), 0.98);
+  EXPECT_GE(agreement(benchmarkSystem(1.0, true, false), false, points(16), 2), 0.98);
 }
 
 TEST(TimeDomain, agreesWithHelix) {
   RegenerativeSystem system = benchmarkSystem(0.5, true, true);
   system.helix = units::radFromDeg(30.0);
-  EXPECT_GE(agreement(system, true, points(30), 3), 0.98);
+  EXPECT_GE(agreement(system, true, points(10), 3), 0.98);
 }
 
 // With uneven pitch the forced vibration differs from tooth to tooth, the chips with it, and teeth leave a
@@ -67,7 +67,7 @@ TEST(TimeDomain, agreesWithHelixAndUnevenPitch) {
   RegenerativeSystem system = benchmarkSystem(0.5, true, true);
   system.helix = units::radFromDeg(30.0);
   system.pitch = {units::radFromDeg(170.0), units::radFromDeg(190.0)};
-  EXPECT_GE(agreement(system, true, points(30), 4, false), 0.98);
+  EXPECT_GE(agreement(system, true, points(10), 4, false), 0.98);
 }
 
 // The flip that zero-order misses by more than a factor of two.
