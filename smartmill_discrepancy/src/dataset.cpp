@@ -185,7 +185,7 @@ Dataset loadDataset(const Campaign& campaign, const MachineModel& nominal) {
   for (const CampaignTest& test : campaign.tests) {
     TestData t;
     t.test = test;
-    t.record = readRecord(campaign, test, nominal);
+    t.record = readRecord(campaign, test);
     if (t.record.size() < LEAST_SAMPLES) {
       throw Error(t.record.file + ": " + std::to_string(t.record.size()) + " samples, at least " +
                   std::to_string(LEAST_SAMPLES) + " are due");

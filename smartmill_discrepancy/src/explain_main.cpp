@@ -9,6 +9,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "bag_campaign.h"
 #include "smartmill_core/error.h"
 #include "smartmill_discrepancy/explanation.h"
 
@@ -24,12 +25,19 @@ void run(const std::string& folder, const std::string& model_file, const std::st
     const double t = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     std::fprintf(stderr, "[%5.1f s] %s\n", t, line.c_str());
   };
-  const Campaign campaign = readCampaign(folder);
-  const Dataset data =
-      loadDataset(campaign, readMachineModel(model_file.empty() ? campaign.modelPath() : model_file));
   std::error_code failed;
   std::filesystem::create_directories(out, failed);
   if (failed) throw Error(out + ": " + failed.message());
+  Campaign campaign;
+  if (std::filesystem::path(folder).extension() == ".bag") {
+    if (model_file.empty()) throw Error(folder + ": a bag holds no model, give one with --model");
+    std::filesystem::remove_all(out + "/campaign", failed);
+    campaign = campaignOfBag(folder, model_file, out + "/campaign");
+  } else {
+    campaign = readCampaign(folder);
+  }
+  const Dataset data =
+      loadDataset(campaign, readMachineModel(model_file.empty() ? campaign.modelPath() : model_file));
   const Explanation explanation = explain(data, options, out);
   writeReport(explanation, out);
   writeHtml(explanation, std::filesystem::path(folder).filename().string(), drawPictures(explanation, out),
@@ -57,7 +65,7 @@ int main(int argc, char** argv) {
   std::string campaign, model, out;
   int threads = 2;
   CLI::App app{"Finds where twin and records of a campaign part and which effects the model lacks."};
-  app.add_option("campaign", campaign, "campaign folder")->required();
+  app.add_option("campaign", campaign, "campaign folder, or a bag")->required();
   app.add_option("--model", model, "machine model file (default: the campaign's)");
   app.add_option("-o,--out", out, "folder of the report")->required();
   app.add_option("--threads", threads, "threads")->check(CLI::Range(1, 64));
