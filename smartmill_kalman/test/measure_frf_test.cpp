@@ -35,6 +35,9 @@
 namespace smartmill::kalman {
 namespace {
 
+/// Goals and conditions are told ahead, so that they are in order on a busy machine too.
+const ros::Duration LEAD(0.5);
+
 using Client = actionlib::SimpleActionClient<smartmill_msgs::MeasureFrfAction>;
 using Blocks = std::map<std::uint64_t, smartmill_msgs::ForceBlock>;
 
@@ -72,7 +75,7 @@ class MeasureFrf : public testing::Test {
 
   smartmill_msgs::MeasureFrfResult measure(const std::string& direction, std::uint32_t hits) {
     smartmill_msgs::MeasureFrfGoal goal;
-    goal.header.stamp = ros::Time::now();
+    goal.header.stamp = ros::Time::now() + LEAD;
     goal.point = POINT_FORCE_SENSOR;
     goal.direction = direction;
     goal.hits = hits;
@@ -160,7 +163,7 @@ TEST_F(MeasureFrf, TapsThenCutsAndReplaysToTheLastDigit) {
   }));
 
   smartmill_msgs::CuttingCondition cut;
-  cut.header.stamp = ros::Time::now();
+  cut.header.stamp = ros::Time::now() + LEAD;
   cut.kind = smartmill_msgs::CuttingCondition::CUT;
   cut.name = "slot_9000";
   cut.teeth = 4;
@@ -171,11 +174,11 @@ TEST_F(MeasureFrf, TapsThenCutsAndReplaysToTheLastDigit) {
   cut.axial_depth = 2e-3;
   cut.exit_angle = units::PI;
   condition.publish(cut);
-  ros::WallDuration(1.5).sleep();
+  ros::WallDuration(1.8).sleep();
   smartmill_msgs::CuttingCondition none;
-  none.header.stamp = ros::Time::now();
+  none.header.stamp = ros::Time::now() + LEAD;
   condition.publish(none);
-  ros::WallDuration(0.7).sleep();
+  ros::WallDuration(1.2).sleep();
   std::uint64_t last = 0;
   {
     const std::lock_guard<std::mutex> lock(mutex);
@@ -184,9 +187,9 @@ TEST_F(MeasureFrf, TapsThenCutsAndReplaysToTheLastDigit) {
   }
 
   // Offline, from the bag.
-  NodeParameters parameters;
-  parameters.taps.strike_timeout = 0.5;
-  parameters.taps.max_bad_hits = 1;
+  // With the live node's own parameters.
+  ParameterReader reader = ParameterReader::fromServer(ros::NodeHandle("/smartmill/kalman"));
+  const NodeParameters parameters = readParameters(reader);
   std::vector<BagCut> cuts;
   const BagSummary summary = compensateBag(file, ForceSensor(), parameters, Method::kalman,
                                            [&](BagCut&& c) { cuts.push_back(std::move(c)); });
