@@ -69,6 +69,22 @@ std::vector<double> ForceTrack::axisWithGaps(std::size_t axis, std::uint64_t fro
   return values;
 }
 
+std::vector<double> ForceTrack::axisAt(std::size_t axis, const std::vector<double>& times) const {
+  std::vector<double> values(times.size(), NOT_A_NUMBER);
+  auto block = blocks_.begin();
+  for (std::size_t i = 0; i < times.size() && block != blocks_.end(); ++i) {
+    for (auto next = std::next(block);
+         next != blocks_.end() && next->second.stamp - 0.5 / sample_rate_ <= times[i]; ++next) {
+      block = next;
+    }
+    const std::vector<double>& source = block->second.force[axis];
+    const long sample = std::lround((times[i] - block->second.stamp) * sample_rate_);
+    if (sample >= 0 && sample < static_cast<long>(source.size()))
+      values[i] = source[static_cast<std::size_t>(sample)];
+  }
+  return values;
+}
+
 std::vector<double> ForceTrack::axis(std::size_t axis, std::uint64_t from, std::uint64_t to) const {
   const auto [first, last] = covered(from, to);
   if (first != from || last != to) {

@@ -29,6 +29,7 @@ TEST(Agreement, WhatOnlyOneSideHasIsMissing) {
   agreement.add({1.0, 2.0}, {1.0});
   EXPECT_EQ(agreement.missing, 1u);
   EXPECT_FALSE(agreement.same(1.0));
+  EXPECT_TRUE(agreement.same(0.0, 0.5));  // one of two compared
   Agreement holes;
   holes.add({1.0, NONE}, {1.0, 2.0});
   EXPECT_FALSE(holes.same(1.0));

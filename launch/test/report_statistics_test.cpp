@@ -95,6 +95,11 @@ TEST(ForceTrack, SamplesMeetByIndexAcrossBlocks) {
   for (std::size_t i = 0; i < y.size(); ++i) EXPECT_DOUBLE_EQ(y[i], 105.1 + static_cast<double>(i));
   EXPECT_THROW(track.axis(0, 115, 121), Error);
   EXPECT_THROW(track.axis(0, 95, 105), Error);
+  const std::vector<double> at = track.axisAt(0, {5.0991, 5.1002, 5.1098, 5.119, 5.13});
+  EXPECT_TRUE(std::isnan(at[0]) && std::isnan(at[4]));
+  EXPECT_DOUBLE_EQ(at[1], 100.0);
+  EXPECT_DOUBLE_EQ(at[2], 110.0);
+  EXPECT_DOUBLE_EQ(at[3], 119.0);
   const std::vector<double> begin = track.axisWithGaps(0, 98, 102);
   EXPECT_TRUE(std::isnan(begin[0]) && std::isnan(begin[1]));
   EXPECT_DOUBLE_EQ(begin[3], 101.0);

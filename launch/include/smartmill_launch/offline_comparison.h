@@ -24,7 +24,11 @@ struct Agreement {
   std::size_t missing = 0;  ///< numbers that only one of them has
   double largest = 0.0;     ///< [1] largest difference over the largest number of its series
   /// @param tolerance [1] half a unit of the last digit printed
-  bool same(double tolerance) const { return compared > 0 && missing == 0 && largest <= tolerance; }
+  /// @param most_missing [1] of what was compared may be on one side only
+  bool same(double tolerance, double most_missing = 0.0) const {
+    return compared > 0 && static_cast<double>(missing) <= most_missing * static_cast<double>(compared) &&
+           largest <= tolerance;
+  }
 
   /// A series whose numbers are of one kind: differences count against its largest number. NaN and infinity
   /// must stand on both sides.

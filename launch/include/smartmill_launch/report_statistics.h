@@ -55,6 +55,8 @@ class ForceTrack {
   std::vector<double> axis(std::size_t axis, std::uint64_t from, std::uint64_t to) const;
   /// As axis(), NaN where a sample is missing.
   std::vector<double> axisWithGaps(std::size_t axis, std::uint64_t from, std::uint64_t to) const;
+  /// Samples at rising times [s], nearest; NaN where none is within half a sample.
+  std::vector<double> axisAt(std::size_t axis, const std::vector<double>& times) const;
   /// Index of the first sample not before a time [s]. @throws Error on an empty track.
   std::uint64_t indexAt(double stamp) const;
   /// Longest stretch without a gap inside from <= index < to; status, where given, must be that of every
