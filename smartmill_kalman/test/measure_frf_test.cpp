@@ -209,6 +209,11 @@ TEST_F(MeasureFrf, TapsThenCutsAndReplaysToTheLastDigit) {
       for (std::size_t i = 0; i < block.fx.size(); ++i) {
         const double time = block.header.stamp.toSec() + static_cast<double>(i) / block.sample_rate;
         if (time < start || at >= offline.offset.size()) continue;
+        // The filters begin anew with the first whole block after the condition.
+        if (block.header.stamp.toSec() < start) {
+          ++at;
+          continue;
+        }
         ASSERT_EQ(block.fx[i], offline.compensated[0][at]) << at;
         ASSERT_EQ(block.fy[i], offline.compensated[1][at]) << at;
         ++at, ++same;
