@@ -53,20 +53,6 @@ std::string targetText(const Target& target) {
   return shown(target.at_least ? ">= %.1f %%" : "<= %.1f %%", target.percent);
 }
 
-const char* wordOf(CutVerdict::Kind kind) {
-  switch (kind) {
-    case CutVerdict::Kind::stable:
-      return "stable";
-    case CutVerdict::Kind::chatter:
-      return "chatter";
-    case CutVerdict::Kind::undecided:
-      return "undecided";
-    case CutVerdict::Kind::unknown:
-      break;
-  }
-  return "unknown";
-}
-
 /// JSON knows neither NaN nor infinity.
 Json number(double value) {
   return std::isfinite(value) ? Json(value) : Json(nullptr);

@@ -268,6 +268,20 @@ std::string SessionPlan::program(const PlannedCut& cut, const std::array<double,
   return text + "M5\n";
 }
 
+const char* wordOf(CutVerdict::Kind kind) {
+  switch (kind) {
+    case CutVerdict::Kind::stable:
+      return "stable";
+    case CutVerdict::Kind::chatter:
+      return "chatter";
+    case CutVerdict::Kind::undecided:
+      return "undecided";
+    case CutVerdict::Kind::unknown:
+      break;
+  }
+  return "unknown";
+}
+
 std::string CutVerdict::text() const {
   const std::string share =
       " (" + std::to_string(chattering) + " of " + std::to_string(windows) + " windows chatter)";

@@ -33,20 +33,6 @@ Json modesOf(const MeasuredModes& measured) {
           {"modes", modes}};
 }
 
-const char* wordOf(CutVerdict::Kind kind) {
-  switch (kind) {
-    case CutVerdict::Kind::stable:
-      return "stable";
-    case CutVerdict::Kind::chatter:
-      return "chatter";
-    case CutVerdict::Kind::undecided:
-      return "undecided";
-    case CutVerdict::Kind::unknown:
-      break;
-  }
-  return "unknown";
-}
-
 }  // namespace
 
 void SessionSummary::write(const std::string& file) const {

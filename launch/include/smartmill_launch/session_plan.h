@@ -132,6 +132,9 @@ struct CutVerdict {
   std::string text() const;         ///< e.g. "chatter at 812.3 Hz (7 of 8 windows)"
 };
 
+/// stable, chatter, undecided or unknown.
+const char* wordOf(CutVerdict::Kind kind);
+
 /// Stable when at most a tenth of the windows chatters, chatter from half on: it takes time to grow, and one
 /// window may hold a disturbance. Fewer than two windows say nothing.
 CutVerdict judge(const std::vector<ChatterWindow>& windows);
