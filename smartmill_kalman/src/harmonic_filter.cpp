@@ -17,18 +17,8 @@ namespace {
 
 using Complex = std::complex<double>;
 
-/// A window whose mean square exceeds the largest of the revolution before by this is a change of the force.
-constexpr double OUT_OF_LINE = 5.0;
-/// Windows after a start that tell what is usual.
-constexpr std::size_t LEAST_WINDOWS = 12;
 /// A harmonic that a sensor passes by less is not told by it.
 constexpr double LEAST_PASSED = 1e-3;
-/// Revolutions at a memory before a longer one is tried.
-constexpr std::size_t DWELL = 2;
-/// The mean square of a revolution that still falls below this share of the last one's: not settled.
-constexpr double STILL_FALLING = 0.8;
-/// The mean square that a longer memory may have over the one at which it was accepted.
-constexpr double MEMORY_TOO_LONG = 1.5;
 
 void requirePositive(const char* key, double value) {
   if (!(value > 0.0) || !std::isfinite(value)) {
@@ -136,7 +126,8 @@ HarmonicFilter::HarmonicFilter(std::vector<HarmonicGain> gains, const ModalModel
     : sample_rate_(sample_rate),
       modes_(sensor.modes.size()),
       harmonics_(static_cast<int>(gains.at(0).filter.size() - 2 * modes_ - 1) / 2),
-      design_(std::move(gains)) {
+      design_(std::move(gains)),
+      watch_(design_.size(), units::TWO_PI / spindle_speed * sample_rate) {
   layOut(sensor, spindle_speed);
   for (Block& block : blocks_) block.re = block.im = Four{};
   setGains();
@@ -173,9 +164,7 @@ void HarmonicFilter::layOut(const ModalModel& sensor, double spindle_speed) {
       block.g[k] = 1.0;
     }
   }
-  const auto samples = units::TWO_PI / spindle_speed * sample_rate_;
-  windows_a_revolution_ = std::max<std::size_t>(
-      4, static_cast<std::size_t>(std::lround(samples / static_cast<double>(window_length_))));
+  watch_.setRevolution(units::TWO_PI / spindle_speed * sample_rate_);
 }
 
 // Force states w = F - i G turn with exp(i n w dt). A mode's own pair is what it still rings: its state less
@@ -280,7 +269,7 @@ void HarmonicFilter::replaceSensor(const ModalModel& sensor, std::vector<Harmoni
   if (!gains.empty() && gains.front().filter.size() == design_.front().filter.size())
     design_ = std::move(gains);
   layOut(sensor, spindle_speed_);
-  level_ = std::min(level_, design_.size() - 1);
+  watch_.setLevels(design_.size());
   setGains();
   expected_ = expectation();
 }
@@ -299,7 +288,7 @@ std::vector<std::complex<double>> HarmonicFilter::measuredHarmonics() const {
 void HarmonicFilter::adopt(const HarmonicFilter& other) {
   if (other.modes_ != modes_) throw Error("Kalman filter: the number of modes cannot change");
   std::vector<double> state = other.state();
-  level_ = std::min(other.level_, gains_.size() - 1);
+  watch_.setLevel(other.level());
   state.resize(2 * modes_ + 1 + 2 * static_cast<std::size_t>(harmonics_), 0.0);
   setState(state);
 }
@@ -315,9 +304,7 @@ double HarmonicFilter::expectation() const {
 void HarmonicFilter::reset() {
   for (Block& block : blocks_) block.re = block.im = Four{};
   expected_ = innovation_ = 0.0;
-  level_ = 0;
-  window_count_ = windows_ = dwell_ = 0;
-  window_sum_ = revolution_sum_ = peak_ = last_peak_ = last_mean_ = accepted_mean_ = 0.0;
+  watch_.reset();
 }
 
 // Without fused multiply-adds the clones give the same numbers.
@@ -337,41 +324,6 @@ __attribute__((target_clones("avx2", "default"))) double HarmonicFilter::advance
   }
   expected_ = (expected[0] + expected[2]) + (expected[1] + expected[3]);
   return (force[0] + force[2]) + (force[1] + force[3]) + force_gain * innovation;
-}
-
-void HarmonicFilter::judgeWindow() {
-  const double mean = window_sum_ / static_cast<double>(window_length_);
-  window_count_ = 0;
-  window_sum_ = 0.0;
-  const bool known = level_ > 0 || windows_ >= LEAST_WINDOWS || last_peak_ > 0.0;
-  if (known && mean > OUT_OF_LINE * (level_ > 0 ? last_peak_ : std::max(last_peak_, peak_))) {
-    level_ = 0;
-    ++restarts_;
-    windows_ = dwell_ = 0;
-    revolution_sum_ = last_mean_ = 0.0;
-    peak_ = last_peak_ = mean;
-    return;
-  }
-  revolution_sum_ += mean;
-  peak_ = std::max(peak_, mean);
-  if (++windows_ == windows_a_revolution_) judgeRevolution();
-}
-
-void HarmonicFilter::judgeRevolution() {
-  const double mean = revolution_sum_ / static_cast<double>(windows_);
-  const bool settled = mean > STILL_FALLING * last_mean_;
-  if (level_ > 0 && mean > MEMORY_TOO_LONG * accepted_mean_) {
-    --level_;
-    dwell_ = 0;
-  } else if (++dwell_ > DWELL && settled && level_ + 1 < gains_.size()) {
-    if (level_ == 0) accepted_mean_ = mean;
-    ++level_;
-    dwell_ = 0;
-  }
-  last_mean_ = mean;
-  last_peak_ = peak_;
-  windows_ = 0;
-  revolution_sum_ = peak_ = 0.0;
 }
 
 std::vector<double> HarmonicFilter::smooth(const std::vector<double>& measured) {

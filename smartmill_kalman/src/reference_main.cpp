@@ -4,6 +4,7 @@
 #include <cmath>
 #include <complex>
 #include <cstdio>
+#include <ctime>
 #include <functional>
 #include <iostream>
 #include <string>
@@ -13,6 +14,7 @@
 
 #include "smartmill_core/units.h"
 #include "smartmill_kalman/campaign_compensation.h"
+#include "smartmill_kalman/delay_filter.h"
 #include "smartmill_kalman/record_compensation.h"
 #include "smartmill_kalman/reference_case.h"
 
@@ -102,6 +104,49 @@ void run(const std::vector<double>& speeds, double duration) {
     row(rpm, "kalman, nine taps", with(Method::kalman, fit.model), "1.5");
     row(rpm, "random walk, best q, causal", randomWalk(reference, record, false), "baseline");
     row(rpm, "random walk, best q, smoothed", randomWalk(reference, record, true), "baseline");
+  }
+}
+
+/// Fourier series and F(t) = F(t - T) side by side: error, states, time of a sample and of the layout.
+void runForceModels(const std::vector<double>& speeds, double duration) {
+  const auto seconds = [](std::clock_t since) {
+    return static_cast<double>(std::clock() - since) / CLOCKS_PER_SEC;
+  };
+  std::printf("force models: error of the force [%%], worst of x and y, causal\n");
+  std::printf(
+      "   rpm  T [samples]  force model         to 3 kHz to 5 kHz   rev 3-8 (3k)   (5k)  states  ns a sample"
+      "  layout [s]\n");
+  for (const double rpm : speeds) {
+    ReferenceCase reference;
+    reference.spindle_speed = units::radPerSecFromRpm(rpm);
+    reference.duration = duration;
+    const ReferenceRecord record = simulate(reference);
+    const auto show = [&](const char* name, auto make) {
+      const std::clock_t began = std::clock();
+      auto filter = make();
+      const double layout = seconds(began);
+      double cost = 0.0;
+      const Errors e = errorsOf(reference, record, [&](const std::vector<double>& measured) {
+        filter.reset();
+        std::vector<double> force;
+        force.reserve(measured.size());
+        const std::clock_t start = std::clock();
+        for (const double sample : measured) force.push_back(filter.step(sample));
+        cost = 1e9 * seconds(start) / static_cast<double>(measured.size());
+        return force;
+      });
+      std::printf("%6.0f  %11.3f  %-18s %9.2f %8.2f %10.2f %10.2f %7zu %10.0f %12.3f\n", rpm,
+                  60.0 / rpm * reference.sample_rate, name, 100.0 * e.to_3k, 100.0 * e.to_5k,
+                  100.0 * e.entry_3k, 100.0 * e.entry_5k, filter.states(), cost, layout);
+    };
+    HarmonicFilterParameters parameters;
+    parameters.max_harmonics = 200;
+    show("Fourier series", [&] {
+      return HarmonicFilter(reference.sensor, reference.spindle_speed, reference.sample_rate, parameters);
+    });
+    show("F(t) = F(t - T)", [&] {
+      return DelayFilter(reference.sensor, reference.spindle_speed, reference.sample_rate, parameters);
+    });
   }
 }
 
@@ -255,12 +300,13 @@ void runTuning(double duration) {
 int main(int argc, char** argv) {
   std::vector<double> speeds{3000.0, 9000.0, 15000.0, 21750.0};
   double duration = 1.0;
-  bool errors = false, tuning = false;
+  bool errors = false, tuning = false, force_models = false;
   CLI::App app{"Errors of the force compensation in the reference cut, beside their targets."};
   app.add_option("--speed-rpm", speeds, "spindle speeds")->check(CLI::Range(500.0, 60000.0));
   app.add_option("--duration-s", duration, "length of a record")->check(CLI::Range(0.3, 100.0));
   app.add_flag("--model-errors", errors,
                "a sensor that is not what it is believed to be: frozen and following");
+  app.add_flag("--force-models", force_models, "Fourier series beside F(t) = F(t - T): error and cost");
   app.add_flag("--tuning", tuning, "seven speeds: laid out from the taps against the best q of the cut");
   try {
     app.parse(argc, argv);
@@ -268,6 +314,10 @@ int main(int argc, char** argv) {
     return app.exit(e) == 0 ? 0 : 2;
   }
   try {
+    if (force_models) {
+      runForceModels(speeds, duration);
+      return 0;
+    }
     if (tuning) {
       runTuning(duration);
       return 0;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "smartmill_core/modal/modal_model.h"
+#include "smartmill_kalman/innovation_watch.h"
 
 namespace smartmill::kalman {
 
@@ -69,15 +70,15 @@ class HarmonicFilter {
   /// Takes one measured sample [N]. @return applied force [N] at this sample, from all samples up to it.
   double step(double measured) {
     innovation_ = measured - expected_;
-    const double force = advance(gains_[level_].data(), innovation_, force_gain_[level_]);
-    watch();
+    const double force = advance(gains_[level()].data(), innovation_, force_gain_[level()]);
+    watch_.add(innovation_);
     return force;
   }
 
   /// Keeps the state going without a measurement. @return predicted force [N].
   double coast() {
     innovation_ = 0.0;
-    return advance(gains_[level_].data(), 0.0, 0.0);
+    return advance(gains_[level()].data(), 0.0, 0.0);
   }
 
   /// At rest, no force.
@@ -109,16 +110,16 @@ class HarmonicFilter {
   /// filter's state and leaves it at the end.
   std::vector<double> smooth(const std::vector<double>& measured);
 
-  double innovation() const { return innovation_; }                 ///< [N] of the last step
-  double innovationStd() const { return innovation_std_[level_]; }  ///< [N] expected by the design
-  double spindleSpeed() const { return spindle_speed_; }            ///< [rad/s]
+  double innovation() const { return innovation_; }                  ///< [N] of the last step
+  double innovationStd() const { return innovation_std_[level()]; }  ///< [N] expected by the design
+  double spindleSpeed() const { return spindle_speed_; }             ///< [rad/s]
   int harmonics() const { return harmonics_; }
-  std::size_t level() const { return level_; }                  ///< 0 quick .. LEVELS - 1 slow
-  bool settled() const { return level_ + 1 == gains_.size(); }  ///< at its longest memory
-  std::size_t restarts() const {
-    return restarts_;
-  }  ///< times that an innovation was out of line: the memory begins anew
-  void setLevel(std::size_t level) { level_ = level < gains_.size() ? level : gains_.size() - 1; }
+  std::size_t states() const { return 2 * modes_ + 1 + 2 * static_cast<std::size_t>(harmonics_); }
+  std::size_t level() const { return watch_.level(); }  ///< 0 quick .. LEVELS - 1 slow
+  bool settled() const { return watch_.settled(); }     ///< at its longest memory
+  /// Times that an innovation was out of line: the memory began anew.
+  std::size_t restarts() const { return watch_.restarts(); }
+  void setLevel(std::size_t level) { watch_.setLevel(level); }
   /// State in the coordinates of HarmonicGain.
   std::vector<double> state() const;
   void setState(const std::vector<double>& state);
@@ -134,12 +135,6 @@ class HarmonicFilter {
     Four re, im;
   };
   double advance(const GainBlock* gain, double innovation, double force_gain);
-  void watch() {
-    window_sum_ += innovation_ * innovation_;
-    if (++window_count_ == window_length_) judgeWindow();
-  }
-  void judgeWindow();
-  void judgeRevolution();
   void layOut(const ModalModel& sensor, double spindle_speed);
   std::vector<double> toPairs(const std::vector<double>& state) const;
   void setGains();
@@ -155,12 +150,7 @@ class HarmonicFilter {
   std::vector<std::vector<GainBlock>> gains_;
   std::vector<double> force_gain_, innovation_std_;
   double expected_ = 0.0, innovation_ = 0.0;
-
-  // Judgement of the innovations: short windows for changes, revolutions for the memory.
-  std::size_t level_ = 0, restarts_ = 0;
-  std::size_t window_length_ = 16, window_count_ = 0, windows_ = 0, windows_a_revolution_ = 1, dwell_ = 0;
-  double window_sum_ = 0.0, revolution_sum_ = 0.0, peak_ = 0.0, last_peak_ = 0.0, last_mean_ = 0.0,
-         accepted_mean_ = 0.0;
+  InnovationWatch watch_;
 };
 
 }  // namespace smartmill::kalman
