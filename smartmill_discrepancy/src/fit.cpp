@@ -14,8 +14,13 @@ namespace smartmill::discrepancy {
 namespace {
 
 using Values = std::vector<double>;
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
 
-/// Residuals of a campaign: measured - simulated over noise, then the priors.
+/// Cost of a campaign for Ceres: (measured - simulated) over noise, then the priors. The residuals of the
+/// records, of which there are some 1e5, are handed on rotated into as many as there are coordinates, which
+/// leaves cost, gradient and normal equations as they are.
 class CampaignCost : public ceres::CostFunction {
  public:
   CampaignCost(const Fitter& fitter, const FitState& start, const NominalTangents* frozen, bool nominal_free)
@@ -25,8 +30,7 @@ class CampaignCost : public ceres::CostFunction {
     for (const Member& m : start.members)
       coordinates_.insert(coordinates_.end(), m.hypothesis->coordinates.begin(),
                           m.hypothesis->coordinates.end());
-    samples_ = fitter.runner().size();
-    set_num_residuals(static_cast<int>(samples_ + coordinates_.size()));
+    set_num_residuals(static_cast<int>(2 * coordinates_.size() + 1));
     mutable_parameter_block_sizes()->push_back(static_cast<int>(coordinates_.size()));
   }
 
@@ -49,26 +53,23 @@ class CampaignCost : public ceres::CostFunction {
     return state;
   }
 
-  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
-    const double* p = parameters[0];
+  /// Residuals of the records and, where asked, the normal equations without priors.
+  /// @return false at a point that the twin refuses or where it gives no numbers
+  bool linearise(const double* p, VectorXd* residual, MatrixXd* information, VectorXd* gradient) const {
     const std::size_t count = coordinates_.size();
+    const auto samples = static_cast<Index>(fitter_.runner().size());
     const Values now(p, p + count);
-    const bool tangents = jacobians && jacobians[0];
     const std::size_t first = frozen_ ? nominal_ : 0;
     std::vector<MachineModel> models;
-    std::vector<std::size_t> column;
     Values step(count, 0.0);
     const bool known = now == last_;
     if (!known) models.push_back(modelAt(now));
-    if (tangents) {
-      for (std::size_t c = first; c < count; ++c) {
-        const Coordinate& k = coordinates_[c];
-        step[c] = now[c] + k.step > k.high ? -k.step : k.step;
-        Values moved = now;
-        moved[c] += step[c];
-        models.push_back(modelAt(moved));
-        column.push_back(c);
-      }
+    for (std::size_t c = first; c < count && information; ++c) {
+      const Coordinate& k = coordinates_[c];
+      step[c] = now[c] + k.step > k.high ? -k.step : k.step;
+      Values moved = now;
+      moved[c] += step[c];
+      models.push_back(modelAt(moved));
     }
     std::vector<Values> simulated;
     try {
@@ -81,41 +82,70 @@ class CampaignCost : public ceres::CostFunction {
       last_ = now;
       simulated.erase(simulated.begin());
     }
-    const Values& measured = fitter_.runner().measured();
-    Eigen::Map<Eigen::VectorXd> r(residuals, static_cast<Eigen::Index>(samples_));
-    for (std::size_t i = 0; i < samples_; ++i) residuals[i] = last_simulated_[i] - measured[i];
+    const auto asVector = [&](const Values& v) { return Eigen::Map<const VectorXd>(v.data(), samples); };
+    *residual = asVector(last_simulated_) - asVector(fitter_.runner().measured());
     if (frozen_ && nominal_ > 0) {
-      Eigen::VectorXd shift(static_cast<Eigen::Index>(nominal_));
-      for (std::size_t c = 0; c < nominal_; ++c)
-        shift[static_cast<Eigen::Index>(c)] = now[c] - frozen_->at[c];
-      r.noalias() += frozen_->columns * shift;
+      VectorXd shift(static_cast<Index>(nominal_));
+      for (std::size_t c = 0; c < nominal_; ++c) shift[static_cast<Index>(c)] = now[c] - frozen_->at[c];
+      residual->noalias() += frozen_->columns * shift;
     }
-    for (std::size_t i = 0; i < samples_; ++i) {
-      if (!std::isfinite(residuals[i])) return false;
+    if (!residual->allFinite()) return false;
+    if (!information) return true;
+    const auto all = static_cast<Index>(count), fixed = static_cast<Index>(first), moving = all - fixed;
+    MatrixXd own(samples, moving);
+    for (Index k = 0; k < moving; ++k) {
+      own.col(k) = (asVector(simulated[static_cast<std::size_t>(k)]) - asVector(last_simulated_)) /
+                   step[first + static_cast<std::size_t>(k)];
     }
-    for (std::size_t c = 0; c < count; ++c)
-      residuals[samples_ + c] = (now[c] - coordinates_[c].null) / coordinates_[c].prior_std;
+    if (!own.allFinite()) return false;
+    information->setZero(all, all);
+    gradient->resize(all);
+    gradient->tail(moving).noalias() = own.transpose() * *residual;
+    information->bottomRightCorner(moving, moving).noalias() = own.transpose() * own;
+    if (fixed > 0) {
+      if (frozen_information_.size() == 0)
+        frozen_information_.noalias() = frozen_->columns.transpose() * frozen_->columns;
+      information->topLeftCorner(fixed, fixed) = frozen_information_;
+      information->topRightCorner(fixed, moving).noalias() = frozen_->columns.transpose() * own;
+      information->bottomLeftCorner(moving, fixed) = information->topRightCorner(fixed, moving).transpose();
+      gradient->head(fixed).noalias() = frozen_->columns.transpose() * *residual;
+    }
+    return true;
+  }
+
+  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
+    const double* p = parameters[0];
+    const auto count = static_cast<Index>(coordinates_.size());
+    const bool tangents = jacobians && jacobians[0];
+    VectorXd residual, gradient;
+    MatrixXd information;
+    if (!linearise(p, &residual, tangents ? &information : nullptr, &gradient)) return false;
+    Eigen::Map<VectorXd> r(residuals, 2 * count + 1);
+    r.setZero();
+    const double squares = residual.squaredNorm();
+    r[count] = std::sqrt(squares);
+    for (Index c = 0; c < count; ++c) {
+      const Coordinate& k = coordinates_[static_cast<std::size_t>(c)];
+      r[count + 1 + c] = (p[c] - k.null) / k.prior_std;
+    }
     if (!tangents) return true;
-    double* j = jacobians[0];
-    if (frozen_) {
-      for (std::size_t i = 0; i < samples_; ++i) {
-        for (std::size_t c = 0; c < nominal_; ++c)
-          j[i * count + c] = frozen_->columns(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(c));
-      }
+    using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+    Eigen::Map<RowMajor> j(jacobians[0], 2 * count + 1, count);
+    j.setZero();
+    // information = R' R with R from P' L D L' P, the residual's share along the tangents R'^-1 gradient.
+    const Eigen::LDLT<MatrixXd> factors(information);
+    const VectorXd root = factors.vectorD().cwiseMax(0.0).cwiseSqrt();
+    MatrixXd rotated = factors.transpositionsP() * MatrixXd::Identity(count, count);
+    rotated = factors.matrixU() * rotated;
+    j.topRows(count) = root.asDiagonal() * rotated;
+    VectorXd along = factors.transpositionsP() * gradient;
+    factors.matrixL().solveInPlace(along);
+    for (Index c = 0; c < count; ++c) {
+      if (root[c] > 1e-12 * root.maxCoeff() && root[c] > 0.0) r[c] = along[c] / root[c];
     }
-    for (std::size_t k = 0; k < column.size(); ++k) {
-      const double scale = 1.0 / step[column[k]];
-      for (std::size_t i = 0; i < samples_; ++i) {
-        const double d = (simulated[k][i] - last_simulated_[i]) * scale;
-        if (!std::isfinite(d)) return false;
-        j[i * count + column[k]] = d;
-      }
-    }
-    for (std::size_t c = 0; c < count; ++c) {
-      double* row = j + (samples_ + c) * count;
-      std::fill(row, row + count, 0.0);
-      row[c] = 1.0 / coordinates_[c].prior_std;
-    }
+    r[count] = std::sqrt(std::max(squares - r.head(count).squaredNorm(), 0.0));
+    for (Index c = 0; c < count; ++c)
+      j(count + 1 + c, c) = 1.0 / coordinates_[static_cast<std::size_t>(c)].prior_std;
     return true;
   }
 
@@ -129,9 +159,10 @@ class CampaignCost : public ceres::CostFunction {
   const Fitter& fitter_;
   FitState start_;
   const NominalTangents* frozen_;
-  std::size_t nominal_, samples_;
+  std::size_t nominal_;
   std::vector<Coordinate> coordinates_;
   mutable Values last_, last_simulated_;
+  mutable MatrixXd frozen_information_;
 };
 
 }  // namespace
@@ -172,7 +203,7 @@ Fit Fitter::fit(const FitState& start, const NominalTangents* frozen, const FitO
   for (std::size_t c = 0; c < coordinates.size(); ++c)
     p[c] = std::clamp(p[c], coordinates[c].low, coordinates[c].high);
   Fit fit;
-  const auto count = static_cast<Eigen::Index>(coordinates.size());
+  const auto count = static_cast<Index>(coordinates.size());
   const std::size_t samples = runner_.size();
   if (coordinates.empty()) {
     fit.state = start;
@@ -207,31 +238,25 @@ Fit Fitter::fit(const FitState& start, const NominalTangents* frozen, const FitO
   }
   // Residual and information at the solution.
   fit.state = cost->unpack(p.data());
-  Values residuals(samples + coordinates.size());
-  Values jacobian(residuals.size() * coordinates.size());
-  double* rows = jacobian.data();
-  const double* point = p.data();
-  if (!cost->Evaluate(&point, residuals.data(), &rows)) {
+  VectorXd residual, gradient;
+  MatrixXd information;
+  if (!cost->linearise(p.data(), &residual, &information, &gradient)) {
     fit.converged = false;
     fit.chi2 = fit.bic = std::numeric_limits<double>::infinity();
     return fit;
   }
-  fit.residual.resize(samples);
-  for (std::size_t i = 0; i < samples; ++i) {
-    fit.residual[i] = -residuals[i];
-    fit.chi2 += residuals[i] * residuals[i];
+  fit.chi2 = residual.squaredNorm();
+  residual = -residual;
+  fit.residual.assign(residual.data(), residual.data() + residual.size());
+  for (Index c = 0; c < count; ++c) {
+    const Coordinate& k = coordinates[static_cast<std::size_t>(c)];
+    fit.penalty += std::pow((p[static_cast<std::size_t>(c)] - k.null) / k.prior_std, 2);
+    information(c, c) += 1.0 / (k.prior_std * k.prior_std);
   }
-  for (std::size_t c = 0; c < coordinates.size(); ++c)
-    fit.penalty += residuals[samples + c] * residuals[samples + c];
   std::size_t own = 0;
   for (const Member& m : fit.state.members) own += m.values.size();
   fit.bic = fit.chi2 + fit.penalty + static_cast<double>(own) * std::log(static_cast<double>(samples));
-  using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-  const Eigen::Map<const RowMajor> j(jacobian.data(), static_cast<Eigen::Index>(residuals.size()), count);
-  Eigen::MatrixXd information = Eigen::MatrixXd::Zero(count, count);
-  information.selfadjointView<Eigen::Lower>().rankUpdate(j.transpose());
-  information = information.selfadjointView<Eigen::Lower>();
-  fit.covariance = information.ldlt().solve(Eigen::MatrixXd::Identity(count, count));
+  fit.covariance = information.ldlt().solve(MatrixXd::Identity(count, count));
   return fit;
 }
 

@@ -14,6 +14,8 @@ namespace {
 const std::array<std::string, 3> FORCES{{"fx", "fy", "fz"}};
 const std::array<std::string, 2> TIP{{"tool_x", "tool_y"}};
 
+constexpr std::size_t POINTS = 360;  // a turn
+
 bool actsBehindSensor(const std::string& effect) {
   for (const char* name : {"extra_mode", "mass_loading", "speed_dependent_mode", "cross_talk", "gain_error",
                            "channel_delay", "charge_drift", "mains_hum", "saturation"}) {
@@ -32,22 +34,37 @@ ModalModel oneMode(double frequency, double damping_ratio, double gain) {
   return m;
 }
 
-// Force per m of outward motion of the tool along x and y at a spindle angle: rows fx fy fz, columns x y
-// [N/m].
-using Stiffness = std::array<std::array<double, 2>, 3>;
+}  // namespace
 
-std::vector<Stiffness> cuttingStiffness(const MachineModel& model, const Engagement& engagement,
-                                        std::size_t points) {
+ModeProbes::ModeProbes(const TwinRunner& runner, const MachineModel& model) : runner_(runner), model_(model) {
+  MachineModel ideal = model;
+  for (ModalModel& axis : ideal.force_sensor.axis) {
+    axis = ModalModel{};
+    axis.direct = 1.0;
+  }
+  ideal.effects.clear();
+  for (const EffectEntry& e : model.effects) {
+    if (!actsBehindSensor(e.name)) ideal.effects.push_back(e);
+  }
+  applied_ = runner.simulate(ideal);
+  for (const std::size_t t : runner.tests()) {
+    const CampaignTest& test = runner.data().tests[t].test;
+    if (test.kind == TestKind::cut) stiffness_[t] = cuttingStiffness(model, *test.engagement);
+  }
+}
+
+std::vector<ModeProbes::Stiffness> ModeProbes::cuttingStiffness(const MachineModel& model,
+                                                                const Engagement& engagement) {
   const ToolGeometry& tool = *model.tool;
   const CuttingCoefficients& k = *model.cutting;
   constexpr int SLICES = 24;
   const double dz = engagement.axial_depth / SLICES;
-  std::vector<Stiffness> table(points, Stiffness{});
-  for (std::size_t p = 0; p < points; ++p) {
+  std::vector<Stiffness> table(POINTS, Stiffness{});
+  for (std::size_t p = 0; p < POINTS; ++p) {
     for (int j = 0; j < tool.teeth; ++j) {
       for (int s = 0; s < SLICES; ++s) {
         const double tip =
-            units::TWO_PI * static_cast<double>(p) / static_cast<double>(points) + tool.toothAngle(j);
+            units::TWO_PI * static_cast<double>(p) / static_cast<double>(POINTS) + tool.toothAngle(j);
         double phi = std::fmod(tip - tool.lag() * (s + 0.5) * dz, units::TWO_PI);
         if (phi < 0.0) phi += units::TWO_PI;
         if (phi < engagement.entry || phi >= engagement.exit) continue;
@@ -64,21 +81,6 @@ std::vector<Stiffness> cuttingStiffness(const MachineModel& model, const Engagem
   return table;
 }
 
-}  // namespace
-
-ModeProbes::ModeProbes(const TwinRunner& runner, const MachineModel& model) : runner_(runner), model_(model) {
-  MachineModel ideal = model;
-  for (ModalModel& axis : ideal.force_sensor.axis) {
-    axis = ModalModel{};
-    axis.direct = 1.0;
-  }
-  ideal.effects.clear();
-  for (const EffectEntry& e : model.effects) {
-    if (!actsBehindSensor(e.name)) ideal.effects.push_back(e);
-  }
-  applied_ = runner.simulate(ideal);
-}
-
 std::vector<double> ModeProbes::sensorMode(std::size_t axis, double frequency, double damping_ratio) const {
   std::vector<double> column(runner_.size(), 0.0);
   for (const Block& b : runner_.blocks()) {
@@ -92,7 +94,6 @@ std::vector<double> ModeProbes::sensorMode(std::size_t axis, double frequency, d
 }
 
 std::vector<double> ModeProbes::tipMode(std::size_t axis, double frequency, double damping_ratio) const {
-  constexpr std::size_t POINTS = 360;
   std::vector<double> column(runner_.size(), 0.0);
   const std::vector<Block>& blocks = runner_.blocks();
   for (std::size_t first = 0; first < blocks.size();) {
@@ -117,7 +118,7 @@ std::vector<double> ModeProbes::tipMode(std::size_t axis, double frequency, doub
         column[blocks[b].offset + i] = displacement[i] / blocks[b].noise;
     }
     if (data.test.kind == TestKind::cut && !displacement.empty() && data.record.has("spindle_angle")) {
-      const std::vector<Stiffness> table = cuttingStiffness(model_, *data.test.engagement, POINTS);
+      const std::vector<Stiffness>& table = stiffness_.at(blocks[first].test);
       const double period = units::TWO_PI / model_.tool->teeth / data.test.spindle_speed * rate;  // [samples]
       const std::vector<double>& angle = data.record.column("spindle_angle");
       for (std::size_t b = first; b < end; ++b) {

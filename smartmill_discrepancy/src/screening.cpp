@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include <Eigen/Cholesky>
 
@@ -76,6 +77,21 @@ class Projection {
     return score.dot(*amplitudes);
   }
 
+  // The same of each column by itself; 0 where it has no trace, no number, or a sign that cannot be.
+  Eigen::VectorXd gains(const Eigen::MatrixXd& columns, bool positive) const {
+    const Eigen::MatrixXd cross = basis_.transpose() * columns;
+    const Eigen::MatrixXd solved = information_.solve(cross);
+    const Eigen::VectorXd raw = columns.colwise().squaredNorm();
+    const Eigen::VectorXd own = raw - (cross.cwiseProduct(solved)).colwise().sum().transpose();
+    const Eigen::VectorXd score = columns.transpose() * residual_ - cross.transpose() * solved_residual_;
+    Eigen::VectorXd result = Eigen::VectorXd::Zero(columns.cols());
+    for (Index k = 0; k < columns.cols(); ++k) {
+      if (!std::isfinite(own[k]) || !std::isfinite(score[k]) || raw[k] == 0.0) continue;
+      if (!positive || score[k] > 0.0) result[k] = score[k] * score[k] / (own[k] + 1e-9 * raw[k] + 1e-30);
+    }
+    return result;
+  }
+
  private:
   std::vector<double> base_;
   Eigen::MatrixXd basis_;
@@ -87,14 +103,19 @@ class Projection {
 std::vector<double> bestFrequencies(const Projection& projection, const std::vector<double>& frequencies,
                                     const std::function<std::vector<double>(double)>& column, bool positive,
                                     int threads) {
+  constexpr std::size_t BATCH = 8;  // one pass over the tangents serves so many
   std::vector<double> gains(frequencies.size(), 0.0);
-  runParallel(frequencies.size(), threads, [&](std::size_t k) {
-    const std::vector<double> values = column(frequencies[k]);
-    const Eigen::Map<const Eigen::VectorXd> map(values.data(), static_cast<Index>(values.size()));
-    if (!map.allFinite() || map.squaredNorm() == 0.0) return;
-    Eigen::VectorXd amplitude;
-    const double gain = projection.gain(map, &amplitude, nullptr);
-    if (!positive || amplitude[0] > 0.0) gains[k] = gain;
+  runParallel((frequencies.size() + BATCH - 1) / BATCH, threads, [&](std::size_t batch) {
+    const std::size_t first = batch * BATCH, count = std::min(BATCH, frequencies.size() - first);
+    Eigen::MatrixXd columns;
+    for (std::size_t k = 0; k < count; ++k) {
+      const std::vector<double> values = column(frequencies[first + k]);
+      const auto size = static_cast<Index>(values.size());
+      columns.resize(size, k == 0 ? static_cast<Index>(count) : columns.cols());
+      columns.col(static_cast<Index>(k)) = Eigen::Map<const Eigen::VectorXd>(values.data(), size);
+    }
+    const Eigen::VectorXd each = projection.gains(columns, positive);
+    for (std::size_t k = 0; k < count; ++k) gains[first + k] = each[static_cast<Index>(k)];
   });
   std::vector<double> best;
   for (int n = 0; n < 2; ++n) {
@@ -110,8 +131,10 @@ std::vector<double> bestFrequencies(const Projection& projection, const std::vec
 }
 
 // Where to try a mode whose frequency nobody knows.
+// tip: best frequencies of the tool's axes, once found.
 std::vector<Hypothesis::Probe> modeProbes(const Hypothesis& h, const Projection& projection,
-                                          const ModeProbes& probes, const TwinRunner& runner) {
+                                          const ModeProbes& probes, const TwinRunner& runner,
+                                          std::map<char, std::vector<double>>& tip) {
   std::vector<Hypothesis::Probe> found;
   double rate = 0.0;
   for (const TestData& t : runner.data().tests) rate = std::max(rate, t.test.sample_rate);
@@ -129,10 +152,12 @@ std::vector<Hypothesis::Probe> modeProbes(const Hypothesis& h, const Projection&
     constexpr double DAMPING = 0.05;
     Hypothesis::Probe probe;
     for (const char a : h.variant) {
-      const std::vector<double> best = bestFrequencies(
-          projection, ModeProbes::grid(200.0, 6000.0, 1.08),
-          [&](double at) { return probes.tipMode(a == 'x' ? 0 : 1, at, DAMPING); }, true, runner.threads());
-      const double f = best.empty() ? 1200.0 : best.front();
+      if (tip.count(a) == 0) {
+        tip[a] = bestFrequencies(
+            projection, ModeProbes::grid(200.0, 6000.0, 1.08),
+            [&](double at) { return probes.tipMode(a == 'x' ? 0 : 1, at, DAMPING); }, true, runner.threads());
+      }
+      const double f = tip[a].empty() ? 1200.0 : tip[a].front();
       for (const double v : {std::log(f), std::log(DAMPING), 0.0}) probe.null.push_back(v);
     }
     for (std::size_t k = 2; k < probe.null.size(); k += 3) {
@@ -151,6 +176,7 @@ std::vector<Promise> screen(const Fitter& fitter, const Fit& now, const NominalT
   const Projection projection(fitter, now, tangents);
   const auto samples = static_cast<Index>(fitter.runner().size());
   const ModeProbes mode_probes(fitter.runner(), fitter.model(now.state));
+  std::map<char, std::vector<double>> tip;
   std::vector<Promise> promises;
   for (const Hypothesis& h : tried) {
     const bool taken = std::any_of(now.state.members.begin(), now.state.members.end(), [&](const Member& m) {
@@ -160,7 +186,7 @@ std::vector<Promise> screen(const Fitter& fitter, const Fit& now, const NominalT
     Promise best;
     best.hypothesis = &h;
     for (const Hypothesis::Probe& probe :
-         h.probes.empty() ? modeProbes(h, projection, mode_probes, fitter.runner()) : h.probes) {
+         h.probes.empty() ? modeProbes(h, projection, mode_probes, fitter.runner(), tip) : h.probes) {
       std::vector<MachineModel> models;
       for (const std::vector<double>& point : probe.points) {
         FitState with = now.state;

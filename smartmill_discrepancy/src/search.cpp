@@ -144,6 +144,7 @@ SearchResult search(TwinRunner& quick_runner, const Fitter& quick, const Fitter&
     // A trifle beside what is left is not what is missing.
     const double least = std::max(options.least_gain, options.least_share * (now.chi2 - samples));
     Fit best = now;
+    double best_promise = 0.0;
     std::size_t fitted = 0;
     std::vector<Rung> rungs;
     for (const Promise& p : promises) {
@@ -152,6 +153,8 @@ SearchResult search(TwinRunner& quick_runner, const Fitter& quick, const Fitter&
         break;
       if (fitted >= 2 && p.gain < 0.02 * promises.front().gain) break;
       if (fitted >= options.fitted_per_round) break;
+      // One that leaves next to nothing can be bettered only by one that promises about as much.
+      if (best.chi2 - samples < 0.02 * (now.chi2 - samples) && p.gain < 0.5 * best_promise) break;
       FitState with = now.state;
       with.members.push_back({p.hypothesis, startOf(quick, now, p)});
       const Fit tried = quick.fit(with, &tangents, {6, 1e-3, true});
@@ -160,7 +163,10 @@ SearchResult search(TwinRunner& quick_runner, const Fitter& quick, const Fitter&
                        p.hypothesis, tried.state.members.back().values});
       say(text("  promise %.4g, gain %.4g  ", p.gain, now.bic - tried.bic) +
           describe(tried.state.members.back()));
-      if (tried.bic < best.bic) best = tried;
+      if (tried.bic < best.bic) {
+        best = tried;
+        best_promise = p.gain;
+      }
       // Nothing that is left could make another hypothesis better.
       if (fitted >= 2 && best.chi2 - samples < 0.01 * (now.chi2 - samples)) break;
     }

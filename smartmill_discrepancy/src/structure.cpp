@@ -1,6 +1,7 @@
 #include "smartmill_discrepancy/structure.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <complex>
 #include <numeric>
@@ -13,8 +14,10 @@ namespace smartmill::discrepancy {
 namespace {
 
 constexpr double LEAST_P = 1e-300;
-constexpr int ORDERS = 36;
+constexpr std::size_t ORDERS = 36;
 constexpr std::size_t PADDED = 1 << 16;
+
+using Turn = std::complex<double>;
 
 // The part of a block in which one kind of thing goes on: the cut of a cut, all of the rest.
 struct Stretch {
@@ -23,6 +26,7 @@ struct Stretch {
   double noise;
   std::vector<double> values;
   std::vector<double> angle;  // unwrapped; empty without spindle angle
+  std::vector<Turn> turns;    // exp(i angle)
   double rate;
 };
 
@@ -41,24 +45,47 @@ struct Line {
   double squares = 0.0, sine = 0.0, cosine = 0.0;
 };
 
+// Least squares of a sine and a cosine.
+struct LineSums {
+  double ss = 0.0, cc = 0.0, sc = 0.0, s = 0.0, c = 0.0;
+  void add(double sine, double cosine, double value) {
+    ss += sine * sine;
+    cc += cosine * cosine;
+    sc += sine * cosine;
+    s += sine * value;
+    c += cosine * value;
+  }
+  Line solve() const {
+    const double det = ss * cc - sc * sc;
+    Line line;
+    if (det <= 1e-9 * ss * cc) return line;
+    line.sine = (cc * s - sc * c) / det;
+    line.cosine = (ss * c - sc * s) / det;
+    line.squares = line.sine * s + line.cosine * c;
+    return line;
+  }
+};
+
 template <class Phase>
 Line lineOf(const std::vector<double>& values, const Phase& phase) {
-  double ss = 0.0, cc = 0.0, sc = 0.0, s = 0.0, c = 0.0;
+  LineSums sums;
+  for (std::size_t i = 0; i < values.size(); ++i) sums.add(std::sin(phase(i)), std::cos(phase(i)), values[i]);
+  return sums.solve();
+}
+
+// Lines at orders 1..ORDERS of the spindle, each by itself.
+std::array<Line, ORDERS> orderLines(const std::vector<double>& values, const std::vector<Turn>& turns) {
+  std::array<LineSums, ORDERS> sums;
   for (std::size_t i = 0; i < values.size(); ++i) {
-    const double sn = std::sin(phase(i)), cs = std::cos(phase(i));
-    ss += sn * sn;
-    cc += cs * cs;
-    sc += sn * cs;
-    s += sn * values[i];
-    c += cs * values[i];
+    Turn at{1.0, 0.0};
+    for (LineSums& order : sums) {
+      at *= turns[i];
+      order.add(at.imag(), at.real(), values[i]);
+    }
   }
-  const double det = ss * cc - sc * sc;
-  Line line;
-  if (det <= 1e-9 * ss * cc) return line;
-  line.sine = (cc * s - sc * c) / det;
-  line.cosine = (ss * c - sc * s) / det;
-  line.squares = line.sine * s + line.cosine * c;
-  return line;
+  std::array<Line, ORDERS> lines;
+  for (std::size_t k = 0; k < ORDERS; ++k) lines[k] = sums[k].solve();
+  return lines;
 }
 
 template <class Phase>
@@ -99,7 +126,8 @@ std::vector<Candidate> candidatesOf(const std::vector<Stretch>& stretches) {
   std::vector<Candidate> all;
   Candidate level{Kind::level, 0.0, 0.0, 0, 1.0}, trend{Kind::trend, 0.0, 0.0, 0, 1.0};
   std::vector<Candidate> orders;
-  for (int k = 1; k <= ORDERS; ++k) orders.push_back({Kind::order, static_cast<double>(k), 0.0, 0, 1.0});
+  for (std::size_t k = 1; k <= ORDERS; ++k)
+    orders.push_back({Kind::order, static_cast<double>(k), 0.0, 0, 1.0});
   double rate = 0.0;
   std::size_t longest = 0;
   std::vector<double> sum(PADDED / 2 + 1, 0.0);
@@ -112,9 +140,11 @@ std::vector<Candidate> candidatesOf(const std::vector<Stretch>& stretches) {
     rate = std::max(rate, s.rate);
     longest = std::max(longest, s.values.size());
     if (!s.angle.empty()) {
-      for (Candidate& o : orders) {
+      const std::array<Line, ORDERS> lines = orderLines(s.values, s.turns);
+      for (std::size_t k = 0; k < ORDERS; ++k) {
+        Candidate& o = orders[k];
         if (o.place * s.test->test.spindle_speed / units::TWO_PI > 0.45 * s.rate) continue;
-        o.squares += lineOf(s.values, [&](std::size_t i) { return o.place * s.angle[i]; }).squares;
+        o.squares += lines[k].squares;
         o.freedom += 2;
       }
     }
@@ -283,11 +313,12 @@ std::vector<Finding> findStructure(const TwinRunner& runner, const std::vector<d
       const TestData& test = runner.data().tests[block.test];
       const std::size_t from = test.test.kind == TestKind::cut ? test.first_cut : 0;
       if (block.size < from + 32) continue;
-      Stretch s{&test, b, block.noise, {}, {}, test.test.sample_rate};
+      Stretch s{&test, b, block.noise, {}, {}, {}, test.test.sample_rate};
       s.values.assign(residual.begin() + static_cast<std::ptrdiff_t>(block.offset + from),
                       residual.begin() + static_cast<std::ptrdiff_t>(block.offset + block.size));
       if (test.test.kind != TestKind::tap && test.record.has("spindle_angle"))
         s.angle = unwrapped(test.record.column("spindle_angle"), from);
+      for (const double a : s.angle) s.turns.push_back(std::polar(1.0, a));
       samples += static_cast<double>(s.values.size());
       for (std::size_t i = block.offset; i < block.offset + block.size; ++i) {
         const double trust = options.twin_accuracy * runner.measured()[i];

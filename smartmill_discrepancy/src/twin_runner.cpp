@@ -3,12 +3,66 @@
 #include <algorithm>
 #include <atomic>
 #include <exception>
+#include <string>
 #include <thread>
 #include <utility>
 
+#include "smartmill_sim/effects/effect.h"
 #include "smartmill_sim/twin/twin.h"
 
 namespace smartmill::discrepancy {
+namespace {
+
+constexpr std::size_t KEPT_RESULTS = 4;  // of each test
+
+void append(std::vector<double>& key, const ModalModel& modes) {
+  key.push_back(static_cast<double>(modes.modes.size()));
+  for (const Mode& m : modes.modes) key.insert(key.end(), {m.frequency, m.damping_ratio, m.gain});
+  key.push_back(modes.direct);
+}
+
+// Every value that the record of a test of this kind depends on.
+std::vector<double> valuesFor(const MachineModel& model, TestKind kind) {
+  std::vector<double> key;
+  if (kind == TestKind::cut) {
+    if (const auto& t = model.tool) {
+      key.insert(key.end(), {static_cast<double>(t->teeth), t->diameter, t->helix});
+      key.insert(key.end(), t->pitch.begin(), t->pitch.end());
+    }
+    if (const auto& c = model.cutting)
+      key.insert(key.end(), {c->ktc, c->krc, c->kac, c->kte, c->kre, c->kae});
+  }
+  append(key, model.tool_tip.x);
+  append(key, model.tool_tip.y);
+  for (const ModalModel& a : model.force_sensor.axis) append(key, a);
+  if (const auto& s = model.spindle; s && kind != TestKind::tap) {
+    key.insert(key.end(), {s->viscous, s->coulomb, s->load_meter_gain, s->load_meter_bandwidth,
+                           s->load_meter_resolution, s->friction_zero_below});
+  }
+  for (std::size_t e = 0; e < model.effects.size(); ++e) {
+    const EffectEntry& effect = model.effects[e];
+    if (const sim::EffectClass* known = sim::findEffectClass(effect.name)) {
+      using sim::Stage;
+      const bool of_cut = known->stage == Stage::geometry || known->stage == Stage::motion ||
+                          known->stage == Stage::cutting_law;
+      if (of_cut && kind != TestKind::cut) continue;
+      if (known->stage == Stage::drive && kind == TestKind::tap) continue;
+    }
+    key.push_back(static_cast<double>(std::hash<std::string>()(effect.name)));
+    for (const auto& [name, value] : effect.numbers) {
+      key.push_back(static_cast<double>(std::hash<std::string>()(name)));
+      key.push_back(value);
+    }
+    for (const auto& [name, word] : effect.words)
+      key.push_back(static_cast<double>(std::hash<std::string>()(name + "=" + word)));
+    key.insert(key.end(), effect.pitch_deg.begin(), effect.pitch_deg.end());
+    append(key, effect.flexibility.x);
+    append(key, effect.flexibility.y);
+  }
+  return key;
+}
+
+}  // namespace
 
 void runParallel(std::size_t count, int threads, const std::function<void(std::size_t)>& job) {
   std::atomic<std::size_t> next{0};
@@ -35,6 +89,13 @@ TwinRunner::TwinRunner(const Dataset& data, std::vector<std::size_t> tests, int 
     : data_(data), tests_(std::move(tests)), threads_(threads), substeps_(substeps) {
   for (const std::size_t t : tests_) {
     const TestData& test = data_.tests[t];
+    Kept& kept = kept_.emplace_back();
+    kept.phase = sim::recordedPhase(test.test, test.record);
+    kept.record.file = test.record.file;
+    kept.record.time = test.record.time;
+    for (const std::string& name : test.record.names) {
+      if (name != "spindle_angle") kept.record.add(name) = test.record.column(name);
+    }
     first_block_.push_back(blocks_.size());
     for (const std::string& channel : test.channels) {
       const double noise = data_.noise.at(channel);
@@ -46,24 +107,43 @@ TwinRunner::TwinRunner(const Dataset& data, std::vector<std::size_t> tests, int 
   first_block_.push_back(blocks_.size());
 }
 
-std::vector<std::vector<double>> TwinRunner::simulate(const std::vector<MachineModel>& models) const {
-  std::vector<std::vector<double>> results(models.size(), std::vector<double>(size_));
+std::vector<double> TwinRunner::simulateOne(const MachineModel& model, std::size_t chosen) const {
+  const TestData& test = data_.tests[tests_[chosen]];
+  Kept& kept = kept_[chosen];
+  std::vector<double> key = valuesFor(model, test.test.kind);
+  {
+    const std::lock_guard<std::mutex> lock(kept.mutex);
+    for (const auto& [values, result] : kept.results) {
+      if (values == key) return result;
+    }
+  }
   sim::SimulationOptions options;
   options.noise = false;
   options.substeps = substeps_;
+  options.phase = kept.phase;
+  const Record record = sim::simulateTest(model, test.test, kept.record, options);
+  ++simulations_;
+  std::vector<double> result;
+  result.reserve(test.channels.size() * record.size());
+  for (std::size_t b = first_block_[chosen]; b < first_block_[chosen + 1]; ++b) {
+    for (const double v : record.column(blocks_[b].channel)) result.push_back(v / blocks_[b].noise);
+  }
+  const std::lock_guard<std::mutex> lock(kept.mutex);
+  kept.results.emplace_front(std::move(key), result);
+  if (kept.results.size() > KEPT_RESULTS) kept.results.pop_back();
+  return result;
+}
+
+std::vector<std::vector<double>> TwinRunner::simulate(const std::vector<MachineModel>& models) const {
+  std::vector<std::vector<double>> results(models.size(), std::vector<double>(size_));
   runParallel(models.size() * tests_.size(), threads_, [&](std::size_t job) {
     const std::size_t m = job / tests_.size(), k = job % tests_.size();
-    const TestData& test = data_.tests[tests_[k]];
-    const Record record = sim::simulateTest(models[m], test.test, test.record, options);
-    for (std::size_t b = first_block_[k]; b < first_block_[k + 1]; ++b) {
-      const Block& block = blocks_[b];
-      const std::vector<double>& values = record.column(block.channel);
-      for (std::size_t i = 0; i < block.size; ++i) results[m][block.offset + i] = values[i] / block.noise;
-      if (correction_.empty()) continue;
-      for (std::size_t i = block.offset; i < block.offset + block.size; ++i) results[m][i] += correction_[i];
+    const std::vector<double> values = simulateOne(models[m], k);
+    const std::size_t from = blocks_[first_block_[k]].offset;
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      results[m][from + i] = values[i] + (correction_.empty() ? 0.0 : correction_[from + i]);
     }
   });
-  simulations_ += models.size() * tests_.size();
   return results;
 }
 

@@ -14,7 +14,8 @@ namespace smartmill::discrepancy {
 /// One test with its record as measured, ready to be compared with the twin.
 struct TestData {
   CampaignTest test;
-  Record record;  ///< forces as the sensor shows them; has spindle_angle for cuts, estimated where the file has none
+  Record record;  ///< forces as the sensor shows them; has spindle_angle for cuts, estimated where the file
+                  ///< has none
   std::vector<std::string> channels;  ///< that count and that the twin gives
   bool heldout = false;               ///< takes no part in any fit or choice
   bool phase_estimated = false;       ///< the record has no spindle angle

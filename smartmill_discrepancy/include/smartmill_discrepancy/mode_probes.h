@@ -1,11 +1,14 @@
 #pragma once
 
-#include <functional>
+#include <array>
+#include <cstddef>
+#include <map>
 #include <string>
 #include <vector>
 
 #include <Eigen/Core>
 
+#include "smartmill_core/cutting/tool.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_discrepancy/twin_runner.h"
 
@@ -30,6 +33,10 @@ class ModeProbes {
  private:
   const TwinRunner& runner_;
   MachineModel model_;
+  // Force per m of outward motion of the tool along x and y over a turn: rows fx fy fz, columns x y [N/m].
+  using Stiffness = std::array<std::array<double, 2>, 3>;
+  static std::vector<Stiffness> cuttingStiffness(const MachineModel& model, const Engagement& engagement);
+  std::map<std::size_t, std::vector<Stiffness>> stiffness_;  // of the runner's cuts
   std::vector<double> applied_;  // force on the sensor over noise, laid out as the runner's vectors
 };
 

@@ -13,7 +13,7 @@ namespace smartmill::discrepancy {
 
 struct SearchOptions {
   int threads = 2;
-  int screening_substeps = 2;
+  int screening_substeps = 1;
   int final_substeps = 8;
   std::size_t fitted_per_round = 5;  ///< hypotheses that a round fits after screening
   std::size_t most_effects = 4;

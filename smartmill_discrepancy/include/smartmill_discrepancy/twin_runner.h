@@ -1,10 +1,14 @@
 #pragma once
 
+#include <atomic>
 #include <cstddef>
+#include <deque>
 #include <functional>
+#include <mutex>
 #include <string>
 #include <vector>
 
+#include "smartmill_core/campaign/record.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_discrepancy/dataset.h"
 
@@ -48,15 +52,26 @@ class TwinRunner {
   std::size_t simulations() const { return simulations_; }  ///< tests simulated so far
 
  private:
+  // Of one test: what the twin needs of its record, and its last results by the values they depend on. A tap
+  // says nothing of a cutting coefficient: what a fit moves leaves many tests as they were.
+  struct Kept {
+    Record record;
+    double phase = 0.0;
+    std::mutex mutex;
+    std::deque<std::pair<std::vector<double>, std::vector<double>>> results;
+  };
+  std::vector<double> simulateOne(const MachineModel& model, std::size_t chosen) const;
+
   const Dataset& data_;
   std::vector<std::size_t> tests_;
+  mutable std::deque<Kept> kept_;
   int threads_, substeps_;
   std::vector<Block> blocks_;
   std::vector<std::size_t> first_block_;  // of each chosen test; one more at the end
   std::size_t size_ = 0;
   std::vector<double> measured_;
   std::vector<double> correction_;
-  mutable std::size_t simulations_ = 0;
+  mutable std::atomic<std::size_t> simulations_{0};
 };
 
 /// Calls job(0) .. job(count - 1), spread over threads. @throws the first exception of a job, by index.

@@ -217,16 +217,6 @@ void run(const MachineModel& model, const CampaignTest& test, const SimulationOp
   }
 }
 
-// Angle at a record's first sample: the phase that fits the recorded angles best at the constant speed.
-double phaseOf(const std::vector<double>& angle, const std::vector<double>& time, double speed) {
-  double s = 0.0, c = 0.0;
-  for (std::size_t i = 0; i < angle.size(); ++i) {
-    s += std::sin(angle[i] - speed * (time[i] - time[0]));
-    c += std::cos(angle[i] - speed * (time[i] - time[0]));
-  }
-  return std::atan2(s, c);
-}
-
 Record simulate(const MachineModel& model, const CampaignTest& test, const Record* recorded, Record record,
                 double phase, const SimulationOptions& options) {
   if (options.substeps < 1) throw Error("simulation: substeps below 1");
@@ -288,6 +278,19 @@ Record simulate(const MachineModel& model, const CampaignTest& test, const Recor
 
 }  // namespace
 
+double recordedPhase(const CampaignTest& test, const Record& recorded) {
+  if (test.kind == TestKind::tap || !recorded.has("spindle_angle")) return 0.0;
+  const std::vector<double>& angle = recorded.column("spindle_angle");
+  double s = 0.0, c = 0.0;
+  for (std::size_t i = 0; i < angle.size(); ++i) {
+    // On the grid of the sample rate, as the test is simulated.
+    const double turned = test.spindle_speed * static_cast<double>(i) / test.sample_rate;
+    s += std::sin(angle[i] - turned);
+    c += std::cos(angle[i] - turned);
+  }
+  return std::atan2(s, c);
+}
+
 Record simulateTest(const MachineModel& model, const CampaignTest& test, const Record& recorded,
                     const SimulationOptions& options) {
   if (recorded.size() == 0) throw Error(recorded.file + ": no samples");
@@ -299,9 +302,7 @@ Record simulateTest(const MachineModel& model, const CampaignTest& test, const R
   for (const std::string& name : recorded.names) {
     if (gives(name, test)) record.add(name) = recorded.column(name);
   }
-  double phase = options.phase.value_or(0.0);
-  if (!options.phase && recorded.has("spindle_angle") && test.kind != TestKind::tap)
-    phase = phaseOf(recorded.column("spindle_angle"), record.time, test.spindle_speed);
+  const double phase = options.phase ? *options.phase : recordedPhase(test, recorded);
   return simulate(model, test, &recorded, std::move(record), phase, options);
 }
 

@@ -20,6 +20,10 @@ struct SimulationOptions {
   bool random_phases = false;
 };
 
+/// [rad] Spindle angle at a record's first sample: the phase that fits its angles best at the test's speed.
+/// 0 for a tap and for a record without spindle_angle.
+double recordedPhase(const CampaignTest& test, const Record& recorded);
+
 /// Simulates one test of a campaign: a record with the columns and sample times of the recorded one. The
 /// recorded spindle angle gives the phase (of a tap: stands as it is), the recorded hammer force drives a
 /// tap. The effects that the model lists act. What no model knows, the phase of a mains hum, is found in the
