@@ -1,0 +1,116 @@
+#pragma once
+
+#include <array>
+#include <complex>
+#include <cstddef>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "smartmill_core/modal/modal_model.h"
+
+namespace smartmill::kalman {
+
+/// Channels of a spindle-integrated sensor: three pairs of preloaded quartz rings, compression positive.
+constexpr std::array<const char*, 6> SPINDLE_SENSOR_CHANNELS{{"x1", "x2", "y1", "y2", "z1", "z2"}};
+
+/// A calibration constant over the length of tool and holder (Burzoni eq. 3-4): applied over shown force.
+struct LengthLine {
+  double slope = 0.0;                                           ///< [1/m]
+  double offset = 0.0;                                          ///< [1]
+  double slope_std = std::numeric_limits<double>::quiet_NaN();  ///< [1/m]
+  double offset_std = std::numeric_limits<double>::quiet_NaN();
+  double at(double length) const { return slope * length + offset; }  ///< [1] at length [m]
+};
+
+/// What turns six sensors into three forces (Burzoni ch. 3).
+struct SpindleSensorCalibration {
+  LengthLine x, y, z;  ///< applied force over the pair's mean
+  std::optional<LengthLine> yx, yz,
+      xz;  ///< cross-talk: load along the first over what the second's pair shows
+  /// Course of the cross-talk over frequency with static gain 1 (eq. 3-7), driven by the force that the first
+  /// axis shows. Ideal: static cross-talk (eq. 3-5).
+  ModalModel dynamic_yx, dynamic_yz, dynamic_xz;
+  std::array<double, 6> preload{{0, 0, 0, 0, 0, 0}};  ///< [N] > 0 compression of each sensor at rest
+  double least_compression = 0.0;                     ///< [N] >= 0 a sensor left with less is not measuring
+  double range_limit = std::numeric_limits<double>::infinity();  ///< [N] compression beyond it is an overload
+  double low_pass = 0.0;          ///< [Hz] of force/measured, causal; 0: none. The filter gets all there is.
+  double drift_std = 5.0 / 60.0;  ///< [N/s] > 0 of a sensor's drift as known beforehand (Burzoni: to 5 N/min)
+  std::array<std::complex<double>, 3> unbalance{};  ///< [kg m] F = Re(unbalance w^2 exp(i spindle angle))
+  std::array<double, 3> unbalance_std{{0, 0, 0}};   ///< [kg m] 0: unbalance not known beforehand
+
+  SpindleSensorCalibration();
+  /// Burzoni Table 1, Table 3 and the preloads of section 3.1.
+  static SpindleSensorCalibration table3();
+  /// @throws Error naming key and value.
+  void validate() const;
+};
+
+/// Pairs' means (eq. 3-1): x half the difference, y half the negative difference, z half the sum: a force
+/// along the spindle compresses both sensors (eq. 3-5 prints a difference there, which would lose it).
+/// @param sensors [N] order of SPINDLE_SENSOR_CHANNELS @return [N]
+std::array<double, 3> pairMeans(const std::array<double, 6>& sensors);
+
+/// Static calibration (eq. 3-5). @param means [N] pairMeans @param length [m] @return force on the tool [N]
+std::array<double, 3> staticForce(const SpindleSensorCalibration& calibration, double length,
+                                  const std::array<double, 3>& means);
+
+/// Largest lateral force [N] along x or y (0, 1) that leaves every sensor of its pair least_compression and
+/// within its range, nothing else acting.
+double lateralLimit(const SpindleSensorCalibration& calibration, double length, std::size_t axis);
+
+/// Reads and writes a smartmill-spindle-sensor/1 file. @throws Error of one line naming file, key and value.
+SpindleSensorCalibration readSpindleSensor(const std::string& file);
+void writeSpindleSensor(const SpindleSensorCalibration& calibration, const std::string& file);
+
+/// Readings of a static calibration: weights hung on a dummy tool, one row a reading.
+struct StaticReadings {
+  std::vector<int> test;                       ///< readings of one test drift together
+  std::vector<double> time;                    ///< [s]
+  std::vector<double> length;                  ///< [m] of tool and holder
+  std::vector<std::array<double, 3>> load;     ///< [N] applied
+  std::vector<std::array<double, 6>> sensors;  ///< [N]
+  std::string file;                            ///< for messages
+  std::size_t size() const { return time.size(); }
+};
+
+/// Table with columns test, time[s], length[mm], load_x[N], load_y[N], load_z[N], x1[N] .. z2[N].
+/// @throws Error naming file, line and column.
+StaticReadings readStaticReadings(const std::string& file);
+
+/// Constants of one length of tool and holder, beside those that the model has no place for.
+struct LengthConstants {
+  double length = 0.0;                             ///< [m]
+  std::array<std::array<double, 3>, 3> share{};    ///< [1] pair [row] per load along [column]
+  std::array<std::array<double, 3>, 3> std_dev{};  ///< [1]
+  double drift = 0.0;                              ///< [N/s] largest of any pair and test, taken out
+  double residual = 0.0;                           ///< [N] of a pair's mean, RMS
+};
+
+struct StaticCalibration {
+  SpindleSensorCalibration calibration;  ///< with standard deviations of its lines
+  std::vector<LengthConstants> lengths;
+};
+
+/// Constants by least squares over all readings of one length (offset and drift of every test among the
+/// unknowns), then their lines over length (eq. 3-4), weighted. One length: no slope. A cross-talk within two
+/// of its standard deviations is none. @param base gives what readings do not tell (preload, limits).
+/// @throws Error when a direction was never loaded.
+StaticCalibration calibrateStatic(const StaticReadings& readings, const SpindleSensorCalibration& base);
+
+/// Verification (Burzoni 3.2.1): largest difference between force told and applied, over the largest applied
+/// force, an axis each [1]. Zero and drift from the readings without load. An axis never loaded: over the
+/// largest of all.
+std::array<double, 3> verifyStatic(const StaticReadings& readings,
+                                   const SpindleSensorCalibration& calibration);
+
+/// Course of a cross-talk (static gain 1) from taps along the first axis.
+/// @param shown [N] force that the first axis shows, one record a tap @param cross [N] pair's mean of the
+/// second @param constant [1] calibration constant of that cross-talk @param sample_rate [Hz]
+/// @param low, high [Hz] band of the fit @throws Error.
+ModalModel fitDynamicCrossTalk(const std::vector<std::vector<double>>& shown,
+                               const std::vector<std::vector<double>>& cross, double constant,
+                               double sample_rate, double low, double high, int max_modes);
+
+}  // namespace smartmill::kalman
