@@ -120,10 +120,13 @@ std::string TwinCuts::besideThisProgram() {
   return fs::exists(program, error) ? program.string() : "";
 }
 
-void TwinCuts::run(const MachineModel& model, const std::vector<TwinCut>& cuts,
+void TwinCuts::run(const std::vector<MachineModel>& models, const std::vector<TwinCut>& cuts,
                    const std::vector<std::string>& columns, bool noise, unsigned seed,
                    const std::function<void(std::size_t, const Record&)>& judge,
                    const std::function<void(double)>& progress) const {
+  if (models.size() != 1 && models.size() != cuts.size())
+    throw Error("simulator: one machine or one a cut is due");
+  const std::size_t most = models.size() == 1 ? BATCH : 1;
   const Scratch scratch;
   struct Batch {
     std::size_t from = 0, to = 0;
@@ -142,14 +145,15 @@ void TwinCuts::run(const MachineModel& model, const std::vector<TwinCut>& cuts,
         batch.from = done;
         // Evenly over the cores where few are left.
         const std::size_t left = (cuts.size() - done + cores - c - 1) / (cores - c);
-        batch.to = done + std::min(BATCH, left);
+        batch.to = done + std::min(most, left);
         const std::string name = std::to_string(c);
         batch.in = scratch.path() / ("in_" + name);
         batch.out = scratch.path() / ("out_" + name);
         batch.words = scratch.path() / ("words_" + name);
         fs::remove_all(batch.in);
         fs::remove_all(batch.out);
-        batch.campaign = writePlan(model, cuts, batch.from, batch.to, columns, batch.in);
+        batch.campaign = writePlan(models[models.size() == 1 ? 0 : batch.from], cuts, batch.from, batch.to,
+                                   columns, batch.in);
         batch.child = start(simulate_,
                             {(batch.in / "model.yaml").string(), batch.in.string(), "-o", batch.out.string(),
                              "--noise", noise ? "on" : "off", "--seed", std::to_string(seed + batch.from)},

@@ -35,6 +35,13 @@ class TwinCuts {
   void run(const MachineModel& model, const std::vector<TwinCut>& cuts,
            const std::vector<std::string>& columns, bool noise, unsigned seed,
            const std::function<void(std::size_t, const Record&)>& judge,
+           const std::function<void(double)>& progress = {}) const {
+    run(std::vector<MachineModel>{model}, cuts, columns, noise, seed, judge, progress);
+  }
+  /// The same with a machine of its own for each cut. @param models one, or one a cut
+  void run(const std::vector<MachineModel>& models, const std::vector<TwinCut>& cuts,
+           const std::vector<std::string>& columns, bool noise, unsigned seed,
+           const std::function<void(std::size_t, const Record&)>& judge,
            const std::function<void(double)>& progress = {}) const;
 
  private:
