@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <limits>
 
-#include <Eigen/Core>
+#include <Eigen/Eigenvalues>
 
 #include "smartmill_core/error.h"
 #include "smartmill_discrepancy/labels.h"
@@ -71,32 +71,38 @@ FitState without(const FitState& state, std::size_t member) {
   return less;
 }
 
-// Standard deviations of the keys of a member's entry, by the law of propagation.
+// Standard deviations of the keys of a member's entry: root mean square of what they differ by at points that
+// have the covariance of the coordinates. Straight tangents would say nothing of the size of a vector of
+// which only one direction is known.
 std::vector<FoundParameter> parametersOf(const Member& member, const Eigen::MatrixXd& covariance) {
   const auto numbers = numbersOf(member.hypothesis->entry(member.values));
-  std::vector<FoundParameter> parameters;
-  Eigen::MatrixXd gradient =
-      Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(numbers.size()), covariance.cols());
-  for (std::size_t c = 0; c < member.values.size(); ++c) {
-    const double step =
-        1e-3 *
-        std::max(std::sqrt(covariance(static_cast<Eigen::Index>(c), static_cast<Eigen::Index>(c))), 1e-12);
-    std::vector<double> moved = member.values;
-    moved[c] += step;
-    const auto other = numbersOf(member.hypothesis->entry(moved));
-    if (other.size() != numbers.size()) continue;
-    for (std::size_t k = 0; k < numbers.size(); ++k) {
-      double difference = other[k].second - numbers[k].second;
-      if (numbers[k].first == "angle_deg") difference = std::remainder(difference, 360.0);
-      gradient(static_cast<Eigen::Index>(k), static_cast<Eigen::Index>(c)) = difference / step;
+  const Eigen::Index count = covariance.cols();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(covariance);
+  Eigen::VectorXd variance = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(numbers.size()));
+  for (Eigen::Index k = 0; k < count; ++k) {
+    const double reach = std::sqrt(static_cast<double>(count) * std::max(axes.eigenvalues()[k], 0.0));
+    for (const double sign : {-1.0, 1.0}) {
+      std::vector<double> moved = member.values;
+      for (std::size_t c = 0; c < moved.size(); ++c) {
+        const Coordinate& limits = member.hypothesis->coordinates[c];
+        moved[c] = std::clamp(moved[c] + sign * reach * axes.eigenvectors()(static_cast<Eigen::Index>(c), k),
+                              limits.low, limits.high);
+      }
+      const auto other = numbersOf(member.hypothesis->entry(moved));
+      if (other.size() != numbers.size()) continue;
+      for (std::size_t n = 0; n < numbers.size(); ++n) {
+        double difference = other[n].second - numbers[n].second;
+        if (numbers[n].first == "angle_deg") difference = std::remainder(difference, 360.0);
+        variance[static_cast<Eigen::Index>(n)] +=
+            difference * difference / (2.0 * static_cast<double>(count));
+      }
     }
   }
-  const Eigen::MatrixXd spread = gradient * covariance * gradient.transpose();
+  std::vector<FoundParameter> parameters;
   for (std::size_t k = 0; k < numbers.size(); ++k) {
-    const auto i = static_cast<Eigen::Index>(k);
     const double own = TWIN_ACCURACY * (numbers[k].first == "angle_deg" ? 57.3 : numbers[k].second);
     parameters.push_back(
-        {numbers[k].first, numbers[k].second, std::sqrt(std::max(spread(i, i), 0.0) + own * own)});
+        {numbers[k].first, numbers[k].second, std::sqrt(variance[static_cast<Eigen::Index>(k)] + own * own)});
   }
   return parameters;
 }

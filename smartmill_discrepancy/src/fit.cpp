@@ -228,6 +228,9 @@ Fit Fitter::fit(const FitState& start, const NominalTangents* frozen, const FitO
   solver.parameter_tolerance = 1e-7;
   solver.logging_type = ceres::SILENT;
   solver.num_threads = 1;
+  // An effect beside the nominal value that it resembles leaves a narrow valley, in which damping would
+  // creep.
+  solver.initial_trust_region_radius = 1e10;
   ceres::Solver::Summary summary;
   ceres::Solve(solver, &problem, &summary);
   fit.converged = summary.IsSolutionUsable();

@@ -137,12 +137,14 @@ SearchResult search(TwinRunner& quick_runner, const Fitter& quick, const Fitter&
   now = quick.fit(state, &tangents, {3, 1e-8, true});
   result.null = now;
   const double samples = static_cast<double>(quick.runner().size());
+  double floor = 0.0;  // squares below which two faithful simulations differ
+  for (const double m : quick.runner().measured()) floor += std::pow(options.twin_accuracy * m, 2);
   say(text("nominal model, values free within their uncertainty: gap %.4f", std::sqrt(now.chi2 / samples),
            0.0));
   for (std::size_t round = 0; round < options.most_effects; ++round) {
     const std::vector<Promise> promises = screen(quick, now, tangents, hypotheses);
     // A trifle beside what is left is not what is missing.
-    const double least = std::max(options.least_gain, options.least_share * (now.chi2 - samples));
+    const double least = std::max({options.least_gain, options.least_share * (now.chi2 - samples), floor});
     Fit best = now;
     double best_promise = 0.0;
     std::size_t fitted = 0;

@@ -20,7 +20,8 @@ struct SearchOptions {
   double least_gain = 30.0;  ///< [1] difference of BIC below which nothing is named
   double least_prior_gain =
       3.0;  ///< [1] the same where it comes from nominal values that need not be pulled off any more
-  double least_share = 0.01;  ///< [1] of the squares above the noise that an effect must take
+  double twin_accuracy = 2e-4;  ///< [1] of the signal, by which two faithful simulations differ
+  double least_share = 0.01;    ///< [1] of the squares above the noise that an effect must take
   std::function<void(const std::string&)> progress;
 };
 
