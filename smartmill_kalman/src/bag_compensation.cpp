@@ -104,6 +104,9 @@ BagSummary compensateBag(const std::string& path, const ForceSensor& sensor, con
                                   {},
                                   {},
                                   [&](const SensorResult& result) { summary.identified.push_back(result); }});
+  if (!parameters.spindle_sensor.empty()) {
+    sorted->useSpindleSensor(readSpindleSensor(parameters.spindle_sensor), parameters.spindle_sensor_length);
+  }
   {
     // The rotation holds for the whole bag, also for blocks that came before it.
     BagReader bag(path);

@@ -43,6 +43,10 @@ KalmanNode::KalmanNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
                [this](const SensorResult& result) { measure_.finish(result); }}),
       measure_(nh, sorted_, parameters_.command_machine),
       diagnostics_(ros::NodeHandle(), private_nh) {
+  if (!parameters_.spindle_sensor.empty()) {
+    sorted_.useSpindleSensor(readSpindleSensor(parameters_.spindle_sensor),
+                             parameters_.spindle_sensor_length);
+  }
   measured_ = nh.advertise<smartmill_msgs::ForceBlock>("force/measured", QUEUE);
   compensated_ = nh.advertise<smartmill_msgs::ForceBlock>("force/compensated", QUEUE);
   wrench_ = nh.advertise<geometry_msgs::WrenchStamped>("force/wrench", QUEUE);
@@ -169,10 +173,16 @@ void KalmanNode::watch() {
 void KalmanNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
   const CompensationHealth& health = sorted_.health();
   const double silent = (ros::WallTime::now() - last_block_).toSec();
+  const SpindleSensorHealth* spindle = sorted_.spindleHealth();
+  const std::size_t invalid = spindle ? spindle->unloaded + spindle->overloaded : 0;
   if (silent > parameters_.input_timeout) {
     status.summary(diagnostic_msgs::DiagnosticStatus::STALE, "no samples from the force sensor");
   } else if (!rotation_known_) {
     status.summary(diagnostic_msgs::DiagnosticStatus::ERROR, "no transform of the force sensor");
+  } else if (spindle && invalid != invalid_told_) {
+    invalid_told_ = invalid;
+    status.summary(diagnostic_msgs::DiagnosticStatus::ERROR,
+                   "a sensor of the spindle was unloaded or overloaded: those samples are no measurement");
   } else if (health.gaps + health.not_finite + health.clipped > 0) {
     status.summary(diagnostic_msgs::DiagnosticStatus::WARN, "samples were lost, clipped or not numbers");
   } else if (health.innovation_ratio > 3.0) {
@@ -202,6 +212,15 @@ void KalmanNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
   status.add("gaps", health.gaps);
   status.add("samples not numbers", health.not_finite);
   status.add("samples clipped", health.clipped);
+  if (spindle) {
+    status.add("samples with a sensor unloaded", spindle->unloaded);
+    status.add("samples with a sensor overloaded", spindle->overloaded);
+    status.add("least compression left [N]", spindle->least_left);
+    status.add("uncertainty of the zero [N]", spindle->zero_std);
+    status.addf("unbalance [g mm]", "%.3f %.3f %.3f", 1e6 * std::abs(spindle->unbalance[0]),
+                1e6 * std::abs(spindle->unbalance[1]), 1e6 * std::abs(spindle->unbalance[2]));
+    status.add("stretches in the air learnt", spindle->stretches);
+  }
   status.add("inputs out of order", sorted_.late());
   status.add("waiting for", sorted_.waitingFor());
   status.add("last measurement of the sensor", measure_.lastMessage());

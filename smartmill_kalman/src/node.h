@@ -40,7 +40,8 @@ class KalmanNode {
   std::array<double, 9> rotation_{{1, 0, 0, 0, 1, 0, 0, 0, 1}};  // sensor to machine
   bool rotation_known_ = false;
   std::deque<std::pair<ForceBlock, ForceBlock>> waiting_;  // for the rotation
-  double next_wrench_ = 0.0;                               // [s]
+  std::size_t invalid_told_ = 0;
+  double next_wrench_ = 0.0;  // [s]
   ros::WallTime last_block_, last_hammer_;
   bool flushed_ = true, hammer_seen_ = false;
 

@@ -36,6 +36,8 @@ NodeParameters readParameters(ParameterReader& reader) {
   reader.read("max_modes", taps.max_modes);
   taps.response_range = compensation.saturation;
   reader.read("model", parameters.model);
+  reader.read("spindle_sensor", parameters.spindle_sensor);
+  reader.read("spindle_sensor_length", parameters.spindle_sensor_length);
   reader.read("command_machine", parameters.command_machine);
   reader.read("hold_back", parameters.hold_back);
   reader.read("wrench_rate", parameters.wrench_rate);
@@ -45,6 +47,7 @@ NodeParameters readParameters(ParameterReader& reader) {
   reader.finish();
   compensation.validate();
   taps.validate();
+  if (!(parameters.spindle_sensor_length > 0.0)) throw Error("spindle_sensor_length: above 0 m is due");
   if (!(parameters.hold_back >= 0.0)) throw Error("hold_back: at least 0 s is due");
   if (!(parameters.wrench_rate > 0.0)) throw Error("wrench_rate: above 0 Hz is due");
   if (!(parameters.drift_limit >= 0.0)) throw Error("drift_limit: at least 0 N is due");

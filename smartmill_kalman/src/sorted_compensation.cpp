@@ -5,6 +5,8 @@
 #include <limits>
 #include <utility>
 
+#include "smartmill_core/error.h"
+
 namespace smartmill::kalman {
 namespace {
 
@@ -22,13 +24,16 @@ SortedCompensation::SortedCompensation(const CompensationParameters& parameters,
                                        const ForceSensor& sensor, double hold_back, Outputs outputs)
     : believed_(sensor),
       outputs_(std::move(outputs)),
-      compensation_(parameters, sensor.measures_workpiece, outputs_.force),
+      compensation_(parameters, sensor.measures_workpiece,
+                    [this](const ForceBlock& m, const ForceBlock& c) { forward(m, c); }),
       measurement_(taps),
       sorter_(hold_back),
       conditions_(sorter_.addEvents("cut/condition")),
       goals_(sorter_.addEvents("kalman/measure_frf")),
       hammers_(sorter_.addEvents("daq/hammer")),
-      angles_(sorter_.addRegular("spindle/angle")),
+      // A machine without a tachometer has no angles to wait for.
+      angles_(parameters.track_speed ? sorter_.addEvents("spindle/angle")
+                                     : sorter_.addRegular("spindle/angle")),
       blocks_(sorter_.addRegular("daq/dynamometer")),
       newest_(NEVER),
       newest_block_(NEVER),
@@ -54,6 +59,8 @@ void SortedCompensation::watch(double stamp, double& newest_here) {
     sorter_.reset();
     compensation_.reset();
     measurement_.reset();
+    if (spindle_) spindle_->reset();
+    invalid_.clear();
     useModelFile();
     newest_ = newest_block_ = newest_hammer_ = newest_angle_ = NEVER;
     if (restarted_) restarted_();
@@ -65,10 +72,53 @@ void SortedCompensation::watch(double stamp, double& newest_here) {
 void SortedCompensation::push(const SampleBlock& block) {
   watch(block.stamp, newest_block_);
   sorter_.push(blocks_, block.stamp, [this, block] {
-    compensation_.handle(block);
-    measurement_.handleSensor(block);
+    if (SpindleForceSensor::isSixChannels(block)) {
+      const SampleBlock forces = toForces(block);
+      compensation_.handle(forces);
+      measurement_.handleSensor(forces);
+    } else {
+      compensation_.handle(block);
+      measurement_.handleSensor(block);
+    }
     drain();
   });
+}
+
+SampleBlock SortedCompensation::toForces(const SampleBlock& block) {
+  if (!spindle_) throw Error("six channels of a spindle's force sensor, but no calibration (spindle_sensor)");
+  for (std::size_t axis = 0; axis < 3; ++axis) spindle_->setSensor(axis, compensation_.sensor(axis));
+  SampleBlock forces = spindle_->handle(block);
+  const std::vector<bool>& invalid = spindle_->invalid();
+  for (std::size_t i = 0; spindle_->anyInvalid() && i < invalid.size(); ++i) {
+    const std::uint64_t index = block.first_index + i;
+    if (!invalid[i]) continue;
+    if (!invalid_.empty() && invalid_.back().second == index) {
+      ++invalid_.back().second;
+    } else {
+      invalid_.emplace_back(index, index + 1);
+    }
+  }
+  return forces;
+}
+
+// The filters bridge what was not measured; where the sensor could not measure nothing is claimed.
+void SortedCompensation::forward(const ForceBlock& measured, const ForceBlock& compensated) {
+  if (!outputs_.force) return;
+  if (!spindle_) {
+    outputs_.force(measured, compensated);
+    return;
+  }
+  ForceBlock shown = measured, marked = compensated;
+  const std::uint64_t begin = marked.first_index, end = begin + marked.force[0].size();
+  while (!invalid_.empty() && invalid_.front().second <= std::min(begin, shown.first_index))
+    invalid_.pop_front();
+  for (const auto& [from, to] : invalid_) {
+    for (std::uint64_t i = std::max(from, begin); i < std::min(to, end); ++i) {
+      for (auto& force : marked.force) force[i - begin] = NOT_A_NUMBER;
+    }
+  }
+  spindle_->lowPass(shown);
+  outputs_.force(shown, marked);
 }
 
 void SortedCompensation::pushHammer(const SampleBlock& block) {
@@ -82,12 +132,18 @@ void SortedCompensation::pushHammer(const SampleBlock& block) {
 
 void SortedCompensation::push(const SpindleAngle& angle) {
   watch(angle.stamp, newest_angle_);
-  sorter_.push(angles_, angle.stamp, [this, angle] { compensation_.handle(angle); });
+  sorter_.push(angles_, angle.stamp, [this, angle] {
+    if (spindle_) spindle_->handle(angle);
+    compensation_.handle(angle);
+  });
 }
 
 void SortedCompensation::push(const CuttingCondition& condition) {
   // A latched condition is older than the data around it: no restart.
-  sorter_.push(conditions_, condition.stamp, [this, condition] { compensation_.handle(condition); });
+  sorter_.push(conditions_, condition.stamp, [this, condition] {
+    if (spindle_) spindle_->handle(condition);
+    compensation_.handle(condition);
+  });
 }
 
 void SortedCompensation::push(const MeasureFrfGoal& goal, std::function<bool(bool)> begin) {

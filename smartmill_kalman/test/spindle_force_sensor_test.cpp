@@ -9,6 +9,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_core/units.h"
+#include "smartmill_kalman/sorted_compensation.h"
 
 namespace smartmill::kalman {
 namespace {
@@ -334,6 +335,70 @@ TEST(SpindleForceSensor, DynamicCrossTalkGoesWhereTheStaticOneFails) {
   }
   EXPECT_GT(was, 40.0);         // 100 N in y stand as 18/27.7 |h - 1| 100 N
   EXPECT_LT(left, 0.01 * was);  // a force linear between samples: 1 - (w dt)^2 / 12 = 0.2 %
+}
+
+// What the node is made of: six channels in, force at the tool out, with the sensor's own sample index.
+TEST(SortedCompensation, TakesSixChannels) {
+  ForceSensor believed;
+  for (ModalModel& axis : believed.axis) {
+    axis.modes = {{930.0, 0.03, 0.9}};
+    axis.direct = 0.1;
+  }
+  SpindleSensorCalibration slack = TABLE;
+  slack.preload.fill(50.0);
+  std::vector<ForceBlock> measured, compensated;
+  SortedCompensation sorted({}, {}, believed, 0.05,
+                            {[&](const ForceBlock& m, const ForceBlock& c) {
+                               measured.push_back(m);
+                               compensated.push_back(c);
+                             },
+                             {},
+                             {},
+                             {}});
+  const double speed = units::TWO_PI * 232.5;  // the fourth harmonic meets the mode: 15 times too large
+  const std::complex<double> passed = believed.axis[0].response(930.0);
+  const auto push = [&](int b, double fy) {
+    SampleBlock block;
+    block.stamp = 50.0 + b * 0.01;
+    block.sample_rate = RATE;
+    block.first_index = 1000 + 256 * b;
+    block.channels = {"x1", "x2", "y1", "y2", "z1", "z2"};
+    block.units.assign(6, "N");
+    for (int i = 0; i < 256; ++i) {
+      const double phase = units::TWO_PI * 930.0 * (b * 256 + i) / RATE;
+      const auto s = sensorsUnder(139.0, (passed * std::polar(20.0, phase)).real(), fy, 0.0);
+      block.samples.insert(block.samples.end(), s.begin(), s.end());
+    }
+    sorted.push(SpindleAngle{block.stamp, 0.0, speed});
+    sorted.push(block);
+  };
+  EXPECT_THROW(  // no calibration yet, and it says so
+      {
+        push(0, 0.0);
+        sorted.flush();
+      },
+      Error);
+  sorted.useSpindleSensor(slack, LENGTH);
+  for (int b = 50; b < 250; ++b) push(b, b == 240 ? 905.0 : 0.0);  // 905 N unload the pair of y
+  sorted.flush();
+  ASSERT_GT(measured.size(), 190u);
+  const std::size_t last = measured.size() - 1, bad = last - 9;
+  EXPECT_EQ(compensated[last].first_index, measured[last].first_index);
+  EXPECT_EQ(compensated[bad].first_index, 1000u + 256u * 240u);
+  double largest = 0.0, shown = 0.0;
+  for (std::size_t i = 0; i < 256; ++i) {
+    shown = std::max(shown, std::abs(measured[bad - 1].force[0][i]));
+    largest = std::max(largest, std::abs(compensated[bad - 1].force[0][i]));
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      EXPECT_TRUE(std::isnan(measured[bad].force[axis][i]));
+      EXPECT_TRUE(std::isnan(compensated[bad].force[axis][i]));
+      EXPECT_FALSE(std::isnan(compensated[bad + 1].force[axis][i]));
+    }
+  }
+  EXPECT_NEAR(shown, 20.0 * std::abs(passed), 2.0);
+  EXPECT_NEAR(largest, 20.0, 0.2);
+  ASSERT_NE(sorted.spindleHealth(), nullptr);
+  EXPECT_EQ(sorted.spindleHealth()->unloaded, 256u);
 }
 
 TEST(FitDynamicCrossTalk, FindsTheCourse) {

@@ -2,13 +2,18 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
+#include <deque>
 #include <functional>
+#include <optional>
 #include <string>
+#include <utility>
 
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/signal/stream_sorter.h"
 #include "smartmill_kalman/force_compensation.h"
 #include "smartmill_kalman/sensor_measurement.h"
+#include "smartmill_kalman/spindle_force_sensor.h"
 
 namespace smartmill::kalman {
 
@@ -31,6 +36,14 @@ class SortedCompensation {
                      const ForceSensor& sensor, double hold_back, Outputs outputs);
   SortedCompensation(const SortedCompensation&) = delete;
   SortedCompensation& operator=(const SortedCompensation&) = delete;
+
+  /// Blocks of six sensors in the spindle (channels x1 .. z2) become forces from now on; samples that are no
+  /// measurement come out as NaN. @param length [m] of tool and holder. @throws Error.
+  void useSpindleSensor(const SpindleSensorCalibration& calibration, double length) {
+    spindle_.emplace(calibration, length);
+  }
+  /// @return counts of the spindle's sensor; null without one.
+  const SpindleSensorHealth* spindleHealth() const { return spindle_ ? &spindle_->health() : nullptr; }
 
   /// Block of the force sensor.
   void push(const SampleBlock& block);
@@ -65,6 +78,8 @@ class SortedCompensation {
  private:
   void watch(double stamp, double& newest_here);
   void drain();
+  SampleBlock toForces(const SampleBlock& block);
+  void forward(const ForceBlock& measured, const ForceBlock& compensated);
   void useModelFile();
 
   ForceSensor believed_;
@@ -74,6 +89,8 @@ class SortedCompensation {
   StreamSorter sorter_;
   std::array<double, 3> identified_;  // [s] stamp of the modes in use, an axis each
   StreamSorter::Stream conditions_, goals_, hammers_, angles_, blocks_;
+  std::optional<SpindleForceSensor> spindle_;
+  std::deque<std::pair<std::uint64_t, std::uint64_t>> invalid_;  // samples [from, to) that are no measurement
   std::function<void()> restarted_;
   double newest_;
   double newest_block_, newest_hammer_, newest_angle_;  // [s] of each stream
