@@ -20,6 +20,10 @@ constexpr double ZERO_TIME = 2.0;  // [s] over which the sensor's zero is told
 constexpr double GAINS_BEAR = 0.01;
 /// The harmonics follow the spindle when its speed has moved by this share.
 constexpr double RETUNE = 1e-6;
+/// A tracked speed reaches the filters every so many samples, and is known once its standard deviation is
+/// below this share.
+constexpr std::size_t TRACK_EVERY = 32;
+constexpr double TRACKED = 1e-4;
 constexpr double STEADY_TIME = 0.05;  // [s] without a change of speed before filters are laid out
 
 void require(const char* key, double value, bool good, const char* due) {
@@ -32,6 +36,9 @@ void require(const char* key, double value, bool good, const char* due) {
 void CompensationParameters::validate() const {
   filter.validate();
   follower.validate();
+  tracker.validate();
+  // Following needs the angle of the teeth, which the force alone does not tell.
+  if (track_speed && follow) throw Error("track_speed: follow needs the spindle's angle, false is due");
   require("follow_revolutions", follow_revolutions, follow_revolutions > 0, "above 0");
   require("least_speed", least_speed, least_speed > 0.0, "above 0 rad/s");
   require("speed_tolerance", speed_tolerance, speed_tolerance > 0.0 && speed_tolerance < 0.5, "0 .. 0.5");
@@ -52,6 +59,19 @@ void ForceCompensation::setSensor(std::size_t axis, const ModalModel& sensor, do
   schedule_.clear();
 }
 
+void ForceCompensation::setMatrix(const SensorMatrix& matrix) {
+  for (std::size_t axis = 0; axis < 3; ++axis) setSensor(axis, matrix.h[axis][axis]);
+  matrix_ = matrix;
+}
+
+void ForceCompensation::layOutCrossTalk(double sample_rate) {
+  if (!matrix_) return;
+  for (std::size_t axis = 0; axis < 3; ++axis) matrix_->h[axis][axis] = *sensor_[axis];
+  int harmonics = filters_[0].harmonics();
+  for (const HarmonicFilter& filter : filters_) harmonics = std::min(harmonics, filter.harmonics());
+  cross_talk_.emplace(*matrix_, filters_[0].spindleSpeed(), sample_rate, harmonics);
+}
+
 bool ForceCompensation::hasSensor() const {
   for (const auto& sensor : sensor_) {
     if (!sensor) return false;
@@ -60,6 +80,7 @@ bool ForceCompensation::hasSensor() const {
 }
 
 void ForceCompensation::handle(const SpindleAngle& angle) {
+  if (parameters_.track_speed) return;
   // While the spindle speeds up or slows down there is no harmonic to follow: a layout would be out of date
   // before it has settled. A slow drift is followed.
   if (steady_speed_ > 0.0 && std::abs(angle.speed / steady_speed_ - 1.0) > parameters_.speed_tolerance) {
@@ -77,6 +98,10 @@ void ForceCompensation::handle(const SpindleAngle& angle) {
 void ForceCompensation::handle(const CuttingCondition& condition) {
   filters_.clear();
   condition_ = condition;
+  if (parameters_.track_speed) {
+    tracker_.reset();
+    speed_ = condition.spindle_speed;
+  }
   forgetMoves();
 }
 
@@ -93,6 +118,7 @@ void ForceCompensation::reset() {
   filters_.clear();
   next_index_.reset();
   speed_ = steady_speed_ = 0.0;
+  tracker_.reset();
   condition_.reset();
   forgetMoves();
   changing_until_ = -std::numeric_limits<double>::infinity();
@@ -126,6 +152,7 @@ void ForceCompensation::design(double speed, double sample_rate) {
     filters_.emplace_back(scheduled, *sensor_[axis], speed, sample_rate);
     if (!before.empty()) filters_[axis].adopt(before[axis]);
   }
+  layOutCrossTalk(sample_rate);
   follower_.reset();
   if (parameters_.follow && condition_ && condition_->kind == CuttingCondition::Kind::cut) {
     const int harmonics = std::min(filters_[0].harmonics(), filters_[1].harmonics());
@@ -170,6 +197,7 @@ void ForceCompensation::follow(double time, double sample_rate) {
     }
     filters_[axis].replaceSensor(*sensor_[axis], std::move(fresh));
   }
+  layOutCrossTalk(sample_rate);
 }
 
 // A piezoelectric sensor drifts; without cutting its mean is its zero.
@@ -227,30 +255,80 @@ void ForceCompensation::handle(const SampleBlock& block) {
     design(speed_, block.sample_rate);
   } else if (std::abs(speed_ / filters_.front().spindleSpeed() - 1.0) > RETUNE) {
     for (std::size_t axis = 0; axis < 3; ++axis) filters_[axis].retune(*sensor_[axis], speed_);
+    layOutCrossTalk(block.sample_rate);
   }
+  if (parameters_.track_speed && !tracker_) tracker_.emplace(parameters_.tracker, speed_, block.sample_rate);
   health_.speed = filters_.front().spindleSpeed();
-  double squares = 0.0;
-  health_.colour = 0.0;
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    HarmonicFilter& filter = filters_[axis];
-    double last = 0.0, own = 0.0, neighbours = 0.0;
-    for (double& force : compensated.force[axis]) {
-      // A sample that is not a number is bridged by the model, never passed on.
-      force = std::isfinite(force) ? filter.step(force) : filter.coast();
-      const double innovation = filter.innovation() / filter.innovationStd();
-      own += innovation * innovation;
-      neighbours += innovation * last;
-      last = innovation;
-    }
-    squares += own;
-    if (own > 0.0) health_.colour = std::max(health_.colour, std::abs(neighbours / own));
-  }
-  health_.innovation_ratio =
-      block.size() == 0 ? 0.0 : std::sqrt(squares / (3.0 * static_cast<double>(block.size())));
-  compensated.status = settling_left_ > 0.0 ? ForceBlock::Status::settling : ForceBlock::Status::compensated;
+  run(compensated.force, block.sample_rate);
+  const bool settling = settling_left_ > 0.0 || (tracker_ && tracker_->speedStd() > TRACKED * speed_);
+  compensated.status = settling ? ForceBlock::Status::settling : ForceBlock::Status::compensated;
   settling_left_ -= static_cast<double>(block.size()) / block.sample_rate;
   output_(measured, compensated);
   if (follower_) follow(block.timeOf(block.size()), block.sample_rate);
+}
+
+/// Takes a block's samples through the filters, in place.
+void ForceCompensation::run(std::array<std::vector<double>, 3>& force, double sample_rate) {
+  std::array<double, 3> last{}, own{}, neighbours{};
+  const auto take = [&](std::size_t axis, double& sample) {
+    HarmonicFilter& filter = filters_[axis];
+    // A sample that is not a number is bridged by the model, never passed on.
+    sample = std::isfinite(sample) ? filter.step(sample) : filter.coast();
+    const double innovation = filter.innovation() / filter.innovationStd();
+    own[axis] += innovation * innovation;
+    neighbours[axis] += innovation * last[axis];
+    last[axis] = innovation;
+  };
+  const std::size_t count = force[0].size();
+  const auto couple = [&](std::size_t i) {
+    std::array<double, 3> now{{force[0][i], force[1][i], force[2][i]}};
+    cross_talk_->add(filters_, now);
+    for (std::size_t axis = 0; axis < 3; ++axis) force[axis][i] = now[axis];
+  };
+  if (!tracker_ && matrix_) {
+    for (std::size_t i = 0; i < count; ++i) {
+      for (std::size_t axis = 0; axis < 3; ++axis) take(axis, force[axis][i]);
+      couple(i);
+    }
+  } else if (!tracker_) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      for (double& sample : force[axis]) take(axis, sample);
+    }
+  } else {
+    // Root of the sum of n^2: what harmonics of noise make of a slope.
+    const double n = filters_.front().harmonics();
+    const double slope_gain = std::sqrt(n * (n + 1.0) * (2.0 * n + 1.0) / 6.0);
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::size_t level = std::min({filters_[0].level(), filters_[1].level(), filters_[2].level()});
+      const double memory = parameters_.filter.memory(level) * units::TWO_PI / speed_;
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const double slope = filters_[axis].slope();
+        take(axis, force[axis][i]);
+        tracker_->update(axis, filters_[axis].innovation(), slope, noise_rms_[axis],
+                         noise_rms_[axis] * slope_gain / std::sqrt(memory * sample_rate));
+      }
+      if (matrix_) couple(i);
+      tracker_->predict(speed_, memory);
+      std::size_t restarts = 0;
+      for (const HarmonicFilter& filter : filters_) restarts += filter.restarts();
+      if (restarts != restarts_) tracker_->reopen();
+      restarts_ = restarts;
+      if ((i + 1) % TRACK_EVERY == 0 && std::abs(tracker_->speed() / speed_ - 1.0) > RETUNE) {
+        speed_ = tracker_->speed();
+        for (std::size_t axis = 0; axis < 3; ++axis) filters_[axis].retune(*sensor_[axis], speed_);
+        layOutCrossTalk(sample_rate);
+      }
+    }
+    health_.speed = speed_;
+    health_.speed_std = tracker_->speedStd();
+  }
+  double squares = 0.0;
+  health_.colour = 0.0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    squares += own[axis];
+    if (own[axis] > 0.0) health_.colour = std::max(health_.colour, std::abs(neighbours[axis] / own[axis]));
+  }
+  health_.innovation_ratio = count == 0 ? 0.0 : std::sqrt(squares / (3.0 * static_cast<double>(count)));
 }
 
 }  // namespace smartmill::kalman

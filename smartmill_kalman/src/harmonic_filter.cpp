@@ -45,6 +45,12 @@ void HarmonicFilterParameters::validate() const {
   }
 }
 
+double HarmonicFilterParameters::memory(std::size_t level) const {
+  const double slow = std::max(settling_revolutions, memory_revolutions);
+  if (level == 0) return settling_revolutions;
+  return level == 1 ? std::sqrt(settling_revolutions * slow) : slow;
+}
+
 HarmonicGain designHarmonicGain(const ModalModel& sensor, double spindle_speed, double sample_rate,
                                 int harmonics, double noise_rms, double settling, double quickest) {
   const auto m = static_cast<Eigen::Index>(2 * sensor.modes.size());
@@ -104,9 +110,9 @@ std::vector<HarmonicGain> designGains(const ModalModel& sensor, double spindle_s
   if (parameters.max_harmonics > 0)
     harmonics = std::clamp(static_cast<int>(top * revolution), 1, parameters.max_harmonics);
   const double quick = parameters.settling_revolutions;
-  const double slow = std::max(quick, parameters.memory_revolutions);
   std::vector<double> memories{quick};
-  if (slow > quick) memories.insert(memories.end(), {std::sqrt(quick * slow), slow});
+  if (parameters.memory_revolutions > quick)
+    memories.insert(memories.end(), {parameters.memory(1), parameters.memory(2)});
   std::vector<HarmonicGain> gains;
   for (const double memory : memories) {
     gains.push_back(designHarmonicGain(sensor, spindle_speed, sample_rate, harmonics, parameters.noise_rms,
@@ -291,6 +297,19 @@ void HarmonicFilter::adopt(const HarmonicFilter& other) {
   watch_.setLevel(other.level());
   state.resize(2 * modes_ + 1 + 2 * static_cast<std::size_t>(harmonics_), 0.0);
   setState(state);
+}
+
+double HarmonicFilter::slope() const {
+  // d/d angle of Re(H W), W turning with exp(i n angle): n (c2 re - c1 im).
+  Four sum = {};
+  const double first = -static_cast<double>(modes_);
+  Four order = {first, first + 1.0, first + 2.0, first + 3.0};
+  for (const Block& block : blocks_) {
+    const Four n = order > 0.0 ? order : Four{};  // modes come first and do not turn with the spindle
+    sum += n * (block.c2 * block.re - block.c1 * block.im);
+    order += 4.0;
+  }
+  return (sum[0] + sum[2]) + (sum[1] + sum[3]);
 }
 
 double HarmonicFilter::expectation() const {

@@ -14,6 +14,9 @@ NodeParameters readParameters(ParameterReader& reader) {
   reader.read("memory_revolutions", compensation.filter.memory_revolutions);
   reader.read("least_speed", compensation.least_speed);
   reader.read("speed_tolerance", compensation.speed_tolerance);
+  reader.read("track_speed", compensation.track_speed);
+  reader.read("speed_std", compensation.tracker.speed_std);
+  reader.read("acceleration_std", compensation.tracker.acceleration_std);
   reader.read("settling_periods", compensation.settling_periods);
   reader.read("follow", compensation.follow);
   reader.read("follow_revolutions", compensation.follow_revolutions);
@@ -36,6 +39,7 @@ NodeParameters readParameters(ParameterReader& reader) {
   reader.read("max_modes", taps.max_modes);
   taps.response_range = compensation.saturation;
   reader.read("model", parameters.model);
+  reader.read("sensor_matrix", parameters.sensor_matrix);
   reader.read("spindle_sensor", parameters.spindle_sensor);
   reader.read("spindle_sensor_length", parameters.spindle_sensor_length);
   reader.read("command_machine", parameters.command_machine);

@@ -83,6 +83,16 @@ ModalModel ReferenceCase::exactSensor() {
   return model;
 }
 
+double ReferenceCase::speedAt(double time) const {
+  const double cutting = std::max(0.0, time - engage_time);
+  return spindle_speed * (1.0 - speed_drop * (1.0 - std::exp(-cutting / drop_time)));
+}
+
+double ReferenceCase::angleAt(double time) const {
+  const double cutting = std::max(0.0, time - engage_time);
+  return spindle_speed * (time - speed_drop * (cutting - drop_time * (1.0 - std::exp(-cutting / drop_time))));
+}
+
 ReferenceRecord simulate(const ReferenceCase& reference) {
   const RunoutForce force(TOOL, {800e6, 250e6, 0.0, 20e3, 20e3, 0.0}, SLOT, 8e-6, units::radFromDeg(31.0));
   const double fine = FINER * reference.sample_rate;
@@ -104,7 +114,7 @@ ReferenceRecord simulate(const ReferenceCase& reference) {
     std::array<double, 2> applied{}, measured{};
     for (int step = FINER - 1; step >= 0; --step) {
       const double t = time - step / fine;
-      applied = t >= reference.engage_time ? force.at(reference.spindle_speed * t) : std::array<double, 2>{};
+      applied = t >= reference.engage_time ? force.at(reference.angleAt(t)) : std::array<double, 2>{};
       for (std::size_t axis = 0; axis < 2; ++axis) measured[axis] = sensor[axis].step(applied[axis]);
     }
     record.time.push_back(time);
@@ -136,12 +146,12 @@ std::array<std::vector<double>, 2> runCompensation(const ReferenceCase& referenc
   condition.kind = CuttingCondition::Kind::cut;
   condition.tool = TOOL;
   condition.engagement = SLOT;
-  condition.spindle_speed = reference.spindle_speed;
+  condition.spindle_speed = reference.spindle_speed * (1.0 + reference.nominal_off);
   compensation.handle(condition);
   for (std::size_t at = 0; at + BLOCK <= record.time.size(); at += BLOCK) {
     compensation.handle(SpindleAngle{record.time[at],
-                                     std::fmod(reference.spindle_speed * record.time[at], units::TWO_PI),
-                                     reference.spindle_speed});
+                                     std::fmod(reference.angleAt(record.time[at]), units::TWO_PI),
+                                     reference.speedAt(record.time[at])});
     SampleBlock block;
     block.stamp = record.time[at];
     block.sample_rate = reference.sample_rate;

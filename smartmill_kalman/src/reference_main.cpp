@@ -150,6 +150,51 @@ void runForceModels(const std::vector<double>& speeds, double duration) {
   }
 }
 
+/// Without a tachometer: the speed as a state, beside the tachometer and beside the commanded speed taken for
+/// true. Errors to 3 kHz over the last 0.3 s; speed error at the end.
+void runSpeeds(const std::vector<double>& speeds, double duration) {
+  std::printf("no tachometer: error of the force to 3 / 5 kHz [%%] over the last 0.3 s, worst of x and y\n");
+  std::printf(
+      "   rpm  commanded speed is off   speed falls    tachometer       speed a state   commanded taken for "
+      "true\n");
+  for (const double rpm : speeds) {
+    for (const auto& [off, drop] : {std::pair(0.0, 0.0), std::pair(0.01, 0.0), std::pair(-0.01, 0.0),
+                                    std::pair(0.0, 0.01), std::pair(0.01, 0.01)}) {
+      ReferenceCase reference;
+      reference.spindle_speed = units::radPerSecFromRpm(rpm);
+      reference.duration = duration;
+      reference.nominal_off = off;
+      reference.speed_drop = drop;
+      const ReferenceRecord record = simulate(reference);
+      const auto error = [&](const ReferenceCase& told, bool track) {
+        CompensationParameters parameters;
+        parameters.filter.max_harmonics = 200;
+        parameters.track_speed = track;
+        const auto force = runCompensation(told, record, reference.sensor, parameters);
+        const std::size_t to = force[0].size();
+        const auto from = to - static_cast<std::size_t>(0.3 * reference.sample_rate);
+        std::array<double, 2> worst{};
+        for (std::size_t axis = 0; axis < 2; ++axis) {
+          for (std::size_t band = 0; band < 2; ++band) {
+            worst[band] = std::max(
+                worst[band], 100.0 * bandError(force[axis], record.truth[axis], reference.sample_rate, from,
+                                               to, band == 0 ? 3000.0 : 5000.0));
+          }
+        }
+        return worst;
+      };
+      ReferenceCase blind = reference;
+      blind.spindle_speed *= 1.0 + off;
+      blind.speed_drop = 0.0;
+      const auto tachometer = error(reference, false), tracked = error(reference, true),
+                 commanded = error(blind, false);
+      std::printf("%6.0f %18.1f %% %13.1f %% %9.2f %7.2f %10.2f %7.2f %12.1f %7.1f\n", rpm, 100.0 * off,
+                  100.0 * drop, tachometer[0], tachometer[1], tracked[0], tracked[1], commanded[0],
+                  commanded[1]);
+    }
+  }
+}
+
 /// Sensor that is not what it is believed to be.
 struct Wrong {
   const char* name;
@@ -298,15 +343,17 @@ void runTuning(double duration) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  std::setvbuf(stdout, nullptr, _IOLBF, 0);
   std::vector<double> speeds{3000.0, 9000.0, 15000.0, 21750.0};
   double duration = 1.0;
-  bool errors = false, tuning = false, force_models = false;
+  bool errors = false, tuning = false, force_models = false, track = false;
   CLI::App app{"Errors of the force compensation in the reference cut, beside their targets."};
   app.add_option("--speed-rpm", speeds, "spindle speeds")->check(CLI::Range(500.0, 60000.0));
   app.add_option("--duration-s", duration, "length of a record")->check(CLI::Range(0.3, 100.0));
   app.add_flag("--model-errors", errors,
                "a sensor that is not what it is believed to be: frozen and following");
   app.add_flag("--force-models", force_models, "Fourier series beside F(t) = F(t - T): error and cost");
+  app.add_flag("--track-speed", track, "no tachometer: the speed as a state beside the tachometer");
   app.add_flag("--tuning", tuning, "seven speeds: laid out from the taps against the best q of the cut");
   try {
     app.parse(argc, argv);
@@ -316,6 +363,10 @@ int main(int argc, char** argv) {
   try {
     if (force_models) {
       runForceModels(speeds, duration);
+      return 0;
+    }
+    if (track) {
+      runSpeeds(speeds, duration);
       return 0;
     }
     if (tuning) {

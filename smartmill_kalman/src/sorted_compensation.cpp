@@ -44,6 +44,10 @@ SortedCompensation::SortedCompensation(const CompensationParameters& parameters,
 
 void SortedCompensation::useModelFile() {
   identified_.fill(NEVER);
+  if (matrix_) {
+    compensation_.setMatrix(*matrix_);
+    for (std::size_t axis = 0; axis < 3; ++axis) believed_.axis[axis] = matrix_->h[axis][axis];
+  }
   for (std::size_t axis = 0; axis < 3; ++axis) {
     if (believed_.noise_rms) {
       compensation_.setSensor(axis, believed_.axis[axis], (*believed_.noise_rms)[axis]);

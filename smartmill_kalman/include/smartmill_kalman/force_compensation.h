@@ -13,8 +13,10 @@
 
 #include "smartmill_core/modal/modal_model.h"
 #include "smartmill_core/signal/streams.h"
+#include "smartmill_kalman/coupled_filter.h"
 #include "smartmill_kalman/harmonic_filter.h"
 #include "smartmill_kalman/mode_follower.h"
+#include "smartmill_kalman/speed_tracker.h"
 
 namespace smartmill::kalman {
 
@@ -26,7 +28,10 @@ struct CompensationParameters {
   /// pass
   double speed_tolerance = 0.002;
   double settling_periods =
-      5.0;                     ///< [1] >= 0 settling times after a start or gap that are marked as settling
+      5.0;  ///< [1] >= 0 settling times after a start or gap that are marked as settling
+  /// No tachometer: the speed is told from the force, beginning with the cutting condition's.
+  bool track_speed = false;
+  SpeedTrackerParameters tracker;
   bool follow = false;         ///< moves the sensor's modes where the cut says so (ModeFollower)
   int follow_revolutions = 8;  ///< [1] > 0 between two looks
   FollowParameters follower;
@@ -47,8 +52,9 @@ struct CompensationHealth {
   /// model tells all that can be told, beyond 0.3 something is left in them
   double colour = 0;
   std::array<double, 3> zero{
-      {0, 0, 0}};    ///< [N] mean of the sensor without cutting (condition AIR or NONE), over seconds
-  double speed = 0;  ///< [rad/s] of the running filters; 0: passing through
+      {0, 0, 0}};        ///< [N] mean of the sensor without cutting (condition AIR or NONE), over seconds
+  double speed = 0;      ///< [rad/s] of the running filters; 0: passing through
+  double speed_std = 0;  ///< [rad/s] where the speed is tracked
 };
 
 /// Sensor blocks in, force blocks out with the same sample index. Inputs come in stamp order
@@ -68,6 +74,10 @@ class ForceCompensation {
   }
   /// @param noise_rms [N] of one sample, > 0
   void setSensor(std::size_t axis, const ModalModel& sensor, double noise_rms);
+  /// Cross-talk from now on: force of an axis also from what the others show. Its own axes serve as sensor
+  /// models; later ones of setSensor() replace them, the cross-talk stays. @throws Error at the first block
+  /// when the matrix cannot be inverted at a harmonic.
+  void setMatrix(const SensorMatrix& matrix);
   bool hasSensor() const;
   /// Model in use. @throws std::bad_optional_access when there is none.
   const ModalModel& sensor(std::size_t axis) const { return sensor_.at(axis).value(); }
@@ -84,6 +94,8 @@ class ForceCompensation {
 
  private:
   void design(double speed, double sample_rate);
+  void run(std::array<std::vector<double>, 3>& force, double sample_rate);
+  void layOutCrossTalk(double sample_rate);
   void follow(double time, double sample_rate);
   void watchZero(const ForceBlock& measured);
   void forgetMoves();
@@ -94,12 +106,16 @@ class ForceCompensation {
   Output output_;
   std::array<std::optional<ModalModel>, 3> sensor_, told_;  // in use, as set
   std::array<double, 3> noise_rms_{{0, 0, 0}};              // [N]
-  std::vector<HarmonicFilter> filters_;  // of the axes with a model, in order; empty: to be laid out
+  std::optional<SensorMatrix> matrix_;
+  std::optional<CrossTalkInverse> cross_talk_;  // of matrix_ at the filters' speed
+  std::vector<HarmonicFilter> filters_;         // of the axes with a model, in order; empty: to be laid out
   std::map<std::pair<std::size_t, int>, std::vector<HarmonicGain>>
       schedule_;  // by axis and point of the speed grid
   int grid_point_ = 0;
   std::optional<CuttingCondition> condition_;
   std::optional<ModeFollower> follower_;
+  std::optional<SpeedTracker> tracker_;
+  std::size_t restarts_ = 0;                         // of all filters, as the tracker knows them
   std::array<std::vector<double>, 2> designed_for_;  // [Hz] modes' frequencies that the gains know
   SpindleAngle angle_;
   double next_look_ = 0.0;     // [s]

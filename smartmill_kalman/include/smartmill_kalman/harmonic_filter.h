@@ -19,6 +19,8 @@ struct HarmonicFilterParameters {
   /// [1] time constant once nothing changes any more, in revolutions; at most settling_revolutions: always
   /// quick
   double memory_revolutions = 2.0;
+  /// Memory of a level of `levels` [revolutions]: quick, geometric mean, slow.
+  double memory(std::size_t level) const;
   /// @throws Error naming key and value.
   void validate() const;
 };
@@ -100,6 +102,10 @@ class HarmonicFilter {
     const std::size_t i = modes_ + n;
     return {blocks_[i / 4].re[i % 4], blocks_[i / 4].im[i % 4]};
   }
+
+  /// Slope of the sample expected next over the spindle's angle [N/rad], of the harmonics in their steady
+  /// state.
+  double slope() const;
 
   /// Takes the force of another filter over (harmonics beyond its own: zero), so that a new layout starts
   /// without a jump. The sensor's modes must be as many.

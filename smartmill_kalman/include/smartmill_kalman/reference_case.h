@@ -20,11 +20,17 @@ struct ReferenceCase {
   double engage_time = 0.02;     ///< [s] the tool is in the cut from here
   double noise_rms = 1.0;        ///< [N]
   double sample_rate = 25600.0;  ///< [Hz]
+  double speed_drop = 0.0;       ///< [1] share of speed that the cut's load takes ...
+  double drop_time = 0.3;        ///< [s] ... with this time constant
+  double nominal_off = 0.0;      ///< [1] share by which the cutting condition's speed is off
   std::uint32_t seed = 1;
   ModalModel sensor = exactSensor();  ///< that measures
   ModalModel later = exactSensor();   ///< that measures at the end
   double drift_from = 1e9,
          drift_to = 1e9;  ///< [s] between them the sensor's parameters go from the one to the other
+
+  double speedAt(double time) const;  ///< [rad/s]
+  double angleAt(double time) const;  ///< [rad] of the spindle, zero at time zero, not wrapped
 
   static ModalModel exactSensor();
 };
@@ -39,8 +45,8 @@ struct ReferenceRecord {
 ReferenceRecord simulate(const ReferenceCase& reference);
 
 /// The reference record through ForceCompensation in blocks of 256 samples, with its angle and cutting
-/// condition: force x and y. @param believed sensor @param moves counts the moves that were followed; may be
-/// null
+/// condition: force x and y. With track_speed no angle comes. @param believed sensor @param moves counts the
+/// moves that were followed; may be null
 std::array<std::vector<double>, 2> runCompensation(const ReferenceCase& reference,
                                                    const ReferenceRecord& record, const ModalModel& believed,
                                                    const CompensationParameters& parameters,
