@@ -33,6 +33,8 @@ void ChatterParameters::validate() const {
         "1..revolutions");
   bound(energy_ratio > 0.0 && energy_ratio < 1.0, "energy_ratio", energy_ratio, "0 < value < 1");
   bound(least_severity >= 0.0 && std::isfinite(least_severity), "least_severity", least_severity, ">= 0 N");
+  bound(alternation_ratio > 0.0 && alternation_ratio <= 1.0, "alternation_ratio", alternation_ratio,
+        "0 < value <= 1");
   bound(path_tolerance > 0.0 && path_tolerance <= 1.0, "path_tolerance", path_tolerance, "0 < value <= 1 m");
   bound(settle_revolutions >= 0.0 && settle_revolutions <= 1000.0, "settle_revolutions", settle_revolutions,
         "0..1000");
@@ -105,8 +107,7 @@ void ChatterDetector::handle(const SpindleAngle& angle) {
   // The speed tells how many full turns lie between two readings.
   const double expected = last.turned + angle.speed * (angle.stamp - last.time);
   const double turns = std::round((expected - angle.angle) / units::TWO_PI);
-  angles_.push_back(
-      {angle.stamp, std::max(last.turned, angle.angle + units::TWO_PI * turns), angle.angle});
+  angles_.push_back({angle.stamp, std::max(last.turned, angle.angle + units::TWO_PI * turns), angle.angle});
   evaluate();
 }
 
@@ -183,7 +184,11 @@ void ChatterDetector::judge(double from, double to) {
   state.stamp = stop;
   state.condition = condition_->name;
   state.valid = true;
-  double all = 0.0, outside = 0.0;
+  double all = 0.0, outside = 0.0, alternating = 0.0;
+  // Orders of the spindle at which a flip of an even number of teeth lies: odd multiples of half the teeth.
+  const int teeth = condition_->tool.teeth;
+  const std::size_t half = teeth > 0 && teeth % 2 == 0 ? static_cast<std::size_t>(teeth) / 2 : 0;
+  std::vector<double> of_order(bins / 2 + 1, 0.0);
   std::vector<double> power(n / 2 + 1, 0.0);
   const std::vector<double> taper = hannWindow(n);
   std::vector<double> outside_of_turn(turns, 0.0);
@@ -215,11 +220,21 @@ void ChatterDetector::judge(double from, double to) {
       outside_of_turn[i / bins] += share * force[i] * force[i] / static_cast<double>(bins);
       force[i] *= taper[i];
     }
+    if (half > 0) {
+      const auto orders = fourier(repeated);
+      for (std::size_t k = half; 2 * k < bins; k += 2 * half) {
+        of_order[k] += 2.0 * std::norm(orders[k]) / std::pow(static_cast<double>(bins), 2);
+        alternating += 2.0 * std::norm(orders[k]) / std::pow(static_cast<double>(bins), 2);
+      }
+    }
     const auto spectrum = fourier(force);
     for (std::size_t k = 0; k < power.size(); ++k) power[k] += std::norm(spectrum[k]);
   }
-  state.energy_ratio = all > 0.0 ? std::min(1.0, outside / all) : 0.0;
-  state.severity = std::sqrt(outside);
+  state.alternation = all > 0.0 ? std::min(1.0, alternating / all) : 0.0;
+  const bool flip = state.alternation > parameters_.alternation_ratio && alternating > outside;
+  const double chatter_energy = flip ? outside + alternating : outside;
+  state.energy_ratio = all > 0.0 ? std::min(1.0, chatter_energy / all) : 0.0;
+  state.severity = std::sqrt(chatter_energy);
   const auto peak =
       static_cast<std::size_t>(std::max_element(power.begin() + 1, power.end() - 1) - power.begin());
   // Vertex of the parabola through the logarithms: exact to a few percent of a line under a Hann window.
@@ -228,15 +243,39 @@ void ChatterDetector::judge(double from, double to) {
   const double curve = a - 2.0 * b + c;
   const double shift = curve < 0.0 ? std::clamp(0.5 * (a - c) / curve, -0.5, 0.5) : 0.0;
   state.frequency = (static_cast<double>(peak) + shift) / (stop - start);
+  if (flip)
+    state.frequency =
+        static_cast<double>(std::max_element(of_order.begin(), of_order.end()) - of_order.begin()) / period;
+  // What dies out within the window is a transient (an entry), not chatter.
+  constexpr double DIES = 0.7;
+  double early = 0.0, late = 0.0;
+  for (std::size_t k = 0; k < turns; ++k) (2 * k < turns ? early : late) += outside_of_turn[k];
+  const bool dies = !flip && late < DIES * early;
   state.chatter =
-      state.energy_ratio > parameters_.energy_ratio && state.severity > parameters_.least_severity;
+      !dies && state.energy_ratio > parameters_.energy_ratio && state.severity > parameters_.least_severity;
   if (state.chatter) {
-    std::size_t turn = turns - 1;
+    // A flip repeats: it was there from the window's beginning, as far as this window tells.
+    std::size_t turn = flip ? 0 : turns - 1;
     while (turn > 0 && outside_of_turn[turn - 1] > parameters_.energy_ratio * all) --turn;
     state.onset = times[turn * bins];
   }
   said_invalid_ = false;
   output_(state);
+}
+
+ForceBlock signalBlock(const SampleBlock& block) {
+  if (block.channels.empty()) throw Error("chatter detection: a sample block without channels");
+  ForceBlock signal;
+  signal.stamp = block.stamp;
+  signal.sample_rate = block.sample_rate;
+  signal.first_index = block.first_index;
+  signal.status = ForceBlock::Status::compensated;
+  for (std::size_t c = 0; c < 3; ++c) {
+    signal.force[c].assign(block.size(), 0.0);
+    if (c >= block.channels.size()) continue;
+    for (std::size_t i = 0; i < block.size(); ++i) signal.force[c][i] = block.at(i, c);
+  }
+  return signal;
 }
 
 SortedDetection::SortedDetection(const ChatterParameters& parameters, double hold_back,

@@ -26,6 +26,10 @@ struct Axes {
   std::vector<std::size_t> index;
 };
 
+/// d n^T at an immersion angle [rad]: force on the tool per unit of depth and of chip thickness, times the
+/// chip's normal. @param tangential, radial [N/m2]
+Eigen::Matrix2d directional(double tangential, double radial, double angle);
+
 /// [rad/s] up to which chatter is looked for: 1.5 times the highest mode.
 double highestOf(const RegenerativeSystem& system);
 

@@ -25,8 +25,8 @@ namespace {
 using namespace smartmill;
 
 struct Request {
-  std::string model, method = "collocation", speeds, out, boundary;
-  double entry_deg = 0.0, exit_deg = 180.0, max_depth_mm = 0.0;
+  std::string model, method = "collocation", speeds, out, boundary, serration;
+  double entry_deg = 0.0, exit_deg = 180.0, max_depth_mm = 0.0, feed_mm = 0.0;
   bool errors = false;
 };
 
@@ -91,13 +91,32 @@ void traceAll(const Request& request, const stability::FloquetSolver& solver,
   std::printf("%zu boundary curves, %zu of them islands\n", curves.size(), islands);
 }
 
+/// Contact of the teeth as it is, where a feed is given.
+void addChips(const Request& request, stability::RegenerativeSystem& system) {
+  if (request.feed_mm == 0.0 && request.serration.empty()) return;
+  if (!(request.feed_mm > 0.0)) throw Error("--feed-mm: above 0 is due (with a serration as well)");
+  stability::ChipGeometry chip;
+  chip.feed = request.feed_mm * units::MM;
+  if (!request.serration.empty()) {
+    double amplitude = 0.0, wavelength = 0.0;
+    char rest = 0;
+    if (std::sscanf(request.serration.c_str(), "%lf:%lf%c", &amplitude, &wavelength, &rest) != 2 ||
+        !(amplitude > 0.0) || !(wavelength > 0.0))
+      throw Error("--serration-mm " + request.serration + ": AMPLITUDE:WAVELENGTH is due, both above 0");
+    chip.serration_amplitude = amplitude * units::MM;
+    chip.serration_wavelength = wavelength * units::MM;
+  }
+  system.chip = chip;
+}
+
 void run(const Request& request) {
   const stability::Method method = stability::methodOf(request.method);
   if (!(request.max_depth_mm > 0.0)) throw Error("--max-depth-mm: above 0 is due");
   std::vector<double> speeds = stability::rangeOf("--speeds", request.speeds);  // [rpm]
   for (double& speed : speeds) speed = units::radPerSecFromRpm(speed);
-  const stability::RegenerativeSystem system =
+  stability::RegenerativeSystem system =
       stability::systemOf(readMachineModel(request.model), request.entry_deg, request.exit_deg);
+  addChips(request, system);
   stability::SolverOptions options;
   options.estimate_error = request.errors;
   const auto solver = stability::makeSolver(method, system, options);
@@ -152,6 +171,13 @@ int main(int argc, char** argv) {
       ->required();
   app.add_option("--boundary", request.boundary,
                  "CSV of the whole boundary with its islands, besides the first loss; a picture beside it");
+  app.add_option(
+      "--feed-mm", request.feed_mm,
+      "per tooth [mm]: contact of the teeth about the forced vibration counts (uneven pitch, serration); "
+      "without it every tooth cuts all along its arc");
+  app.add_option(
+      "--serration-mm", request.serration,
+      "AMPLITUDE:WAVELENGTH [mm] of a serrated edge, evenly shifted from tooth to tooth; needs --feed-mm");
   app.add_flag("--errors", request.errors, "estimate the error of each limit by a refined solution");
   try {
     app.parse(argc, argv);

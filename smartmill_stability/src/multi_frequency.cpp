@@ -46,8 +46,9 @@ struct Harmonics {
   }
 };
 
-Harmonics harmonicsOf(const RegenerativeSystem& system, double speed, int most) {
-  const DelayedSystem unit = delayedSystem(system, speed, 1.0);
+/// @param depth [m] at which the feedback is taken, over the depth
+Harmonics harmonicsOf(const RegenerativeSystem& system, double speed, int most, double depth = 1.0) {
+  const DelayedSystem unit = delayedSystem(system, speed, depth);
   Harmonics h;
   h.step = TWO_PI / unit.period;
   h.delays = unit.delays;
@@ -71,7 +72,7 @@ Harmonics harmonicsOf(const RegenerativeSystem& system, double speed, int most) 
       const double half = 0.5 * length / parts, middle = ends[e] + (2 * p + 1) * half;
       constexpr double NODE = 0.7745966692414834;
       for (const auto& [x, w] : {std::pair{-NODE, 5.0 / 9.0}, {0.0, 8.0 / 9.0}, {NODE, 5.0 / 9.0}}) {
-        const double t = middle + x * half, weight = w * half / unit.period;
+        const double t = middle + x * half, weight = w * half / unit.period / depth;
         unit.feedback(t, middle, f);
         for (int k = -most; k <= most; ++k) {
           const auto i = static_cast<std::size_t>(k + most);
@@ -172,6 +173,9 @@ class MultiFrequency : public StabilitySolver {
     if (system_.helix > 0.0)
       throw Error(
           "multi_frequency: with helix the feedback is not proportional to the depth, collocation is due");
+    if (system_.chip)
+      throw Error(
+          "multi_frequency: with a chip geometry the contact changes with the depth, collocation is due");
     for (const SystemMode& mode : system_.modes) {
       peaks_.push_back(TWO_PI * mode.frequency);
       widths_.push_back(TWO_PI * mode.frequency * mode.damping_ratio);
@@ -297,7 +301,7 @@ class ZeroOrder : public StabilitySolver {
     if (!(max_depth > 0.0)) throw Error("stability: the largest depth must be above 0");
     const bool damped = system_.damping_radial > 0.0 || system_.damping_tangential > 0.0;
     if (system_.cut == Cut::milling && system_.evenPitch() && system_.overlap == 1.0 && !damped &&
-        system_.kt > 0.0) {
+        !system_.chip && system_.kt > 0.0) {
       const RegenerativeProcess process{system_.teeth, system_.entry, system_.exit, system_.kt,
                                         system_.kr / system_.kt};
       std::vector<double> sorted = speeds;
@@ -324,7 +328,13 @@ class ZeroOrder : public StabilitySolver {
   Limit general(double speed, double max_depth) const {
     RegenerativeSystem straight = system_;
     straight.helix = 0.0;  // the mean does not know it
-    const Harmonics mean = harmonicsOf(straight, speed, 0);
+    // A serration by its mean over a whole wave.
+    double part = 1.0;  // [m]
+    if (straight.chip) {
+      straight.chip->forced_vibration = false;
+      if (straight.chip->serration_amplitude > 0.0) part = straight.chip->serration_wavelength;
+    }
+    const Harmonics mean = harmonicsOf(straight, speed, 0, part);
     Limit limit;
     std::array<Complex, 2> before{};
     for (std::size_t i = 0; i < response_.frequency.size(); ++i) {

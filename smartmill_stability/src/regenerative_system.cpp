@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "floquet.h"
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/error.h"
 #include "smartmill_stability/delayed_system.h"
@@ -17,13 +18,15 @@ void require(bool good, const char* what, double value) {
     throw Error(std::string("stability: ") + what + " " + std::to_string(value) + " is impossible");
 }
 
-/// d n^T at an immersion angle: force on the tool per unit of depth and of chip thickness, times the chip's
-/// normal.
+}  // namespace
+
 Eigen::Matrix2d directional(double tangential, double radial, double angle) {
   const double s = std::sin(angle), c = std::cos(angle);
   const Eigen::Vector2d force(-tangential * c - radial * s, tangential * s - radial * c);
   return force * Eigen::RowVector2d(s, c);
 }
+
+namespace {
 
 /// Antiderivative of directional() over the angle.
 Eigen::Matrix2d directionalIntegral(double tangential, double radial, double angle) {
@@ -151,6 +154,16 @@ void RegenerativeSystem::validate() const {
   require(overlap >= 0.0 && overlap <= 1.0, "overlap", overlap);
   const bool needs_diameter = helix > 0.0 || damping_radial > 0.0 || damping_tangential > 0.0;
   require(diameter > 0.0 || !needs_diameter, "diameter [m]", diameter);
+  if (chip) {
+    require(cut == Cut::milling, "chip geometry outside milling:", 0.0);
+    require(chip->feed > 0.0, "feed per tooth [m]", chip->feed);
+    require(chip->radius_offset.empty() || static_cast<int>(chip->radius_offset.size()) == teeth,
+            "number of radius offsets", static_cast<double>(chip->radius_offset.size()));
+    require(chip->serration_amplitude >= 0.0, "serration amplitude [m]", chip->serration_amplitude);
+    require(chip->serration_amplitude == 0.0 || chip->serration_wavelength > 0.0, "serration wavelength [m]",
+            chip->serration_wavelength);
+    require(exit <= TWO_PI + 1e-9, "exit angle beyond a turn with a chip geometry [rad]", exit);
+  }
   if (cut == Cut::turning) {
     require(teeth == 1, "number of teeth in turning", teeth);
     require(helix == 0.0, "helix in turning [rad]", helix);
@@ -242,6 +255,7 @@ DelayedSystem delayedSystem(const RegenerativeSystem& system, double speed, doub
     };
     return delayed;
   }
+  if (system.chip && depth > 0.0) return contactSystem(system, speed, depth);
   const Teeth teeth(system, speed, depth);
   delayed.period = TWO_PI / speed / (system.evenPitch() ? system.teeth : 1);
   delayed.delays = teeth.delays();

@@ -54,6 +54,9 @@ std::vector<AgreementPoint> agreementWithTwin(const MachineModel& model, const R
                                               const std::function<void(double)>& progress) {
   options.validate();
   const auto solver = makeFloquetSolver(Method::collocation, system);
+  RegenerativeSystem plain = system;
+  plain.chip.reset();
+  const auto places = makeFloquetSolver(Method::collocation, plain);
   std::mt19937_64 random(options.seed);
   std::uniform_real_distribution<double> unit;
   std::vector<AgreementPoint> points;
@@ -64,7 +67,7 @@ std::vector<AgreementPoint> agreementWithTwin(const MachineModel& model, const R
     if (tries > 100 * options.points + 1000) throw Error("agreement: no points outside the band are found");
     AgreementPoint p;
     p.speed = options.speed_low + (options.speed_high - options.speed_low) * unit(random);
-    const Limit limit = solver->limit(p.speed, options.max_depth);
+    const Limit limit = places->limit(p.speed, options.max_depth);
     const double share = 0.4 + 1.2 * unit(random);
     p.limit = limit.depth;
     p.depth = (std::isfinite(limit.depth) ? limit.depth : 0.5 * options.max_depth) * share;

@@ -40,7 +40,8 @@ bool repeatsNoMore(const Record& record, int samples, int period, double scale);
 
 /// Random points outside the band, uniform in speed and in depth over the first limit (0.4 .. 1.6): stable or
 /// not by the default solver and by the simulator's records.
-/// @param system of the model (helix, pitch, arc)
+/// @param system of the model (helix, pitch, arc); with a chip geometry its contact counts, and the first
+/// limits from which points are drawn stay those of the system without (they take longer)
 std::vector<AgreementPoint> agreementWithTwin(const MachineModel& model, const RegenerativeSystem& system,
                                               const AgreementOptions& options, const TwinCuts& twin,
                                               const std::function<void(double)>& progress = {});

@@ -25,6 +25,7 @@ struct Request {
   std::vector<double> pitch_deg;
   int points = 400, revolutions = 180;
   unsigned seed = 1;
+  bool linear = false;
 };
 
 /// @return whether the target is met.
@@ -49,8 +50,11 @@ bool run(const Request& request) {
   options.points = request.points;
   options.seed = request.seed;
   options.revolutions = request.revolutions;
-  const stability::RegenerativeSystem system =
-      stability::systemOf(model, request.entry_deg, request.exit_deg);
+  stability::RegenerativeSystem system = stability::systemOf(model, request.entry_deg, request.exit_deg);
+  if (!system.evenPitch() && !request.linear) {
+    system.chip.emplace();
+    system.chip->feed = options.feed;
+  }
   const stability::TwinCuts twin(request.simulate.empty() ? stability::TwinCuts::besideThisProgram()
                                                           : request.simulate);
   const auto points = agreementWithTwin(model, system, options, twin, [](double share) {
@@ -104,6 +108,9 @@ int main(int argc, char** argv) {
   app.add_option("--helix-deg", request.helix_deg, "instead of the model's [deg]");
   app.add_option("--pitch-deg", request.pitch_deg, "instead of the model's, one a tooth [deg]")
       ->delimiter(',');
+  app.add_flag(
+      "--linear-chips", request.linear,
+      "uneven pitch: the solver takes every tooth to cut all along its arc, as linear theory has it");
   app.add_option("--feed-mm", request.feed_mm, "per tooth [mm] (0.1)");
   app.add_option("--revolutions", request.revolutions, "of a cut (180)");
   app.add_option("-o,--out", request.out, "CSV of all points");

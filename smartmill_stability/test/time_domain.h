@@ -18,7 +18,8 @@ class TimeDomain {
   /// @param x, y receptances of the tool tip @param feed [m] per tooth @param may_leave false: chips may be
   /// negative, as linear theory has it
   TimeDomain(const RegenerativeSystem& system, const ModalModel& x, const ModalModel& y, double speed,
-             double depth, double feed, int steps_per_revolution = 720, bool may_leave = true)
+             double depth, double feed, int steps_per_revolution = 720, bool may_leave = true,
+             int least_slices = 1)
       : may_leave_(may_leave),
         system_(system),
         steps_(steps_per_revolution),
@@ -28,7 +29,8 @@ class TimeDomain {
     const double per_step = units::TWO_PI / steps_;
     const double lag = system.helix > 0.0 ? std::tan(system.helix) / (0.5 * system.diameter) : 0.0;
     const int slices =
-        lag > 0.0 ? std::max(4, static_cast<int>(std::ceil(lag * depth / (2.0 * per_step)))) : 1;
+        std::max(least_slices,
+                 lag > 0.0 ? std::max(4, static_cast<int>(std::ceil(lag * depth / (2.0 * per_step)))) : 1);
     slice_depth_ = depth / slices;
     for (int s = 0; s < slices; ++s)
       lag_.push_back(static_cast<int>(std::lround(lag * depth * (s + 0.5) / slices / per_step)));
@@ -47,6 +49,19 @@ class TimeDomain {
 
   /// Radial offset of each tooth [m], outwards.
   void setRunout(std::vector<double> runout) { runout_ = std::move(runout); }
+
+  /// Radius of tooth k at a height: amplitude sin(2 pi (height / wavelength + k / teeth)) [m]. Needs slices
+  /// much thinner than the wave.
+  void setSerration(double amplitude, double wavelength) {
+    const std::size_t slices = surface_.size();
+    serration_.assign(slices, std::vector<double>(tooth_.size(), 0.0));
+    for (std::size_t s = 0; s < slices; ++s)
+      for (std::size_t k = 0; k < tooth_.size(); ++k)
+        serration_[s][k] =
+            amplitude *
+            std::sin(units::TWO_PI * ((static_cast<double>(s) + 0.5) * slice_depth_ / wavelength +
+                                      static_cast<double>(k) / static_cast<double>(tooth_.size())));
+  }
 
   /// One step of the spindle. @return displacement x, y [m]; force() that made it.
   std::array<double, 2> step() {
@@ -83,7 +98,8 @@ class TimeDomain {
         double& left = surface_[s][static_cast<std::size_t>(at)];
         if (phi <= system_.entry || phi >= system_.exit) continue;
         const double si = std::sin(phi), co = std::cos(phi);
-        const double reach = (u[0] + fed) * si + u[1] * co + (runout_.empty() ? 0.0 : runout_[k]);
+        const double reach = (u[0] + fed) * si + u[1] * co + (runout_.empty() ? 0.0 : runout_[k]) +
+                             (serration_.empty() ? 0.0 : serration_[s][k]);
         const double chip = reach - left;
         if (chip <= 0.0 && may_leave_) continue;
         if (leave) left = reach;
@@ -105,18 +121,14 @@ class TimeDomain {
   ModalFilter x_, y_;
   std::vector<int> lag_, tooth_;
   std::vector<double> runout_;
+  std::vector<std::vector<double>> serration_;  // [slice][tooth]
   std::vector<std::vector<double>> surface_;
   std::array<double, 2> force_{{0.0, 0.0}};
   long count_ = 0;
 };
 
-/// Whether what does not repeat with the principal period (a tooth's for even pitch, else a revolution) grows
-/// or stays over the second half of a run.
-inline bool chattersInTime(const RegenerativeSystem& system, const ModalModel& x, const ModalModel& y,
-                           double speed, double depth, double feed, bool may_leave = true,
-                           int revolutions = 180, int steps = 720) {
-  TimeDomain run(system, x, y, speed, depth, feed, steps, may_leave);
-  const int period = system.evenPitch() ? steps / system.teeth : steps;
+/// Whether what does not repeat with a period (in steps) grows or stays over the second half of a run.
+inline bool chattersInTime(TimeDomain& run, int period, double feed, int revolutions = 180, int steps = 720) {
   std::vector<std::array<double, 2>> before(static_cast<std::size_t>(period));
   constexpr int WINDOW = 25;  // turns: longer than the beats of a quasi-periodic motion
   double middle = 0.0, last = 0.0;
@@ -135,6 +147,14 @@ inline bool chattersInTime(const RegenerativeSystem& system, const ModalModel& x
   const double samples = static_cast<double>(WINDOW) * steps;
   if (last < samples * std::pow(1e-6 * feed, 2)) return false;
   return last > 0.7 * middle || last > samples * std::pow(0.05 * feed, 2);
+}
+
+/// The same by the principal period: a tooth's for even pitch, else a revolution.
+inline bool chattersInTime(const RegenerativeSystem& system, const ModalModel& x, const ModalModel& y,
+                           double speed, double depth, double feed, bool may_leave = true,
+                           int revolutions = 180, int steps = 720) {
+  TimeDomain run(system, x, y, speed, depth, feed, steps, may_leave);
+  return chattersInTime(run, system.evenPitch() ? steps / system.teeth : steps, feed, revolutions, steps);
 }
 
 }  // namespace smartmill::stability

@@ -16,9 +16,13 @@ namespace smartmill::stability {
 struct ChatterParameters {
   int revolutions =
       16;  ///< [1] 4..200, length of the window: longer tells nearer frequencies from the harmonics
-  int hop_revolutions = 8;        ///< [1] 1..revolutions, between two verdicts
-  double energy_ratio = 0.1;      ///< [1] 0 < value < 1, chatter above
-  double least_severity = 5.0;    ///< [N] >= 0, and above this force outside the harmonics
+  int hop_revolutions = 8;    ///< [1] 1..revolutions, between two verdicts
+  double energy_ratio = 0.1;  ///< [1] 0 < value < 1, chatter above
+  double least_severity =
+      5.0;  ///< [N] >= 0, and above this force outside the harmonics (or [unit] of the signal)
+  /// [1] 0 < value <= 1, flip of an even number of teeth above: energy at odd multiples of half the tooth
+  /// passing frequency, which runout excites as well; 1: never
+  double alternation_ratio = 0.1;
   double path_tolerance = 1e-3;   ///< [m] > 0, distance of the tool from the steady part of the cut
   double settle_revolutions = 4;  ///< [1] >= 0, dropped after the tool came into full engagement
   double maximum_gap = 0.2;       ///< [s] > 0, longer without controller state or angle: not steady
@@ -36,6 +40,9 @@ struct ChatterState {
   double frequency = std::numeric_limits<double>::quiet_NaN();  ///< [Hz]
   double energy_ratio = 0.0;  ///< [1] outside the spindle's harmonics over all, without the mean
   double severity = 0.0;      ///< [N] root mean square outside the harmonics, all axes together
+  /// [1] energy that alternates from tooth to tooth (odd multiples of half the tooth passing) over all; 0 for
+  /// an odd number of teeth
+  double alternation = 0.0;
   /// [s] begin of the first revolution from which the force repeats no more to the end of the window; NaN
   /// without chatter
   double onset = std::numeric_limits<double>::quiet_NaN();
@@ -43,8 +50,9 @@ struct ChatterState {
 
 /// Tells chatter from forced vibration in the compensated force: what repeats every revolution (teeth,
 /// runout) is the mean over the window's revolutions at each angle; what is left is chatter or noise. A flip
-/// (period-two) lobe of an even number of teeth lies on spindle harmonics and cannot be seen this way. Inputs
-/// in stamp order; results follow from them alone.
+/// (period-two) of an even number of teeth repeats every revolution as runout does, and no sampling once per
+/// revolution tells it from runout; what tells is its size: a flip makes every other tooth leave the cut, so
+/// most of the energy alternates from tooth to tooth. Inputs in stamp order; results follow from them alone.
 class ChatterDetector {
  public:
   using Output = std::function<void(const ChatterState&)>;
@@ -85,6 +93,10 @@ class ChatterDetector {
   bool said_invalid_ = false;
 };
 
+/// Samples of another sensor for the detector: up to three channels in their own unit (vibration, sound), to
+/// which severity and least_severity then belong. @throws Error without a channel.
+ForceBlock signalBlock(const SampleBlock& block);
+
 /// A detector behind a StreamSorter: what node and offline tool both use.
 class SortedDetection {
  public:
@@ -95,6 +107,7 @@ class SortedDetection {
   void push(const CncState& state);
   void push(const SpindleAngle& angle);
   void push(const ForceBlock& block);
+  void push(const SampleBlock& block) { push(signalBlock(block)); }
   void flush() { sorter_.flush(); }  ///< end of data
   std::string waitingFor() const { return sorter_.waitingFor(); }
   std::size_t late() const { return sorter_.late(); }

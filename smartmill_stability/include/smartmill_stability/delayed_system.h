@@ -36,6 +36,10 @@ struct DelayedSystem {
 /// a revolution.
 DelayedSystem delayedSystem(const RegenerativeSystem& system, double speed, double depth);
 
+/// The same with the contact of a system's chip geometry about the forced vibration. Principal period: a
+/// revolution.
+DelayedSystem contactSystem(const RegenerativeSystem& system, double speed, double depth);
+
 /// Dominant multiplier of any delayed system by Chebyshev collocation. @param nodes an element, 4..40
 CharacteristicMultiplier collocationMultiplier(const DelayedSystem& system, int nodes);
 

@@ -27,6 +27,20 @@ struct SystemMode {
 
 enum class Cut { milling, turning };
 
+/// What makes the chips of one tooth differ from another's: runout, a serrated edge, and, where pitch or
+/// radius are uneven, the forced vibration itself. A tooth may then miss the cut at some place, and a later
+/// one cuts what several left. The stability is that of the vibration about the forced one, with the contact
+/// as it is there (chips grow with the feed, so with chip-proportional forces the ratio of offsets to feed
+/// matters alone).
+struct ChipGeometry {
+  double feed = 0.0;                  ///< [m] per tooth (mean over the teeth) > 0
+  std::vector<double> radius_offset;  ///< [m] runout of each tooth; empty: none
+  double serration_amplitude =
+      0.0;  ///< [m] >= 0, radius = amplitude x sin(2 pi (z / wavelength + k / teeth))
+  double serration_wavelength = 0.0;  ///< [m] > 0 where there is an amplitude
+  bool forced_vibration = true;       ///< false: chips of a rigid tool decide about the contact
+};
+
 /// A milling or turning system: dynamics of the tool tip and what regenerates. Angles are immersion angles,
 /// clockwise from +y, x is the feed; forces act on the tool (docs/formats.md).
 struct RegenerativeSystem {
@@ -50,6 +64,9 @@ struct RegenerativeSystem {
   double damping_radial = 0.0;
   /// Share of the earlier surface that is cut again (Kim's mu): 1 milling and plunge turning, 0 threading.
   double overlap = 1.0;
+  /// Milling: contact as it is. Absent: every tooth cuts all along its arc what the tooth before it left.
+  /// Known to the Floquet solvers; zero_order knows the serration's mean over whole wavelengths.
+  std::optional<ChipGeometry> chip;
 
   /// @throws Error naming the quantity and its value.
   void validate() const;
