@@ -100,6 +100,24 @@ std::map<std::string, double> noiseOf(const Dataset& data) {
   return noise;
 }
 
+// No model follows the phase of chatter: such cuts say that there is some, and are not compared.
+void setChatterAside(Dataset& data) {
+  for (std::size_t k = 0; k < data.tests.size();) {
+    TestData& t = data.tests[k];
+    const auto chatter = findChatter(t.record, t.test, t.first_cut);
+    if (!chatter) {
+      ++k;
+      continue;
+    }
+    data.notes.push_back("test " + t.test.name + " chatters at " + number(std::round(chatter->frequency)) +
+                         " Hz and is not compared sample by sample");
+    data.chattering.push_back({std::move(t), *chatter});
+    data.tests.erase(data.tests.begin() + static_cast<std::ptrdiff_t>(k));
+  }
+  if (data.tests.empty())
+    throw Error(data.campaign.folder + ": every test chatters, nothing can be compared");
+}
+
 }  // namespace
 
 std::size_t Dataset::samples() const {
@@ -215,6 +233,7 @@ Dataset loadDataset(const Campaign& campaign, const MachineModel& nominal) {
   data.notes.assign(aside.begin(), aside.end());
   data.noise = noiseOf(data);
   for (const std::string& note : estimatePhases(data)) data.notes.push_back(note);
+  setChatterAside(data);
   chooseHeldout(data.tests);
   return data;
 }

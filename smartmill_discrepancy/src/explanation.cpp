@@ -10,6 +10,7 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_discrepancy/labels.h"
+#include "smartmill_sim/twin/twin.h"
 
 namespace smartmill::discrepancy {
 namespace {
@@ -131,6 +132,29 @@ double floorDeviation(std::size_t samples) {
   return samples ? std::sqrt(0.5 / static_cast<double>(samples)) : 0.0;
 }
 
+// Cuts that chatter speak for a model that chatters in them.
+void addChatter(const Dataset& data, Explanation* result) {
+  sim::SimulationOptions options;
+  options.noise = false;
+  for (const ChatteringTest& c : data.chattering) {
+    const auto chatters = [&](const MachineModel& model) {
+      const Record simulated = sim::simulateTest(model, c.data.test, c.data.record, options);
+      return findChatter(simulated, c.data.test, c.data.first_cut).has_value();
+    };
+    if (chatters(data.nominal)) continue;
+    Finding f;
+    f.channel = "fx";
+    f.tests = {c.data.test.name};
+    f.domain = "frequency";
+    f.location["frequency_hz"] = c.chatter.frequency;
+    f.depends_on = {"cutting"};
+    f.amplitude = c.chatter.amplitude;
+    f.p_value = 1e-300;
+    result->where.push_back(f);
+    if (!chatters(result->model)) result->unexplained.push_back(f);
+  }
+}
+
 }  // namespace
 
 Explanation explain(const Dataset& data, const ExplainOptions& options, const std::string& folder) {
@@ -195,7 +219,7 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
     }
     if (worst_score <= 1.0) break;
     say("  stands for another cause: " + found.best.state.members[worst].hypothesis->title());
-    refine(quick_runner, quick, exact, without(found.best.state, worst), &found);
+    refine(quick_runner, quick, exact, without(found.best.state, worst), s, &found);
     result.unexplained = findStructure(exact_runner, found.best.residual, structure);
   }
 
@@ -263,6 +287,7 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
   addGaps(heldout_runner, before_heldout, after_heldout, true);
 
   addCurves(exact_runner, before, after, &result);
+  addChatter(data, &result);
 
   if (result.effects.empty()) {
     result.verdict = result.unexplained.empty() ? "no_disagreement" : "unknown_effect";

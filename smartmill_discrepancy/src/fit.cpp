@@ -228,11 +228,13 @@ Fit Fitter::fit(const FitState& start, const NominalTangents* frozen, const FitO
   solver.parameter_tolerance = 1e-7;
   solver.logging_type = ceres::SILENT;
   solver.num_threads = 1;
-  // An effect beside the nominal value that it resembles leaves a narrow valley, in which damping would
-  // creep.
-  solver.initial_trust_region_radius = 1e10;
+  // Damped steps first, which cross what is curved; then undamped ones: an effect beside the nominal value
+  // that it resembles leaves a narrow valley, in which damping would creep.
   ceres::Solver::Summary summary;
-  ceres::Solve(solver, &problem, &summary);
+  for (const double radius : {1e4, 1e10}) {
+    solver.initial_trust_region_radius = radius;
+    ceres::Solve(solver, &problem, &summary);
+  }
   fit.converged = summary.IsSolutionUsable();
   if (!fit.converged) {
     fit.state = start;

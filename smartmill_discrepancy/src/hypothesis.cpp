@@ -66,6 +66,13 @@ Hypothesis amplitudes(const std::string& effect, std::vector<Coordinate> coordin
   return h;
 }
 
+// Tries the one amplitude from several distances: what it does is not in proportion to it.
+Hypothesis reaching(Hypothesis h, const Values& reaches) {
+  h.probes.clear();
+  for (const double reach : reaches) h.probes.push_back(straight(h.coordinates, reach));
+  return h;
+}
+
 // A vector in the plane: size and direction in the file, Cartesian in the fit, which has no pole at zero.
 Hypothesis planar(const std::string& effect, const std::string& size_key, double reach, double limit,
                   double prior) {
@@ -103,6 +110,26 @@ Hypothesis scaled(const std::string& effect, const Coordinate& amplitude, double
     e.numbers[scale_key] = std::exp(v[1]);
     return e;
   };
+  return h;
+}
+
+// A power law exponent and reference: force times (x / reference)^-exponent. The fit moves the exponent and
+// the level at a middle x, which stays well known where the exponent is small.
+Hypothesis powerLaw(const std::string& effect, const std::string& reference_key, double middle, double low,
+                    double high) {
+  Hypothesis h = amplitudes(
+      effect, {{"exponent", 0.0, -1.0, 1.0, 0.002, 0.3}, {"level", 0.0, -1.0, 1.0, 0.002, 0.2}}, 0.02);
+  h.entry = [effect, reference_key, middle, low, high](const Values& v) {
+    EffectEntry e;
+    e.name = effect;
+    e.numbers["exponent"] = v[0];
+    const double steep = std::abs(v[0]) > 1e-9 ? v[0] : 1e-9;
+    e.numbers[reference_key] =
+        std::clamp(middle * std::exp(std::clamp(v[1] / steep, -20.0, 20.0)), low, high);
+    return e;
+  };
+  // A level without a slope cannot be written: each point has some slope.
+  h.probes = {{{0.0, 0.0}, {{0.02, 0.0}, {0.02, 0.01}}, false}};
   return h;
 }
 
@@ -204,15 +231,13 @@ std::vector<Hypothesis> catalogueHypotheses(const Dataset& data, std::vector<std
                               {"Kre_n_per_mm", 0.0, -200.0, 200.0, 0.2, 20.0},
                               {"Kae_n_per_mm", 0.0, -200.0, 200.0, 0.2, 20.0}},
                              2.0));
-    all.push_back(scaled("size_effect", {"exponent", 0.0, -0.8, 0.8, 0.002, 0.3}, 0.05, "reference_chip_um",
-                         {60.0}, 1.0, 3000.0, 1.0));
+    all.push_back(powerLaw("size_effect", "reference_chip_um", 60.0, 1.0, 3000.0));
     if (scope.known_wear) {
       all.push_back(amplitudes("tool_wear", {{"edge_growth_per_min", 0.0, -0.2, 20.0, 0.005, 1.0}}, 0.1));
     } else {
       leaveOut("tool_wear", "cut_time_before_s is not stated");
     }
-    all.push_back(scaled("cutting_speed", {"exponent", 0.0, -1.0, 1.0, 0.002, 0.3}, 0.05,
-                         "reference_m_per_min", {150.0}, 1.0, 5000.0, 1.0));
+    all.push_back(powerLaw("cutting_speed", "reference_m_per_min", 150.0, 1.0, 5000.0));
     if (model.tool && model.tool->teeth > 1) all.push_back(unevenPitch(*model.tool));
     if (model.tool) {
       const double helix = units::degFromRad(model.tool->helix);
@@ -221,8 +246,9 @@ std::vector<Hypothesis> catalogueHypotheses(const Dataset& data, std::vector<std
     }
     for (const char* axis : {"x", "y", "xy"}) all.push_back(flexibility(axis));
     if (!model.tool_tip.x.modes.empty() || !model.tool_tip.y.modes.empty()) {
-      all.push_back(
-          amplitudes("process_damping", {{"coefficient_n_per_mm", 0.0, -1e4, 1e6, 5.0, 2000.0}}, 50.0));
+      all.push_back(reaching(
+          amplitudes("process_damping", {{"coefficient_n_per_mm", 0.0, -1e4, 1e6, 5.0, 2000.0}}, 50.0),
+          {50.0, 300.0, 1500.0}));
     } else {
       leaveOut("process_damping", "the model's tool is rigid");
     }
@@ -234,9 +260,12 @@ std::vector<Hypothesis> catalogueHypotheses(const Dataset& data, std::vector<std
       if (scope.channels.count(std::string("f") + axis)) all.push_back(extraMode(axis));
     }
     if (sensor_modes) {
-      all.push_back(amplitudes("mass_loading", {{"mass_ratio", 0.0, -0.6, 3.0, 0.002, 0.3}}, 0.01));
-      all.push_back(
-          amplitudes("speed_dependent_mode", {{"softening_per_krpm", 0.0, -0.04, 0.04, 2e-4, 0.02}}, 0.001));
+      // A light mode answers in proportion only while it moves by less than its width.
+      all.push_back(reaching(amplitudes("mass_loading", {{"mass_ratio", 0.0, -0.6, 3.0, 0.002, 0.3}}, 0.01),
+                             {0.01, 0.05, 0.12, 0.2, 0.3, 0.45, 0.7, -0.05, -0.12, -0.25}));
+      all.push_back(reaching(
+          amplitudes("speed_dependent_mode", {{"softening_per_krpm", 0.0, -0.04, 0.04, 2e-4, 0.02}}, 0.001),
+          {0.001, 0.003, 0.006, 0.01, 0.015, 0.025, -0.003, -0.01}));
     } else {
       leaveOut("mass_loading and speed_dependent_mode", "the model's force sensor has no modes");
     }
@@ -292,11 +321,12 @@ std::vector<Hypothesis> catalogueHypotheses(const Dataset& data, std::vector<std
   }
   for (const std::string& channel : scope.channels) {
     const bool slow = channel == "load_meter";
-    all.push_back(withWord(
-        amplitudes("channel_delay",
-                   {{"delay_us", 0.0, 0.0, slow ? 2e5 : 5000.0, slow ? 50.0 : 1.0, slow ? 10000.0 : 200.0}},
-                   slow ? 500.0 : 10.0),
-        "channel", channel));
+    all.push_back(withWord(reaching(amplitudes("channel_delay",
+                                               {{"delay_us", 0.0, 0.0, slow ? 2e5 : 5000.0, slow ? 50.0 : 1.0,
+                                                 slow ? 10000.0 : 200.0}},
+                                               slow ? 500.0 : 10.0),
+                                    slow ? Values{500.0, 5000.0, 30000.0} : Values{10.0, 60.0, 150.0, 400.0}),
+                           "channel", channel));
     all.push_back(
         withWord(amplitudes("gain_error", {{"gain", 1.0, 0.05, 5.0, 0.002, 0.2}}, 0.02), "channel", channel));
   }
@@ -310,8 +340,10 @@ std::vector<Hypothesis> catalogueHypotheses(const Dataset& data, std::vector<std
       leaveOut("friction_warmup", "start_time_s is not stated");
     }
     const double nominal = model.spindle->load_meter_bandwidth;
-    Hypothesis lag = amplitudes("load_meter_lag",
-                                {{"ln bandwidth_hz", 0.0, std::log(0.01), std::log(20.0), 0.005, 0.7}}, -0.1);
+    Hypothesis lag =
+        reaching(amplitudes("load_meter_lag",
+                            {{"ln bandwidth_hz", 0.0, std::log(0.01), std::log(20.0), 0.005, 0.7}}, -0.1),
+                 {-0.1, -0.5, -1.2, 0.4});
     lag.entry = [nominal](const Values& v) {
       EffectEntry e;
       e.name = "load_meter_lag";

@@ -21,6 +21,21 @@ std::string describe(const Member& m) {
   return line;
 }
 
+// Whether a fit is better than one with less in it. Nominal values pulled far off their stated uncertainty
+// speak for an effect even where they could stand for it.
+bool tells(const Fit& less, const Fit& more, double least, const SearchOptions& options) {
+  const double gain = less.bic - more.bic;
+  return gain > least ||
+         (gain > options.least_prior_gain && less.penalty - more.penalty > 4.0 * options.least_prior_gain);
+}
+
+// Squares below which two faithful simulations differ.
+double floorOf(const TwinRunner& runner, double twin_accuracy) {
+  double floor = 0.0;
+  for (const double m : runner.measured()) floor += std::pow(twin_accuracy * m, 2);
+  return floor;
+}
+
 FitState without(const FitState& state, std::size_t member) {
   FitState less = state;
   less.members.erase(less.members.begin() + static_cast<std::ptrdiff_t>(member));
@@ -60,7 +75,7 @@ std::vector<double> startOf(const Fitter& fitter, const Fit& now, const Promise&
 }  // namespace
 
 void refine(TwinRunner& quick_runner, const Fitter& quick, const Fitter& exact, const FitState& state,
-            SearchResult* result) {
+            const SearchOptions& options, SearchResult* result) {
   // The quick runner, made equal to the exact one at the state, finds the exact solution in a few passes.
   NominalTangents tangents;
   FitState from = state;
@@ -77,13 +92,18 @@ void refine(TwinRunner& quick_runner, const Fitter& quick, const Fitter& exact, 
   }
   const FitState& at = result->best.state;
   result->contribution.clear();
+  result->needed.clear();
   result->rivals.clear();
   if (at.members.empty()) return;
   const double bic = result->best.bic;
   for (std::size_t m = 0; m < at.members.size(); ++m) {
     const FitState less = without(at, m);
-    const double lost = quick.fit(less, &tangents, {6, 1e-3, true}).bic;
+    const Fit rest = quick.fit(less, &tangents, {6, 1e-3, true});
+    const double lost = rest.bic;
     result->contribution.push_back(lost - bic);
+    result->needed.push_back(
+        tells(rest, result->best,
+              std::max(options.least_gain, floorOf(quick.runner(), options.twin_accuracy)), options));
     const std::string& own = at.members[m].hypothesis->effect;
     // Rivals: what came near to it in the round that took it.
     std::size_t round = 0;
@@ -115,30 +135,40 @@ SearchResult search(TwinRunner& quick_runner, const Fitter& quick, const Fitter&
   };
   SearchResult result;
   FitState state;
-  state.nominal.assign(quick.freedom().coordinates().size(), 0.0);
-  const auto correct = [&](const FitState& at) {
+  const std::vector<Coordinate>& free = quick.freedom().coordinates();
+  state.nominal.assign(free.size(), 0.0);
+  // What is missing pulls the nominal values far away, but they belong near to what is stated: there the
+  // tangents are taken.
+  const auto anchored = [&](FitState at) {
+    constexpr double NEAR = 2.5;  // standard deviations
+    for (std::size_t c = 0; c < free.size(); ++c) {
+      const double reach = NEAR * free[c].prior_std;
+      at.nominal[c] = std::clamp(at.nominal[c], free[c].null - reach, free[c].null + reach);
+    }
+    return at;
+  };
+  const auto linearise = [&](const FitState& where) {
+    const FitState at = anchored(where);
     const MachineModel model = quick.model(at);
     quick_runner.correctTo(model, exact.runner().simulate(model));
+    return quick.nominalTangents(at);
   };
   // Nominal values that are off far: tangents are taken anew where the fit went.
   NominalTangents tangents;
   Fit now;
   for (int pass = 0; pass < 3; ++pass) {
-    correct(state);
-    tangents = quick.nominalTangents(state);
+    tangents = linearise(state);
     Fit fit = quick.fit(state, &tangents, {8, 1e-8, true});
     const bool settled = pass > 0 && std::abs(now.bic - fit.bic) < std::max(1.0, 1e-3 * fit.bic);
     now = std::move(fit);
     state = now.state;
     if (settled) break;
   }
-  correct(state);
-  tangents = quick.nominalTangents(state);
+  tangents = linearise(state);
   now = quick.fit(state, &tangents, {3, 1e-8, true});
   result.null = now;
   const double samples = static_cast<double>(quick.runner().size());
-  double floor = 0.0;  // squares below which two faithful simulations differ
-  for (const double m : quick.runner().measured()) floor += std::pow(options.twin_accuracy * m, 2);
+  const double floor = floorOf(quick.runner(), options.twin_accuracy);
   say(text("nominal model, values free within their uncertainty: gap %.4f", std::sqrt(now.chi2 / samples),
            0.0));
   for (std::size_t round = 0; round < options.most_effects; ++round) {
@@ -172,29 +202,23 @@ SearchResult search(TwinRunner& quick_runner, const Fitter& quick, const Fitter&
       // Nothing that is left could make another hypothesis better.
       if (fitted >= 2 && best.chi2 - samples < 0.01 * (now.chi2 - samples)) break;
     }
-    // Nominal values pulled far off their stated uncertainty speak for an effect even where they could stand
-    // for it.
-    const bool better =
-        now.bic - best.bic > least ||
-        (now.bic - best.bic > options.least_prior_gain &&
-         now.penalty - best.penalty > 4.0 * options.least_prior_gain && now.chi2 - samples < 0.01 * samples);
+    const bool better = tells(now, best, least, options) &&
+                        (now.bic - best.bic > least || now.chi2 - samples < 0.01 * samples);
     for (Rung& r : rungs) {
       r.taken = better && r.effect == best.state.members.back().hypothesis->effect &&
                 r.variant == best.state.members.back().hypothesis->variant;
       result.ladder.push_back(r);
     }
     if (!better) break;
-    correct(best.state);
-    tangents = quick.nominalTangents(best.state);
+    tangents = linearise(best.state);
     Fit refined = quick.fit(best.state, &tangents, {10, 1e-7, true});
     // The tangents held where the fit began; where it went far they are taken anew.
-    correct(refined.state);
-    tangents = quick.nominalTangents(refined.state);
+    tangents = linearise(refined.state);
     now = quick.fit(refined.state, &tangents, {10, 1e-7, true});
     // What was found earlier may have stood for what has been found now.
     for (std::size_t m = 0; m < now.state.members.size() && now.state.members.size() > 1;) {
       const Fit less = quick.fit(without(now.state, m), &tangents, {6, 1e-3, true});
-      if (less.bic - now.bic < options.least_prior_gain) {
+      if (!tells(less, now, std::max(options.least_gain, floor), options)) {
         say("  not needed any more: " + now.state.members[m].hypothesis->title());
         now = less;
       } else {
@@ -203,14 +227,14 @@ SearchResult search(TwinRunner& quick_runner, const Fitter& quick, const Fitter&
     }
     say(text("gap %.4f with ", std::sqrt(now.chi2 / samples), 0.0) + describe(now.state.members.back()));
   }
-  refine(quick_runner, quick, exact, now.state, &result);
+  refine(quick_runner, quick, exact, now.state, options, &result);
   // With everything settled an effect may turn out to be needed no more.
   while (!result.contribution.empty()) {
     const auto least = std::min_element(result.contribution.begin(), result.contribution.end());
-    if (*least >= options.least_prior_gain) break;
     const auto m = static_cast<std::size_t>(least - result.contribution.begin());
+    if (result.needed[m]) break;
     say("  not needed any more: " + result.best.state.members[m].hypothesis->title());
-    refine(quick_runner, quick, exact, without(result.best.state, m), &result);
+    refine(quick_runner, quick, exact, without(result.best.state, m), options, &result);
   }
   for (const Member& m : result.best.state.members) say("found " + describe(m));
   return result;

@@ -8,6 +8,7 @@
 #include "smartmill_core/campaign/campaign.h"
 #include "smartmill_core/campaign/record.h"
 #include "smartmill_core/model/machine_model.h"
+#include "smartmill_discrepancy/chatter.h"
 
 namespace smartmill::discrepancy {
 
@@ -23,13 +24,20 @@ struct TestData {
   std::size_t first_cut = 0;          ///< first sample in cut; record.size() without cut
 };
 
+/// A cut that was left aside because it chatters.
+struct ChatteringTest {
+  TestData data;
+  Chatter chatter;
+};
+
 /// A campaign in memory.
 struct Dataset {
   Campaign campaign;
   MachineModel nominal;
   std::vector<TestData> tests;
-  std::map<std::string, double> noise;  ///< RMS of each channel [unit of the channel]
-  std::vector<std::string> notes;       ///< what was left aside, one line each
+  std::vector<ChatteringTest> chattering;  ///< not among tests
+  std::map<std::string, double> noise;     ///< RMS of each channel [unit of the channel]
+  std::vector<std::string> notes;          ///< what was left aside, one line each
 
   std::size_t samples() const;  ///< sum over tests of channels x samples
 };

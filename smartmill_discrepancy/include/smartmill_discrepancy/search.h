@@ -49,13 +49,14 @@ struct SearchResult {
   Fit best;  ///< with the effects found
   std::vector<Rung> ladder;
   std::vector<double> contribution;  ///< of each member: BIC that is lost without it, others fitted again
+  std::vector<bool> needed;          ///< whether that is enough to name it
   std::vector<Rival> rivals;
 };
 
 /// Fits a state with every value free and simulated exactly, and measures what each member contributes and
 /// how its best rivals do in its place.
 void refine(TwinRunner& quick_runner, const Fitter& quick, const Fitter& exact, const FitState& state,
-            SearchResult* result);
+            const SearchOptions& options, SearchResult* result);
 
 /// The cut or air cut, among variations of the campaign's tests, in which two models differ most.
 std::optional<std::string> separatingTest(const Dataset& data, const MachineModel& a, const MachineModel& b);

@@ -19,6 +19,9 @@ constexpr double SLICE_ANGLE = 0.02;  // [rad] lag over a slice: the mid-slice r
 constexpr double NO_GAP = 1e-9;       // [m] below this gap the edge still rubs: chips near 0 are rounded
 constexpr double MARGIN = 2.0 * NODE_ANGLE;  // surface kept beyond an arc, for interpolation at its end
 
+constexpr std::size_t PASSAGES = 64;              // kept: eight nodes' worth
+constexpr double PASSAGE_ANGLE = NODE_ANGLE / 8;  // at least between two
+
 double wrapped(double angle) {
   const double a = std::fmod(angle, TWO_PI);
   return a < 0.0 ? a + TWO_PI : a;
@@ -170,7 +173,8 @@ void CuttingProcess::cut(Slice& slice, int tooth, double before, double angle, c
     if (slice.chip[j] > -NO_GAP) {
       const CuttingCoefficients& k = law_.coefficients;
       double kc = law_.chip_factor;
-      if (law_.size_exponent != 0.0 && chip > 0.0) kc *= std::pow(chip / law_.size_reference, -law_.size_exponent);
+      if (law_.size_exponent != 0.0 && chip > 0.0)
+        kc *= std::pow(chip / law_.size_reference, -law_.size_exponent);
       const double h = kc * chip, edge = edgeShare(law_, chip);
       double ft = (k.ktc * h + k.kte * edge) * length;
       double fr = (k.krc * h + k.kre * edge) * length;
@@ -192,28 +196,46 @@ void CuttingProcess::cut(Slice& slice, int tooth, double before, double angle, c
     }
   }
   // Cut the nodes passed since the last step, up to the last one before the tooth: the one right behind it is
-  // still needed as it was.
-  const double step = angle - before;
+  // still needed as it was. Each is left where the tip was when the tooth passed it.
   const long first = static_cast<long>(std::floor(before / NODE_ANGLE));
   const long last = static_cast<long>(std::floor(angle / NODE_ANGLE)) - 1;
   for (long n = first; n <= last; ++n) {
-    // At low speed the first node was passed several steps ago: the feed tells where the tool was, the
-    // vibration is known one step back.
-    const double share = step > 0.0 ? std::min((n * NODE_ANGLE - before) / step, 1.0) : 1.0;
-    const double recent = std::max(share, -1.0);
     const auto i = static_cast<std::size_t>(nodeIndex(n));
-    const auto place = [&](std::size_t axis) {
-      const double moved = now.displacement[axis] - last_.displacement[axis];
-      return last_.centre[axis] + share * (now.centre[axis] - last_.centre[axis]) + last_.displacement[axis] +
-             recent * moved;
-    };
-    const double x = place(0), y = place(1);
+    const auto [x, y] = tipBack(angle - static_cast<double>(n) * NODE_ANGLE);
     slice.surface[i] = std::max(slice.surface[i], radius + x * sin_[i] + y * cos_[i]);
   }
 }
 
+void CuttingProcess::remember(const ToolMotion& now, double turned) {
+  turned_ += turned;
+  const Passage here{turned_, {{now.centre[0] + now.displacement[0], now.centre[1] + now.displacement[1]}}};
+  if (passages_.empty()) passages_.assign(PASSAGES, here);
+  // The newest always stands at now; it stays once the spindle has turned on far enough.
+  const Passage& before = passages_[(newest_ + PASSAGES - 1) % PASSAGES];
+  if (passages_[newest_].turned - before.turned >= PASSAGE_ANGLE) newest_ = (newest_ + 1) % PASSAGES;
+  passages_[newest_] = here;
+}
+
+std::array<double, 2> CuttingProcess::tipBack(double angle) const {
+  const double at = turned_ - angle;
+  std::size_t after = newest_, before = newest_;
+  for (std::size_t k = 1; k < PASSAGES; ++k) {
+    const std::size_t earlier = (newest_ + PASSAGES - k) % PASSAGES;
+    // Before the first step the tool came as it went on.
+    if (passages_[earlier].turned == passages_[before].turned) break;
+    after = before;
+    before = earlier;
+    if (passages_[before].turned <= at) break;
+  }
+  const Passage &a = passages_[before], &b = passages_[after];
+  const double span = b.turned - a.turned;
+  const double share = span > 0.0 ? (at - a.turned) / span : 1.0;
+  return {{a.tip[0] + share * (b.tip[0] - a.tip[0]), a.tip[1] + share * (b.tip[1] - a.tip[1])}};
+}
+
 CuttingForce CuttingProcess::step(const ToolMotion& now) {
   CuttingForce sum;
+  remember(now, moved_ ? wrapped(now.angle - last_.angle) : 0.0);
   if (!arcs_.empty()) {
     const double turned = moved_ ? wrapped(now.angle - last_.angle) : 0.0;
     const ToolMotion before = moved_ ? last_ : now;

@@ -77,6 +77,14 @@ class CuttingProcess {
     std::vector<double> surface;  // [m] reach from the machine's origin at each node's angle
     std::vector<double> chip;     // [m] last chip of each tooth
   };
+  /// Where the tip was when the spindle stood at an angle.
+  struct Passage {
+    double turned = 0.0;                // [rad] since the first step
+    std::array<double, 2> tip{{0, 0}};  // [m] centre and vibration
+  };
+  void remember(const ToolMotion& now, double turned);
+  /// [m] the tip when the spindle stood so far back [rad], at most a few nodes of the surface.
+  std::array<double, 2> tipBack(double angle) const;
   double steadySurface(double node_angle, double lag, const ToolMotion& now) const;
   /// [rad] of the middle of the slice's part in the arc.
   double lagOf(const Slice& slice, const ContactArc& arc) const;
@@ -93,6 +101,9 @@ class CuttingProcess {
   double height_;                  // [m] of a slice
   ToolMotion last_;
   bool moved_ = false;
+  double turned_ = 0.0;            // [rad] since the first step
+  std::vector<Passage> passages_;  // ring, some to each node of the surface
+  std::size_t newest_ = 0;
 };
 
 }  // namespace smartmill::sim
