@@ -90,12 +90,14 @@ Harmonics harmonicsOf(const RegenerativeSystem& system, double speed, int most, 
 /// Eigenvalues of the harmonic balance at chatter frequencies of one speed.
 class Balance {
  public:
-  Balance(const RegenerativeSystem& system, const Axes& axes, double speed, int below, int above)
+  /// @param depth [m] at which the feedback is taken (with helix it is not proportional to the depth)
+  Balance(const RegenerativeSystem& system, const Axes& axes, double speed, int below, int above,
+          double depth = 1.0)
       : system_(system),
         axes_(axes),
         below_(below),
         above_(above),
-        harmonics_(harmonicsOf(system, speed, below + above)) {}
+        harmonics_(harmonicsOf(system, speed, below + above, depth)) {}
 
   double step() const { return harmonics_.step; }
 
@@ -170,9 +172,6 @@ class MultiFrequency : public StabilitySolver {
   MultiFrequency(const RegenerativeSystem& system, const SolverOptions& options)
       : system_(system), options_(options), axes_(system.response ? bothAxes() : Axes(system.modes)) {
     if (options_.harmonics == 0) options_.harmonics = DEFAULT_HARMONICS;
-    if (system_.helix > 0.0)
-      throw Error(
-          "multi_frequency: with helix the feedback is not proportional to the depth, collocation is due");
     if (system_.chip)
       throw Error(
           "multi_frequency: with a chip geometry the contact changes with the depth, collocation is due");
@@ -199,17 +198,105 @@ class MultiFrequency : public StabilitySolver {
     const double period = TWO_PI / speed / (system_.evenPitch() ? system_.teeth : 1);
     const int within = static_cast<int>(std::ceil(highest_ * period / TWO_PI));
     const int reach = within + extra;
+    if (system_.helix > 0.0) return withHelix(speed, max_depth, reach);
     // The set -reach .. reach - 1 is symmetric at half a step, where the flip lies.
     const Balance balance(system_, axes_, speed, reach, reach - 1);
-    const double step = balance.step(), least = 0.5 / max_depth;
-    std::vector<double> grid = gridOf(step);
     Limit limit;
     Crossing first;
-    const auto consider = [&](const Crossing& c) {
+    for (const Crossing& c : crossings(balance, max_depth)) {
       const double depth = 1.0 / c.value.real();
-      if (!(depth > 0.0) || depth > max_depth || depth >= limit.depth) return;
+      if (depth >= limit.depth) continue;
       limit.depth = depth;
       first = c;
+    }
+    describe(balance, first, limit);
+    return limit;
+  }
+
+  void describe(const Balance& balance, const Crossing& at, Limit& limit) const {
+    if (!std::isfinite(limit.depth)) return;
+    limit.kind = std::abs(at.w - 0.5 * balance.step()) < 1e-6 * balance.step() ? Kind::flip : Kind::hopf;
+    limit.frequency = balance.strongest(at.w, at.value);
+  }
+
+  /// With helix the sweep of the edge belongs to a depth d; scaled with that sweep the feedback has crossings
+  /// a_i(d), and the cut itself is at a boundary where one of them is d. The first such d when d grows from
+  /// zero, where all a_i lie above, is the first loss.
+  Limit withHelix(double speed, double max_depth, int reach) const {
+    struct State {
+      double depth = 0.0;
+      int below = 0;         // crossings under the depth
+      double nearest = 0.0;  // log of the crossing nearest to the depth, over the depth
+      Crossing at;
+    };
+    const auto look = [&](double depth) {
+      const Balance balance(system_, axes_, speed, reach, reach - 1, depth);
+      State state;
+      state.depth = depth;
+      state.nearest = std::numeric_limits<double>::infinity();
+      for (const Crossing& c : crossings(balance, 4.0 * depth)) {
+        const double ratio = -std::log(c.value.real() * depth);
+        state.below += ratio < 0.0;
+        if (std::abs(ratio) < std::abs(state.nearest)) {
+          state.nearest = ratio;
+          state.at = c;
+        }
+      }
+      return state;
+    };
+    Limit limit;
+    // A straight edge loses stability near the same depth unless the sweep is long.
+    RegenerativeSystem straight = system_;
+    straight.helix = 0.0;
+    const Balance plain(straight, axes_, speed, reach, reach - 1);
+    double start = max_depth;
+    for (const Crossing& c : crossings(plain, 4.0 * max_depth)) start = std::min(start, 1.0 / c.value.real());
+    constexpr double GROWTH = 1.12, BELOW = 0.5, CLOSE = 0.02;
+    State before = look(std::min(BELOW * start, max_depth));
+    // Should it chatter there already, go down.
+    for (int i = 0; i < 20 && before.below > 0; ++i) before = look(0.5 * before.depth);
+    while (before.depth < max_depth) {
+      // Not beyond the crossing that is foretold, by more than a little.
+      const double growth = before.nearest > 0.0 && std::isfinite(before.nearest)
+                                ? std::clamp(std::exp(1.1 * before.nearest), 1.0 + CLOSE, GROWTH)
+                                : GROWTH;
+      const State next = look(std::min(max_depth, growth * before.depth));
+      if (next.below != before.below) {
+        State a = before, b = next;
+        for (int i = 0; i < 40 && b.depth / a.depth - 1.0 > options_.tolerance; ++i) {
+          // The same crossing above the depth on one side, below it on the other: false position, else
+          // halves.
+          double share = 0.5;
+          if (i % 3 != 2 && a.nearest > 0.0 && b.nearest < 0.0 && std::isfinite(a.nearest - b.nearest))
+            share = std::clamp(a.nearest / (a.nearest - b.nearest), 1e-3, 1.0 - 1e-3);
+          const State middle = look(a.depth + share * (b.depth - a.depth));
+          (middle.below != before.below ? b : a) = middle;
+          if (std::abs(middle.nearest) < 0.1 * options_.tolerance) {
+            a = b = middle;
+            break;
+          }
+        }
+        // A pair of crossings that appears below the depth all at once is no boundary at this depth.
+        const State& found = std::abs(a.nearest) < std::abs(b.nearest) ? a : b;
+        if (std::abs(found.nearest) < 0.5 * CLOSE) {
+          limit.depth = found.depth;
+          describe(Balance(system_, axes_, speed, reach, reach - 1, found.depth), found.at, limit);
+          return limit;
+        }
+      }
+      before = next;
+    }
+    return limit;
+  }
+
+  /// All depths up to the largest at which an eigenvalue is real and positive.
+  std::vector<Crossing> crossings(const Balance& balance, double max_depth) const {
+    const double step = balance.step(), least = 0.5 / max_depth;
+    const std::vector<double> grid = gridOf(step);
+    std::vector<Crossing> found;
+    const auto consider = [&](const Crossing& c) {
+      const double depth = 1.0 / c.value.real();
+      if (depth > 0.0 && depth <= max_depth) found.push_back(c);
     };
     std::vector<Complex> before;
     for (std::size_t i = 0; i < grid.size(); ++i) {
@@ -226,10 +313,7 @@ class MultiFrequency : public StabilitySolver {
       }
       before = values;
     }
-    if (!std::isfinite(limit.depth)) return limit;
-    limit.kind = std::abs(first.w - 0.5 * step) < 1e-6 * step ? Kind::flip : Kind::hopf;
-    limit.frequency = balance.strongest(first.w, first.value);
-    return limit;
+    return found;
   }
 
   Crossing crossing(const Balance& balance, double wa, Complex a, double wb, Complex b, double least) const {

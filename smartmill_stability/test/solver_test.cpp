@@ -336,6 +336,25 @@ TEST(Helix, solversAgreeAndNoHelixIsALimit) {
   }
 }
 
+// In the frequency domain, with the sweep of the edge at the depth itself, against collocation: Hopf and flip, and
+// speeds that are stable to the largest depth.
+TEST(Helix, multiFrequencyAgreesWithCollocation) {
+  RegenerativeSystem system = benchmarkSystem(0.3, true, false);
+  system.helix = units::radFromDeg(30.0);
+  SolverOptions options;
+  options.tolerance = 1e-4;
+  for (const double rpm : {8000.0, 11000.0, 13000.0, 16000.0}) {
+    const double speed = radPerSecFromRpm(rpm);
+    const Limit spectral = makeSolver(Method::collocation, system)->limit(speed, MAX_DEPTH);
+    const Limit multi = makeSolver(Method::multi_frequency, system, options)->limit(speed, MAX_DEPTH);
+    EXPECT_EQ(std::isfinite(multi.depth), std::isfinite(spectral.depth)) << rpm;
+    if (!std::isfinite(spectral.depth)) continue;
+    EXPECT_NEAR(multi.depth / spectral.depth, 1.0, 2e-3) << rpm;
+    EXPECT_EQ(multi.kind, spectral.kind) << rpm;
+    EXPECT_NEAR(multi.frequency / spectral.frequency, 1.0, 2e-3) << rpm;
+  }
+}
+
 // A flank that rubs takes energy: at low speed the limit rises; both Floquet solvers see the same.
 TEST(ProcessDamping, raisesTheLimitAtLowSpeed) {
   RegenerativeSystem system = benchmarkSystem(0.5, true, true);
