@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 #include <string>
 
 #include <Eigen/Cholesky>
@@ -10,6 +11,7 @@
 #include <Eigen/SVD>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/model/strict_yaml.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::kalman {
@@ -93,11 +95,9 @@ ModalModel fitCrossTalk(const FrequencyResponse& frf, const ModalModel& own, con
   return model;
 }
 
-CoupledFilter::CoupledFilter(const SensorMatrix& sensor, double spindle_speed, double sample_rate,
-                             const HarmonicFilterParameters& parameters) {
-  for (std::size_t i = 0; i < 3; ++i)
-    axis_.emplace_back(sensor.h[i][i], spindle_speed, sample_rate, parameters);
-  for (int n = 0; n <= axis_[0].harmonics(); ++n) {
+CrossTalkInverse::CrossTalkInverse(const SensorMatrix& sensor, double spindle_speed, double sample_rate,
+                                   int harmonics) {
+  for (int n = 0; n <= harmonics; ++n) {
     const double f = n * spindle_speed / units::TWO_PI;
     if (!(sensor.condition(f) < LARGEST_CONDITION)) {
       throw Error("sensor matrix: cannot be inverted at " + std::to_string(f) + " Hz");
@@ -115,19 +115,86 @@ CoupledFilter::CoupledFilter(const SensorMatrix& sensor, double spindle_speed, d
   }
 }
 
-std::array<double, 3> CoupledFilter::step(const std::array<double, 3>& measured) {
-  std::array<double, 3> force{};
-  for (std::size_t i = 0; i < 3; ++i) force[i] = axis_[i].step(measured[i]);
+void CrossTalkInverse::add(const std::vector<HarmonicFilter>& axes, std::array<double, 3>& force) const {
   for (std::size_t n = 0; n < correction_.size(); ++n) {
     for (std::size_t j = 0; j < 3; ++j) {
-      const Complex own = axis_[j].forceHarmonic(n);
+      const Complex own = axes[j].forceHarmonic(n);
       for (std::size_t i = 0; i < 3; ++i) {
         const Complex& share = correction_[n][i][j];
         force[i] += share.real() * own.real() - share.imag() * own.imag();
       }
     }
   }
+}
+
+CoupledFilter::CoupledFilter(const SensorMatrix& sensor, double spindle_speed, double sample_rate,
+                             const HarmonicFilterParameters& parameters) {
+  for (std::size_t i = 0; i < 3; ++i)
+    axis_.emplace_back(sensor.h[i][i], spindle_speed, sample_rate, parameters);
+  inverse_.emplace_back(sensor, spindle_speed, sample_rate, axis_[0].harmonics());
+}
+
+std::array<double, 3> CoupledFilter::step(const std::array<double, 3>& measured) {
+  std::array<double, 3> force{};
+  for (std::size_t i = 0; i < 3; ++i) force[i] = axis_[i].step(measured[i]);
+  inverse_.front().add(axis_, force);
   return force;
+}
+
+namespace {
+
+constexpr const char* FORMAT = "smartmill-sensor-matrix/1";
+
+std::string keyOf(std::size_t row, std::size_t column) {
+  return {"xyz"[row], "xyz"[column]};
+}
+
+}  // namespace
+
+SensorMatrix readSensorMatrix(const std::string& file) {
+  const StrictYaml yaml = StrictYaml::fromFile(file);
+  yaml.oneOf("format", {FORMAT});
+  SensorMatrix matrix;
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j < 3; ++j) {
+      const StrictYaml map = yaml.map(keyOf(i, j));
+      ModalModel& model = matrix.h[i][j];
+      model.direct = map.number("direct");
+      if (map.has("modes")) {
+        for (const StrictYaml& entry : map.maps("modes")) {
+          Mode mode;
+          mode.frequency = entry.number("frequency_hz", Range::positive());
+          mode.damping_ratio = entry.number("damping_ratio", {0.0, 1.0, true, true});
+          mode.gain = entry.number("gain");
+          entry.finish();
+          model.modes.push_back(mode);
+        }
+      }
+      map.finish();
+    }
+  }
+  yaml.finish();
+  return matrix;
+}
+
+void writeSensorMatrix(const SensorMatrix& matrix, const std::string& file) {
+  std::ofstream out(file);
+  out << "format: " << FORMAT
+      << "\n# measured axis, then the force's: xy is what x shows of a force along y\n";
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j < 3; ++j) {
+      const ModalModel& model = matrix.h[i][j];
+      out << keyOf(i, j) << ":\n  direct: " << yamlNumber(model.direct, 17) << "\n";
+      if (!model.modes.empty()) out << "  modes:\n";
+      for (const Mode& mode : model.modes) {
+        out << "  - {frequency_hz: " << yamlNumber(mode.frequency, 17)
+            << ", damping_ratio: " << yamlNumber(mode.damping_ratio, 17)
+            << ", gain: " << yamlNumber(mode.gain, 17) << "}\n";
+      }
+    }
+  }
+  out.close();
+  if (!out) throw Error(file + ": cannot be written");
 }
 
 }  // namespace smartmill::kalman

@@ -5,7 +5,6 @@
 #include <fstream>
 #include <map>
 #include <set>
-#include <sstream>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
@@ -15,6 +14,7 @@
 #include "smartmill_core/modal/modal_fit.h"
 #include "smartmill_core/model/strict_yaml.h"
 #include "smartmill_core/units.h"
+#include "smartmill_kalman/numeric_table.h"
 
 namespace smartmill::kalman {
 namespace {
@@ -321,52 +321,19 @@ void writeSpindleSensor(const SpindleSensorCalibration& c, const std::string& fi
 }
 
 StaticReadings readStaticReadings(const std::string& file) {
-  std::ifstream stream(file);
-  if (!stream) throw Error(file + ": cannot be read");
-  const std::vector<std::string> due{"test",  "time[s]", "length[mm]", "load_x[N]", "load_y[N]", "load_z[N]",
-                                     "x1[N]", "x2[N]",   "y1[N]",      "y2[N]",     "z1[N]",     "z2[N]"};
-  const auto cellsOf = [](std::string line) {
-    if (!line.empty() && line.back() == '\r') line.pop_back();
-    std::vector<std::string> cells;
-    std::stringstream cut(line);
-    for (std::string cell; std::getline(cut, cell, ',');) cells.push_back(cell);
-    return cells;
-  };
-  std::string line;
-  std::getline(stream, line);
-  const std::vector<std::string> header = cellsOf(line);
-  std::vector<std::size_t> place;
-  for (const std::string& name : due) {
-    const auto at = std::find(header.begin(), header.end(), name);
-    if (at == header.end()) throw Error(file + ": column " + name + " is missing");
-    place.push_back(static_cast<std::size_t>(at - header.begin()));
-  }
+  const auto columns =
+      readNumericTable(file, {"test", "time[s]", "length[mm]", "load_x[N]", "load_y[N]", "load_z[N]", "x1[N]",
+                              "x2[N]", "y1[N]", "y2[N]", "z1[N]", "z2[N]"});
   StaticReadings readings;
   readings.file = file;
-  for (int number = 2; std::getline(stream, line); ++number) {
-    if (line.empty() || line == "\r") continue;
-    const std::vector<std::string> cells = cellsOf(line);
-    std::array<double, 12> row{};
-    for (std::size_t c = 0; c < due.size(); ++c) {
-      const std::string cell = place[c] < cells.size() ? cells[place[c]] : "";
-      std::size_t used = 0;
-      try {
-        row[c] = std::stod(cell, &used);
-      } catch (const std::exception&) {
-        used = 0;
-      }
-      if (used == 0 || used != cell.size() || !std::isfinite(row[c])) {
-        throw Error(file + ": line " + std::to_string(number) + ": column " + due[c] + ": '" + cell +
-                    "' is no number");
-      }
-    }
-    readings.test.push_back(static_cast<int>(std::lround(row[0])));
-    readings.time.push_back(row[1]);
-    readings.length.push_back(row[2] * units::MM);
-    readings.load.push_back({row[3], row[4], row[5]});
-    readings.sensors.push_back({row[6], row[7], row[8], row[9], row[10], row[11]});
+  for (std::size_t i = 0; i < columns[0].size(); ++i) {
+    readings.test.push_back(static_cast<int>(std::lround(columns[0][i])));
+    readings.time.push_back(columns[1][i]);
+    readings.length.push_back(columns[2][i] * units::MM);
+    readings.load.push_back({columns[3][i], columns[4][i], columns[5][i]});
+    readings.sensors.push_back(
+        {columns[6][i], columns[7][i], columns[8][i], columns[9][i], columns[10][i], columns[11][i]});
   }
-  if (readings.size() == 0) throw Error(file + ": no readings");
   return readings;
 }
 
