@@ -43,7 +43,9 @@ StateSpaceCheck checkStateSpace(const StateSpace& space, const std::string& form
   if (n == 0) return check;
   const MatrixXd a = time * space.a;
   const Eigen::FullPivLU<MatrixXd> lu(a);
-  check.condition = lu.isInvertible() ? infinityNorm(a) * infinityNorm(lu.inverse()) : HUGE_VAL;
+  // However small the pivots: a matrix near to singular is what this number is for. A constant force is singular.
+  check.condition = infinityNorm(a) * infinityNorm(lu.inverse());
+  if (!std::isfinite(check.condition)) check.condition = HUGE_VAL;
   check.conditioned = 1.0 / check.condition > PRECISION;
 
   const Eigen::VectorXcd poles = Eigen::EigenSolver<MatrixXd>(a, false).eigenvalues();
