@@ -233,6 +233,28 @@ bool ChartMaker::byCollocation() const {
   return good("x") && good("y");
 }
 
+std::optional<RegenerativeSystem> ChartMaker::system(const Engagement& engagement) const {
+  if (!modes_.count("x") || !modes_.count("y") || !coefficients_ || !(coefficients_->value.ktc > 0.0))
+    return {};
+  const CuttingCoefficients& cutting = coefficients_->value;
+  const bool given = engagement.exit > engagement.entry;
+  RegenerativeSystem system;
+  system.modes = systemModes(modes_.at("x").model, modes_.at("y").model);
+  system.teeth = tool_geometry_.teeth;
+  system.pitch = tool_geometry_.pitch;
+  system.helix = tool_geometry_.helix;
+  system.diameter = tool_geometry_.diameter;
+  system.entry = given ? engagement.entry : parameters_.entry;
+  system.exit = given ? engagement.exit : parameters_.exit;
+  system.kt = cutting.ktc;
+  system.kr = std::isfinite(cutting.krc) ? cutting.krc : parameters_.kr * cutting.ktc;
+  return system;
+}
+
+std::size_t ChartMaker::modesInX() const {
+  return modes_.count("x") ? systemModes(modes_.at("x").model, 0).size() : 0;
+}
+
 ChartMaker::Basis ChartMaker::basis() const {
   const std::string lacking = missing();
   if (!lacking.empty()) throw Error("no chart yet, missing: " + lacking);
@@ -244,16 +266,7 @@ ChartMaker::Basis ChartMaker::basis() const {
   basis.process.kt = cutting.ktc;
   basis.process.kr = std::isfinite(cutting.krc) ? cutting.krc / cutting.ktc : parameters_.kr;
   if (byCollocation()) {
-    RegenerativeSystem system;
-    system.modes = systemModes(modes_.at("x").model, modes_.at("y").model);
-    system.teeth = tool_geometry_.teeth;
-    system.pitch = tool_geometry_.pitch;
-    system.helix = tool_geometry_.helix;
-    system.diameter = tool_geometry_.diameter;
-    system.entry = parameters_.entry;
-    system.exit = parameters_.exit;
-    system.kt = cutting.ktc;
-    system.kr = basis.process.kr * cutting.ktc;
+    const RegenerativeSystem system = *this->system({});
     SolverOptions options;
     options.tolerance = 1e-4;
     options.nodes = 10;  // 1e-6 of the depth, enough for a chart

@@ -116,4 +116,92 @@ std::optional<ModeCorrection> correctFromChatter(const RegenerativeSystem& belie
   return best;
 }
 
+ChatterAdvisor::ChatterAdvisor(double low, double high, int teeth, Believed believed, Output output)
+    : low_(low), high_(high), teeth_(teeth), believed_(std::move(believed)), output_(std::move(output)) {
+  if (!(low > 0.0) || !(high >= low)) throw Error("chatter advice: 0 < low <= high speed is due");
+  if (teeth < 1) throw Error("chatter advice: teeth are due");
+}
+
+void ChatterAdvisor::handle(const CuttingCondition& condition) {
+  constexpr std::size_t KEPT = 8;
+  conditions_.push_back(condition);
+  if (conditions_.size() > KEPT) conditions_.pop_front();
+}
+
+void ChatterAdvisor::handle(const ChatterState& state) {
+  const bool same = !running_.empty() && running_.front().condition == state.condition;
+  if (!state.valid || !state.chatter || !same) {
+    running_.clear();
+    advised_ = false;
+  }
+  if (!state.valid || !state.chatter) return;
+  running_.push_back(state);
+  if (advised_ || running_.size() < 2) return;
+  constexpr double AGREE = 0.01;
+  const double before = running_[running_.size() - 2].frequency;
+  if (std::abs(state.frequency - before) > AGREE * before) return;
+  advised_ = true;
+  advise(state);
+}
+
+void ChatterAdvisor::advise(const ChatterState& state) {
+  ChatterAdvice advice;
+  advice.stamp = state.stamp;
+  advice.episode = episodes(running_).front();
+  const double frequency = 0.5 * (state.frequency + running_[running_.size() - 2].frequency);
+  advice.episode.frequency = frequency;
+  CuttingCondition condition;
+  for (const CuttingCondition& c : conditions_)
+    if (c.name == state.condition) condition = c;
+  advice.depth = condition.engagement.axial_depth;
+  const int teeth = condition.tool.teeth > 0 ? condition.tool.teeth : teeth_;
+  std::optional<RegenerativeSystem> system = believed_(condition);
+  const double speed = condition.spindle_speed;
+  // Deep enough to tell a pocket from the rest.
+  const double most = 5.0 * advice.depth;
+  if (system && speed > 0.0 && advice.depth > 0.0) {
+    const auto limitOf = [&](const RegenerativeSystem& s) {
+      return makeSolver(Method::collocation, s)->limit(speed, most).depth;
+    };
+    advice.believed_limit = limitOf(*system);
+    advice.correction = correctFromChatter(*system, speed, advice.depth, frequency);
+    if (advice.correction) {
+      advice.believed_frequency = system->modes[advice.correction->mode].frequency;
+      system = advice.correction->system;
+      advice.corrected_limit = limitOf(*system);
+    }
+  }
+  std::vector<double> proposed = speedsFromChatter(frequency, teeth, low_, high_);
+  constexpr std::size_t MOST_SPEEDS = 12;
+  if (proposed.size() > MOST_SPEEDS) proposed.resize(MOST_SPEEDS);
+  const bool known = system && most > 0.0;
+  if (known) {
+    // A flip's frequency is no mode's: the pockets lie where the teeth pass in step with a mode.
+    for (const SystemMode& mode : system->modes)
+      for (const double s : speedsFromChatter(mode.frequency, teeth, low_, high_))
+        if (proposed.size() < 4 * MOST_SPEEDS) proposed.push_back(s);
+  }
+  for (const double s : proposed) {
+    constexpr double ALIKE = 0.01;
+    if (std::any_of(advice.speeds.begin(), advice.speeds.end(), [&](const ChatterAdvice::Speed& other) {
+          return std::abs(other.speed / s - 1.0) < ALIKE;
+        }))
+      continue;
+    ChatterAdvice::Speed one;
+    one.speed = s;
+    one.limit = one.frequency = std::numeric_limits<double>::quiet_NaN();
+    if (known) {
+      const Limit limit = makeSolver(Method::collocation, *system)->limit(s, most);
+      one.limit = limit.depth;
+      one.frequency = limit.frequency;
+    }
+    advice.speeds.push_back(one);
+  }
+  if (known)
+    std::stable_sort(advice.speeds.begin(), advice.speeds.end(), [](const auto& a, const auto& b) {
+      return a.limit != b.limit ? a.limit > b.limit : a.speed > b.speed;
+    });
+  output_(advice);
+}
+
 }  // namespace smartmill::stability

@@ -1,8 +1,11 @@
 #include "node.h"
 
+#include <smartmill_msgs/ChatterAdvice.h>
 #include <smartmill_msgs/ChatterState.h>
 #include <smartmill_msgs/StabilityChart.h>
 #include <boost/function.hpp>
+
+#include <type_traits>
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/machine_model.h"
@@ -54,11 +57,23 @@ StabilityNode::StabilityNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
       }()),
       maker_(parameters_.chart, readMachineModel(parameters_.model)),
       detection_(parameters_.chatter, parameters_.hold_back,
-                 [this](const ChatterState& state) { publish(state); }),
+                 [this](const ChatterState& state) {
+                   publish(state);
+                   try {
+                     advisor_.handle(state);
+                   } catch (const Error& error) {
+                     ROS_ERROR("chatter advice: %s", error.what());
+                   }
+                 }),
+      advisor_(
+          parameters_.chart.speed_low, maker_.highestSpeed(), maker_.teeth(),
+          [this](const CuttingCondition& condition) { return maker_.system(condition.engagement); },
+          [this](const ChatterAdvice& advice) { publish(advice); }),
       last_input_(ros::WallTime::now()),
       diagnostics_(ros::NodeHandle(), private_nh) {
   chart_ = nh.advertise<smartmill_msgs::StabilityChart>("stability/chart", 1, true);
   chatter_ = nh.advertise<smartmill_msgs::ChatterState>("chatter/state", 100);
+  advice_ = nh.advertise<smartmill_msgs::ChatterAdvice>("chatter/advice", 10, true);
   predict_ = nh.advertiseService("stability/predict", &StabilityNode::predict, this);
   subscribe<smartmill_msgs::Frf>(nh, "tool/frf", &StabilityNode::measured);
   subscribe<smartmill_msgs::ModalModel>(nh, "tool/modes", &StabilityNode::measured);
@@ -66,7 +81,12 @@ StabilityNode::StabilityNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
   subscribe<smartmill_msgs::CuttingCondition>(nh, "cut/condition", &StabilityNode::stream);
   subscribe<smartmill_msgs::CncState>(nh, "cnc/state", &StabilityNode::stream);
   subscribe<smartmill_msgs::SpindleAngle>(nh, "spindle/angle", &StabilityNode::stream);
-  subscribe<smartmill_msgs::ForceBlock>(nh, "force/compensated", &StabilityNode::stream);
+  if (parameters_.chatter_signal == "force") {
+    subscribe<smartmill_msgs::ForceBlock>(nh, "force/compensated", &StabilityNode::stream);
+  } else {
+    const std::string topic = "daq/" + parameters_.chatter_signal;
+    subscribe<smartmill_msgs::SampleBlock>(nh, topic.c_str(), &StabilityNode::stream);
+  }
   diagnostics_.setHardwareID("none");
   diagnostics_.add("stability chart", this, &StabilityNode::diagnoseChart);
   diagnostics_.add("chatter detection", this, &StabilityNode::diagnoseChatter);
@@ -104,6 +124,7 @@ template <typename Message>
 void StabilityNode::stream(const Message& message) {
   last_input_ = ros::WallTime::now();
   flushed_ = false;
+  if constexpr (std::is_same_v<Message, smartmill_msgs::CuttingCondition>) advisor_.handle(fromMsg(message));
   detection_.push(fromMsg(message));
 }
 
@@ -118,6 +139,34 @@ void StabilityNode::publish(const ChatterState& state) {
   message.energy_ratio = state.energy_ratio;
   message.severity = state.severity;
   chatter_.publish(message);
+}
+
+void StabilityNode::publish(const ChatterAdvice& advice) {
+  smartmill_msgs::ChatterAdvice message;
+  message.header.stamp = fromSec(advice.stamp);
+  message.condition = advice.episode.condition;
+  message.frequency = advice.episode.frequency;
+  message.severity = advice.episode.severity;
+  message.onset = advice.episode.onset;
+  for (const ChatterAdvice::Speed& s : advice.speeds) {
+    smartmill_msgs::StabilityPoint point;
+    point.spindle_speed = s.speed;
+    point.axial_depth = advice.depth;
+    point.depth_limit = s.limit;
+    point.chatter_frequency = s.frequency;
+    message.speeds.push_back(point);
+  }
+  message.corrected = advice.correction.has_value();
+  if (advice.correction) {
+    const std::size_t in_x = maker_.modesInX(), mode = advice.correction->mode;
+    message.direction = mode < in_x ? "x" : "y";
+    message.mode = static_cast<std::uint32_t>(mode < in_x ? mode : mode - in_x);
+    message.believed_frequency = advice.believed_frequency;
+    message.corrected_frequency = advice.correction->frequency;
+    message.believed_depth_limit = advice.believed_limit;
+    message.corrected_depth_limit = advice.corrected_limit;
+  }
+  advice_.publish(message);
 }
 
 bool StabilityNode::predict(smartmill_msgs::PredictStability::Request& request,

@@ -8,11 +8,13 @@
 #include <smartmill_msgs/PredictStability.h>
 
 #include "parameters_ros.h"
+#include "smartmill_stability/chatter_advice.h"
 
 namespace smartmill::stability {
 
 /// Shell around ChartMaker and SortedDetection: FRFs and coefficients in, stability/chart and the service
-/// stability/predict out; compensated force and controller state in, chatter/state out.
+/// stability/predict out; compensated force (or vibration, sound) and controller state in,
+/// chatter/state and chatter/advice out.
 class StabilityNode {
  public:
   /// @throws Error on a wrong parameter or model.
@@ -26,6 +28,7 @@ class StabilityNode {
   template <typename Message>
   void stream(const Message& message);
   void publish(const ChatterState& state);
+  void publish(const ChatterAdvice& advice);
   bool predict(smartmill_msgs::PredictStability::Request& request,
                smartmill_msgs::PredictStability::Response& response);
   void watch();
@@ -35,12 +38,13 @@ class StabilityNode {
   NodeParameters parameters_;
   ChartMaker maker_;
   SortedDetection detection_;
+  ChatterAdvisor advisor_;
   std::string chart_problem_;  // why the last chart could not be made
   ChatterState last_state_;
   ros::WallTime last_input_;
   bool flushed_ = true;
 
-  ros::Publisher chart_, chatter_;
+  ros::Publisher chart_, chatter_, advice_;
   ros::ServiceServer predict_;
   std::vector<ros::Subscriber> subscribers_;
   diagnostic_updater::Updater diagnostics_;

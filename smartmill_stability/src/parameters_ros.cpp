@@ -32,6 +32,8 @@ NodeParameters readParameters(ParameterReader& reader, const std::string& model)
   reader.read("chatter_hop_revolutions", chatter.hop_revolutions);
   reader.read("chatter_energy_ratio", chatter.energy_ratio);
   reader.read("chatter_least_severity", chatter.least_severity);
+  reader.read("chatter_alternation_ratio", chatter.alternation_ratio);
+  reader.read("chatter_signal", parameters.chatter_signal);
   reader.read("path_tolerance", chatter.path_tolerance);
   reader.read("settle_revolutions", chatter.settle_revolutions);
   reader.read("maximum_gap", chatter.maximum_gap);
@@ -42,6 +44,9 @@ NodeParameters readParameters(ParameterReader& reader, const std::string& model)
   if (!model.empty()) parameters.model = model;
   chart.validate();
   chatter.validate();
+  if (parameters.chatter_signal != "force" && parameters.chatter_signal != "vibration" &&
+      parameters.chatter_signal != "sound")
+    throw Error("chatter_signal: '" + parameters.chatter_signal + "' is unknown (force, vibration or sound)");
   if (parameters.model.empty()) throw Error("model: the path of a smartmill-model/1 file is due");
   if (!(parameters.hold_back >= 0.0)) throw Error("hold_back: at least 0 s is due");
   if (!(parameters.input_timeout > 0.0)) throw Error("input_timeout: above 0 s is due");

@@ -12,8 +12,9 @@ struct NodeParameters {
   std::string model;  ///< path of a smartmill-model/1 file: tool and spindle limits
   ChartParameters chart;
   ChatterParameters chatter;
-  double hold_back = 0.05;     ///< [s] >= 0
-  double input_timeout = 1.0;  ///< [s] > 0, of wall time
+  std::string chatter_signal = "force";  ///< force (compensated), vibration or sound (daq/...)
+  double hold_back = 0.05;               ///< [s] >= 0
+  double input_timeout = 1.0;            ///< [s] > 0, of wall time
 };
 
 /// @param model path that goes before the key `model`, which then may be absent.

@@ -1,5 +1,6 @@
 #include "smartmill_stability/chatter_advice.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <iostream>
@@ -250,6 +251,95 @@ TEST(Correction, nothingFitsIsSaid) {
   EXPECT_FALSE(
       correctFromChatter(benchmarkSystem(1.0, true, false), radPerSecFromRpm(40000.0), 0.2e-3, 1900.0, 0.02));
   EXPECT_THROW(correctFromChatter(benchmarkSystem(1.0, true, false), 1000.0, 1e-3, -1.0), Error);
+}
+
+// A belief 3 % low in one mode, and verdicts with the true frequency: advice once, with mode, factor and
+// speeds whose limit is several times that of the cut.
+TEST(Advisor, advisesOnceAnEpisode) {
+  const ModalModel x{{{700.0, 0.03, 4e-8}}, 0.0};
+  ModalModel y = benchmark();
+  RegenerativeSystem truth = benchmarkSystem(0.5, true, true);
+  truth.modes = systemModes(x, y);
+  RegenerativeSystem belief = truth;
+  y.modes[0].frequency /= 1.03;
+  belief.modes = systemModes(x, y);
+  const double speed = radPerSecFromRpm(13000.0);
+  CuttingCondition condition;
+  condition.name = "cut";
+  condition.spindle_speed = speed;
+  condition.engagement = {truth.entry, truth.exit, 0.0, 0.1e-3};
+  const double limit = makeSolver(Method::collocation, truth)->limit(speed, 10e-3).depth;
+  condition.engagement.axial_depth = 1.2 * limit;
+  const double observed =
+      makeFloquetSolver(Method::collocation, truth)->at(speed)->chatterFrequency(1.2 * limit);
+  std::vector<ChatterAdvice> given;
+  ChatterAdvisor advisor(
+      radPerSecFromRpm(8000.0), radPerSecFromRpm(40000.0), 2,
+      [&](const CuttingCondition&) { return std::optional<RegenerativeSystem>(belief); },
+      [&](const ChatterAdvice& advice) { given.push_back(advice); });
+  advisor.handle(condition);
+  CuttingCondition next = condition;  // told ahead of its time
+  next.name = "next";
+  next.spindle_speed = 100.0;
+  advisor.handle(next);
+  ChatterState state;
+  state.valid = true;
+  state.condition = "cut";
+  double stamp = 1.0;
+  const auto tell = [&](bool chatter, double frequency) {
+    state.chatter = chatter;
+    state.frequency = frequency;
+    state.stamp = stamp++;
+    advisor.handle(state);
+  };
+  tell(false, 100.0);
+  tell(true, 3.0 * observed);  // growing still: another line
+  EXPECT_TRUE(given.empty());
+  tell(true, observed);
+  EXPECT_TRUE(given.empty());
+  tell(true, 1.001 * observed);
+  ASSERT_EQ(given.size(), 1u);
+  tell(true, observed);
+  EXPECT_EQ(given.size(), 1u);
+  tell(false, 100.0);
+  tell(true, observed);
+  tell(true, observed);
+  EXPECT_EQ(given.size(), 2u);
+  const ChatterAdvice& advice = given.front();
+  EXPECT_EQ(advice.stamp, 4.0);
+  ASSERT_TRUE(advice.correction);
+  EXPECT_EQ(advice.correction->mode, 1u);
+  EXPECT_NEAR(advice.correction->factor, 1.03, 0.004);
+  EXPECT_NEAR(advice.believed_frequency, 922.0 / 1.03, 1e-9);
+  EXPECT_NEAR(advice.corrected_limit / limit, 1.0, 0.1);
+  ASSERT_FALSE(advice.speeds.empty());
+  // In step with the chatter is among them (its frequency is the flip's here, no pocket), in step with a mode
+  // first.
+  const double step = units::TWO_PI * 1.0005 * observed / 2.0;
+  EXPECT_TRUE(std::any_of(advice.speeds.begin(), advice.speeds.end(),
+                          [&](const auto& s) { return std::abs(s.speed - step) < 1.0; }));
+  EXPECT_GT(advice.speeds.front().limit, 2.0 * limit);
+  const double there =
+      makeSolver(Method::collocation, truth)->limit(advice.speeds.front().speed, 10e-3).depth;
+  EXPECT_GT(there, 1.5 * limit);
+}
+
+TEST(Advisor, withoutABeliefTheSpeedsAlone) {
+  std::vector<ChatterAdvice> given;
+  ChatterAdvisor advisor(
+      100.0, 4000.0, 4, [](const CuttingCondition&) { return std::nullopt; },
+      [&](const ChatterAdvice& advice) { given.push_back(advice); });
+  ChatterState state;
+  state.valid = state.chatter = true;
+  state.frequency = 800.0;
+  state.condition = "cut";
+  advisor.handle(state);
+  advisor.handle(state);
+  ASSERT_EQ(given.size(), 1u);
+  EXPECT_FALSE(given[0].correction);
+  ASSERT_FALSE(given[0].speeds.empty());
+  EXPECT_NEAR(given[0].speeds[0].speed, units::TWO_PI * 200.0, 1e-9);
+  EXPECT_TRUE(std::isnan(given[0].speeds[0].limit));
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <ros/ros.h>
 
+#include <smartmill_msgs/ChatterAdvice.h>
 #include <smartmill_msgs/ChatterState.h>
 #include <smartmill_msgs/PredictStability.h>
 #include <smartmill_msgs/StabilityChart.h>
@@ -123,6 +124,17 @@ TEST_F(StabilityNode, findsChatterInReplayedForce) {
   }
   EXPECT_GT(quiet, 10);
   EXPECT_GT(chatter, 10);
+  // Two straight teeth of the model: the fastest speed below 2200 rad/s at which they pass in step with the
+  // chatter.
+  const auto advice =
+      ros::topic::waitForMessage<smartmill_msgs::ChatterAdvice>("chatter/advice", nh_, ros::Duration(5.0));
+  ASSERT_TRUE(advice);
+  EXPECT_EQ(advice->condition, "cut_1");
+  EXPECT_GT(toSec(advice->header.stamp), 200.0);
+  EXPECT_NEAR(advice->frequency, scene.frequency, 0.5);
+  ASSERT_FALSE(advice->speeds.empty());
+  EXPECT_NEAR(advice->speeds[0].spindle_speed, units::TWO_PI * scene.frequency / 4.0, 1.0);
+  EXPECT_FALSE(advice->corrected);  // no modes were measured
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "smartmill_core/modal/results.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/units.h"
+#include "smartmill_stability/solver.h"
 #include "smartmill_stability/zero_order.h"
 
 namespace smartmill::stability {
@@ -92,6 +93,13 @@ class ChartMaker {
 
   /// @throws Error when something is missing or the data contradict each other.
   Chart chart() const;
+
+  /// The machine as measured in a cut with other angles (a cut that has none: those of the chart); empty
+  /// while modes of x and y or the tangential coefficient are missing.
+  std::optional<RegenerativeSystem> system(const Engagement& engagement) const;
+  int teeth() const { return tool_geometry_.teeth; }
+  std::size_t modesInX() const;                                   ///< of system(): those of y follow
+  double highestSpeed() const { return parameters_.speed_high; }  ///< [rad/s]
 
   /// @throws Error as chart(), or on a speed or depth that is not positive.
   Prediction predict(double spindle_speed, double axial_depth) const;

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <deque>
+#include <functional>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -42,5 +45,49 @@ struct ModeCorrection {
 /// most [1] largest change tried; empty when nothing fits.
 std::optional<ModeCorrection> correctFromChatter(const RegenerativeSystem& believed, double speed,
                                                  double depth, double observed, double most = 0.1);
+
+/// What to do about chatter in a running cut (topic chatter/advice).
+struct ChatterAdvice {
+  double stamp = 0.0;  ///< [s] of the window that confirmed the chatter
+  ChatterEpisode episode;
+  struct Speed {
+    double speed = 0.0;      ///< [rad/s]
+    double limit = 0.0;      ///< [m] by the corrected system; NaN without a believed one
+    double frequency = 0.0;  ///< [Hz] at that limit
+  };
+  std::vector<Speed> speeds;                                          ///< fastest first
+  double depth = 0.0;                                                 ///< [m] of the cut
+  std::optional<ModeCorrection> correction;                           ///< of the believed system
+  double believed_frequency = 0.0;                                    ///< [Hz] of the corrected mode before
+  double believed_limit = std::numeric_limits<double>::quiet_NaN();   ///< [m] at the speed of the cut
+  double corrected_limit = std::numeric_limits<double>::quiet_NaN();  ///< [m]
+};
+
+/// Follows the verdicts of a detector and gives advice once an episode, when two windows one after the other
+/// agree on the frequency within 1 %: while chatter grows the first window may still name another line.
+class ChatterAdvisor {
+ public:
+  /// The believed system of a cut, empty while modes or coefficients are missing.
+  using Believed = std::function<std::optional<RegenerativeSystem>(const CuttingCondition&)>;
+  using Output = std::function<void(const ChatterAdvice&)>;
+  /// @param low, high [rad/s] speeds to propose @param teeth where the condition names none
+  ChatterAdvisor(double low, double high, int teeth, Believed believed, Output output);
+
+  /// Conditions may come ahead of the verdicts of the cut before.
+  void handle(const CuttingCondition& condition);
+  /// @throws Error as the solvers on an impossible believed system.
+  void handle(const ChatterState& state);
+
+ private:
+  void advise(const ChatterState& state);
+
+  double low_, high_;
+  int teeth_;
+  Believed believed_;
+  Output output_;
+  std::deque<CuttingCondition> conditions_;  // the newest few
+  std::vector<ChatterState> running_;        // of the present episode
+  bool advised_ = false;
+};
 
 }  // namespace smartmill::stability
