@@ -1,5 +1,6 @@
 #include "smartmill_stability/chatter_detector.h"
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -73,6 +74,61 @@ TEST(ChatterDetector, tellsWhenChatterBegins) {
   EXPECT_FALSE(before);
   EXPECT_GT(first, 1.5);
   EXPECT_LT(first, 1.5 + 24 / 75.3);  // a window and a hop later at the most
+}
+
+// Every other tooth out of the cut: it repeats each revolution, and only its size tells it from runout.
+TEST(ChatterDetector, findsTheFlipOfFourTeeth) {
+  Scene scene;
+  scene.teeth = 4;
+  scene.alternating = 150.0;
+  int valid = 0;
+  for (const ChatterState& state : run(scene)) {
+    if (!state.valid) continue;
+    ++valid;
+    EXPECT_TRUE(state.chatter);
+    EXPECT_NEAR(state.frequency, 2.0 * 75.3, 0.1);
+    const double forced = 1.49 * (150.0 * 150.0 + 60.0 * 60.0 + 40.0 * 40.0) / 2.0,
+                 flip = 150.0 * 150.0 / 2.0;
+    EXPECT_NEAR(state.alternation, flip / (forced + flip), 0.02);
+    EXPECT_NEAR(state.severity, 150.0 / std::sqrt(2.0), 5.0);
+  }
+  EXPECT_GT(valid, 10);
+  // A tenth of the force alternating, as runout does it, is none; nor can it be told where the teeth are not
+  // known.
+  scene.alternating = 20.0;
+  for (const ChatterState& state : run(scene)) EXPECT_FALSE(state.chatter);
+  scene.alternating = 150.0;
+  scene.teeth = 0;
+  for (const ChatterState& state : run(scene)) EXPECT_FALSE(state.chatter);
+}
+
+// The ringing of an entry is no chatter, though it is large in the first window.
+TEST(ChatterDetector, whatDiesOutIsNoChatter) {
+  Scene scene;
+  scene.transient = 400.0;
+  double largest = 0.0;
+  for (const ChatterState& state : run(scene)) {
+    EXPECT_FALSE(state.chatter) << state.stamp;
+    largest = std::max(largest, state.energy_ratio);
+  }
+  EXPECT_GT(largest, 0.1);  // the ratio alone would have called it chatter
+}
+
+TEST(SignalBlock, takesUpToThreeChannels) {
+  SampleBlock block;
+  block.stamp = 3.0;
+  block.sample_rate = 1000.0;
+  block.first_index = 7;
+  block.channels = {"ax", "ay"};
+  block.units = {"m/s2", "m/s2"};
+  block.samples = {1.0, 2.0, 3.0, 4.0};
+  const ForceBlock signal = signalBlock(block);
+  EXPECT_EQ(signal.stamp, 3.0);
+  EXPECT_EQ(signal.first_index, 7u);
+  EXPECT_EQ(signal.force[0], (std::vector<double>{1.0, 3.0}));
+  EXPECT_EQ(signal.force[1], (std::vector<double>{2.0, 4.0}));
+  EXPECT_EQ(signal.force[2], (std::vector<double>{0.0, 0.0}));
+  EXPECT_THROW(signalBlock(SampleBlock{}), Error);
 }
 
 TEST(ChatterDetector, saysNothingOutsideTheSteadyPart) {

@@ -17,6 +17,9 @@ struct Scene {
   double frequency = 1043.0;  // [Hz]
   double noise = 1.0;         // [N]
   double chatter_from = 0.0;  // [s]
+  double alternating = 0.0;   // [N] at half the tooth passing frequency of four teeth
+  double transient = 0.0;     // [N] at the chatter frequency when the cut begins, dying out with 0.12 s
+  int teeth = 0;              // told with the condition
   double duration = 3.0;      // [s]; full engagement from 0.5 s to 2.5 s
 };
 
@@ -29,6 +32,7 @@ void play(const Scene& scene, const Handle& handle, double start = 0.0) {
   condition.stamp = start + 0.01;
   condition.kind = CuttingCondition::Kind::cut;
   condition.name = "cut_1";
+  condition.tool.teeth = scene.teeth;
   condition.steady_from = {{0.010, 0.0, -0.001}};
   condition.steady_to = {{0.050, 0.0, -0.001}};
   std::mt19937 random(7);
@@ -65,7 +69,11 @@ void play(const Scene& scene, const Handle& handle, double start = 0.0) {
         const double chatter = cutting && t > scene.chatter_from
                                    ? scene.chatter * std::cos(units::TWO_PI * scene.frequency * t)
                                    : 0.0;
-        block.force[0].push_back(forced + chatter + normal(random));
+        const double more = cutting ? scene.alternating * std::cos(2.0 * angle + 0.7) +
+                                          scene.transient * std::exp(-(t - 0.5) / 0.12) *
+                                              std::cos(units::TWO_PI * scene.frequency * t)
+                                    : 0.0;
+        block.force[0].push_back(forced + chatter + more + normal(random));
         block.force[1].push_back(0.7 * forced + normal(random));
         block.force[2].push_back(normal(random));
       }
