@@ -87,7 +87,7 @@ BagSummary compensateBag(const std::string& path, const ForceSensor& sensor, con
   std::optional<SortedCompensation> sorted;
   Cutter cutter([&](BagCut&& cut) {
     ++summary.cuts;
-    if (method != Method::kalman && cut.speed > 0.0) {
+    if (method != Method::kalman && method != Method::fixed_lag && cut.speed > 0.0) {
       for (std::size_t axis = 0; axis < 3; ++axis) {
         cut.compensated[axis] = compensateRecord(method, cut.measured[axis], sorted->sensor(axis), cut.speed,
                                                  cut.sample_rate, parameters.compensation.filter);
@@ -104,6 +104,7 @@ BagSummary compensateBag(const std::string& path, const ForceSensor& sensor, con
                                   {},
                                   {},
                                   [&](const SensorResult& result) { summary.identified.push_back(result); }});
+  if (!parameters.sensor_matrix.empty()) sorted->useMatrix(readSensorMatrix(parameters.sensor_matrix));
   if (!parameters.spindle_sensor.empty()) {
     sorted->useSpindleSensor(readSpindleSensor(parameters.spindle_sensor), parameters.spindle_sensor_length);
   }

@@ -1,8 +1,11 @@
 #include "smartmill_kalman/campaign_compensation.h"
 
+#include <algorithm>
 #include <cmath>
+#include <filesystem>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/signal/frequency_response.h"
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/signal/window.h"
@@ -25,9 +28,6 @@ void SensorFitParameters::validate() const {
   }
 }
 
-namespace {
-
-/// H1 over all hits, hammer force windowed.
 FrequencyResponse averaged(const std::vector<std::vector<double>>& hammer,
                            const std::vector<std::vector<double>>& response, double sample_rate) {
   if (hammer.empty() || hammer.size() != response.size()) throw Error("sensor identification: no hits");
@@ -54,6 +54,15 @@ FrequencyResponse averaged(const std::vector<std::vector<double>>& hammer,
     estimator.add(force, response[i]);
   }
   return estimator.h1("1");
+}
+
+namespace {
+
+/// A blow against the sensor's axis, or a sensor that shows the reaction: its slow response is negative.
+bool staysOpposite(const FrequencyResponse& frf, double low) {
+  double sum = 0.0;
+  for (const auto& value : frf.band(low, 3.0 * low + 50.0).value) sum += value.real();
+  return sum < 0.0;
 }
 
 struct Taps {
@@ -88,7 +97,11 @@ ModalFit identifySensor(const std::vector<std::vector<double>>& hammer,
   options.high = std::min(parameters.high, 0.45 * sample_rate);
   options.max_modes = parameters.max_modes;
   options.unit_static_gain = true;
-  return fitModes(averaged(hammer, response, sample_rate), options);
+  FrequencyResponse measured = averaged(hammer, response, sample_rate);
+  if (staysOpposite(measured, parameters.low)) {
+    for (auto& value : measured.value) value = -value;
+  }
+  return fitModes(measured, options);
 }
 
 std::array<ModalModel, 3> identifySensor(const Campaign& campaign, const SensorFitParameters& parameters) {
@@ -105,17 +118,31 @@ std::array<ModalModel, 3> identifySensor(const Campaign& campaign, const SensorF
   return sensor;
 }
 
+bool measuresWorkpiece(const Campaign& campaign, const std::string& model_file) {
+  const std::string file = model_file.empty() ? campaign.modelPath() : model_file;
+  if (model_file.empty() && (file.empty() || !std::filesystem::is_regular_file(file))) return false;
+  return readMachineModel(file).force_sensor.measures_workpiece;
+}
+
+void turnForces(Record& record) {
+  for (std::size_t i = 0; i < record.names.size(); ++i) {
+    if (std::find(FORCES.begin(), FORCES.end(), record.names[i]) == FORCES.end()) continue;
+    for (double& sample : record.columns[i]) sample = -sample;
+  }
+}
+
 std::array<std::vector<double>, 3> compensate(const Record& record, const std::array<ModalModel, 3>& sensor,
                                               bool measures_workpiece, double spindle_speed,
                                               double sample_rate, const HarmonicFilterParameters& parameters,
-                                              Method method) {
+                                              Method method, double lag) {
   std::array<std::vector<double>, 3> force;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     std::vector<double> measured = record.column(FORCES[axis]);
     if (measures_workpiece) {
       for (double& sample : measured) sample = -sample;
     }
-    force[axis] = compensateRecord(method, measured, sensor[axis], spindle_speed, sample_rate, parameters);
+    force[axis] =
+        compensateRecord(method, measured, sensor[axis], spindle_speed, sample_rate, parameters, lag);
   }
   return force;
 }
@@ -132,9 +159,12 @@ SensorMatrix identifySensorMatrix(const Campaign& campaign, const SensorFitParam
   for (std::size_t j = 0; j < 3; ++j) {
     for (std::size_t i = 0; i < 3; ++i) {
       if (i == j) continue;
-      sensor.h[i][j] =
-          fitCrossTalk(averaged(taps[j].hammer, taps[j].response[i], taps[j].rate), sensor.h[j][j],
-                       sensor.h[i][i], parameters.low, std::min(parameters.high, 0.45 * taps[j].rate));
+      FrequencyResponse across = averaged(taps[j].hammer, taps[j].response[i], taps[j].rate);
+      if (staysOpposite(averaged(taps[j].hammer, taps[j].response[j], taps[j].rate), parameters.low)) {
+        for (auto& value : across.value) value = -value;
+      }
+      sensor.h[i][j] = fitCrossTalk(across, sensor.h[j][j], sensor.h[i][i], parameters.low,
+                                    std::min(parameters.high, 0.45 * taps[j].rate));
     }
   }
   return sensor;

@@ -30,10 +30,11 @@ using namespace smartmill;
 constexpr std::array<const char*, 3> AXES{{"x", "y", "z"}};
 
 struct Request {
-  std::string source, out, model, parameters, method = "kalman";
+  std::string source, out, model, parameters, method = "kalman", matrix_out;
   bool identify = false, coupled = false, blind = false;
   double blind_low = 600.0, blind_high = 1500.0;  // [Hz]
   std::optional<double> bandwidth, noise, settling;
+  double lag = 0.05;  // [s]
   kalman::SensorFitParameters fit;
 };
 
@@ -62,6 +63,7 @@ void write(const std::string& folder, const std::string& name, const std::vector
 
 /// What is said about the samples' times.
 const char* latency(const Request& request) {
+  if (request.method == "fixed-lag") return "the lag taken out";
   return request.method == "inverse" ? "its latency of 256 samples taken out" : "no latency";
 }
 
@@ -94,6 +96,7 @@ kalman::NodeParameters parametersOf(const Request& request) {
   kalman::HarmonicFilterParameters& filter = parameters.compensation.filter;
   if (request.bandwidth) filter.bandwidth = *request.bandwidth;
   if (request.noise) filter.noise_rms = *request.noise;
+  if (request.method == "fixed-lag") parameters.compensation.lag = request.lag;
   if (request.settling) filter.settling_revolutions = *request.settling;
   return parameters;
 }
@@ -115,7 +118,10 @@ void fromCampaign(const Request& request) {
         100.0 * matrix->h[0][1].staticGain(), 100.0 * matrix->h[0][2].staticGain(),
         100.0 * matrix->h[1][0].staticGain(), 100.0 * matrix->h[1][2].staticGain(),
         100.0 * matrix->h[2][0].staticGain(), 100.0 * matrix->h[2][1].staticGain(), worst);
+    if (!request.matrix_out.empty()) kalman::writeSensorMatrix(*matrix, request.matrix_out);
+    workpiece = kalman::measuresWorkpiece(campaign, request.model);
   } else if (request.identify) {
+    workpiece = kalman::measuresWorkpiece(campaign, request.model);
     sensor = kalman::identifySensor(campaign, request.fit);
   } else {
     const MachineModel model = readMachineModel(request.model.empty() ? campaign.modelPath() : request.model);
@@ -127,13 +133,15 @@ void fromCampaign(const Request& request) {
   for (const CampaignTest& test : campaign.tests) {
     if (test.kind != TestKind::cut) continue;
     std::fprintf(stderr, "compensating %s\n", test.name.c_str());
-    const Record record = readRecord(campaign, test);
+    Record record = readRecord(campaign, test);
+    if (workpiece) kalman::turnForces(record);
     if (request.blind) printBlind(test.name, record, test, request);
     const auto force =
         matrix ? kalman::compensate(record, *matrix, test.spindle_speed, test.sample_rate,
                                     parameters.compensation.filter)
-               : kalman::compensate(record, sensor, workpiece, test.spindle_speed, test.sample_rate,
-                                    parameters.compensation.filter, kalman::methodOf(request.method));
+               : kalman::compensate(record, sensor, false, test.spindle_speed, test.sample_rate,
+                                    parameters.compensation.filter, kalman::methodOf(request.method),
+                                    request.lag);
     write(request.out, test.name, record.time, force);
     printRange(test.name, forces(record), force);
     ++cuts;
@@ -229,9 +237,13 @@ int main(int argc, char** argv) {
   app.add_flag(
       "--coupled", request.coupled,
       "campaign: sensor with its cross-talk from the campaign's own taps along x, y and z; method kalman");
-  app.add_option("--method", request.method, "kalman (causal, as the node), smoother or inverse")
-      ->check(CLI::IsMember({"kalman", "smoother", "inverse"}))
+  app.add_option("--matrix-out", request.matrix_out,
+                 "with --coupled: file of the matrix, for the node's parameter sensor_matrix");
+  app.add_option("--method", request.method,
+                 "kalman (causal, as the node), smoother, fixed-lag (as the node with `lag`) or inverse")
+      ->check(CLI::IsMember({"kalman", "smoother", "fixed-lag", "inverse"}))
       ->capture_default_str();
+  app.add_option("--lag-s", request.lag, "lag of fixed-lag")->check(CLI::Range(0.0, 10.0))->capture_default_str();
   app.add_option("--bandwidth-hz", request.bandwidth, "harmonics up to this frequency");
   app.add_option("--noise-rms-n", request.noise, "noise of one sample");
   app.add_option("--settling-revolutions", request.settling, "time constant of the amplitudes");

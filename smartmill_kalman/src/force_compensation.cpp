@@ -42,6 +42,7 @@ void CompensationParameters::validate() const {
   require("follow_revolutions", follow_revolutions, follow_revolutions > 0, "above 0");
   require("least_speed", least_speed, least_speed > 0.0, "above 0 rad/s");
   require("speed_tolerance", speed_tolerance, speed_tolerance > 0.0 && speed_tolerance < 0.5, "0 .. 0.5");
+  require("lag", lag, lag >= 0.0 && lag <= 10.0, "0 .. 10 s");
   require("settling_periods", settling_periods, settling_periods >= 0.0, "at least 0");
   require("saturation", saturation, saturation >= 0.0, "at least 0 N");
 }
@@ -55,11 +56,12 @@ ForceCompensation::ForceCompensation(const CompensationParameters& parameters, b
 void ForceCompensation::setSensor(std::size_t axis, const ModalModel& sensor, double noise_rms) {
   sensor_.at(axis) = told_.at(axis) = sensor;
   noise_rms_.at(axis) = noise_rms;
-  filters_.clear();
+  stop();
   schedule_.clear();
 }
 
 void ForceCompensation::setMatrix(const SensorMatrix& matrix) {
+  if (parameters_.lag > 0.0) throw Error("lag: with a sensor matrix 0 is due, the smoother knows no cross-talk");
   for (std::size_t axis = 0; axis < 3; ++axis) setSensor(axis, matrix.h[axis][axis]);
   matrix_ = matrix;
 }
@@ -95,8 +97,27 @@ void ForceCompensation::handle(const SpindleAngle& angle) {
   angle_ = angle;
 }
 
-void ForceCompensation::handle(const CuttingCondition& condition) {
+// Filters start anew: what they have learnt ends here.
+void ForceCompensation::stop() {
+  flush();
   filters_.clear();
+}
+
+void ForceCompensation::flush() {
+  while (!waiting_.empty()) release();
+}
+
+// The oldest block, as the samples up to now tell it.
+void ForceCompensation::release() {
+  auto [measured, compensated] = std::move(waiting_.front());
+  waiting_.pop_front();
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    compensated.force[axis] = smoothers_[axis].take(compensated.force[axis].size());
+  output_(measured, compensated);
+}
+
+void ForceCompensation::handle(const CuttingCondition& condition) {
+  stop();
   condition_ = condition;
   if (parameters_.track_speed) {
     tracker_.reset();
@@ -115,6 +136,8 @@ void ForceCompensation::forgetMoves() {
 }
 
 void ForceCompensation::reset() {
+  waiting_.clear();
+  smoothers_ = {};
   filters_.clear();
   next_index_.reset();
   speed_ = steady_speed_ = 0.0;
@@ -223,7 +246,7 @@ void ForceCompensation::handle(const SampleBlock& block) {
   }
   if (next_index_ && *next_index_ != block.first_index) {
     ++health_.gaps;
-    filters_.clear();
+    stop();
   }
   next_index_ = block.first_index + block.size();
 
@@ -244,7 +267,7 @@ void ForceCompensation::handle(const SampleBlock& block) {
   watchZero(measured);
   ForceBlock compensated = measured;
   if (!hasSensor() || speed_ < parameters_.least_speed || block.stamp < changing_until_) {
-    filters_.clear();
+    stop();
     health_.speed = 0.0;
     compensated.status = ForceBlock::Status::passed_through;
     output_(measured, compensated);
@@ -263,7 +286,14 @@ void ForceCompensation::handle(const SampleBlock& block) {
   const bool settling = settling_left_ > 0.0 || (tracker_ && tracker_->speedStd() > TRACKED * speed_);
   compensated.status = settling ? ForceBlock::Status::settling : ForceBlock::Status::compensated;
   settling_left_ -= static_cast<double>(block.size()) / block.sample_rate;
-  output_(measured, compensated);
+  if (parameters_.lag > 0.0) {
+    waiting_.emplace_back(std::move(measured), std::move(compensated));
+    const auto lag = static_cast<std::size_t>(std::lround(parameters_.lag * block.sample_rate));
+    while (!waiting_.empty() && smoothers_[0].waiting() >= waiting_.front().first.force[0].size() + lag)
+      release();
+  } else {
+    output_(measured, compensated);
+  }
   if (follower_) follow(block.timeOf(block.size()), block.sample_rate);
 }
 
@@ -273,7 +303,11 @@ void ForceCompensation::run(std::array<std::vector<double>, 3>& force, double sa
   const auto take = [&](std::size_t axis, double& sample) {
     HarmonicFilter& filter = filters_[axis];
     // A sample that is not a number is bridged by the model, never passed on.
-    sample = std::isfinite(sample) ? filter.step(sample) : filter.coast();
+    if (parameters_.lag > 0.0) {
+      sample = smoothers_[axis].step(filter, sample);
+    } else {
+      sample = std::isfinite(sample) ? filter.step(sample) : filter.coast();
+    }
     const double innovation = filter.innovation() / filter.innovationStd();
     own[axis] += innovation * innovation;
     neighbours[axis] += innovation * last[axis];

@@ -53,6 +53,17 @@ double HarmonicFilterParameters::memory(std::size_t level) const {
 
 HarmonicGain designHarmonicGain(const ModalModel& sensor, double spindle_speed, double sample_rate,
                                 int harmonics, double noise_rms, double settling, double quickest) {
+  std::vector<double> each;
+  for (int n = 0; n <= harmonics; ++n) {
+    const double passed = std::abs(sensor.response(n * spindle_speed / units::TWO_PI));
+    each.push_back(std::max(std::min(1.0, 2.0 * passed) * settling, quickest));
+  }
+  return designHarmonicGain(sensor, spindle_speed, sample_rate, noise_rms, each);
+}
+
+HarmonicGain designHarmonicGain(const ModalModel& sensor, double spindle_speed, double sample_rate,
+                                double noise_rms, const std::vector<double>& settling) {
+  const auto harmonics = static_cast<Eigen::Index>(settling.size()) - 1;
   const auto m = static_cast<Eigen::Index>(2 * sensor.modes.size());
   const Eigen::Index f = 2 * harmonics + 1;
   const double dt = 1.0 / sample_rate;
@@ -66,8 +77,7 @@ HarmonicGain designHarmonicGain(const ModalModel& sensor, double spindle_speed, 
   for (Eigen::Index n = 0; n <= harmonics; ++n) {
     const Eigen::Index own = n == 0 ? 1 : 2, at = m + (n == 0 ? 0 : 2 * n - 1);
     const double w = static_cast<double>(n) * spindle_speed;
-    const double passed = std::abs(sensor.response(w / units::TWO_PI));
-    const double tau = std::max(std::min(1.0, 2.0 * passed) * settling, quickest);
+    const double tau = settling[static_cast<std::size_t>(n)];
     Eigen::MatrixXd a = Eigen::MatrixXd::Zero(m + own, m + own), q = a;
     a.topLeftCorner(m, m) = modes.a;
     a.block(0, m, m, 1) = modes.b;
@@ -234,6 +244,7 @@ void HarmonicFilter::setState(const std::vector<double>& state) {
 }
 
 void HarmonicFilter::setGains() {
+  shared_layout_.reset();
   gains_.clear();
   force_gain_.clear();
   innovation_std_.clear();
@@ -346,7 +357,7 @@ __attribute__((target_clones("avx2", "default"))) double HarmonicFilter::advance
 }
 
 std::vector<double> HarmonicFilter::smooth(const std::vector<double>& measured) {
-  const std::size_t slow = gains_.size() - 1, n = 4 * blocks_.size();
+  const std::size_t slow = gains_.size() - 1;
   std::vector<double> force, innovation;
   force.reserve(measured.size());
   innovation.reserve(measured.size());
@@ -354,30 +365,53 @@ std::vector<double> HarmonicFilter::smooth(const std::vector<double>& measured) 
     innovation.push_back(sample - expected_);
     force.push_back(advance(gains_[slow].data(), innovation.back(), 0.0));
   }
-  // lambda(k) = c' nu / S + (I - c' K') Phi' lambda(k + 1); force smoothed = force predicted + (P d')'
-  // lambda.
-  std::vector<double> lambda(2 * n, 0.0);
-  const std::vector<double> smoothing = toPairs(design_[slow].smoothing);
-  for (std::size_t at = measured.size(); at-- > 0;) {
-    double through_gain = 0.0;
-    for (std::size_t i = 0; i < n; ++i) {
-      const Block& block = blocks_[i / 4];
-      const double re = lambda[2 * i], im = lambda[2 * i + 1];
-      lambda[2 * i] = block.a[i % 4] * re + block.b[i % 4] * im;
-      lambda[2 * i + 1] = block.a[i % 4] * im - block.b[i % 4] * re;
-      through_gain +=
-          gains_[slow][i / 4].re[i % 4] * lambda[2 * i] + gains_[slow][i / 4].im[i % 4] * lambda[2 * i + 1];
-    }
-    const double drive = innovation[at] / design_[slow].variance - through_gain;
-    double correction = 0.0;
-    for (std::size_t i = 0; i < n; ++i) {
-      lambda[2 * i] += blocks_[i / 4].c1[i % 4] * drive;
-      lambda[2 * i + 1] += blocks_[i / 4].c2[i % 4] * drive;
-      correction += smoothing[2 * i] * lambda[2 * i] + smoothing[2 * i + 1] * lambda[2 * i + 1];
-    }
-    force[at] += correction;
-  }
+  const std::shared_ptr<const Layout> fixed = layout();
+  std::vector<GainBlock> lambda(blocks_.size(), GainBlock{});
+  for (std::size_t at = measured.size(); at-- > 0;)
+    force[at] += goBack(*fixed, slow, innovation[at], true, lambda);
   return force;
+}
+
+std::shared_ptr<const HarmonicFilter::Layout> HarmonicFilter::layout() const {
+  if (!shared_layout_) {
+    auto made = std::make_shared<Layout>();
+    made->blocks = blocks_;
+    made->gains = gains_;
+    made->force_gain = force_gain_;
+    for (const HarmonicGain& design : design_) {
+      const std::vector<double> pairs = toPairs(design.smoothing);
+      made->smoothing.emplace_back(blocks_.size());
+      for (std::size_t i = 0; i < 4 * blocks_.size(); ++i) {
+        made->smoothing.back()[i / 4].re[i % 4] = pairs[2 * i];
+        made->smoothing.back()[i / 4].im[i % 4] = pairs[2 * i + 1];
+      }
+      made->variance.push_back(design.variance);
+    }
+    shared_layout_ = std::move(made);
+  }
+  return shared_layout_;
+}
+
+// lambda(k) = c' nu / S + (I - c' K') Phi' lambda(k + 1); force smoothed = force predicted + (P d')' lambda.
+__attribute__((target_clones("avx2", "default"))) double HarmonicFilter::goBack(
+    const Layout& layout, std::size_t level, double innovation, bool seen, std::vector<GainBlock>& lambda) {
+  const std::vector<GainBlock>&gain = layout.gains[level], &smoothing = layout.smoothing[level];
+  Four through = {}, correction = {};
+  for (std::size_t i = 0; i < lambda.size(); ++i) {
+    const Block& block = layout.blocks[i];
+    const Four re = lambda[i].re, im = lambda[i].im;
+    lambda[i].re = block.a * re + block.b * im;
+    lambda[i].im = block.a * im - block.b * re;
+    through += gain[i].re * lambda[i].re + gain[i].im * lambda[i].im;
+  }
+  const double taken = (through[0] + through[2]) + (through[1] + through[3]);
+  const double drive = seen ? innovation / layout.variance[level] - taken : 0.0;
+  for (std::size_t i = 0; i < lambda.size(); ++i) {
+    lambda[i].re += layout.blocks[i].c1 * drive;
+    lambda[i].im += layout.blocks[i].c2 * drive;
+    correction += smoothing[i].re * lambda[i].re + smoothing[i].im * lambda[i].im;
+  }
+  return (correction[0] + correction[2]) + (correction[1] + correction[3]);
 }
 
 }  // namespace smartmill::kalman

@@ -43,6 +43,7 @@ KalmanNode::KalmanNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
                [this](const SensorResult& result) { measure_.finish(result); }}),
       measure_(nh, sorted_, parameters_.command_machine),
       diagnostics_(ros::NodeHandle(), private_nh) {
+  if (!parameters_.sensor_matrix.empty()) sorted_.useMatrix(readSensorMatrix(parameters_.sensor_matrix));
   if (!parameters_.spindle_sensor.empty()) {
     sorted_.useSpindleSensor(readSpindleSensor(parameters_.spindle_sensor),
                              parameters_.spindle_sensor_length);

@@ -14,6 +14,7 @@ NodeParameters readParameters(ParameterReader& reader) {
   reader.read("memory_revolutions", compensation.filter.memory_revolutions);
   reader.read("least_speed", compensation.least_speed);
   reader.read("speed_tolerance", compensation.speed_tolerance);
+  reader.read("lag", compensation.lag);
   reader.read("track_speed", compensation.track_speed);
   reader.read("speed_std", compensation.tracker.speed_std);
   reader.read("acceleration_std", compensation.tracker.acceleration_std);

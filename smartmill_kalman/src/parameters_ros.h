@@ -12,6 +12,7 @@ struct NodeParameters {
   CompensationParameters compensation;
   TapParameters taps;
   std::string model;           ///< machine model file whose force_sensor section gives the sensor
+  std::string sensor_matrix;  ///< smartmill-sensor-matrix/1 file with the cross-talk; empty: none
   std::string spindle_sensor;  ///< smartmill-spindle-sensor/1 file for blocks of six channels; empty: none
   double spindle_sensor_length = 0.139;  ///< [m] > 0 of tool and holder
   bool command_machine = true;           ///< false: replay; no blow is asked for, the recorded ones answer

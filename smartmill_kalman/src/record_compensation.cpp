@@ -6,6 +6,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/units.h"
 #include "smartmill_kalman/inverse_filter.h"
+#include "smartmill_kalman/lag_smoother.h"
 
 namespace smartmill::kalman {
 namespace {
@@ -44,8 +45,9 @@ std::vector<double> stateAtStart(HarmonicFilter quick, const std::vector<double>
 Method methodOf(const std::string& name) {
   if (name == "kalman") return Method::kalman;
   if (name == "smoother") return Method::smoother;
+  if (name == "fixed-lag") return Method::fixed_lag;
   if (name == "inverse") return Method::inverse;
-  throw Error("method '" + name + "': kalman, smoother or inverse is due");
+  throw Error("method '" + name + "': kalman, smoother, fixed-lag or inverse is due");
 }
 
 std::vector<double> smoothRecord(const std::vector<double>& measured, const ModalModel& sensor,
@@ -81,7 +83,7 @@ std::vector<double> smoothRecord(const std::vector<double>& measured, const Moda
 
 std::vector<double> compensateRecord(Method method, const std::vector<double>& measured,
                                      const ModalModel& sensor, double spindle_speed, double sample_rate,
-                                     const HarmonicFilterParameters& parameters) {
+                                     const HarmonicFilterParameters& parameters, double lag) {
   if (method == Method::smoother)
     return smoothRecord(measured, sensor, spindle_speed, sample_rate, parameters);
   std::vector<double> force;
@@ -97,6 +99,22 @@ std::vector<double> compensateRecord(Method method, const std::vector<double>& m
   }
   HarmonicFilter filter(sensor, spindle_speed, sample_rate, parameters);
   force.reserve(measured.size());
+  if (method == Method::fixed_lag) {
+    // In blocks, as the node: a block's samples know what comes up to the lag after the block's end.
+    constexpr std::size_t BLOCK = 256;
+    const auto late = static_cast<std::size_t>(std::lround(lag * sample_rate));
+    LagSmoother smoother;
+    const auto take = [&](std::size_t count) {
+      const std::vector<double> told = smoother.take(count);
+      force.insert(force.end(), told.begin(), told.end());
+    };
+    for (const double sample : measured) {
+      smoother.step(filter, sample);
+      if (smoother.waiting() >= BLOCK + late) take(BLOCK);
+    }
+    while (smoother.waiting() > 0) take(BLOCK);
+    return force;
+  }
   for (const double sample : measured) force.push_back(filter.step(sample));
   return force;
 }

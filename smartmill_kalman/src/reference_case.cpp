@@ -162,6 +162,7 @@ std::array<std::vector<double>, 2> runCompensation(const ReferenceCase& referenc
       block.samples.insert(block.samples.end(), {record.measured[0][i], record.measured[1][i], 0.0});
     compensation.handle(block);
   }
+  compensation.flush();
   if (moves) *moves = compensation.health().moves;
   return force;
 }

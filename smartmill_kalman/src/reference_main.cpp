@@ -2,7 +2,6 @@
 // targets.
 
 #include <cmath>
-#include <complex>
 #include <cstdio>
 #include <ctime>
 #include <functional>
@@ -17,6 +16,7 @@
 #include "smartmill_kalman/delay_filter.h"
 #include "smartmill_kalman/record_compensation.h"
 #include "smartmill_kalman/reference_case.h"
+#include "smartmill_kalman/tuning.h"
 
 namespace {
 
@@ -195,6 +195,36 @@ void runSpeeds(const std::vector<double>& speeds, double duration) {
   }
 }
 
+/// What a known latency buys: error over lag, from causal to the whole record.
+void runLags(const std::vector<double>& speeds, double duration) {
+  std::printf(
+      "fixed lag: error of the force to 3 / 5 kHz [%%] from 0.1 s after engagement, worst of x and y\n");
+  std::printf("   rpm      lag [ms]  to 3 kHz to 5 kHz\n");
+  for (const double rpm : speeds) {
+    ReferenceCase reference;
+    reference.spindle_speed = units::radPerSecFromRpm(rpm);
+    reference.duration = duration;
+    const ReferenceRecord record = simulate(reference);
+    const auto from = static_cast<std::size_t>((reference.engage_time + 0.1) * reference.sample_rate);
+    for (const double lag : {0.0, 0.002, 0.005, 0.01, 0.02, 0.04, 0.08, 0.16}) {
+      CompensationParameters parameters;
+      parameters.filter.max_harmonics = 200;
+      parameters.lag = lag;
+      const auto force = runCompensation(reference, record, reference.sensor, parameters);
+      double to_3k = 0.0, to_5k = 0.0;
+      for (std::size_t axis = 0; axis < 2; ++axis) {
+        const auto error = [&](double band) {
+          return 100.0 * bandError(force[axis], record.truth[axis], reference.sample_rate, from,
+                                   force[axis].size(), band);
+        };
+        to_3k = std::max(to_3k, error(3000.0));
+        to_5k = std::max(to_5k, error(5000.0));
+      }
+      std::printf("%6.0f  %12.0f %9.3f %8.3f\n", rpm, 1000.0 * lag, to_3k, to_5k);
+    }
+  }
+}
+
 /// Sensor that is not what it is believed to be.
 struct Wrong {
   const char* name;
@@ -279,65 +309,103 @@ void runErrors(const std::vector<double>& speeds, double duration) {
   }
 }
 
-/// Burzoni's tables 8..15: what a filter laid out from the taps alone loses against the one with the best q,
-/// told by the truth of the cut.
-void runTuning(double duration) {
-  std::printf("sensor from nine taps; q as laid out, and the best of a fixed q, by the truth of the cut\n");
+/// Burzoni's tables 8..15 and his maps: what a q from the taps alone loses against the best q of the cut,
+/// told by the truth of the cut; and the harmonic form, as laid out and with a memory a band from the
+/// likelihood.
+void runTuning(double duration, const std::string& picture) {
+  constexpr double BAND = 5000.0, AMPLITUDES = 3000.0;
+  constexpr int FLUTES = 4, HARMONICS = 60;
+  const std::vector<double> edges{1000.0, 3000.0};  // [Hz]
+  ReferenceCase reference;
+  reference.duration = duration;
+  const double rate = reference.sample_rate;
+  const ReferenceTaps taps = simulateTaps(reference, 9);
+  const ModalModel sensor = identifySensor(taps.hammer, taps.response, rate, {100.0, 5000.0, 4}).model;
+  const FrequencyResponse frf = averaged(taps.hammer, taps.response, rate);
+  const double r_taps = noiseBefore(taps, rate, 0.009);
+  std::vector<double> speeds;
+  for (double rpm = 1000.0; rpm <= 20000.0; rpm += 200.0) speeds.push_back(units::radPerSecFromRpm(rpm));
+  const TuningMap map = tapMap(taps, sensor, rate, r_taps, speeds, BAND);
   std::printf(
-      "   rpm   RMSE [N]   best q: RMSE [N]   amplitude error of tooth harmonics [%%]: as laid out   best "
-      "q\n");
+      "sensor from nine taps; R from before the blows %.3f N2; RMSE of the harmonics' amplitudes [N], "
+      "amplitude error of the tooth harmonics to 3 kHz [%%], worst of x and y\n",
+      r_taps);
+  std::printf(
+      "        |        random walk (Burzoni)                     |   harmonics, as laid out  |  "
+      "memory a band from the likelihood\n");
+  std::printf(
+      "    rpm | R of air   q of taps  RMSE   ampl.  best q  RMSE |      RMSE   ampl.         |  "
+      "RMSE   ampl.   revolutions\n");
+  std::vector<std::pair<double, int>> cuts;
   for (const double rpm : {1000.0, 3700.0, 6500.0, 9300.0, 12000.0, 14800.0, 17600.0}) {
-    ReferenceCase reference;
     reference.spindle_speed = units::radPerSecFromRpm(rpm);
-    reference.duration = duration;
-    const ReferenceTaps taps = simulateTaps(reference, 9);
-    const ModalModel sensor =
-        identifySensor(taps.hammer, taps.response, reference.sample_rate, {100.0, 5000.0, 4}).model;
     const ReferenceRecord record = simulate(reference);
-    const double rate = reference.sample_rate, revolution = units::TWO_PI / reference.spindle_speed;
-    const double revolutions = std::floor((duration - 0.2) / revolution);
-    const std::size_t to = record.time.size();
-    const std::size_t from = to - static_cast<std::size_t>(std::lround(revolutions * revolution * rate));
-    struct Score {
-      double rmse = 0.0, amplitude = 0.0;
-    };
-    const auto scored = [&](HarmonicFilter filter) {
-      Score score;
+    // Air cutting: the tool is not in the cut before engage_time.
+    double r_air = 0.0;
+    const auto air = static_cast<std::size_t>(0.9 * reference.engage_time * rate);
+    for (std::size_t i = 0; i < air; ++i)
+      r_air += std::pow(record.measured[0][i], 2) / static_cast<double>(air);
+    const auto from = static_cast<std::size_t>(0.4 * duration * rate);
+    const auto scored = [&](const std::function<std::vector<double>(const std::vector<double>&)>& estimate) {
+      CutScore worst;
       for (std::size_t axis = 0; axis < 2; ++axis) {
-        filter.reset();
-        std::vector<double> force;
-        for (const double sample : record.measured[axis]) force.push_back(filter.step(sample));
-        double squares = 0.0;
-        for (std::size_t i = from; i < to; ++i) squares += std::pow(force[i] - record.truth[axis][i], 2);
-        score.rmse = std::max(score.rmse, std::sqrt(squares / static_cast<double>(to - from)));
-        double largest = 0.0;
-        for (int n = 4; n * reference.spindle_speed < units::TWO_PI * 3000.0; n += 4) {
-          std::complex<double> is = 0.0, found = 0.0;
-          for (std::size_t i = from; i < to; ++i) {
-            const auto turn = std::polar(1.0, -n * reference.spindle_speed * record.time[i]);
-            is += turn * record.truth[axis][i];
-            found += turn * force[i];
-          }
-          largest = std::max(largest, std::abs(is));
-          // A harmonic below a fiftieth of the largest is no amplitude to be right about.
-          if (std::abs(is) > 0.02 * largest)
-            score.amplitude = std::max(score.amplitude, std::abs(std::abs(found) / std::abs(is) - 1.0));
-        }
+        const CutScore score = scoreCut(estimate(record.measured[axis]), record.truth[axis], rate,
+                                        reference.spindle_speed, FLUTES, from, BAND, AMPLITUDES);
+        worst.rmse = std::max(worst.rmse, score.rmse);
+        worst.amplitude = std::max(worst.amplitude, score.amplitude);
       }
-      return score;
+      return worst;
     };
-    HarmonicFilterParameters parameters;
-    const Score own = scored(HarmonicFilter(sensor, reference.spindle_speed, rate, parameters));
-    Score best;
+    const auto walk = [&](int exponent) {
+      return scored([&](const std::vector<double>& measured) {
+        return randomWalkForce(measured, sensor, rate, std::pow(2.0, exponent), r_air);
+      });
+    };
+    const int told = map.best(reference.spindle_speed);
+    const CutScore own = walk(told);
+    CutScore best;
     best.rmse = 1e9;
-    for (double memory = 0.1; memory < 10.0; memory *= 2.0) {
-      parameters.settling_revolutions = parameters.memory_revolutions = memory;
-      const Score fixed = scored(HarmonicFilter(sensor, reference.spindle_speed, rate, parameters));
-      if (fixed.rmse < best.rmse) best = fixed;
+    int best_exponent = 0;
+    for (int exponent = LEAST_EXPONENT; exponent <= MOST_EXPONENT; ++exponent) {
+      const CutScore score = walk(exponent);
+      if (score.rmse >= best.rmse) continue;
+      best = score;
+      best_exponent = exponent;
     }
-    std::printf("%6.0f  %9.3f %18.3f %53.2f %8.2f\n", rpm, own.rmse, best.rmse, 100.0 * own.amplitude,
-                100.0 * best.amplitude);
+    cuts.emplace_back(reference.spindle_speed, best_exponent);
+    HarmonicFilterParameters parameters;
+    parameters.max_harmonics = HARMONICS;
+    HarmonicFilter filter(sensor, reference.spindle_speed, rate, parameters);
+    const CutScore laid_out = scored([&](const std::vector<double>& measured) {
+      filter.reset();
+      std::vector<double> force;
+      for (const double sample : measured) force.push_back(filter.step(sample));
+      return force;
+    });
+    const BandTuning tuned = tuneBands(record.measured[0], sensor, reference.spindle_speed, rate,
+                                       std::sqrt(r_air), edges, frf, HARMONICS);
+    const CutScore bands = scored([&](const std::vector<double>& measured) {
+      return bandForce(measured, sensor, reference.spindle_speed, rate, std::sqrt(r_air), edges, tuned.memory,
+                       HARMONICS);
+    });
+    std::printf("%7.0f | %8.3f %8s%-2d %6.3f %6.2f %5s%-2d %6.3f | %9.3f %7.2f         | %6.3f %6.2f  ", rpm,
+                r_air, "2^", told, own.rmse, 100.0 * own.amplitude, "2^", best_exponent, best.rmse,
+                laid_out.rmse, 100.0 * laid_out.amplitude, bands.rmse, 100.0 * bands.amplitude);
+    for (const double memory : tuned.memory) std::printf(" %g", memory);
+    std::printf("\n");
   }
+  if (picture.empty()) return;
+  std::vector<std::pair<std::string, TuningMap>> maps{{"sensor as measured", map}};
+  for (const double k : {-3.0, -2.0, 2.0, 3.0}) {
+    char name[64];
+    std::snprintf(name, sizeof name, "%+.0f standard deviations", k);
+    maps.emplace_back(name, tapMap(plantAt(taps, frf, rate, k), sensor, rate, r_taps, speeds, BAND));
+    std::printf("plant at %s: best q at 9300 rpm 2^%d, at 17600 rpm 2^%d\n", name,
+                maps.back().second.best(units::radPerSecFromRpm(9300.0)),
+                maps.back().second.best(units::radPerSecFromRpm(17600.0)));
+  }
+  drawMaps(maps, cuts, picture);
+  std::printf("maps drawn to %s\n", picture.c_str());
 }
 
 }  // namespace
@@ -346,7 +414,8 @@ int main(int argc, char** argv) {
   std::setvbuf(stdout, nullptr, _IOLBF, 0);
   std::vector<double> speeds{3000.0, 9000.0, 15000.0, 21750.0};
   double duration = 1.0;
-  bool errors = false, tuning = false, force_models = false, track = false;
+  std::string picture;
+  bool errors = false, tuning = false, force_models = false, track = false, lags = false;
   CLI::App app{"Errors of the force compensation in the reference cut, beside their targets."};
   app.add_option("--speed-rpm", speeds, "spindle speeds")->check(CLI::Range(500.0, 60000.0));
   app.add_option("--duration-s", duration, "length of a record")->check(CLI::Range(0.3, 100.0));
@@ -354,7 +423,9 @@ int main(int argc, char** argv) {
                "a sensor that is not what it is believed to be: frozen and following");
   app.add_flag("--force-models", force_models, "Fourier series beside F(t) = F(t - T): error and cost");
   app.add_flag("--track-speed", track, "no tachometer: the speed as a state beside the tachometer");
+  app.add_flag("--lags", lags, "error of the fixed-lag smoother over its lag");
   app.add_flag("--tuning", tuning, "seven speeds: laid out from the taps against the best q of the cut");
+  app.add_option("--picture", picture, "with --tuning: PNG of the maps q over speed, with confidence plants");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
@@ -369,8 +440,12 @@ int main(int argc, char** argv) {
       runSpeeds(speeds, duration);
       return 0;
     }
+    if (lags) {
+      runLags(speeds, duration);
+      return 0;
+    }
     if (tuning) {
-      runTuning(duration);
+      runTuning(duration, picture);
       return 0;
     }
     errors ? runErrors(speeds, std::max(duration, 1.6)) : run(speeds, duration);

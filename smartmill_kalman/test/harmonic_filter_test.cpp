@@ -145,7 +145,9 @@ TEST_P(SixSpeeds, rangeStaysAndWaveformIsRight) {
     std::vector<double> revolution;
     for (int i = 0; i < 7200; ++i) revolution.push_back(applied(units::TWO_PI * i / 7200.0));
     ModalFilter dynamometer(sensor(axis == 0 ? 930.0 : 1080.0), 4.0 * RATE, Hold::first_order);
-    HarmonicFilter filter(sensor(axis == 0 ? 930.0 : 1080.0), speed, RATE, {});
+    HarmonicFilterParameters parameters;
+    parameters.max_harmonics = 50;  // as the node's, see launch/config/kalman.yaml
+    HarmonicFilter filter(sensor(axis == 0 ? 930.0 : 1080.0), speed, RATE, parameters);
     std::mt19937 random(7);
     std::normal_distribution<double> noise(0.0, 1.0);
     std::vector<double> estimate;

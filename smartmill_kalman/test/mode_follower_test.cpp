@@ -92,7 +92,7 @@ class Following : public testing::Test {
   Outcome run(const ModalModel& is) {
     ReferenceCase reference;
     reference.spindle_speed = units::radPerSecFromRpm(21750.0);
-    reference.duration = 0.55;
+    reference.duration = 0.42;
     const ModalModel believed = reference.sensor;
     reference.sensor = is;
     const ReferenceRecord record = simulate(reference);

@@ -21,8 +21,12 @@ struct SensorFitParameters {
   void validate() const;
 };
 
+/// H1 over all hits [1], hammer force windowed, with standard deviations.
+FrequencyResponse averaged(const std::vector<std::vector<double>>& hammer,
+                           const std::vector<std::vector<double>>& response, double sample_rate);
+
 /// Sensor model of one axis (static gain 1) from taps along it: H1 over all hits, hammer force windowed
-/// (Dunwoody ch. 5).
+/// (Dunwoody ch. 5). A sensor that answers a blow with the other sign is turned: its static gain is 1.
 /// @param hammer, response [N] one vector a hit, all of one length @param sample_rate [Hz]
 /// @throws Error when there is no hit, a NaN, or no mode in the band.
 ModalFit identifySensor(const std::vector<std::vector<double>>& hammer,
@@ -46,6 +50,13 @@ std::array<std::vector<double>, 3> compensate(const Record& record, const Sensor
 std::array<std::vector<double>, 3> compensate(const Record& record, const std::array<ModalModel, 3>& sensor,
                                               bool measures_workpiece, double spindle_speed,
                                               double sample_rate, const HarmonicFilterParameters& parameters,
-                                              Method method = Method::kalman);
+                                              Method method = Method::kalman, double lag = 0.05);
+
+/// The model's `measures: force_on_workpiece`, of the file or, when that is empty, of the campaign's own
+/// model; false without a model. @throws Error when a model cannot be read.
+bool measuresWorkpiece(const Campaign& campaign, const std::string& model_file);
+
+/// Turns fx, fy, fz: the reaction becomes the force on the tool.
+void turnForces(Record& record);
 
 }  // namespace smartmill::kalman

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <limits>
 #include <map>
@@ -15,6 +16,7 @@
 #include "smartmill_core/signal/streams.h"
 #include "smartmill_kalman/coupled_filter.h"
 #include "smartmill_kalman/harmonic_filter.h"
+#include "smartmill_kalman/lag_smoother.h"
 #include "smartmill_kalman/mode_follower.h"
 #include "smartmill_kalman/speed_tracker.h"
 
@@ -29,6 +31,9 @@ struct CompensationParameters {
   double speed_tolerance = 0.002;
   double settling_periods =
       5.0;  ///< [1] >= 0 settling times after a start or gap that are marked as settling
+  /// [s] >= 0: blocks come out so much later and tell each force from the samples up to so much after it
+  /// (LagSmoother); 0: causal
+  double lag = 0.0;
   /// No tachometer: the speed is told from the force, beginning with the cutting condition's.
   bool track_speed = false;
   SpeedTrackerParameters tracker;
@@ -87,6 +92,9 @@ class ForceCompensation {
   void handle(const SpindleAngle& angle);
   void handle(const CuttingCondition& condition);
 
+  /// End of data, or nothing more that belongs together: what waits for later samples comes out.
+  void flush();
+
   /// A bag was restarted: as new, sensor models stay.
   void reset();
 
@@ -99,6 +107,8 @@ class ForceCompensation {
   void follow(double time, double sample_rate);
   void watchZero(const ForceBlock& measured);
   void forgetMoves();
+  void stop();
+  void release();
   const std::vector<HarmonicGain>& gains(std::size_t axis, int grid_point, double sample_rate);
 
   CompensationParameters parameters_;
@@ -109,6 +119,8 @@ class ForceCompensation {
   std::optional<SensorMatrix> matrix_;
   std::optional<CrossTalkInverse> cross_talk_;  // of matrix_ at the filters' speed
   std::vector<HarmonicFilter> filters_;         // of the axes with a model, in order; empty: to be laid out
+  std::array<LagSmoother, 3> smoothers_;
+  std::deque<std::pair<ForceBlock, ForceBlock>> waiting_;  // measured and causal, for their lag to pass
   std::map<std::pair<std::size_t, int>, std::vector<HarmonicGain>>
       schedule_;  // by axis and point of the speed grid
   int grid_point_ = 0;

@@ -3,6 +3,7 @@
 #include <array>
 #include <complex>
 #include <cstddef>
+#include <memory>
 #include <vector>
 
 #include "smartmill_core/modal/modal_model.h"
@@ -42,6 +43,10 @@ struct HarmonicGain {
 /// @param spindle_speed [rad/s] @param sample_rate [Hz] @param settling, quickest [s]
 HarmonicGain designHarmonicGain(const ModalModel& sensor, double spindle_speed, double sample_rate,
                                 int harmonics, double noise_rms, double settling, double quickest);
+
+/// The same with a time constant [s] for each harmonic, 0 .. N.
+HarmonicGain designHarmonicGain(const ModalModel& sensor, double spindle_speed, double sample_rate,
+                                double noise_rms, const std::vector<double>& settling);
 
 /// Gains from quick to slow: settling_revolutions, memory_revolutions and their geometric mean.
 std::vector<HarmonicGain> designGains(const ModalModel& sensor, double spindle_speed, double sample_rate,
@@ -130,7 +135,6 @@ class HarmonicFilter {
   std::vector<double> state() const;
   void setState(const std::vector<double>& state);
 
- private:
   // A pair is a rotation (a, b) of (re, im) with the share (c1, c2) in the measured and (g) in the applied
   // force. Four pairs run side by side.
   typedef double Four __attribute__((vector_size(32), aligned(8)));
@@ -140,6 +144,19 @@ class HarmonicFilter {
   struct GainBlock {
     Four re, im;
   };
+  /// What a smoother goes back with; one for as long as sensor, speed and gains stay.
+  struct Layout {
+    std::vector<Block> blocks;                             ///< re, im of no meaning
+    std::vector<std::vector<GainBlock>> gains, smoothing;  ///< a level each
+    std::vector<double> variance, force_gain;              ///< [N2], [1] a level each
+  };
+  std::shared_ptr<const Layout> layout() const;
+  /// One sample back: lambda of a sample from that of the one after it. @param level, innovation of the
+  /// sample's step @param seen false: it was bridged @return correction of its predicted force [N]
+  static double goBack(const Layout& layout, std::size_t level, double innovation, bool seen,
+                       std::vector<GainBlock>& lambda);
+
+ private:
   double advance(const GainBlock* gain, double innovation, double force_gain);
   void layOut(const ModalModel& sensor, double spindle_speed);
   std::vector<double> toPairs(const std::vector<double>& state) const;
@@ -157,6 +174,7 @@ class HarmonicFilter {
   std::vector<double> force_gain_, innovation_std_;
   double expected_ = 0.0, innovation_ = 0.0;
   InnovationWatch watch_;
+  mutable std::shared_ptr<const Layout> shared_layout_;  // empty: to be made
 };
 
 }  // namespace smartmill::kalman

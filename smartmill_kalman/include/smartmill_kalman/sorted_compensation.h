@@ -42,6 +42,12 @@ class SortedCompensation {
   void useSpindleSensor(const SpindleSensorCalibration& calibration, double length) {
     spindle_.emplace(calibration, length);
   }
+  /// The sensor's cross-talk serves from now on, its own axes instead of the believed ones until taps tell
+  /// better.
+  void useMatrix(const SensorMatrix& matrix) {
+    matrix_ = matrix;
+    useModelFile();
+  }
   /// @return counts of the spindle's sensor; null without one.
   const SpindleSensorHealth* spindleHealth() const { return spindle_ ? &spindle_->health() : nullptr; }
 
@@ -61,7 +67,11 @@ class SortedCompensation {
   void push(const MeasuredModes& modes);
   /// The hammer's stream has died: it holds the others back no longer.
   void hammerLost(const std::string& text);
-  void flush() { sorter_.flush(); }  ///< end of data
+  /// End of data.
+  void flush() {
+    sorter_.flush();
+    compensation_.flush();
+  }
 
   const CompensationHealth& health() const { return compensation_.health(); }
   /// Model in use of an axis.
@@ -90,6 +100,7 @@ class SortedCompensation {
   std::array<double, 3> identified_;  // [s] stamp of the modes in use, an axis each
   StreamSorter::Stream conditions_, goals_, hammers_, angles_, blocks_;
   std::optional<SpindleForceSensor> spindle_;
+  std::optional<SensorMatrix> matrix_;
   std::deque<std::pair<std::uint64_t, std::uint64_t>> invalid_;  // samples [from, to) that are no measurement
   std::function<void()> restarted_;
   double newest_;
