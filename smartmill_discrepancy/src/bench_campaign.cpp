@@ -11,6 +11,7 @@
 #include "smartmill_core/units.h"
 #include "smartmill_discrepancy/hypothesis.h"
 #include "smartmill_sim/twin/cutting_machine.h"
+#include "smartmill_sim/twin/twin.h"
 
 namespace smartmill::discrepancy {
 namespace {
@@ -261,7 +262,7 @@ void writeBenchCampaign(const MachineModel& nominal, const BenchTruth& truth, co
                                                      : 2] = peak * std::sin(units::PI * (t - hit) / width);
         if (cut && !engaged && t >= *test.engage_time - 1e-3 / test.sample_rate) {
           machine.engage({{test.engagement->entry, test.engagement->exit, test.engagement->axial_depth}},
-                         input.motion);
+                         input.motion, sim::ENGAGEMENT_RISE * steps);
           engaged = true;
         }
         const sim::CuttingMachine::Output out = machine.step(input);

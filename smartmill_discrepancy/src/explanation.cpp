@@ -164,15 +164,18 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
   };
   Explanation result;
   result.notes = data.notes;
-  if (const std::vector<std::string> wrong = wrongLabels(data, options.search.threads); !wrong.empty()) {
+  const auto refuse = [&](const std::vector<std::string>& reasons) {
     std::string all;
-    for (const std::string& w : wrong) all += (all.empty() ? "" : "; ") + w;
-    throw Error(data.campaign.folder + ": " + all);
-  }
+    for (const std::string& r : reasons) all += (all.empty() ? "" : "; ") + r;
+    if (!reasons.empty()) throw Error(data.campaign.folder + ": " + all);
+  };
+  const Labels labels = checkLabels(data, options.search.threads);
+  refuse(labels.wrong);
   const std::vector<Hypothesis> hypotheses = catalogueHypotheses(data, &result.notes);
   std::vector<std::size_t> fitted, heldout;
   for (std::size_t t = 0; t < data.tests.size(); ++t) (data.tests[t].heldout ? heldout : fitted).push_back(t);
-  const SearchOptions& s = options.search;
+  SearchOptions s = options.search;
+  if (!labels.doubtful.empty()) s.most_effects = std::min<std::size_t>(s.most_effects, 2);
   const NominalFreedom freedom(data.nominal);
   TwinRunner quick_runner(data, fitted, s.threads, s.screening_substeps);
   const TwinRunner exact_runner(data, fitted, s.threads, s.final_substeps);
@@ -295,6 +298,8 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
     result.verdict = result.unexplained.empty() ? "explained" : "partly_explained";
   }
   if (result.verdict == "no_disagreement") result.where.clear();
+  // An effect that acts in one test most may look like another test's label; one that explains all clears it.
+  if (!result.unexplained.empty()) refuse(labels.doubtful);
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   std::snprintf(line, sizeof line, "verdict %s; gap %.4f -> %.4f, held out %.4f -> %.4f",
                 result.verdict.c_str(), result.before.fit, result.after.fit, result.before.heldout,

@@ -18,6 +18,10 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+// Share of a coordinate's step: a tangent that is a little curved would tell effects apart from nominal
+// values that do exactly the same.
+constexpr double TANGENT = 0.02;
+
 /// Cost of a campaign for Ceres: (measured - simulated) over noise, then the priors. The residuals of the
 /// records, of which there are some 1e5, are handed on rotated into as many as there are coordinates, which
 /// leaves cost, gradient and normal equations as they are.
@@ -66,7 +70,7 @@ class CampaignCost : public ceres::CostFunction {
     if (!known) models.push_back(modelAt(now));
     for (std::size_t c = first; c < count && information; ++c) {
       const Coordinate& k = coordinates_[c];
-      step[c] = now[c] + k.step > k.high ? -k.step : k.step;
+      step[c] = TANGENT * (now[c] + k.step > k.high ? -k.step : k.step);
       Values moved = now;
       moved[c] += step[c];
       models.push_back(modelAt(moved));
@@ -181,7 +185,7 @@ NominalTangents Fitter::nominalTangents(const FitState& state) const {
   std::vector<MachineModel> models{model(state)};
   for (std::size_t c = 0; c < coordinates.size(); ++c) {
     FitState moved = state;
-    moved.nominal[c] += coordinates[c].step;
+    moved.nominal[c] += TANGENT * coordinates[c].step;
     models.push_back(model(moved));
   }
   const std::vector<Values> simulated = runner_.simulate(models);
@@ -190,7 +194,7 @@ NominalTangents Fitter::nominalTangents(const FitState& state) const {
   for (std::size_t c = 0; c < coordinates.size(); ++c) {
     for (std::size_t i = 0; i < runner_.size(); ++i) {
       tangents.columns(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(c)) =
-          (simulated[c + 1][i] - simulated[0][i]) / coordinates[c].step;
+          (simulated[c + 1][i] - simulated[0][i]) / (TANGENT * coordinates[c].step);
     }
   }
   return tangents;

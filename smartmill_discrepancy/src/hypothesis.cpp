@@ -77,8 +77,8 @@ Hypothesis reaching(Hypothesis h, const Values& reaches) {
 Hypothesis planar(const std::string& effect, const std::string& size_key, double reach, double limit,
                   double prior) {
   Hypothesis h = amplitudes(effect,
-                            {{size_key + " cos", 0.0, -limit, limit, 0.02 * reach, prior},
-                             {size_key + " sin", 0.0, -limit, limit, 0.02 * reach, prior}},
+                            {{size_key + " cos", 0.0, -limit, limit, 5e-4 * reach, prior},
+                             {size_key + " sin", 0.0, -limit, limit, 5e-4 * reach, prior}},
                             reach);
   h.entry = [effect, size_key](const Values& v) {
     EffectEntry e;
@@ -98,7 +98,7 @@ Hypothesis scaled(const std::string& effect, const Coordinate& amplitude, double
   Hypothesis h;
   h.effect = effect;
   const double middle = std::log(scales[scales.size() / 2]);
-  h.coordinates = {amplitude, {"ln " + scale_key, middle, std::log(low), std::log(high), 0.01, prior}};
+  h.coordinates = {amplitude, {"ln " + scale_key, middle, std::log(low), std::log(high), 2.5e-4, prior}};
   for (const double s : scales) {
     h.probes.push_back({{amplitude.null, std::log(s)}, {{amplitude.null + reach, std::log(s)}}, false});
   }
@@ -118,7 +118,7 @@ Hypothesis scaled(const std::string& effect, const Coordinate& amplitude, double
 Hypothesis powerLaw(const std::string& effect, const std::string& reference_key, double middle, double low,
                     double high) {
   Hypothesis h = amplitudes(
-      effect, {{"exponent", 0.0, -1.0, 1.0, 0.002, 0.3}, {"level", 0.0, -1.0, 1.0, 0.002, 0.2}}, 0.02);
+      effect, {{"exponent", 0.0, -1.0, 1.0, 5e-05, 0.3}, {"level", 0.0, -1.0, 1.0, 5e-05, 0.2}}, 0.02);
   h.entry = [effect, reference_key, middle, low, high](const Values& v) {
     EffectEntry e;
     e.name = effect;
@@ -147,7 +147,7 @@ Hypothesis withWord(Hypothesis h, const std::string& key, const std::string& wor
 Hypothesis unevenPitch(const ToolGeometry& tool) {
   std::vector<Coordinate> coordinates;
   for (int k = 0; k + 1 < tool.teeth; ++k)
-    coordinates.push_back({"pitch " + std::to_string(k), 0.0, -30.0, 30.0, 0.02, 5.0});
+    coordinates.push_back({"pitch " + std::to_string(k), 0.0, -30.0, 30.0, 5e-4, 5.0});
   Hypothesis h = amplitudes("uneven_pitch", coordinates, 0.5);
   h.entry = [tool](const Values& v) {
     EffectEntry e;
@@ -167,9 +167,9 @@ Hypothesis extraMode(const std::string& axis) {
   Hypothesis h;
   h.effect = "extra_mode";
   h.variant = axis;
-  h.coordinates = {{"ln frequency_hz", std::log(800.0), std::log(20.0), std::log(12000.0), 1e-4, 1.5},
-                   {"ln damping_ratio", std::log(0.03), std::log(0.001), std::log(0.6), 0.01, 1.0},
-                   {"gain", 0.0, -1.0, 1.0, 1e-3, 0.2}};
+  h.coordinates = {{"ln frequency_hz", std::log(800.0), std::log(20.0), std::log(12000.0), 2.5e-06, 1.5},
+                   {"ln damping_ratio", std::log(0.03), std::log(0.001), std::log(0.6), 0.00025, 1.0},
+                   {"gain", 0.0, -1.0, 1.0, 2.5e-05, 0.2}};
   h.entry = [axis](const Values& v) {
     EffectEntry e;
     e.name = "extra_mode";
@@ -187,10 +187,10 @@ Hypothesis flexibility(const std::string& axis) {
   for (const char a : axis) {
     const std::string name(1, a);
     h.coordinates.push_back(
-        {"ln " + name + " frequency_hz", std::log(1200.0), std::log(100.0), std::log(8000.0), 1e-3, 1.0});
+        {"ln " + name + " frequency_hz", std::log(1200.0), std::log(100.0), std::log(8000.0), 2.5e-5, 1.0});
     h.coordinates.push_back(
-        {"ln " + name + " damping_ratio", std::log(0.04), std::log(0.003), std::log(0.4), 0.02, 1.0});
-    h.coordinates.push_back({name + " compliance_um_per_kn", 0.0, 0.0, 1000.0, 0.2, 100.0});
+        {"ln " + name + " damping_ratio", std::log(0.04), std::log(0.003), std::log(0.4), 5e-4, 1.0});
+    h.coordinates.push_back({name + " compliance_um_per_kn", 0.0, 0.0, 1000.0, 5e-3, 100.0});
   }
   h.entry = [axis](const Values& v) {
     EffectEntry e;
@@ -227,13 +227,13 @@ std::vector<Hypothesis> catalogueHypotheses(const Dataset& data, std::vector<std
   if (scope.cuts) {
     all.push_back(planar("runout", "offset_um", 1.0, 200.0, 20.0));
     all.push_back(amplitudes("edge_forces",
-                             {{"Kte_n_per_mm", 0.0, -200.0, 200.0, 0.2, 20.0},
-                              {"Kre_n_per_mm", 0.0, -200.0, 200.0, 0.2, 20.0},
-                              {"Kae_n_per_mm", 0.0, -200.0, 200.0, 0.2, 20.0}},
+                             {{"Kte_n_per_mm", 0.0, -200.0, 200.0, 0.005, 20.0},
+                              {"Kre_n_per_mm", 0.0, -200.0, 200.0, 0.005, 20.0},
+                              {"Kae_n_per_mm", 0.0, -200.0, 200.0, 0.005, 20.0}},
                              2.0));
     all.push_back(powerLaw("size_effect", "reference_chip_um", 60.0, 1.0, 3000.0));
     if (scope.known_wear) {
-      all.push_back(amplitudes("tool_wear", {{"edge_growth_per_min", 0.0, -0.2, 20.0, 0.005, 1.0}}, 0.1));
+      all.push_back(amplitudes("tool_wear", {{"edge_growth_per_min", 0.0, -0.2, 20.0, 0.000125, 1.0}}, 0.1));
     } else {
       leaveOut("tool_wear", "cut_time_before_s is not stated");
     }
@@ -242,18 +242,18 @@ std::vector<Hypothesis> catalogueHypotheses(const Dataset& data, std::vector<std
     if (model.tool) {
       const double helix = units::degFromRad(model.tool->helix);
       all.push_back(
-          amplitudes("helix", {{"helix_deg", helix, 0.0, 75.0, 0.1, 8.0}}, helix > 60.0 ? -1.0 : 1.0));
+          amplitudes("helix", {{"helix_deg", helix, 0.0, 75.0, 0.0025, 8.0}}, helix > 60.0 ? -1.0 : 1.0));
     }
     for (const char* axis : {"x", "y", "xy"}) all.push_back(flexibility(axis));
     if (!model.tool_tip.x.modes.empty() || !model.tool_tip.y.modes.empty()) {
       all.push_back(reaching(
-          amplitudes("process_damping", {{"coefficient_n_per_mm", 0.0, -1e4, 1e6, 5.0, 2000.0}}, 50.0),
+          amplitudes("process_damping", {{"coefficient_n_per_mm", 0.0, -1e4, 1e6, 0.125, 2000.0}}, 50.0),
           {50.0, 300.0, 1500.0}));
     } else {
       leaveOut("process_damping", "the model's tool is rigid");
     }
-    all.push_back(amplitudes("depth_tilt", {{"slope_um_per_mm", 0.0, -900.0, 900.0, 0.5, 50.0}}, 5.0));
-    all.push_back(amplitudes("feed_error", {{"ratio", 1.0, 0.2, 5.0, 0.005, 0.2}}, 0.02));
+    all.push_back(amplitudes("depth_tilt", {{"slope_um_per_mm", 0.0, -900.0, 900.0, 0.0125, 50.0}}, 5.0));
+    all.push_back(amplitudes("feed_error", {{"ratio", 1.0, 0.2, 5.0, 0.000125, 0.2}}, 0.02));
   }
   if (scope.forces()) {
     for (const char* axis : {"x", "y", "z"}) {
@@ -261,10 +261,18 @@ std::vector<Hypothesis> catalogueHypotheses(const Dataset& data, std::vector<std
     }
     if (sensor_modes) {
       // A light mode answers in proportion only while it moves by less than its width.
-      all.push_back(reaching(amplitudes("mass_loading", {{"mass_ratio", 0.0, -0.6, 3.0, 0.002, 0.3}}, 0.01),
-                             {0.01, 0.05, 0.12, 0.2, 0.3, 0.45, 0.7, -0.05, -0.12, -0.25}));
+      // In logarithms the mass does just what the modes' stated frequencies do, all at once.
+      Hypothesis mass = amplitudes(
+          "mass_loading", {{"ln 1 + mass_ratio", 0.0, std::log(0.4), std::log(4.0), 5e-05, 0.3}}, 0.01);
+      mass.entry = [](const Values& v) {
+        EffectEntry e;
+        e.name = "mass_loading";
+        e.numbers["mass_ratio"] = std::expm1(v[0]);
+        return e;
+      };
+      all.push_back(reaching(std::move(mass), {0.01, 0.05, 0.12, 0.2, 0.3, 0.45, 0.7, -0.05, -0.12, -0.25}));
       all.push_back(reaching(
-          amplitudes("speed_dependent_mode", {{"softening_per_krpm", 0.0, -0.04, 0.04, 2e-4, 0.02}}, 0.001),
+          amplitudes("speed_dependent_mode", {{"softening_per_krpm", 0.0, -0.04, 0.04, 5e-06, 0.02}}, 0.001),
           {0.001, 0.003, 0.006, 0.01, 0.015, 0.025, -0.003, -0.01}));
     } else {
       leaveOut("mass_loading and speed_dependent_mode", "the model's force sensor has no modes");
@@ -273,10 +281,10 @@ std::vector<Hypothesis> catalogueHypotheses(const Dataset& data, std::vector<std
     for (const char* pair : {"xy", "xz", "yx", "yz", "zx", "zy"})
       pairs.push_back({pair, 0.0, -0.9, 0.9, 0.002, 0.1});
     all.push_back(amplitudes("cross_talk", pairs, 0.01));
-    Hypothesis drift = amplitudes(
-        "charge_drift",
-        {{"rate_n_per_min", 0.0, -1e5, 1e5, 1.0, 500.0}, {"y rate_n_per_min", 0.0, -1e5, 1e5, 1.0, 500.0}},
-        20.0);
+    Hypothesis drift = amplitudes("charge_drift",
+                                  {{"rate_n_per_min", 0.0, -1e5, 1e5, 0.025, 500.0},
+                                   {"y rate_n_per_min", 0.0, -1e5, 1e5, 0.025, 500.0}},
+                                  20.0);
     drift.entry = [](const Values& v) {
       EffectEntry e;
       e.name = "charge_drift";
@@ -291,7 +299,7 @@ std::vector<Hypothesis> catalogueHypotheses(const Dataset& data, std::vector<std
       if (!scope.channels.count("fx") && !scope.channels.count("fy")) break;
       Hypothesis hum = amplitudes(
           "mains_hum",
-          {{"amplitude_n", 0.0, 0.0, 1e4, 0.02, 10.0}, {"y_ratio", 0.5, -20.0, 20.0, 0.005, 1.0}}, 1.0);
+          {{"amplitude_n", 0.0, 0.0, 1e4, 0.0005, 10.0}, {"y_ratio", 0.5, -20.0, 20.0, 0.000125, 1.0}}, 1.0);
       hum.variant = frequency == 50.0 ? "50 Hz" : "60 Hz";
       // The twin takes each record's phase from the record, for which the amplitude must not be zero.
       hum.probes.clear();
@@ -308,7 +316,7 @@ std::vector<Hypothesis> catalogueHypotheses(const Dataset& data, std::vector<std
     const double limit = scope.largest_force;
     Hypothesis saturation;
     saturation.effect = "saturation";
-    saturation.coordinates = {{"limit_n", 4.0 * limit, 0.02 * limit, 8.0 * limit, 2e-4 * limit, 4.0 * limit}};
+    saturation.coordinates = {{"limit_n", 4.0 * limit, 0.02 * limit, 8.0 * limit, 1e-5 * limit, 4.0 * limit}};
     for (const double share : {0.99, 0.97})
       saturation.probes.push_back({{4.0 * limit}, {{share * limit}}, true});
     saturation.entry = [](const Values& v) {
@@ -322,19 +330,19 @@ std::vector<Hypothesis> catalogueHypotheses(const Dataset& data, std::vector<std
   for (const std::string& channel : scope.channels) {
     const bool slow = channel == "load_meter";
     all.push_back(withWord(reaching(amplitudes("channel_delay",
-                                               {{"delay_us", 0.0, 0.0, slow ? 2e5 : 5000.0, slow ? 50.0 : 1.0,
+                                               {{"delay_us", 0.0, 0.0, slow ? 2e5 : 5000.0, slow ? 2.0 : 0.02,
                                                  slow ? 10000.0 : 200.0}},
                                                slow ? 500.0 : 10.0),
                                     slow ? Values{500.0, 5000.0, 30000.0} : Values{10.0, 60.0, 150.0, 400.0}),
                            "channel", channel));
     all.push_back(
-        withWord(amplitudes("gain_error", {{"gain", 1.0, 0.05, 5.0, 0.002, 0.2}}, 0.02), "channel", channel));
+        withWord(amplitudes("gain_error", {{"gain", 1.0, 0.05, 5.0, 5e-05, 0.2}}, 0.02), "channel", channel));
   }
   if (scope.channels.count("load_meter")) {
-    all.push_back(scaled("stribeck_friction", {"breakaway_nm", 0.0, -20.0, 20.0, 0.005, 0.5}, 0.05,
+    all.push_back(scaled("stribeck_friction", {"breakaway_nm", 0.0, -20.0, 20.0, 0.000125, 0.5}, 0.05,
                          "speed_rpm", {400.0, 1200.0, 3500.0}, 50.0, 30000.0, 1.0));
     if (scope.moved_starts) {
-      all.push_back(scaled("friction_warmup", {"cold_ratio", 0.0, -0.9, 20.0, 0.005, 0.5}, 0.05,
+      all.push_back(scaled("friction_warmup", {"cold_ratio", 0.0, -0.9, 20.0, 0.000125, 0.5}, 0.05,
                            "time_constant_s", {80.0, 250.0, 700.0}, 2.0, 20000.0, 1.0));
     } else {
       leaveOut("friction_warmup", "start_time_s is not stated");
@@ -342,7 +350,7 @@ std::vector<Hypothesis> catalogueHypotheses(const Dataset& data, std::vector<std
     const double nominal = model.spindle->load_meter_bandwidth;
     Hypothesis lag =
         reaching(amplitudes("load_meter_lag",
-                            {{"ln bandwidth_hz", 0.0, std::log(0.01), std::log(20.0), 0.005, 0.7}}, -0.1),
+                            {{"ln bandwidth_hz", 0.0, std::log(0.01), std::log(20.0), 0.000125, 0.7}}, -0.1),
                  {-0.1, -0.5, -1.2, 0.4});
     lag.entry = [nominal](const Values& v) {
       EffectEntry e;

@@ -55,8 +55,9 @@ double forceSquares(const TestData& t, const Record& simulated) {
 
 }  // namespace
 
-std::vector<std::string> wrongLabels(const Dataset& data, int threads) {
-  std::vector<std::string> wrong;
+Labels checkLabels(const Dataset& data, int threads) {
+  Labels labels;
+  std::vector<std::string>& wrong = labels.wrong;
   char line[300];
   for (const TestData& t : data.tests) {
     if (t.test.kind == TestKind::tap || t.phase_estimated || !t.record.has("spindle_angle")) continue;
@@ -69,7 +70,7 @@ std::vector<std::string> wrongLabels(const Dataset& data, int threads) {
       wrong.push_back(line);
     }
   }
-  if (!wrong.empty()) return wrong;
+  if (!wrong.empty()) return labels;
 
   const std::size_t count = data.tests.size();
   sim::SimulationOptions options;
@@ -102,7 +103,7 @@ std::vector<std::string> wrongLabels(const Dataset& data, int threads) {
       wrong.push_back(line);
     }
   }
-  if (!wrong.empty()) return wrong;
+  if (!wrong.empty()) return labels;
 
   // Swapped channels.
   std::map<std::pair<std::size_t, std::size_t>, std::vector<std::string>> swapped;
@@ -130,7 +131,7 @@ std::vector<std::string> wrongLabels(const Dataset& data, int threads) {
   for (const auto& [pair, tests] : swapped)
     wrong.push_back(FORCES[pair.first] + " and " + FORCES[pair.second] + " look swapped in tests " +
                     joined(tests));
-  if (!wrong.empty()) return wrong;
+  if (!wrong.empty()) return labels;
 
   // A cut that another cut's label fits far better than its own, while the others fit theirs.
   std::vector<double> gaps(count, 0.0), all;
@@ -139,7 +140,7 @@ std::vector<std::string> wrongLabels(const Dataset& data, int threads) {
     gaps[i] = forceSquares(data.tests[i], own[i]) / static_cast<double>(data.tests[i].record.size());
     all.push_back(gaps[i]);
   }
-  if (all.size() < 4) return wrong;
+  if (all.size() < 4) return labels;
   const double usual = median(all);
   for (std::size_t i = 0; i < count; ++i) {
     const TestData& t = data.tests[i];
@@ -160,10 +161,10 @@ std::vector<std::string> wrongLabels(const Dataset& data, int threads) {
       }
     }
     if (best < RELABELLED * gaps[i] && best < AS_WELL * std::max(theirs, 6.0))
-      wrong.push_back("test " + t.test.name + " looks mislabelled: feed, depth or immersion of " + name +
-                      " fit its record");
+      labels.doubtful.push_back("test " + t.test.name + " looks mislabelled: feed, depth or immersion of " +
+                                name + " fit its record");
   }
-  return wrong;
+  return labels;
 }
 
 }  // namespace smartmill::discrepancy

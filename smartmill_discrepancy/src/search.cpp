@@ -77,18 +77,34 @@ std::vector<double> startOf(const Fitter& fitter, const Fit& now, const Promise&
 void refine(TwinRunner& quick_runner, const Fitter& quick, const Fitter& exact, const FitState& state,
             const SearchOptions& options, SearchResult* result) {
   // The quick runner, made equal to the exact one at the state, finds the exact solution in a few passes.
+  // They end when no value moves by much of its standard deviation: in a narrow valley the cost says little.
+  constexpr int PASSES = 6;
+  constexpr double SETTLED = 0.1;
   NominalTangents tangents;
   FitState from = state;
-  for (int pass = 0; pass < 3; ++pass) {
+  for (int pass = 0; pass <= PASSES; ++pass) {
     const MachineModel model = quick.model(from);
     quick_runner.correctTo(model, exact.runner().simulate(model));
     tangents = quick.nominalTangents(from);
-    Fit fit = quick.fit(from, &tangents, {6, 1e-8, true});
-    if (!fit.converged) break;
-    from = fit.state;
-    const bool settled = pass > 0 && std::abs(fit.bic - result->best.bic) < 1.0;
-    result->best = std::move(fit);
-    if (settled) break;
+    // All tangents at one point: only these tell what is known along a valley.
+    Fit here = quick.fit(from, &tangents, {0, 1e-8, true});
+    if (!here.converged) break;
+    const Eigen::MatrixXd covariance = here.covariance;
+    result->best = std::move(here);
+    if (pass == PASSES) break;
+    const Fit next = quick.fit(from, &tangents, {6, 1e-8, true});
+    if (!next.converged) break;
+    double moved = 0.0;
+    Eigen::Index k = 0;
+    const auto compare = [&](const std::vector<double>& a, const std::vector<double>& b) {
+      for (std::size_t c = 0; c < a.size(); ++c, ++k)
+        moved = std::max(moved, std::abs(a[c] - b[c]) / std::sqrt(covariance(k, k)));
+    };
+    compare(from.nominal, next.state.nominal);
+    for (std::size_t m = 0; m < from.members.size(); ++m)
+      compare(from.members[m].values, next.state.members[m].values);
+    if (moved < SETTLED) break;
+    from = next.state;
   }
   const FitState& at = result->best.state;
   result->contribution.clear();

@@ -83,18 +83,19 @@ TEST(Labels, nameSwappedChannelsAndAnotherSpeed) {
   const Campaign campaign =
       only(readCampaign(campaigns() + "/runout"), {"air_1000", "slot_3000", "slot_7200", "slot_4500_060"});
   const Dataset data = loadDataset(campaign, readMachineModel(campaign.modelPath()));
-  EXPECT_TRUE(wrongLabels(data, 2).empty());
+  EXPECT_TRUE(checkLabels(data, 2).wrong.empty());
+  EXPECT_TRUE(checkLabels(data, 2).doubtful.empty());
 
   Dataset swapped = data;
   Record& record = swapped.tests[2].record;
   std::swap(record.add("fx"), record.add("fy"));
-  const std::vector<std::string> wrong = wrongLabels(swapped, 2);
+  const std::vector<std::string> wrong = checkLabels(swapped, 2).wrong;
   ASSERT_EQ(wrong.size(), 1u);
   EXPECT_EQ(wrong.front(), "fx and fy look swapped in tests " + swapped.tests[2].test.name);
 
   Dataset speed = data;
   speed.tests[2].test.spindle_speed *= 1.25;
-  ASSERT_EQ(wrongLabels(speed, 2).size(), 1u);
+  ASSERT_EQ(checkLabels(speed, 2).wrong.size(), 1u);
 }
 
 // Closed forms: chi-square with two degrees of freedom is exponential; Benjamini-Hochberg by hand.

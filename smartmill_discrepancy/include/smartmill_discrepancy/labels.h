@@ -8,9 +8,15 @@
 namespace smartmill::discrepancy {
 
 /// What of a campaign is not as it is labelled, one line each, e.g. "fx and fy look swapped in tests slot_1,
-/// slot_2": channels swapped, channel in another unit, spindle at another speed than stated, test with the
-/// label of another. Compares with the nominal model; looks only for what would be far larger than any effect
-/// of the catalogue.
-std::vector<std::string> wrongLabels(const Dataset& data, int threads);
+/// slot_2".
+struct Labels {
+  std::vector<std::string> wrong;  ///< channels swapped, channel in another unit, spindle at another speed
+  /// A test that another's label fits. An effect that acts in that test most looks alike: only where nothing
+  /// explains the campaign the label is wrong.
+  std::vector<std::string> doubtful;
+};
+
+/// Compares with the nominal model; looks only for what would be far larger than any effect of the catalogue.
+Labels checkLabels(const Dataset& data, int threads);
 
 }  // namespace smartmill::discrepancy

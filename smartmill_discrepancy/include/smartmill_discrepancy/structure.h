@@ -24,7 +24,7 @@ struct Finding {
 struct StructureOptions {
   int most = 12;                ///< findings
   double p_value = 1e-6;        ///< false discovery rate
-  double twin_accuracy = 1e-4;  ///< [1] of the signal, below which the twin is not believed
+  double twin_accuracy = 2e-4;  ///< [1] of the signal, below which the twin is not believed
   double squares_of_gap =
       0.0;  ///< what share_of_gap refers to; 0: the residual's own squares above the noise
   double least_share =

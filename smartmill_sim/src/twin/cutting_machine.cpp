@@ -117,7 +117,9 @@ void CuttingMachine::update(const Input& input) {
   if (rigid_) rigid_->setLaw(state_.law);
   if (regenerative_) regenerative_->setLaw(state_.law);
   if (drive_) drive_->setFriction(state_.friction_extra, state_.friction_factor);
-  if (std::abs(state_.sensor_frequency / sensor_frequency_ - 1.0) > SENSOR_TOLERANCE) {
+  // The first time exactly, then only when it has moved.
+  const double moved = std::abs(state_.sensor_frequency / sensor_frequency_ - 1.0);
+  if (moved > SENSOR_TOLERANCE || (sensor_frequency_ == 1.0 && moved > 0.0)) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       ModalFilter next(firstModeAt(model_.force_sensor.axis[axis], state_.sensor_frequency), 1.0 / time_step_,
                        Hold::first_order);

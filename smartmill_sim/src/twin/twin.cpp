@@ -22,10 +22,6 @@ namespace {
 
 const std::array<const char*, 2> TIP{{"tool_x", "tool_y"}};
 
-// The force of a cut comes on over this part of a sample before the engagement (so it fits campaigns that
-// another program made): [1]
-constexpr double RISE = 1.0 / 6.0;
-
 // Columns that this twin gives: inputs and the channels of the measuring chain.
 bool gives(const std::string& column, const CampaignTest& test) {
   if (column == "spindle_angle" || column == "hammer") return true;
@@ -267,7 +263,7 @@ Record simulate(const MachineModel& model, const CampaignTest& test, const Recor
         // A rounded time stamp must not put the sample of engagement on the wrong side.
         if (cut && !engaged && t >= start - 1e-3 * dt) {
           machine.engage({{test.engagement->entry, test.engagement->exit, test.engagement->axial_depth}},
-                         input.motion, RISE * options.substeps);
+                         input.motion, ENGAGEMENT_RISE * options.substeps);
           engaged = true;
         }
         return input;

@@ -20,6 +20,10 @@ struct SimulationOptions {
   bool random_phases = false;
 };
 
+/// [1] The force of a cut comes on over this part of a sample before the engagement (so it fits campaigns that
+/// another program made).
+constexpr double ENGAGEMENT_RISE = 1.0 / 6.0;
+
 /// [rad] Spindle angle at a record's first sample: the phase that fits its angles best at the test's speed.
 /// 0 for a tap and for a record without spindle_angle.
 double recordedPhase(const CampaignTest& test, const Record& recorded);
