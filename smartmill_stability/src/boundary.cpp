@@ -34,16 +34,28 @@ class Tracer {
       for (int j = 0; j < o_.depths; ++j) cells.insert({i, j});
     for (int level = 0;; ++level) {
       const int size = fine_ >> level;
+      const int rows = o_.speeds << level, columns = o_.depths << level;
       std::set<Corner> passed;
-      for (const Corner& c : cells)
-        if (crosses(c, size)) passed.insert(c);
+      // Follow the boundary into cells that were not looked at: a narrow tip goes on where a coarser grid
+      // lost it.
+      std::vector<Corner> open(cells.begin(), cells.end());
+      while (!open.empty()) {
+        const Corner c = open.back();
+        open.pop_back();
+        if (!crosses(c, size) || !passed.insert(c).second) continue;
+        for (int di = -1; di <= 1; ++di)
+          for (int dj = -1; dj <= 1; ++dj) {
+            const Corner beside{c[0] + di, c[1] + dj};
+            const bool in = beside[0] >= 0 && beside[1] >= 0 && beside[0] < rows && beside[1] < columns;
+            if (in && cells.insert(beside).second) open.push_back(beside);
+          }
+      }
       if (level == o_.levels) {
         for (const Corner& c : passed) connect(c);
         break;
       }
       // The neighbours too: the boundary may leave through a corner or bend back between two samples.
       std::set<Corner> next;
-      const int rows = o_.speeds << level, columns = o_.depths << level;
       for (const Corner& c : passed)
         for (int di = -1; di <= 1; ++di)
           for (int dj = -1; dj <= 1; ++dj) {

@@ -68,6 +68,7 @@ void traceAll(const Request& request, const stability::FloquetSolver& solver,
   options.speed_low = speeds.front();
   options.speed_high = speeds.back();
   options.max_depth = request.max_depth_mm * units::MM;
+  options.levels = 3;  // tips of pockets down to 1/480 of the range of speeds
   const auto curves = stability::traceBoundary(solver, options);
   std::ofstream csv(request.boundary);
   csv.precision(8);
