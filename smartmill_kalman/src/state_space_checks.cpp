@@ -42,10 +42,9 @@ StateSpaceCheck checkStateSpace(const StateSpace& space, const std::string& form
   check.states = static_cast<int>(n);
   if (n == 0) return check;
   const MatrixXd a = time * space.a;
-  const Eigen::FullPivLU<MatrixXd> lu(a);
   // However small the pivots: a matrix near to singular is what this number is for. A constant force is singular.
-  check.condition = infinityNorm(a) * infinityNorm(lu.inverse());
-  if (!std::isfinite(check.condition)) check.condition = HUGE_VAL;
+  const MatrixXd inverse = a.partialPivLu().inverse();
+  check.condition = inverse.allFinite() ? infinityNorm(a) * infinityNorm(inverse) : HUGE_VAL;
   check.conditioned = 1.0 / check.condition > PRECISION;
 
   const Eigen::VectorXcd poles = Eigen::EigenSolver<MatrixXd>(a, false).eigenvalues();

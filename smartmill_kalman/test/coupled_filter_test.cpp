@@ -1,13 +1,17 @@
 #include "smartmill_kalman/coupled_filter.h"
 
+#include <algorithm>
 #include <cmath>
+#include <fstream>
 #include <random>
 
 #include <gtest/gtest.h>
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/modal/modal_filter.h"
+#include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_core/units.h"
+#include "smartmill_kalman/force_compensation.h"
 #include "smartmill_kalman/reference_case.h"
 
 namespace smartmill::kalman {
@@ -84,6 +88,56 @@ TEST(CoupledFilter, RefusesAMatrixThatCannotBeInverted) {
   matrix.h[0][1] = matrix.h[0][0];
   matrix.h[1][0] = matrix.h[1][1];
   EXPECT_THROW(CoupledFilter(matrix, 900.0, RATE, {}), Error);
+}
+
+TEST(SensorMatrix, FileKeepsEveryDigit) {
+  const TemporaryFolder folder;
+  writeSensorMatrix(sensor(), folder.file("matrix.yaml"));
+  const SensorMatrix back = readSensorMatrix(folder.file("matrix.yaml"));
+  for (std::size_t i = 0; i < 3; ++i) {
+    for (std::size_t j = 0; j < 3; ++j)
+      EXPECT_EQ(back.h[i][j].response(777.0), sensor().h[i][j].response(777.0)) << i << j;
+  }
+  std::ofstream(folder.file("matrix.yaml"), std::ios::app) << "xy: {direct: 0.0}\n";
+  EXPECT_THROW(readSensorMatrix(folder.file("matrix.yaml")), Error);
+}
+
+// Online, block by block: the same numbers as the coupled filter of whole records.
+TEST(ForceCompensation, CoupledIsTheCoupledFilter) {
+  const double speed =
+      std::exp(0.01 * std::lround(100.0 * std::log(units::radPerSecFromRpm(9000.0))));  // on the grid
+  CompensationParameters parameters;
+  CoupledFilter whole(sensor(), speed, RATE, parameters.filter);
+  std::vector<std::array<double, 3>> expected;
+  std::vector<double> worst;
+  ForceCompensation online(parameters, false, [&](const ForceBlock& measured, const ForceBlock& compensated) {
+    for (std::size_t i = 0; i < measured.force[0].size(); ++i) {
+      const auto force = whole.step({measured.force[0][i], measured.force[1][i], measured.force[2][i]});
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        worst.push_back(std::abs(force[axis] - compensated.force[axis][i]));
+    }
+  });
+  online.setMatrix(sensor());
+  online.handle(SpindleAngle{0.0, 0.0, speed});
+  std::mt19937 random(9);
+  std::normal_distribution<double> noise(0.0, 1.0);
+  for (int b = 0; b < 20; ++b) {
+    SampleBlock block;
+    block.stamp = 0.01 * b;
+    block.sample_rate = RATE;
+    block.first_index = 256 * b;
+    block.channels = {"fx", "fy", "fz"};
+    block.units = {"N", "N", "N"};
+    for (int i = 0; i < 256; ++i) {
+      const double phase = 4.0 * speed * (256 * b + i) / RATE;
+      block.samples.insert(block.samples.end(),
+                           {200.0 * std::cos(phase) + noise(random), 100.0 * std::sin(phase) + noise(random),
+                            30.0 + noise(random)});
+    }
+    online.handle(block);
+  }
+  ASSERT_EQ(worst.size(), 3u * 256u * 20u);
+  EXPECT_LT(*std::max_element(worst.begin(), worst.end()), 1e-9);
 }
 
 // 200 noisy FRFs: the gains found lie within 1.96 of their standard deviations in 95 %.
