@@ -148,7 +148,10 @@ void printTerms(const Options& o, const LoadRecordResult& found) {
   }
   if (found.edge_growth != 0.0)
     std::printf("  Kte x (1 + %.4f per minute of cut)\n", 60.0 * found.edge_growth);
-  if (found.runout != 0.0) std::printf("  effective runout %.2f um\n", found.runout / units::UM);
+  if (found.runout != 0.0) {
+    std::printf("  runout %.2f um at %.1f deg\n", found.runout / units::UM,
+                units::degFromRad(found.runout_angle));
+  }
   if (!o.spindle_uncertainty && !found.terms.empty() && found.terms.back() == "load meter's lag") {
     std::printf("  load meter's bandwidth %.4f Hz\n", found.bandwidth);
   }

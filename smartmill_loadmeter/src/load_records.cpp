@@ -5,21 +5,29 @@
 
 #include <Eigen/Dense>
 
+#include "smartmill_loadmeter/runout_torque.h"
 #include "smartmill_core/campaign/record.h"
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/units.h"
 #include "smartmill_loadmeter/campaign_identification.h"
-#include "smartmill_loadmeter/runout.h"
 
 namespace smartmill::loadmeter {
 
 namespace {
 
-// Columns of a record, in units of a typical value: idle torque, Ktc, Kte, log of the time constant.
-constexpr int COLUMNS = 4;
-enum Column { IDLE, KTC, KTE, LAG };
-const Eigen::Vector4d UNIT(1.0, 1e9, 1e4, 1.0);
+// Columns of a record, in units of a typical value: idle torque, Ktc, Kte, log of the time constant, runout
+// x, y.
+constexpr int COLUMNS = 6;
+enum Column { IDLE, KTC, KTE, LAG, RUNOUT_X, RUNOUT_Y };
+using Row = Eigen::Matrix<double, COLUMNS, 1>;
+using Square = Eigen::Matrix<double, COLUMNS, COLUMNS>;
+const Row UNIT = (Row() << 1.0, 1e9, 1e4, 1.0, 1e-5, 1e-5).finished();
+
+/// Offset of the cutter axis [m], towards tooth 1 and across.
+struct Runout {
+  double x = 0.0, y = 0.0;
+};
 
 // One first-order lag, exact for an input that runs linearly within a step.
 class Lag {
@@ -27,14 +35,15 @@ class Lag {
   explicit Lag(double time_constant) : time_constant_(time_constant) {}
   void start(double value) { output_ = value; }
   double step(double from, double to, double dt) {
-    const double a = std::exp(-dt / time_constant_), slope = dt > 0.0 ? (to - from) / dt : 0.0;
+    if (dt != dt_) keep_ = std::exp(-dt / time_constant_), dt_ = dt;
+    const double a = keep_, slope = dt > 0.0 ? (to - from) / dt : 0.0;
     output_ = a * output_ + (1.0 - a) * (from - slope * time_constant_) + slope * dt;
     return output_;
   }
 
  private:
   double time_constant_;
-  double output_ = 0.0;
+  double output_ = 0.0, dt_ = 0.0, keep_ = 1.0;
 };
 
 /// One air cut or cut and its torque for Ktc = 1 and Kte = 1.
@@ -44,68 +53,28 @@ struct LoadRecord {
   double start_time = 0.0;  // [s]
   double edge_age = 0.0;    // [s] cutting time of the edge in the middle of the cut
   bool cut = false;
-  std::vector<double> voltage;                  // [V]
-  std::size_t first = 0;                        // sample at or after engagement
-  double dt = 0.0, lead = 0.0;                  // [s] sample interval; engagement before sample `first`
-  bool throughout = false;                      // in cut before the record began
-  std::array<double, 2> at_engagement{{0, 0}};  // torque per Ktc, Kte
-  std::array<double, 2> mean{{0, 0}};
-  std::array<std::vector<double>, 2> torque;  // from `first` on
-
-  // Mean torque with the cutter axis off by k steps over that without, per Ktc and Kte.
-  std::array<std::vector<double>, 2> runout;
+  std::vector<double> voltage;  // [V]
+  std::size_t first = 0;        // sample at or after engagement
+  double dt = 0.0, lead = 0.0;  // [s] sample interval; engagement before sample `first`
+  bool throughout = false;      // in cut before the record began
+  ToolGeometry tool;
+  Engagement engagement;
+  bool has_angle = false;
+  double engage_angle = 0.0;  // [rad] of the spindle
+  std::vector<double> angle;  // [rad] from `first` on
+  // Without the angle runout acts through the mean alone: share of it, per Ktc and Kte.
+  std::array<double, 2> share{{1.0, 1.0}};
 
   // Condensed: V = watt (columns x quantities).
-  Eigen::Matrix4d normal;
-  Eigen::Vector4d right;
+  Square normal;
+  Row right;
   double squares = 0.0;
-  Eigen::Vector4d sum;  // of the rows: what a constant error of the voltage does
+  Row sum;  // of the rows: what a constant error of the voltage does
   Eigen::MatrixXd rows;
   Eigen::VectorXd target;
   double saturated = 0.0;  // [V2] squares left by the record's own best fit
   double rounding = 0.0;   // [V] of its level
 };
-
-constexpr double OFFSET_STEP = 2e-6;  // [m]
-constexpr std::size_t OFFSETS = 41;
-
-// Runout moves material from tooth to tooth, which leaves the mean torque as it is until a tooth misses part
-// of its arc. h is the least distance to any surface that earlier teeth left; offset towards tooth 1.
-std::array<std::vector<double>, 2> runoutShares(const ToolGeometry& tool, const Engagement& e) {
-  constexpr int STEPS = 256;
-  const double low = std::max(e.entry, 0.0), high = std::min(e.exit, units::PI);
-  std::array<std::vector<double>, 2> shares;
-  std::array<double, 2> straight{};
-  for (std::size_t o = 0; o < OFFSETS; ++o) {
-    const double offset = OFFSET_STEP * static_cast<double>(o);
-    double chip = 0.0, arc = 0.0;
-    std::vector<double> radius;
-    for (int t = 0; t < tool.teeth; ++t) radius.push_back(offset * std::cos(tool.toothAngle(t)));
-    for (int t = 0; t < tool.teeth; ++t) {
-      for (int i = 0; i < STEPS; ++i) {
-        const double s = std::sin(low + (high - low) * (i + 0.5) / STEPS);
-        const double h = chipThickness(tool, e.feed_per_tooth, s, radius, t);
-        // A tooth that misses does so in part of the step: smooth over the step.
-        const double width = e.feed_per_tooth * (high - low) / STEPS;
-        const double share = std::clamp(0.5 + h / width, 0.0, 1.0);
-        arc += share;
-        chip += share * std::max(h, 0.0);
-      }
-    }
-    if (o == 0) straight = {chip, arc};
-    shares[0].push_back(chip / straight[0]);
-    shares[1].push_back(arc / straight[1]);
-  }
-  return shares;
-}
-
-// Continued oddly below zero, so that a fit may stand at zero and know its standard deviation.
-double shareAt(const std::vector<double>& shares, double offset) {
-  const double at = std::min(std::abs(offset) / OFFSET_STEP, static_cast<double>(OFFSETS) - 1.001);
-  const std::size_t i = static_cast<std::size_t>(at);
-  const double change = shares[i] + (shares[i + 1] - shares[i]) * (at - static_cast<double>(i)) - 1.0;
-  return offset < 0.0 ? 1.0 - change : 1.0 + change;
-}
 
 LoadRecord prepare(const CampaignTest& test, const Record& record, const ToolGeometry& tool) {
   LoadRecord r;
@@ -122,30 +91,59 @@ LoadRecord prepare(const CampaignTest& test, const Record& record, const ToolGeo
   r.lead = static_cast<double>(r.first) * r.dt - engage;
   r.edge_age =
       test.cut_time_before.value_or(0.0) + 0.5 * (static_cast<double>(record.size()) * r.dt - engage);
-  r.runout = runoutShares(tool, *test.engagement);
-  const std::vector<double>* angle = record.has("spindle_angle") ? &record.column("spindle_angle") : nullptr;
-  for (std::size_t u = 0; u < 2; ++u) {
-    const MechanisticForce force(
-        tool, u == 0 ? CuttingCoefficients{1, 0, 0, 0, 0, 0} : CuttingCoefficients{0, 0, 0, 1, 0, 0},
-        *test.engagement);
-    r.mean[u] = force.mean().torque;
-    // Without the angle: the mean.
-    const auto torqueAt = [&](std::size_t i, double time) {
-      return angle ? force.at((*angle)[i] + r.speed * (time - record.time[i])).torque : r.mean[u];
-    };
-    for (std::size_t i = r.first; i < record.size(); ++i) r.torque[u].push_back(torqueAt(i, record.time[i]));
-    if (r.first < record.size()) r.at_engagement[u] = torqueAt(r.first, begin + engage);
-  }
+  r.tool = tool;
+  r.engagement = *test.engagement;
+  r.has_angle = record.has("spindle_angle");
+  if (!r.has_angle || r.first >= record.size()) return r;
+  const std::vector<double>& angle = record.column("spindle_angle");
+  r.engage_angle = angle[r.first] + r.speed * (begin + engage - record.time[r.first]);
+  r.angle.assign(angle.begin() + static_cast<std::ptrdiff_t>(r.first), angle.end());
   return r;
 }
 
-std::vector<double> lagged(const LoadRecord& r, std::size_t u, double time_constant) {
+// Torque in cut per unit of Ktc, Kte: at engagement, in the mean, from `first` on.
+struct UnitTorque {
+  std::array<double, 2> at_engagement, mean;
+  std::array<std::vector<double>, 2> torque;
+};
+
+// Without the angle: the mean.
+UnitTorque unitTorque(const LoadRecord& r, const Runout& runout) {
+  constexpr std::size_t STEPS = 4096;  // of a revolution, linear between: 3e-7 of the ripple
+  UnitTorque unit;
+  const RunoutTorque torque(r.tool, r.engagement, runout.x, runout.y);
+  unit.mean = torque.mean();
+  const std::size_t n = r.voltage.size() - r.first;
+  if (!r.has_angle) {
+    unit.at_engagement = unit.mean;
+    for (std::size_t u = 0; u < 2; ++u) unit.torque[u].assign(n, unit.mean[u]);
+    return unit;
+  }
+  std::vector<std::array<double, 2>> table(STEPS + 1);
+  for (std::size_t i = 0; i < STEPS; ++i) {
+    table[i] = torque.at(units::TWO_PI * static_cast<double>(i) / STEPS);
+  }
+  table[STEPS] = table[0];
+  for (std::size_t u = 0; u < 2; ++u) unit.torque[u].resize(n);
+  for (std::size_t i = 0; i < r.angle.size(); ++i) {
+    const double turn = r.angle[i] / units::TWO_PI, at = (turn - std::floor(turn)) * STEPS;
+    const std::size_t k = std::min(static_cast<std::size_t>(at), STEPS - 1);
+    const double share = at - static_cast<double>(k);
+    for (std::size_t u = 0; u < 2; ++u) {
+      unit.torque[u][i] = table[k][u] + share * (table[k + 1][u] - table[k][u]);
+    }
+  }
+  unit.at_engagement = torque.at(r.engage_angle);
+  return unit;
+}
+
+std::vector<double> lagged(const LoadRecord& r, const UnitTorque& unit, std::size_t u, double time_constant) {
   std::vector<double> out(r.voltage.size(), 0.0);
   Lag lag(time_constant);
-  if (r.throughout) lag.start(r.mean[u]);
-  double before = r.at_engagement[u];
-  for (std::size_t i = 0; i < r.torque[u].size(); ++i) {
-    const double now = r.torque[u][i];
+  if (r.throughout) lag.start(unit.mean[u]);
+  double before = unit.at_engagement[u];
+  for (std::size_t i = 0; i < unit.torque[u].size(); ++i) {
+    const double now = unit.torque[u][i];
     // Engagement is a step that need not fall on a sample.
     out[r.first + i] = lag.step(before, now, i == 0 ? r.lead : r.dt);
     before = now;
@@ -153,40 +151,69 @@ std::vector<double> lagged(const LoadRecord& r, std::size_t u, double time_const
   return out;
 }
 
-/// @param ktc, kte [N/m2], [N/m] about which the lag's column is taken. @param resolution [V].
-void condense(LoadRecord& r, double gain, double time_constant, double ktc, double kte, double resolution) {
+// Mean torque with runout over that without, per Ktc and Kte.
+std::array<double, 2> meanShare(const LoadRecord& r, const Runout& runout) {
+  const std::array<double, 2> plain = RunoutTorque(r.tool, r.engagement, 0.0, 0.0).mean(),
+                              with = RunoutTorque(r.tool, r.engagement, runout.x, runout.y).mean();
+  return {with[0] / plain[0], with[1] / plain[1]};
+}
+
+/// @param ktc, kte [N/m2], [N/m] about which the columns of the lag and the runout are taken.
+/// @param runout [m] likewise. @param resolution [V].
+void condense(LoadRecord& r, double gain, double time_constant, double ktc, double kte, const Runout& runout,
+              double resolution) {
   const double watt = gain * r.speed;
   r.normal.setZero();
   r.right.setZero();
   r.sum.setZero();
   r.squares = 0.0;
   std::array<std::vector<double>, 2> unit;
-  std::vector<double> by_lag;
+  std::array<std::vector<double>, 3> by;  // lag, runout x, y
   if (r.cut) {
-    const double h = 1e-3;
-    by_lag.assign(r.voltage.size(), 0.0);
+    const std::array<double, 2> k{ktc, kte};
+    for (std::vector<double>& column : by) column.assign(r.voltage.size(), 0.0);
+    const auto addTo = [&](std::vector<double>& column, const UnitTorque& torque, std::size_t u, double tau,
+                           double factor) {
+      const std::vector<double> response = lagged(r, torque, u, tau);
+      for (std::size_t i = 0; i < column.size(); ++i) column[i] += factor * response[i];
+    };
+    const UnitTorque here = unitTorque(r, r.has_angle ? runout : Runout());
+    const double h = 1e-3, d = 2e-7;
     for (std::size_t u = 0; u < 2; ++u) {
-      unit[u] = lagged(r, u, time_constant);
-      const std::vector<double> above = lagged(r, u, time_constant * (1.0 + h));
-      const std::vector<double> below = lagged(r, u, time_constant * (1.0 - h));
-      for (std::size_t i = 0; i < by_lag.size(); ++i) {
-        by_lag[i] += (u == 0 ? ktc : kte) * (above[i] - below[i]) / (2.0 * h);
+      unit[u] = lagged(r, here, u, time_constant);
+      addTo(by[0], here, u, time_constant * (1.0 + h), k[u] / (2.0 * h));
+      addTo(by[0], here, u, time_constant * (1.0 - h), -k[u] / (2.0 * h));
+    }
+    if (r.has_angle && r.tool.teeth > 1) {
+      for (const double sign : {1.0, -1.0}) {
+        const UnitTorque along = unitTorque(r, {runout.x + sign * d, runout.y}),
+                         across = unitTorque(r, {runout.x, runout.y + sign * d});
+        for (std::size_t u = 0; u < 2; ++u) {
+          addTo(by[1], along, u, time_constant, sign * k[u] / (2.0 * d));
+          addTo(by[2], across, u, time_constant, sign * k[u] / (2.0 * d));
+        }
       }
+    } else {
+      r.share = meanShare(r, runout);
     }
   }
-  Eigen::Vector4d row(watt * UNIT[IDLE], 0.0, 0.0, 0.0);
+  Row row = Row::Zero();
+  row[IDLE] = watt * UNIT[IDLE];
   for (std::size_t i = 0; i < r.voltage.size(); ++i) {
     if (r.cut) {
       row[KTC] = watt * unit[0][i] * UNIT[KTC];
       row[KTE] = watt * unit[1][i] * UNIT[KTE];
-      row[LAG] = watt * by_lag[i] * UNIT[LAG];
+      for (std::size_t c = 0; c < 3; ++c) {
+        const Eigen::Index at = static_cast<Eigen::Index>(LAG + c);
+        row[at] = watt * by[c][i] * UNIT[at];
+      }
     }
     r.normal += row * row.transpose();
     r.right += row * r.voltage[i];
     r.sum += row;
     r.squares += r.voltage[i] * r.voltage[i];
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> solver(r.normal);
+  const Eigen::SelfAdjointEigenSolver<Square> solver(r.normal);
   const double largest = solver.eigenvalues().maxCoeff();
   std::vector<int> kept;
   for (int k = 0; k < COLUMNS; ++k) {
@@ -216,7 +243,7 @@ struct Terms {
   FrictionShape friction;
   bool growth = false, runout = false, lag = false;
   std::size_t count() const {
-    return friction.unknowns() + 2 + (growth ? 1 : 0) + (runout ? 1 : 0) + (lag ? 1 : 0);
+    return friction.unknowns() + 2 + (growth ? 1 : 0) + (runout ? 2 : 0) + (lag ? 1 : 0);
   }
 };
 
@@ -244,14 +271,15 @@ class Campaigns {
   double zero_below = 0.0;  // [rad/s]
   double slowest = 0.0, fastest = 0.0;
   std::vector<Prior> friction_priors;
-  double runout_prior = 0.0;  // [m]; 0: none
+  double runout_prior = 0.0;  // [m] of each component; 0: none
+  Runout runout_at;           // of the condensed records
   double lag_prior = 0.0;     // std of the log time constant; 0: none
   double lag_at = 0.0;        // log of (time constant of the condensed records / the model's)
 
   std::size_t ktcAt(const Terms& t) const { return t.friction.unknowns(); }
 
   std::size_t residualCount() const {
-    std::size_t n = friction_priors.size() + (lag_prior > 0.0 ? 1 : 0) + (runout_prior > 0.0 ? 1 : 0);
+    std::size_t n = friction_priors.size() + (lag_prior > 0.0 ? 1 : 0) + (runout_prior > 0.0 ? 2 : 0);
     for (const LoadRecord& r : records) n += static_cast<std::size_t>(r.target.size());
     return n;
   }
@@ -260,21 +288,28 @@ class Campaigns {
     const FrictionLaw law = FrictionLaw::fromValues(terms.friction, v.data(), zero_below);
     std::size_t at = ktcAt(terms);
     const double ktc = v[at++], kte = v[at++];
-    const double growth = terms.growth ? v[at++] : 0.0, offset = terms.runout ? v[at++] : 0.0;
+    const double growth = terms.growth ? v[at++] : 0.0;
+    const Runout runout = terms.runout ? Runout{v[at], v[at + 1]} : Runout();
+    if (terms.runout) at += 2;
     const double log_lag = terms.lag ? v[at++] : lag_at;
     for (const LoadRecord& r : records) {
-      Eigen::Vector4d quantity = Eigen::Vector4d::Zero();
+      Row quantity = Row::Zero();
       quantity[IDLE] = law.torque(r.speed, r.start_time);
       if (r.cut) {
-        quantity[KTC] = ktc * shareAt(r.runout[0], offset);
-        quantity[KTE] = kte * (1.0 + growth * r.edge_age) * shareAt(r.runout[1], offset);
+        quantity[KTC] = ktc * r.share[0];
+        quantity[KTE] = kte * (1.0 + growth * r.edge_age) * r.share[1];
         quantity[LAG] = log_lag - lag_at;
+        quantity[RUNOUT_X] = runout.x - runout_at.x;
+        quantity[RUNOUT_Y] = runout.y - runout_at.y;
       }
       const Eigen::VectorXd rest = (r.rows * quantity.cwiseQuotient(UNIT) - r.target) / noise;
       for (Eigen::Index i = 0; i < rest.size(); ++i) *out++ = rest[i];
     }
     for (const Prior& p : friction_priors) *out++ = (v[p.unknown] - p.value) / p.std_dev;
-    if (runout_prior > 0.0) *out++ = offset / runout_prior;
+    if (runout_prior > 0.0) {
+      *out++ = runout.x / runout_prior;
+      *out++ = runout.y / runout_prior;
+    }
     if (lag_prior > 0.0) *out++ = log_lag / lag_prior;
   }
 
@@ -283,7 +318,10 @@ class Campaigns {
     unknowns.push_back({ktc, -1e12, 1e12, 1e9});
     unknowns.push_back({kte, -1e8, 1e8, 1e4});
     if (terms.growth) unknowns.push_back({0.0, -0.1, 1.0, 0.01});
-    if (terms.runout) unknowns.push_back({5e-6, -6e-5, 6e-5, 1e-5});
+    if (terms.runout) {
+      unknowns.push_back({runout_at.x, -1e-4, 1e-4, 1e-5});
+      unknowns.push_back({runout_at.y, -1e-4, 1e-4, 1e-5});
+    }
     if (terms.lag) unknowns.push_back({lag_at, -3.0, 3.0, 0.1});
     Solution s;
     s.terms = terms;
@@ -295,10 +333,61 @@ class Campaigns {
     double size2 = 0.0;
     for (const LoadRecord& r : records) size2 += r.target.squaredNorm();
     s.share = noise * std::sqrt(s.fit.squares / size2);
-    s.bic = informationCriterion(s.fit.squares, s.residuals, terms.count(), false);
+    s.bic = informationCriterion(s.fit.squares * noise * noise, s.residuals, terms.count(), false);
     return s;
   }
 };
+
+/// Coefficients averaged over what the runout may be.
+struct RunoutAverage {
+  double ktc = 0.0, kte = 0.0;
+  double variance_tc = 0.0, variance_te = 0.0,
+         covariance = 0.0;  // between the offsets, beside each one's own
+};
+
+// Where teeth miss part of their arc runout only ever takes away edge: an offset of zero is no middle, so
+// each offset has its own fit, weighted by how well the records go with it.
+RunoutAverage averageOverRunout(Campaigns all, const Solution& chosen, double largest,
+                                const ToolGeometry& tool) {
+  constexpr int OFFSETS = 6, ANGLES = 4;
+  const std::size_t at = all.ktcAt(chosen.terms);
+  const FrictionLaw start =
+      FrictionLaw::fromValues(chosen.terms.friction, chosen.fit.value.data(), all.zero_below);
+  struct Point {
+    double ktc, kte, squares;
+  };
+  std::vector<Point> points;
+  double least = std::numeric_limits<double>::infinity(), misfit = 1.0;
+  for (int o = 0; o < OFFSETS; ++o) {
+    for (int a = 0; a < ANGLES; ++a) {
+      const double offset = largest * (o + 0.5) / OFFSETS;
+      const double angle = units::TWO_PI / tool.teeth * (a + 0.5) / ANGLES;
+      for (LoadRecord& r : all.records) {
+        if (r.cut) r.share = meanShare(r, {offset * std::cos(angle), offset * std::sin(angle)});
+      }
+      const Solution s = all.solve(chosen.terms, start, chosen.fit.value[at], chosen.fit.value[at + 1]);
+      points.push_back({s.fit.value[at], s.fit.value[at + 1], s.fit.squares});
+      if (s.fit.squares < least) least = s.fit.squares, misfit = std::max(1.0, s.misfit);
+    }
+  }
+  RunoutAverage average;
+  double sum = 0.0;
+  const auto weight = [&](const Point& p) { return std::exp(-0.5 * (p.squares - least) / misfit); };
+  for (const Point& p : points) {
+    sum += weight(p);
+    average.ktc += weight(p) * p.ktc;
+    average.kte += weight(p) * p.kte;
+  }
+  average.ktc /= sum;
+  average.kte /= sum;
+  for (const Point& p : points) {
+    const double c = p.ktc - average.ktc, e = p.kte - average.kte, w = weight(p) / sum;
+    average.variance_tc += w * c * c;
+    average.variance_te += w * e * e;
+    average.covariance += w * c * e;
+  }
+  return average;
+}
 
 }  // namespace
 
@@ -363,7 +452,11 @@ LoadRecordResult identifyFromLoadRecords(const std::vector<TestRecord>& tests, c
     all.friction_priors = {{0, known.viscous, std::sqrt(known.covariance[0]) + smallest / all.fastest},
                            {1, known.coulomb, std::sqrt(known.covariance[3]) + smallest}};
   }
-  all.runout_prior = options.runout_uncertainty;
+  // With the angle a tooth's own share shows in the ripple; without it runout is averaged over, further
+  // below.
+  const bool ripple = std::any_of(all.records.begin(), all.records.end(),
+                                  [](const LoadRecord& r) { return r.has_angle && r.tool.teeth > 1; });
+  if (ripple) all.runout_prior = options.runout_uncertainty / std::sqrt(2.0);
   if (options.spindle_uncertainty) all.lag_prior = std::max(stated, 1e-6);
 
   const double nominal_lag = timeConstant(spindle.load_meter_bandwidth);
@@ -371,27 +464,29 @@ LoadRecordResult identifyFromLoadRecords(const std::vector<TestRecord>& tests, c
   start.viscous = spindle.viscous;
   start.coulomb = spindle.coulomb;
   start.stribeck_speed = 0.15 * all.fastest;
-  double ktc = 1e9, kte = 1e4;
+  double ktc = 1e9, kte = 1e4, growth = 0.0;
   const auto condenseAll = [&] {
     double left = 0.0, freedom = samples;
     for (LoadRecord& r : all.records) {
-      condense(r, spindle.load_meter_gain, nominal_lag * std::exp(all.lag_at), ktc, kte,
-               spindle.load_meter_resolution);
+      condense(r, spindle.load_meter_gain, nominal_lag * std::exp(all.lag_at), ktc,
+               kte * (1.0 + growth * r.edge_age), all.runout_at, spindle.load_meter_resolution);
       left += r.saturated;
       freedom -= static_cast<double>(r.target.size());
     }
     // The rounding's own spread is a floor: a record without noise does not stand for an exact reading.
     all.noise = std::max(std::sqrt(left / freedom), 0.1 * spindle.load_meter_resolution / std::sqrt(12.0));
   };
-  // Again about what was found: the lag's column hangs on the coefficients, and on the lag where it moves.
+  // Again about what was found: the columns of lag and runout hang on the coefficients, and on themselves.
   const auto settle = [&](const Terms& terms) {
     Solution s;
-    for (int pass = 0; pass < (terms.lag ? 4 : 2); ++pass) {
+    for (int pass = 0; pass < (terms.runout ? 6 : terms.lag ? 4 : 2); ++pass) {
       condenseAll();
       s = all.solve(terms, start, ktc, kte);
-      const std::size_t at = all.ktcAt(terms);
-      ktc = s.fit.value[at];
-      kte = s.fit.value[at + 1];
+      std::size_t at = all.ktcAt(terms);
+      ktc = s.fit.value[at++];
+      kte = s.fit.value[at++];
+      growth = terms.growth ? s.fit.value[at++] : 0.0;
+      if (terms.runout) all.runout_at = {s.fit.value[at], s.fit.value[at + 1]};
       if (terms.lag) all.lag_at = s.fit.value.back();
       start = FrictionLaw::fromValues(terms.friction, s.fit.value.data(), all.zero_below);
     }
@@ -400,11 +495,12 @@ LoadRecordResult identifyFromLoadRecords(const std::vector<TestRecord>& tests, c
 
   Terms terms;
   terms.lag = options.spindle_uncertainty;
-  terms.runout = options.runout_uncertainty > 0.0;
+  terms.runout = all.runout_prior > 0.0;
   Solution chosen = settle(terms);
   // Terms are added while the records disagree by more than chance would (chi2 per degree of freedom of some
   // forty: 1.6 has a probability below 1 %), each one that the evidence favours by more than ten.
   while (options.choose_terms && chosen.misfit > 1.6 && chosen.share > MODEL_SHARE) {
+    const double chosen_noise = all.noise;
     std::vector<Terms> tries;
     const auto with = [&](auto change) {
       Terms t = chosen.terms;
@@ -416,7 +512,6 @@ LoadRecordResult identifyFromLoadRecords(const std::vector<TestRecord>& tests, c
     }
     if (!chosen.terms.friction.warmup && timed) with([](Terms& t) { t.friction.warmup = true; });
     if (!chosen.terms.growth && ages.size() >= 3) with([](Terms& t) { t.growth = true; });
-    if (!chosen.terms.runout && tool.teeth > 1) with([](Terms& t) { t.runout = true; });
     if (!chosen.terms.lag) with([](Terms& t) { t.lag = true; });
     std::optional<Solution> best;
     for (const Terms& t : tries) {
@@ -433,8 +528,34 @@ LoadRecordResult identifyFromLoadRecords(const std::vector<TestRecord>& tests, c
         if (!t.friction.stribeck || chosen.terms.friction.stribeck) break;
       }
     }
+    double best_noise = all.noise;
+    if (!chosen.terms.runout && ripple) {
+      // Runout changes the shape of the responses: condensed anew about what it finds.
+      Terms t = chosen.terms;
+      t.runout = true;
+      const Campaigns before = all;
+      const FrictionLaw start_before = start;
+      const std::array<double, 3> k_before{ktc, kte, growth};
+      const Solution s = settle(t);
+      if (!best || s.bic < best->bic) {
+        best = s;
+        best_noise = all.noise;
+      } else {
+        all = before;
+        start = start_before;
+        ktc = k_before[0], kte = k_before[1], growth = k_before[2];
+      }
+    }
     // Half of the disagreement must go with it: a wrong cause always takes up some.
-    if (!best || best->bic > chosen.bic - 10.0 || best->fit.squares > 0.5 * chosen.fit.squares) break;
+    const auto volts2 = [](const Solution& s, double noise) { return s.fit.squares * noise * noise; };
+    if (!best || best->bic > chosen.bic - 10.0 ||
+        volts2(*best, best_noise) > 0.5 * volts2(chosen, chosen_noise)) {
+      if (all.runout_at.x != 0.0 && !chosen.terms.runout) {
+        all.runout_at = {};
+        chosen = settle(chosen.terms);
+      }
+      break;
+    }
     start = FrictionLaw::fromValues(best->terms.friction, best->fit.value.data(), all.zero_below);
     chosen = settle(best->terms);
   }
@@ -487,6 +608,15 @@ LoadRecordResult identifyFromLoadRecords(const std::vector<TestRecord>& tests, c
   result.set.value = result.set.std_dev = NOT_IDENTIFIED;
   result.set.value.ktc = chosen.fit.value[at];
   result.set.value.kte = chosen.fit.value[at + 1];
+  if (!ripple && tool.teeth > 1 && options.runout_uncertainty > 0.0) {
+    const RunoutAverage average =
+        averageOverRunout(all, chosen, options.runout_uncertainty * std::sqrt(3.0), tool);
+    result.set.value.ktc = average.ktc;
+    result.set.value.kte = average.kte;
+    total(tc, tc) += average.variance_tc;
+    total(te, te) += average.variance_te;
+    total(tc, te) += average.covariance;
+  }
   // Of load_meter_v_per_w and the depth: both coefficients follow them.
   const double scale = std::hypot(options.spindle_uncertainty ? stated : 0.0, options.depth_uncertainty);
   const auto stdOf = [&](Eigen::Index i, double value) {
@@ -502,7 +632,11 @@ LoadRecordResult identifyFromLoadRecords(const std::vector<TestRecord>& tests, c
   }
   result.bandwidth = spindle.load_meter_bandwidth / std::exp(all.lag_at);
   if (chosen.terms.growth) result.edge_growth = chosen.fit.value[at + 2];
-  if (chosen.terms.runout) result.runout = chosen.fit.value[at + 2 + (chosen.terms.growth ? 1 : 0)];
+  if (chosen.terms.runout) {
+    result.runout = std::hypot(all.runout_at.x, all.runout_at.y);
+    result.runout_angle = std::atan2(all.runout_at.y, all.runout_at.x);
+    if (result.runout_angle < 0.0) result.runout_angle += units::TWO_PI;
+  }
   result.noise = all.noise;
   result.misfit = chosen.misfit;
   result.disagreement = chosen.share;

@@ -29,7 +29,7 @@ void row(const char* name, std::vector<double> errors, double inside) {
 void machines(unsigned first, int count) {
   const Faults faults;
   std::vector<double> thesis_ktc, thesis_kte, ktc, kte;
-  double inside_ktc = 0.0, inside_kte = 0.0, z2 = 0.0;
+  double inside_ktc = 0.0, inside_kte = 0.0, z2 = 0.0, z2_kte = 0.0, depth2 = 0.0, rest2 = 0.0;
   std::map<std::string, int> terms;
   for (int i = 0; i < count; ++i) {
     if (isatty(STDERR_FILENO)) std::fprintf(stderr, "\rcase %d of %d", i + 1, count);
@@ -41,6 +41,9 @@ void machines(unsigned first, int count) {
     inside_ktc += std::abs(e.z_ktc) < 1.96;
     inside_kte += std::abs(e.z_kte) < 1.96;
     z2 += e.z_ktc * e.z_ktc / count;
+    z2_kte += e.z_kte * e.z_kte / count;
+    rest2 += e.z_beside_depth * e.z_beside_depth / count;
+    depth2 += e.depth * e.depth / (faults.depth_error * faults.depth_error) / count;
     for (const std::string& t : e.terms) ++terms[t];
   }
   if (isatty(STDERR_FILENO)) std::fprintf(stderr, "\n");
@@ -52,7 +55,12 @@ void machines(unsigned first, int count) {
   row("Ktc, records with law by evidence", ktc, inside_ktc / count);
   row("Kte, thesis to the letter", thesis_kte, -1.0);
   row("Kte, records with law by evidence", kte, inside_kte / count);
-  std::printf("variance of the z-score of Ktc %.2f; chosen:", z2);
+  std::printf(
+      "mean square of the z-score: Ktc %.2f, Kte %.2f; Ktc with the true depth %.2f; of the depth errors "
+      "drawn, over their 2 %%: %.2f "
+      "(chance "
+      "+- %.2f)\nchosen:",
+      z2, z2_kte, rest2, depth2, std::sqrt(2.0 / count));
   for (const auto& [term, times] : terms) std::printf(" %s in %d;", term.c_str(), times);
   std::printf("\n");
 }

@@ -80,6 +80,7 @@ MachineCase drawCase(unsigned seed, const Faults& faults) {
   }
   const double gain = s.load_meter_gain * (1.0 + faults.gain_error * normal(random));
   const double depth_share = 1.0 + faults.depth_error * normal(random);
+  c.depth = depth_share - 1.0;
   const double offset = between(0.0, faults.largest_runout), angle = between(0.0, TWO_PI);
   c.model.file = "case " + std::to_string(seed);
   c.model.tool = tool;
@@ -189,6 +190,10 @@ CaseErrors judge(const MachineCase& one, const Faults& faults) {
   errors.kte = found.set.value.kte / one.truth.kte - 1.0;
   errors.z_ktc = (found.set.value.ktc - one.truth.ktc) / found.set.std_dev.ktc;
   errors.z_kte = (found.set.value.kte - one.truth.kte) / found.set.std_dev.kte;
+  errors.depth = one.depth;
+  const double own = found.set.std_dev.ktc / found.set.value.ktc;
+  errors.z_beside_depth = ((1.0 + errors.ktc) / (1.0 + one.depth) - 1.0) /
+                          std::sqrt(own * own - options.depth_uncertainty * options.depth_uncertainty);
   errors.terms = found.terms;
   return errors;
 }

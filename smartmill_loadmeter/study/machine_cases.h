@@ -23,6 +23,7 @@ struct Faults {
 struct MachineCase {
   MachineModel model;  ///< what is believed: load meter, nominal friction, tool
   CuttingCoefficients truth;
+  double depth = 0.0;  ///< [1] relative error of the axial depth of all its cuts
   std::vector<TestRecord> tests;
 };
 
@@ -40,6 +41,8 @@ struct CaseErrors {
   double thesis_ktc, thesis_kte;  ///< [1] the thesis' procedure to the letter (eq. 3.5..3.19)
   double ktc, kte;                ///< [1] this package
   double z_ktc, z_kte;            ///< [1] error over stated standard deviation
+  double z_beside_depth;  ///< [1] of Ktc with the depth error that was drawn taken out of error and std
+  double depth;           ///< [1] error of the depth that was drawn
   std::vector<std::string> terms;
 };
 CaseErrors judge(const MachineCase& one, const Faults& faults);

@@ -6,6 +6,7 @@
 
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/units.h"
+#include "smartmill_loadmeter/runout_torque.h"
 #include "study/machine_cases.h"
 
 namespace smartmill::loadmeter {
@@ -30,6 +31,35 @@ TEST(Scene, runoutMovesMaterialFromToothToToothWhileAllCut) {
   EXPECT_NEAR(std::accumulate(straight.begin(), straight.end(), 0.0),
               std::accumulate(offset.begin(), offset.end(), 0.0), 1e-3 * 720);
   EXPECT_NE(straight[200], offset[200]);
+}
+
+// Closed form against summed slices, teeth that miss part of their arc among them.
+TEST(RunoutTorque, isTheTorqueOfTheSlicesInClosedForm) {
+  for (const double offset : {0.0, 8e-6, 40e-6, 90e-6}) {
+    for (const double helix : {0.0, 0.5}) {
+      ToolGeometry tool{4, 0.016, helix, {}};
+      if (offset > 50e-6) tool.pitch = {1.4, 1.7, 1.5, units::TWO_PI - 4.6};
+      const Engagement e{0.2, 2.9, 0.002, 6e-5};
+      const double angle = 4.57;
+      const RunoutTorque closed(tool, e, offset * std::cos(angle), offset * std::sin(angle));
+      constexpr std::size_t STEPS = 1440;
+      for (std::size_t u = 0; u < 2; ++u) {
+        const CuttingCoefficients k =
+            u == 0 ? CuttingCoefficients{1e9, 0, 0, 0, 0, 0} : CuttingCoefficients{0, 0, 0, 1e4, 0, 0};
+        const double unit = u == 0 ? 1e9 : 1e4;
+        const auto slices = torqueOverARevolution(tool, e, k, offset, angle, STEPS);
+        const double mean = std::accumulate(slices.begin(), slices.end(), 0.0) / STEPS;
+        EXPECT_NEAR(unit * closed.mean()[u], mean, 2e-3 * mean) << offset << " " << helix;
+        double error2 = 0.0;
+        for (std::size_t i = 0; i < STEPS; ++i) {
+          const double at = unit * closed.at(units::TWO_PI * static_cast<double>(i) / STEPS)[u];
+          error2 += (at - slices[i]) * (at - slices[i]) / STEPS;
+        }
+        // 24 slices: a step of the edge's torque at each entry and exit.
+        EXPECT_LT(std::sqrt(error2), 0.03 * mean) << offset << " " << helix;
+      }
+    }
+  }
 }
 
 // The full study of 200 cases is the program loadmeter_study.

@@ -29,8 +29,9 @@ struct LoadRecordOptions {
   bool spindle_uncertainty = false;
   /// [1] relative standard deviation of the axial depth, common to all cuts (the tool's length).
   double depth_uncertainty = 0.0;
-  /// [m] standard deviation of the cutter axis' offset (runout), whose effect on the mean torque then takes
-  /// part.
+  /// [m] RMS of the cutter axis' offset (runout) that is to be expected. With the spindle angle the offset is
+  /// then found from the ripple; without it the coefficients are averaged over offsets up to sqrt(3) times as
+  /// large, each as likely as the records make it.
   double runout_uncertainty = 0.0;
   /// Stribeck, warm-up, edge growth, runout and a slower load meter are tried where the records disagree.
   bool choose_terms = true;
@@ -42,7 +43,8 @@ struct LoadRecordResult {
   FrictionLaw friction;            ///< as found
   double bandwidth = 0.0;          ///< [Hz] of the load meter: the model's, or found
   double edge_growth = 0.0;        ///< [1/s] of Kte with the cutting time of the edge
-  double runout = 0.0;             ///< [m] effective offset
+  double runout = 0.0;             ///< [m] offset of the cutter axis
+  double runout_angle = 0.0;       ///< [rad] of the offset, 0..2 pi, as effects.md
   double noise = 0.0;              ///< [V] RMS of the load meter about each record's own best fit
   double misfit = 0.0;             ///< [1] chi2 per degree of freedom between the records; 1: they agree
   double disagreement = 0.0;       ///< [1] RMS of it, as a share of the records' voltage
