@@ -9,6 +9,7 @@
 #include <fstream>
 #include <iostream>
 #include <map>
+#include <mutex>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,7 @@
 #include "smartmill_core/model/effect_catalogue.h"
 #include "smartmill_discrepancy/bench_campaign.h"
 #include "smartmill_discrepancy/explanation.h"
+#include "smartmill_discrepancy/twin_runner.h"
 
 namespace {
 
@@ -81,79 +83,228 @@ bool grouped(const Explanation& e, const std::string& name) {
   return false;
 }
 
+// What one case came to.
+struct Outcome {
+  std::string expected, found;  // names; nothing
+  std::vector<std::string> named;
+  Explanation explanation;
+  bool right = false, false_effect = false;
+  double largest_score = 0.0;
+};
+
+Outcome runCase(const Options& o, const Case& c, int number, std::uint64_t seed) {
+  const std::string folder = o.out + "/case_" + std::to_string(number);
+  // Sealed: only this block knows the truth until explain is done.
+  BenchTruth truth;
+  {
+    std::mt19937_64 own(seed);
+    const MachineModel nominal = drawMachine(own, needsFlexible(c));
+    truth.machine = o.exact_nominal ? nominal : drawTruth(nominal, own);
+    for (const std::string& name : c.names) truth.machine.effects.push_back(drawEffect(name, nominal, own));
+    if (c.kind == "outside") truth.outside = drawOutside(own);
+    writeBenchCampaign(nominal, truth, folder, seed + 1, o.substeps);
+    writeMachineModel(truth.machine, o.out + "/sealed_" + std::to_string(number) + ".yaml");
+  }
+  Outcome outcome;
+  Explanation& e = outcome.explanation;
+  try {
+    const Campaign campaign = readCampaign(folder);
+    const Dataset data = loadDataset(campaign, readMachineModel(campaign.modelPath()));
+    ExplainOptions options;
+    options.search.threads = 1;
+    std::filesystem::create_directories(folder + "/report");
+    e = explain(data, options, folder + "/report");
+    writeReport(e, folder + "/report");
+  } catch (const Error& error) {
+    e.verdict = std::string("refused: ") + error.what();
+  }
+  for (const std::string& name : c.names) outcome.expected += (outcome.expected.empty() ? "" : "+") + name;
+  if (truth.outside) outcome.expected = "outside: " + truth.outside->kind + " " + truth.outside->channel;
+  if (outcome.expected.empty()) outcome.expected = "nothing";
+  for (const FoundEffect& f : e.effects) {
+    outcome.named.push_back(f.name);
+    outcome.found += (outcome.found.empty() ? "" : "+") + f.name;
+  }
+  if (c.kind == "outside") {
+    outcome.right = (e.verdict == "unknown_effect" || e.verdict == "partly_explained") &&
+                    !e.unexplained.empty() && e.unexplained.front().channel == truth.outside->channel &&
+                    e.unexplained.front().domain == truth.outside->domain();
+    outcome.false_effect = e.verdict == "explained";
+    for (const Finding& f : e.unexplained) outcome.found += " [" + f.channel + " " + f.domain + "]";
+  } else if (c.names.empty()) {
+    outcome.false_effect = !e.effects.empty();
+    outcome.right = e.verdict == "no_disagreement";
+  } else {
+    outcome.right = true;
+    for (std::size_t k = 0; k < c.names.size(); ++k) {
+      const auto same = [&](const FoundEffect& f) { return f.name == c.names[k]; };
+      const auto at = std::find_if(e.effects.begin(), e.effects.end(), same);
+      outcome.right = outcome.right && (at != e.effects.end() || grouped(e, c.names[k]));
+      if (at != e.effects.end())
+        outcome.largest_score = std::max(outcome.largest_score, largestScore(*at, truth.machine.effects[k]));
+    }
+    // The first name is the one that explains most.
+    if (c.kind == "single" && outcome.right) {
+      const auto first = std::max_element(
+          e.effects.begin(), e.effects.end(),
+          [](const FoundEffect& a, const FoundEffect& b) { return a.delta_bic < b.delta_bic; });
+      outcome.right = first->name == c.names.front() || grouped(e, c.names.front());
+    }
+    for (const FoundEffect& f : e.effects) {
+      if (std::find(c.names.begin(), c.names.end(), f.name) == c.names.end()) outcome.false_effect = true;
+    }
+  }
+  if (outcome.found.empty()) outcome.found = e.verdict;
+  if (!o.keep && outcome.right) std::filesystem::remove_all(folder);
+  return outcome;
+}
+
+// Rows: what was hidden; columns: what was named; the share of the row's cases.
+void drawConfusion(const std::vector<Case>& cases, const std::vector<Outcome>& outcomes,
+                   const std::string& png) {
+  std::vector<std::string> hidden, named;
+  std::map<std::pair<std::string, std::string>, int> count;
+  std::map<std::string, int> all;
+  const auto known = [](std::vector<std::string>& names, const std::string& name) {
+    if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+  };
+  for (std::size_t k = 0; k < cases.size(); ++k) {
+    if (cases[k].kind == "pair") continue;
+    const std::string truth = cases[k].kind == "outside" ? "outside" : outcomes[k].expected;
+    known(hidden, truth);
+    ++all[truth];
+    std::vector<std::string> columns = outcomes[k].named;
+    if (columns.empty())
+      columns.push_back(outcomes[k].explanation.verdict.substr(0, outcomes[k].explanation.verdict.find(':')));
+    for (const std::string& c : columns) ++count[{truth, c}];
+  }
+  named = hidden;
+  named.erase(std::remove_if(named.begin(), named.end(),
+                             [](const std::string& n) { return n == "nothing" || n == "outside"; }),
+              named.end());
+  for (const auto& [key, n] : count) known(named, key.second);
+  if (hidden.empty()) return;
+  std::string data, program;
+  for (const auto& [key, n] : count) {
+    const auto x = std::find(named.begin(), named.end(), key.second) - named.begin();
+    const auto y = std::find(hidden.begin(), hidden.end(), key.first) - hidden.begin();
+    data += std::to_string(x) + " " + std::to_string(y) + " " +
+            std::to_string(static_cast<double>(n) / all[key.first]) + " " + std::to_string(n) + "\n";
+  }
+  const auto tics = [](const std::vector<std::string>& names) {
+    std::string text = "(";
+    for (std::size_t k = 0; k < names.size(); ++k)
+      text += (k ? ", '" : "'") + names[k] + "' " + std::to_string(k);
+    return text + ")";
+  };
+  program =
+      "$m << EOD\n" + data + "EOD\nset title 'hidden (rows) and named (columns)'\n" +
+      "set palette defined (0 '#f7fbff', 1 '#08519c')\nset cbrange [0:1]\nset xtics rotate by -60 " +
+      tics(named) + "\nset ytics " + tics(hidden) + "\nset xrange [-0.5:" + std::to_string(named.size()) +
+      "-0.5]\nset yrange [" + std::to_string(hidden.size()) +
+      "-0.5:-0.5]\nplot $m using 1:2:(0.5):(0.5):3 with boxxyerror fillstyle solid 1.0 border lc 'white' "
+      "fc palette notitle, $m using 1:2:(sprintf('%d', $4)) with labels font ',8' tc rgb 'orange' notitle\n";
+  drawWithGnuplot(png, 1100, 900, program);
+}
+
+// Stated confidence of each named effect against the share that was really hidden.
+void drawReliability(const std::vector<Case>& cases, const std::vector<Outcome>& outcomes,
+                     const std::string& out) {
+  const std::vector<double> edges{0.0, 0.8, 0.95, 0.99, 0.999, 1.0};
+  struct Bin {
+    double stated = 0.0, right = 0.0, all = 0.0;
+  };
+  std::vector<Bin> bins(edges.size() - 1);
+  for (std::size_t k = 0; k < cases.size(); ++k) {
+    for (const FoundEffect& f : outcomes[k].explanation.effects) {
+      std::size_t b = 0;
+      while (b + 2 < edges.size() && f.confidence >= edges[b + 1]) ++b;
+      bins[b].stated += f.confidence;
+      bins[b].all += 1.0;
+      if (std::find(cases[k].names.begin(), cases[k].names.end(), f.name) != cases[k].names.end() ||
+          std::any_of(cases[k].names.begin(), cases[k].names.end(),
+                      [&](const std::string& name) { return grouped(outcomes[k].explanation, name); }))
+        bins[b].right += 1.0;
+    }
+  }
+  std::string data;
+  std::ofstream csv(out + "/reliability.csv");
+  csv << "stated,right,effects\n";
+  for (const Bin& b : bins) {
+    if (b.all == 0.0) continue;
+    const double share = b.right / b.all;
+    // Wilson's interval.
+    const double z2 = 3.84, middle = (share + z2 / (2.0 * b.all)) / (1.0 + z2 / b.all);
+    const double half =
+        std::sqrt(z2 * (share * (1.0 - share) / b.all + z2 / (4.0 * b.all * b.all))) / (1.0 + z2 / b.all);
+    char line[200];
+    std::snprintf(line, sizeof line, "%.5f %.5f %.5f %.5f\n", b.stated / b.all, share, middle - half,
+                  middle + half);
+    data += line;
+    csv << b.stated / b.all << "," << share << "," << b.all << "\n";
+    std::printf("stated confidence %.4f: %.0f of %.0f named effects right\n", b.stated / b.all, b.right,
+                b.all);
+  }
+  if (data.empty()) return;
+  drawWithGnuplot(
+      out + "/reliability.png", 700, 650,
+      "$r << EOD\n" + data +
+          "EOD\nset title 'reliability of the stated confidence'\nset xlabel 'stated'\nset ylabel "
+          "'share right'\nset xrange [0.4:1.02]\nset yrange [0:1.05]\nset key left\nplot x with lines "
+          "dt 2 lc 'gray' title 'ideal', $r using 1:2:3:4 with yerrorbars pt 7 title 'named effects'\n");
+}
+
 void run(const Options& o) {
   std::mt19937_64 random(o.seed);
   std::filesystem::create_directories(o.out);
   std::ofstream table(o.out + "/cases.csv");
   table << "case,kind,truth,verdict,found,right,largest_z,gap_before,gap_after,heldout_after,seconds\n";
-  std::map<std::pair<std::string, std::string>, int> confusion;
-  std::map<std::string, std::pair<int, int>> score;  // right, all
-  int number = 0;
-  for (const Case& c : drawCases(o, random)) {
-    const std::string folder = o.out + "/case_" + std::to_string(number);
-    const std::uint64_t seed = random();
-    // Sealed: only this block knows the truth until explain is done.
-    BenchTruth truth;
-    {
-      std::mt19937_64 own(seed);
-      const MachineModel nominal = drawMachine(own, needsFlexible(c));
-      truth.machine = o.exact_nominal ? nominal : drawTruth(nominal, own);
-      for (const std::string& name : c.names) truth.machine.effects.push_back(drawEffect(name, nominal, own));
-      if (c.kind == "outside") truth.outside = drawOutside(own);
-      writeBenchCampaign(nominal, truth, folder, seed + 1, o.substeps);
-      writeMachineModel(truth.machine, o.out + "/sealed_" + std::to_string(number) + ".yaml");
-    }
-    Explanation e;
-    try {
-      const Campaign campaign = readCampaign(folder);
-      const Dataset data = loadDataset(campaign, readMachineModel(campaign.modelPath()));
-      ExplainOptions options;
-      options.search.threads = o.threads;
-      std::filesystem::create_directories(folder + "/report");
-      e = explain(data, options, folder + "/report");
-      writeReport(e, folder + "/report");
-    } catch (const Error& error) {
-      e.verdict = std::string("refused: ") + error.what();
-    }
-    std::string expected, found;
-    for (const std::string& name : c.names) expected += (expected.empty() ? "" : "+") + name;
-    if (truth.outside) expected = truth.outside->kind + " " + truth.outside->channel;
-    for (const FoundEffect& f : e.effects) found += (found.empty() ? "" : "+") + f.name;
-    bool right = false;
-    double largest = 0.0;
-    if (c.kind == "outside") {
-      right = (e.verdict == "unknown_effect" || e.verdict == "partly_explained") && !e.unexplained.empty() &&
-              e.unexplained.front().channel == truth.outside->channel &&
-              e.unexplained.front().domain == truth.outside->domain();
-      for (const Finding& f : e.unexplained) found += " [" + f.channel + " " + f.domain + "]";
-    } else {
-      right = c.names.empty() ? e.verdict == "no_disagreement"
-                              : e.verdict == "explained" && e.effects.size() == c.names.size();
-      for (std::size_t k = 0; k < c.names.size(); ++k) {
-        const auto same = [&](const FoundEffect& f) { return f.name == c.names[k]; };
-        const auto at = std::find_if(e.effects.begin(), e.effects.end(), same);
-        right = right && (at != e.effects.end() || grouped(e, c.names[k]));
-        if (at != e.effects.end()) largest = std::max(largest, largestScore(*at, truth.machine.effects[k]));
-      }
-    }
-    ++confusion[{expected.empty() ? "nothing" : expected, found.empty() ? e.verdict : found}];
-    score[c.kind].first += right;
-    ++score[c.kind].second;
+  const std::vector<Case> cases = drawCases(o, random);
+  std::vector<std::uint64_t> seeds;
+  for (std::size_t k = 0; k < cases.size(); ++k) seeds.push_back(random());
+  std::vector<Outcome> outcomes(cases.size());
+  std::mutex mutex;
+  runParallel(cases.size(), o.threads, [&](std::size_t k) {
+    Outcome outcome = runCase(o, cases[k], static_cast<int>(k), seeds[k]);
+    const Explanation& e = outcome.explanation;
     char line[600];
-    std::snprintf(line, sizeof line, "%d,%s,%s,%s,%s,%d,%.2f,%.3f,%.4f,%.4f,%.1f", number, c.kind.c_str(),
-                  expected.c_str(), e.verdict.c_str(), found.c_str(), right ? 1 : 0, largest, e.before.fit,
-                  e.after.fit, e.after.heldout, e.seconds);
+    std::snprintf(line, sizeof line, "%zu,%s,%s,%s,%s,%d,%.2f,%.3f,%.4f,%.4f,%.1f", k, cases[k].kind.c_str(),
+                  outcome.expected.c_str(), e.verdict.c_str(), outcome.found.c_str(), outcome.right ? 1 : 0,
+                  outcome.largest_score, e.before.fit, e.after.fit, e.after.heldout, e.seconds);
+    const std::lock_guard<std::mutex> lock(mutex);
     table << line << std::endl;
     std::printf("%s\n", line);
     std::fflush(stdout);
-    if (!o.keep && right) std::filesystem::remove_all(folder);
-    ++number;
+    outcomes[k] = std::move(outcome);
+  });
+  std::map<std::string, std::pair<int, int>> score;  // right, all
+  std::map<std::pair<std::string, std::string>, int> confusion;
+  int named = 0, low_gap = 0, false_effects = 0, close = 0, scored = 0;
+  for (std::size_t k = 0; k < cases.size(); ++k) {
+    const Outcome& r = outcomes[k];
+    ++confusion[{r.expected, r.found}];
+    score[cases[k].kind].first += r.right;
+    ++score[cases[k].kind].second;
+    if (cases[k].kind == "none" || cases[k].kind == "outside") false_effects += r.false_effect;
+    if (cases[k].names.empty() || !r.right) continue;
+    ++named;
+    low_gap += r.explanation.after.heldout <= 1.1;
+    ++scored;
+    close += r.largest_score <= 3.0;
   }
   std::ofstream matrix(o.out + "/confusion.csv");
   matrix << "truth,found,cases\n";
   for (const auto& [key, count] : confusion) matrix << key.first << "," << key.second << "," << count << "\n";
   for (const auto& [kind, counts] : score)
     std::printf("%s: %d of %d right\n", kind.c_str(), counts.first, counts.second);
+  if (score.count("none") || score.count("outside"))
+    std::printf("catalogue effect named as sufficient where none was hidden: %d\n", false_effects);
+  if (named > 0) {
+    std::printf("held-out gap at most 1.1: %d of %d named cases\n", low_gap, named);
+    std::printf("every parameter within three standard deviations: %d of %d\n", close, scored);
+  }
+  drawConfusion(cases, outcomes, o.out + "/confusion.png");
+  drawReliability(cases, outcomes, o.out);
 }
 
 }  // namespace
@@ -168,7 +319,7 @@ int main(int argc, char** argv) {
   app.add_option("--outside", o.outside, "cases with a cause outside the catalogue");
   app.add_option("--only", o.only, "effects to draw from, comma separated");
   app.add_option("--seed", o.seed, "of everything drawn");
-  app.add_option("--threads", o.threads, "threads")->check(CLI::Range(1, 64));
+  app.add_option("--threads", o.threads, "cases at a time")->check(CLI::Range(1, 64));
   app.add_option("--substeps", o.substeps, "integration steps a sample of the hidden machine")
       ->check(CLI::Range(2, 64));
   app.add_flag("--keep", o.keep, "keep the campaigns of right cases too");

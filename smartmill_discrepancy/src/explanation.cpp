@@ -66,6 +66,30 @@ Trace traceOf(const Fitter& fitter, const Fit& fit, std::size_t member) {
   return trace;
 }
 
+// Vuong's comparison of two models over the tests that tell them apart.
+double confidenceBetween(const Fitter& fitter, const FitState& better, const FitState& other) {
+  const TwinRunner& runner = fitter.runner();
+  const auto simulated = runner.simulate({fitter.model(better), fitter.model(other)});
+  std::map<std::size_t, std::pair<double, double>> by_test;  // gain, squares between the two
+  for (const Block& b : runner.blocks()) {
+    auto& [gain, between] = by_test[b.test];
+    for (std::size_t i = b.offset; i < b.offset + b.size; ++i) {
+      const double m = runner.measured()[i], x = simulated[0][i], y = simulated[1][i];
+      gain += (m - y) * (m - y) - (m - x) * (m - x);
+      between += (x - y) * (x - y);
+    }
+  }
+  // A gain of one test that is far beyond the others' counts no more than they do.
+  double sum = 0.0, squares = 0.0;
+  for (const auto& [test, values] : by_test) {
+    if (values.second < 4.0) continue;  // nothing that the noise would not hide
+    const double vote = values.first / std::sqrt(values.second * (4.0 + values.second));
+    sum += vote;
+    squares += vote * vote;
+  }
+  return squares > 0.0 ? 0.5 * std::erfc(-sum / std::sqrt(2.0 * squares)) : 0.5;
+}
+
 FitState without(const FitState& state, std::size_t member) {
   FitState less = state;
   less.members.erase(less.members.begin() + static_cast<std::ptrdiff_t>(member));
@@ -258,8 +282,10 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
     effect.heldout_gap_reduction =
         without_it > floor ? std::clamp(1.0 - std::max(with - floor, 0.0) / (without_it - floor), -1.0, 1.0)
                            : 0.0;
+    effect.confidence = confidenceBetween(exact, best.state, without(best.state, m));
     for (const Rival& rival : found.rivals) {
       if (rival.member != m) continue;
+      effect.confidence = std::min(effect.confidence, confidenceBetween(exact, best.state, rival.state));
       effect.alternatives.emplace_back(rival.effect, rival.delta_bic);
       if (rival.delta_bic > effect.delta_bic - ALIKE) {
         result.not_separable.push_back({effect.name, rival.effect});

@@ -238,6 +238,9 @@ Fit Fitter::fit(const FitState& start, const NominalTangents* frozen, const FitO
   for (const double radius : {1e4, 1e10}) {
     solver.initial_trust_region_radius = radius;
     ceres::Solve(solver, &problem, &summary);
+    // A step that gains less than the tolerance is not taken: near the noise only the excess over it counts.
+    const double excess = std::max(summary.final_cost - 0.5 * static_cast<double>(samples), 10.0);
+    solver.function_tolerance = options.tolerance * std::min(excess / summary.final_cost, 1.0);
   }
   fit.converged = summary.IsSolutionUsable();
   if (!fit.converged) {

@@ -113,6 +113,18 @@ Hypothesis scaled(const std::string& effect, const Coordinate& amplitude, double
   return h;
 }
 
+// A factor: its logarithm moves along with those of the nominal values that it resembles.
+Hypothesis logarithmic(const std::string& effect, const std::string& key, double low, double high) {
+  Hypothesis h = amplitudes(effect, {{"ln " + key, 0.0, low, high, 1e-4, 0.2}}, 0.02);
+  h.entry = [effect, key](const Values& v) {
+    EffectEntry e;
+    e.name = effect;
+    e.numbers[key] = std::exp(v[0]);
+    return e;
+  };
+  return h;
+}
+
 // A power law exponent and reference: force times (x / reference)^-exponent. The fit moves the exponent and
 // the level at a middle x, which stays well known where the exponent is small.
 Hypothesis powerLaw(const std::string& effect, const std::string& reference_key, double middle, double low,
@@ -253,7 +265,7 @@ std::vector<Hypothesis> catalogueHypotheses(const Dataset& data, std::vector<std
       leaveOut("process_damping", "the model's tool is rigid");
     }
     all.push_back(amplitudes("depth_tilt", {{"slope_um_per_mm", 0.0, -900.0, 900.0, 0.0125, 50.0}}, 5.0));
-    all.push_back(amplitudes("feed_error", {{"ratio", 1.0, 0.2, 5.0, 0.000125, 0.2}}, 0.02));
+    all.push_back(logarithmic("feed_error", "ratio", std::log(0.2), std::log(5.0)));
   }
   if (scope.forces()) {
     for (const char* axis : {"x", "y", "z"}) {
@@ -336,7 +348,7 @@ std::vector<Hypothesis> catalogueHypotheses(const Dataset& data, std::vector<std
                                     slow ? Values{500.0, 5000.0, 30000.0} : Values{10.0, 60.0, 150.0, 400.0}),
                            "channel", channel));
     all.push_back(
-        withWord(amplitudes("gain_error", {{"gain", 1.0, 0.05, 5.0, 5e-05, 0.2}}, 0.02), "channel", channel));
+        withWord(logarithmic("gain_error", "gain", std::log(0.05), std::log(5.0)), "channel", channel));
   }
   if (scope.channels.count("load_meter")) {
     all.push_back(scaled("stribeck_friction", {"breakaway_nm", 0.0, -20.0, 20.0, 0.000125, 0.5}, 0.05,

@@ -18,14 +18,6 @@ std::string quoted(const std::string& name) {
   return text + "'";
 }
 
-void draw(const std::string& png, int width, int height, const std::string& commands) {
-  FILE* pipe = popen("gnuplot", "w");
-  if (!pipe) throw Error("gnuplot cannot be started");
-  std::fprintf(pipe, "set terminal pngcairo size %d,%d font 'sans,10' noenhanced\nset output %s\n%s\n", width,
-               height, quoted(png).c_str(), commands.c_str());
-  if (pclose(pipe) != 0) throw Error(png + ": gnuplot failed");
-}
-
 // Tests from left to right, channels from bottom to top, colour: logarithm of the gap.
 std::string gapMap(const Explanation& e, bool after) {
   std::vector<std::string> tests, channels;
@@ -151,10 +143,18 @@ std::string remains(const Explanation& e) {
 
 }  // namespace
 
+void drawWithGnuplot(const std::string& png, int width, int height, const std::string& commands) {
+  FILE* pipe = popen("gnuplot", "w");
+  if (!pipe) throw Error("gnuplot cannot be started");
+  std::fprintf(pipe, "set terminal pngcairo size %d,%d font 'sans,10' noenhanced\nset output %s\n%s\n", width,
+               height, quoted(png).c_str(), commands.c_str());
+  if (pclose(pipe) != 0) throw Error(png + ": gnuplot failed");
+}
+
 std::vector<std::string> drawPictures(const Explanation& e, const std::string& folder) {
   std::vector<std::string> names;
   const auto add = [&](const std::string& name, int width, int height, const std::string& commands) {
-    draw(folder + "/" + name, width, height, commands);
+    drawWithGnuplot(folder + "/" + name, width, height, commands);
     names.push_back(name);
   };
   add("gaps.png", 1200, 900,

@@ -54,6 +54,7 @@ void writeReport(const Explanation& e, const std::string& folder) {
                                  {"parameters", parameters},
                                  {"delta_bic", rounded(effect.delta_bic)},
                                  {"heldout_gap_reduction", rounded(effect.heldout_gap_reduction)},
+                                 {"confidence", rounded(effect.confidence)},
                                  {"alternatives", alternatives}});
   }
   report["not_separable"] = e.not_separable;

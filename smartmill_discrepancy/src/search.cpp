@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
+#include <map>
 
 namespace smartmill::discrepancy {
 namespace {
@@ -21,19 +22,40 @@ std::string describe(const Member& m) {
   return line;
 }
 
-// Whether a fit is better than one with less in it. Nominal values pulled far off their stated uncertainty
-// speak for an effect even where they could stand for it.
-bool tells(const Fit& less, const Fit& more, double least, const SearchOptions& options) {
-  const double gain = less.bic - more.bic;
-  return gain > least ||
-         (gain > options.least_prior_gain && less.penalty - more.penalty > 4.0 * options.least_prior_gain);
+// Squares by channel.
+std::map<std::string, double> squaresOf(const TwinRunner& runner, const std::vector<double>& values) {
+  std::map<std::string, double> squares;
+  for (const Block& b : runner.blocks()) {
+    double& sum = squares[b.channel];
+    for (std::size_t i = b.offset; i < b.offset + b.size; ++i) sum += values[i] * values[i];
+  }
+  return squares;
 }
 
-// Squares below which two faithful simulations differ.
-double floorOf(const TwinRunner& runner, double twin_accuracy) {
+// Gain of BIC below which one fit is not better than another: in the channels in which they differ two
+// faithful simulations differ by so many squares.
+double leastGain(const TwinRunner& runner, const Fit& less, const Fit& more, const SearchOptions& options) {
+  constexpr double SHARE = 0.05;  // of the gain, for a channel to count
+  const auto before = squaresOf(runner, less.residual), after = squaresOf(runner, more.residual),
+             signal = squaresOf(runner, runner.measured());
   double floor = 0.0;
-  for (const double m : runner.measured()) floor += std::pow(twin_accuracy * m, 2);
-  return floor;
+  for (const auto& [channel, squares] : signal) {
+    if (before.at(channel) - after.at(channel) > SHARE * (less.chi2 - more.chi2))
+      floor += squares * options.twin_accuracy * options.twin_accuracy;
+  }
+  return std::max(options.least_gain, floor);
+}
+
+// Nominal values pulled far off their stated uncertainty speak for an effect even where they could stand for
+// it.
+bool relieves(const Fit& less, const Fit& more, const SearchOptions& options) {
+  return less.bic - more.bic > options.least_prior_gain &&
+         less.penalty - more.penalty > 4.0 * options.least_prior_gain;
+}
+
+// Whether a fit is better than one with less in it.
+bool tells(const TwinRunner& runner, const Fit& less, const Fit& more, const SearchOptions& options) {
+  return less.bic - more.bic > leastGain(runner, less, more, options) || relieves(less, more, options);
 }
 
 FitState without(const FitState& state, std::size_t member) {
@@ -117,9 +139,7 @@ void refine(TwinRunner& quick_runner, const Fitter& quick, const Fitter& exact, 
     const Fit rest = quick.fit(less, &tangents, {6, 1e-3, true});
     const double lost = rest.bic;
     result->contribution.push_back(lost - bic);
-    result->needed.push_back(
-        tells(rest, result->best,
-              std::max(options.least_gain, floorOf(quick.runner(), options.twin_accuracy)), options));
+    result->needed.push_back(tells(quick.runner(), rest, result->best, options));
     const std::string& own = at.members[m].hypothesis->effect;
     // Rivals: what came near to it in the round that took it.
     std::size_t round = 0;
@@ -184,28 +204,30 @@ SearchResult search(TwinRunner& quick_runner, const Fitter& quick, const Fitter&
   now = quick.fit(state, &tangents, {3, 1e-8, true});
   result.null = now;
   const double samples = static_cast<double>(quick.runner().size());
-  const double floor = floorOf(quick.runner(), options.twin_accuracy);
+  const auto free_count = static_cast<double>(free.size());
   say(text("nominal model, values free within their uncertainty: gap %.4f", std::sqrt(now.chi2 / samples),
            0.0));
   for (std::size_t round = 0; round < options.most_effects; ++round) {
     const std::vector<Promise> promises = screen(quick, now, tangents, hypotheses);
     // A trifle beside what is left is not what is missing.
-    const double least = std::max({options.least_gain, options.least_share * (now.chi2 - samples), floor});
+    const double least = std::max(options.least_gain, options.least_share * (now.chi2 - samples));
+    // With next to nothing left but nominal values far off, an effect may do what they do; only all values
+    // moved together go along that valley.
+    const bool strained = now.chi2 - samples < 0.01 * samples &&
+                          now.penalty > 4.0 * options.least_prior_gain + 2.0 * free_count;
     Fit best = now;
     double best_promise = 0.0;
     std::size_t fitted = 0;
     std::vector<Rung> rungs;
     for (const Promise& p : promises) {
-      if (p.gain < least &&
-          (p.gain < 4.0 * options.least_prior_gain || now.penalty < 4.0 * options.least_prior_gain))
-        break;
+      if (p.gain < least && !(strained && p.gain > 4.0 * options.least_prior_gain)) break;
       if (fitted >= 2 && p.gain < 0.02 * promises.front().gain) break;
       if (fitted >= options.fitted_per_round) break;
       // One that leaves next to nothing can be bettered only by one that promises about as much.
       if (best.chi2 - samples < 0.02 * (now.chi2 - samples) && p.gain < 0.5 * best_promise) break;
       FitState with = now.state;
       with.members.push_back({p.hypothesis, startOf(quick, now, p)});
-      const Fit tried = quick.fit(with, &tangents, {6, 1e-3, true});
+      const Fit tried = quick.fit(with, strained ? nullptr : &tangents, {6, 1e-3, true});
       ++fitted;
       rungs.push_back({round, p.hypothesis->effect, p.hypothesis->variant, p.gain, now.bic - tried.bic, false,
                        p.hypothesis, tried.state.members.back().values});
@@ -218,8 +240,8 @@ SearchResult search(TwinRunner& quick_runner, const Fitter& quick, const Fitter&
       // Nothing that is left could make another hypothesis better.
       if (fitted >= 2 && best.chi2 - samples < 0.01 * (now.chi2 - samples)) break;
     }
-    const bool better = tells(now, best, least, options) &&
-                        (now.bic - best.bic > least || now.chi2 - samples < 0.01 * samples);
+    const bool better = now.bic - best.bic > std::max(least, leastGain(quick.runner(), now, best, options)) ||
+                        (now.chi2 - samples < 0.01 * samples && relieves(now, best, options));
     for (Rung& r : rungs) {
       r.taken = better && r.effect == best.state.members.back().hypothesis->effect &&
                 r.variant == best.state.members.back().hypothesis->variant;
@@ -234,7 +256,7 @@ SearchResult search(TwinRunner& quick_runner, const Fitter& quick, const Fitter&
     // What was found earlier may have stood for what has been found now.
     for (std::size_t m = 0; m < now.state.members.size() && now.state.members.size() > 1;) {
       const Fit less = quick.fit(without(now.state, m), &tangents, {6, 1e-3, true});
-      if (!tells(less, now, std::max(options.least_gain, floor), options)) {
+      if (!tells(quick.runner(), less, now, options)) {
         say("  not needed any more: " + now.state.members[m].hypothesis->title());
         now = less;
       } else {

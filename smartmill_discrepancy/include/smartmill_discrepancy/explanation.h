@@ -28,6 +28,9 @@ struct FoundEffect {
       0.0;  ///< [1] share of the held-out squares above the noise that it takes away
   double evenness =
       0.0;  ///< [1] variance over the tests of the size in which each test shows it; 0 where all agree
+  /// [1] that the tests as a body prefer this effect to its best rival (or to none), were they drawn anew:
+  /// Vuong's comparison of two models over tests.
+  double confidence = 0.0;
   std::vector<std::pair<std::string, double>> alternatives;  ///< other effects in its place: name, delta_bic
 };
 
@@ -55,6 +58,9 @@ struct SpectrumCurve {
 struct GapPair {
   double fit = 0.0, heldout = 0.0;
 };
+
+/// Draws a gnuplot program into a PNG file. @throws Error when gnuplot is missing or fails.
+void drawWithGnuplot(const std::string& png, int width, int height, const std::string& commands);
 
 /// What explain found (formats.md section 3).
 struct Explanation {
