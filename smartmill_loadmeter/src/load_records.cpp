@@ -5,12 +5,12 @@
 
 #include <Eigen/Dense>
 
-#include "smartmill_loadmeter/runout_torque.h"
 #include "smartmill_core/campaign/record.h"
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/units.h"
 #include "smartmill_loadmeter/campaign_identification.h"
+#include "smartmill_loadmeter/runout_torque.h"
 
 namespace smartmill::loadmeter {
 
@@ -107,9 +107,8 @@ struct UnitTorque {
   std::array<std::vector<double>, 2> torque;
 };
 
-// Without the angle: the mean.
-UnitTorque unitTorque(const LoadRecord& r, const Runout& runout) {
-  constexpr std::size_t STEPS = 4096;  // of a revolution, linear between: 3e-7 of the ripple
+// Without the angle: the mean. @param steps of a revolution, linear between them.
+UnitTorque unitTorque(const LoadRecord& r, const Runout& runout, std::size_t steps) {
   UnitTorque unit;
   const RunoutTorque torque(r.tool, r.engagement, runout.x, runout.y);
   unit.mean = torque.mean();
@@ -119,21 +118,31 @@ UnitTorque unitTorque(const LoadRecord& r, const Runout& runout) {
     for (std::size_t u = 0; u < 2; ++u) unit.torque[u].assign(n, unit.mean[u]);
     return unit;
   }
-  std::vector<std::array<double, 2>> table(STEPS + 1);
-  for (std::size_t i = 0; i < STEPS; ++i) {
-    table[i] = torque.at(units::TWO_PI * static_cast<double>(i) / STEPS);
+  std::vector<std::array<double, 2>> table(steps + 1);
+  for (std::size_t i = 0; i < steps; ++i) {
+    table[i] = torque.at(units::TWO_PI * static_cast<double>(i) / static_cast<double>(steps));
   }
-  table[STEPS] = table[0];
+  table[steps] = table[0];
   for (std::size_t u = 0; u < 2; ++u) unit.torque[u].resize(n);
   for (std::size_t i = 0; i < r.angle.size(); ++i) {
-    const double turn = r.angle[i] / units::TWO_PI, at = (turn - std::floor(turn)) * STEPS;
-    const std::size_t k = std::min(static_cast<std::size_t>(at), STEPS - 1);
+    const double turn = r.angle[i] / units::TWO_PI,
+                 at = (turn - std::floor(turn)) * static_cast<double>(steps);
+    const std::size_t k = std::min(static_cast<std::size_t>(at), steps - 1);
     const double share = at - static_cast<double>(k);
     for (std::size_t u = 0; u < 2; ++u) {
       unit.torque[u][i] = table[k][u] + share * (table[k + 1][u] - table[k][u]);
     }
   }
   unit.at_engagement = torque.at(r.engage_angle);
+  return unit;
+}
+
+// Both torques as one, in place of the first.
+UnitTorque weighted(UnitTorque unit, const std::array<double, 2>& k, double factor) {
+  const auto join = [&](double& first, double second) { first = factor * (k[0] * first + k[1] * second); };
+  join(unit.at_engagement[0], unit.at_engagement[1]);
+  join(unit.mean[0], unit.mean[1]);
+  for (std::size_t i = 0; i < unit.torque[0].size(); ++i) join(unit.torque[0][i], unit.torque[1][i]);
   return unit;
 }
 
@@ -172,26 +181,24 @@ void condense(LoadRecord& r, double gain, double time_constant, double ktc, doub
   if (r.cut) {
     const std::array<double, 2> k{ktc, kte};
     for (std::vector<double>& column : by) column.assign(r.voltage.size(), 0.0);
-    const auto addTo = [&](std::vector<double>& column, const UnitTorque& torque, std::size_t u, double tau,
-                           double factor) {
-      const std::vector<double> response = lagged(r, torque, u, tau);
-      for (std::size_t i = 0; i < column.size(); ++i) column[i] += factor * response[i];
-    };
-    const UnitTorque here = unitTorque(r, r.has_angle ? runout : Runout());
+    const UnitTorque here = unitTorque(r, r.has_angle ? runout : Runout(), 4096);
+    for (std::size_t u = 0; u < 2; ++u) unit[u] = lagged(r, here, u, time_constant);
+    // What is weighted may be summed before the lag, which is linear.
+    UnitTorque sum = weighted(here, k, 1.0);
     const double h = 1e-3, d = 2e-7;
-    for (std::size_t u = 0; u < 2; ++u) {
-      unit[u] = lagged(r, here, u, time_constant);
-      addTo(by[0], here, u, time_constant * (1.0 + h), k[u] / (2.0 * h));
-      addTo(by[0], here, u, time_constant * (1.0 - h), -k[u] / (2.0 * h));
-    }
+    const std::vector<double> slower = lagged(r, sum, 0, time_constant * (1.0 + h)),
+                              faster = lagged(r, sum, 0, time_constant * (1.0 - h));
+    for (std::size_t i = 0; i < by[0].size(); ++i) by[0][i] = (slower[i] - faster[i]) / (2.0 * h);
     if (r.has_angle && r.tool.teeth > 1) {
-      for (const double sign : {1.0, -1.0}) {
-        const UnitTorque along = unitTorque(r, {runout.x + sign * d, runout.y}),
-                         across = unitTorque(r, {runout.x, runout.y + sign * d});
-        for (std::size_t u = 0; u < 2; ++u) {
-          addTo(by[1], along, u, time_constant, sign * k[u] / (2.0 * d));
-          addTo(by[2], across, u, time_constant, sign * k[u] / (2.0 * d));
-        }
+      for (std::size_t axis = 0; axis < 2; ++axis) {
+        const Runout step = axis == 0 ? Runout{d, 0.0} : Runout{0.0, d};
+        sum = weighted(unitTorque(r, {runout.x + step.x, runout.y + step.y}, 1024), k, 0.5 / d);
+        const UnitTorque below =
+            weighted(unitTorque(r, {runout.x - step.x, runout.y - step.y}, 1024), k, 0.5 / d);
+        sum.at_engagement[0] -= below.at_engagement[0];
+        sum.mean[0] -= below.mean[0];
+        for (std::size_t i = 0; i < sum.torque[0].size(); ++i) sum.torque[0][i] -= below.torque[0][i];
+        by[1 + axis] = lagged(r, sum, 0, time_constant);
       }
     } else {
       r.share = meanShare(r, runout);
