@@ -36,8 +36,9 @@ double gapOf(const std::vector<double>& residual) {
 
 // How an effect shows: squares of its trace by channel, and how evenly the tests agree on its size.
 struct Trace {
-  std::map<std::string, double> squares;
+  std::vector<double> values;
   double total = 0.0, evenness = 0.0;
+  bool every_test_better = true;  // of those in which it shows
 };
 
 Trace traceOf(const Fitter& fitter, const Fit& fit, std::size_t member) {
@@ -45,11 +46,12 @@ Trace traceOf(const Fitter& fitter, const Fit& fit, std::size_t member) {
   less.members.erase(less.members.begin() + static_cast<std::ptrdiff_t>(member));
   const auto simulated = fitter.runner().simulate({fitter.model(fit.state), fitter.model(less)});
   Trace trace;
+  trace.values.resize(fitter.runner().size());
   std::map<std::size_t, std::pair<double, double>> by_test;  // squares, product with the residual
   for (const Block& b : fitter.runner().blocks()) {
     for (std::size_t i = b.offset; i < b.offset + b.size; ++i) {
       const double s = simulated[0][i] - simulated[1][i];
-      trace.squares[b.channel] += s * s;
+      trace.values[i] = s;
       trace.total += s * s;
       by_test[b.test].first += s * s;
       by_test[b.test].second += s * fit.residual[i];
@@ -61,6 +63,7 @@ Trace traceOf(const Fitter& fitter, const Fit& fit, std::size_t member) {
     if (sums.first < 1e-6 * trace.total) continue;
     variance += sums.second * sums.second / sums.first;
     count += 1.0;
+    trace.every_test_better = trace.every_test_better && sums.first + 2.0 * sums.second > 0.0;
   }
   trace.evenness = std::max(0.0, (variance - count) / trace.total);
   return trace;
@@ -88,6 +91,33 @@ double confidenceBetween(const Fitter& fitter, const FitState& better, const Fit
     squares += vote * vote;
   }
   return squares > 0.0 ? 0.5 * std::erfc(-sum / std::sqrt(2.0 * squares)) : 0.5;
+}
+
+// Squares of what is left at the very places (order, frequency, level, trend of a channel) where the trace
+// lies.
+double leftWhere(const TwinRunner& runner, const Trace& trace, const std::vector<Finding>& unexplained,
+                 const StructureOptions& options) {
+  constexpr double SHARE = 0.03;  // of the trace's squares, to count as its place
+  StructureOptions of_trace = options;
+  of_trace.squares_of_gap = 0.0;
+  double left = 0.0;
+  const std::vector<Finding> places = findStructure(runner, trace.values, of_trace);
+  for (const Finding& f : unexplained) {
+    for (const Finding& place : places) {
+      if (place.channel != f.channel || place.domain != f.domain || place.squares < SHARE * trace.total)
+        continue;
+      const auto near = [&](const char* key, double tolerance) {
+        const auto a = place.location.find(key), b = f.location.find(key);
+        return a == place.location.end() || b == f.location.end() ||
+               std::abs(a->second / b->second - 1.0) < tolerance;
+      };
+      if (near("order", 1e-6) && near("frequency_hz", 0.05)) {
+        left += f.squares;
+        break;
+      }
+    }
+  }
+  return left;
 }
 
 FitState without(const FitState& state, std::size_t member) {
@@ -221,23 +251,31 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
   result.unexplained = findStructure(exact_runner, found.best.residual, structure);
   // What the calibration of the nominal values takes away is no disagreement of their kind.
   result.where = findStructure(exact_runner, found.null.residual, structure);
-  // An effect that the tests do not agree on, or that is small beside what is left where it acts, stands for
-  // another cause.
+  // Of its share of the held-out squares above the noise.
+  const auto heldoutReduction = [&](const FitState& state, std::size_t m) {
+    const double with = squaresOf(residualOf(heldout_runner, exact.model(state)));
+    const double without_it = squaresOf(residualOf(heldout_runner, exact.model(without(state, m))));
+    const auto floor = static_cast<double>(heldout_runner.size());
+    return without_it > floor
+               ? std::clamp(1.0 - std::max(with - floor, 0.0) / (without_it - floor), -1.0, 1.0)
+               : 0.0;
+  };
+  // An effect stands for another cause when the tests do not agree on its size, unless it helps in every one
+  // of them and in those that it never saw; or when it leaves much at the very places where it acts.
   while (!result.unexplained.empty() && !found.best.state.members.empty()) {
     std::size_t worst = 0;
     double worst_score = 1.0;
     for (std::size_t m = 0; m < found.best.state.members.size(); ++m) {
       const Trace trace = traceOf(exact, found.best, m);
-      double rest = 0.0;
-      for (const Finding& f : result.unexplained) {
-        const auto at = trace.squares.find(f.channel);
-        if (at != trace.squares.end() && at->second > 0.01 * trace.total) rest += f.squares;
-      }
-      const double score = std::max(trace.evenness / options.least_evenness,
+      const double rest = leftWhere(exact_runner, trace, result.unexplained, structure);
+      const bool helps =
+          trace.every_test_better && heldoutReduction(found.best.state, m) > options.least_heldout_reduction;
+      const double score = std::max(helps ? 0.0 : trace.evenness / options.least_evenness,
                                     2.0 * rest / std::max(found.contribution[m], 1.0));
-      std::snprintf(line, sizeof line, "  %s: tests differ by %.3g, rest %.3g, contribution %.3g",
+      std::snprintf(line, sizeof line,
+                    "  %s: tests differ by %.3g, left where it acts %.3g, contribution %.3g%s",
                     found.best.state.members[m].hypothesis->title().c_str(), trace.evenness, rest,
-                    found.contribution[m]);
+                    found.contribution[m], helps ? ", helps everywhere" : "");
       say(line);
       if (score > worst_score) {
         worst_score = score;
@@ -276,12 +314,7 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
     writeStdDevs(entry, effect.parameters);
     effect.delta_bic = found.contribution[m];
     effect.evenness = traceOf(exact, best, m).evenness;
-    const double with = squaresOf(residualOf(heldout_runner, exact.model(best.state)));
-    const double without_it = squaresOf(residualOf(heldout_runner, exact.model(without(best.state, m))));
-    const auto floor = static_cast<double>(heldout_runner.size());
-    effect.heldout_gap_reduction =
-        without_it > floor ? std::clamp(1.0 - std::max(with - floor, 0.0) / (without_it - floor), -1.0, 1.0)
-                           : 0.0;
+    effect.heldout_gap_reduction = heldoutReduction(best.state, m);
     effect.confidence = confidenceBetween(exact, best.state, without(best.state, m));
     for (const Rival& rival : found.rivals) {
       if (rival.member != m) continue;

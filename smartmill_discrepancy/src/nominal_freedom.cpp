@@ -10,7 +10,10 @@ NominalFreedom::NominalFreedom(const MachineModel& nominal) {
                        std::function<void(MachineModel&, double)> scale) {
     if (value == 0.0 || !std::isfinite(value) || percent <= 0.0) return;
     const double std_dev = 0.01 * percent;
-    coordinates_.push_back({std::move(name), 0.0, -8.0 * std_dev, 8.0 * std_dev, 2e-3 * std_dev, std_dev});
+    // Not far enough to hide an effect that a value could stand for.
+    constexpr double REACH = 4.5;
+    coordinates_.push_back(
+        {std::move(name), 0.0, -REACH * std_dev, REACH * std_dev, 2e-3 * std_dev, std_dev});
     set_.push_back(std::move(scale));
   };
   const Uncertainty& u = nominal.uncertainty;

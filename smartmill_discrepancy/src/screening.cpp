@@ -40,6 +40,12 @@ class Projection {
     Eigen::VectorXd prior = Eigen::VectorXd::Zero(basis_.cols());
     for (std::size_t c = 0; c < freedom.size(); ++c)
       prior[static_cast<Index>(c)] = 1.0 / (freedom[c].prior_std * freedom[c].prior_std);
+    // One that stands at its bound moves no further.
+    for (std::size_t c = 0; c < freedom.size(); ++c) {
+      const double room =
+          std::min(now.state.nominal[c] - freedom[c].low, freedom[c].high - now.state.nominal[c]);
+      if (room < 0.01 * freedom[c].prior_std) basis_.col(static_cast<Index>(c)).setZero();
+    }
     Eigen::VectorXd pull = Eigen::VectorXd::Zero(basis_.cols());
     for (std::size_t c = 0; c < freedom.size(); ++c)
       pull[static_cast<Index>(c)] = -now.state.nominal[c] * prior[static_cast<Index>(c)];

@@ -114,7 +114,7 @@ void refine(TwinRunner& quick_runner, const Fitter& quick, const Fitter& exact, 
     const Eigen::MatrixXd covariance = here.covariance;
     result->best = std::move(here);
     if (pass == PASSES) break;
-    const Fit next = quick.fit(from, &tangents, {6, 1e-8, true});
+    const Fit next = quick.fit(from, &tangents, {6, 1e-5, true});
     if (!next.converged) break;
     double moved = 0.0;
     Eigen::Index k = 0;
@@ -194,14 +194,14 @@ SearchResult search(TwinRunner& quick_runner, const Fitter& quick, const Fitter&
   Fit now;
   for (int pass = 0; pass < 3; ++pass) {
     tangents = linearise(state);
-    Fit fit = quick.fit(state, &tangents, {8, 1e-8, true});
+    Fit fit = quick.fit(state, &tangents, {8, 1e-5, true});
     const bool settled = pass > 0 && std::abs(now.bic - fit.bic) < std::max(1.0, 1e-3 * fit.bic);
     now = std::move(fit);
     state = now.state;
     if (settled) break;
   }
   tangents = linearise(state);
-  now = quick.fit(state, &tangents, {3, 1e-8, true});
+  now = quick.fit(state, &tangents, {3, 1e-5, true});
   result.null = now;
   const double samples = static_cast<double>(quick.runner().size());
   const auto free_count = static_cast<double>(free.size());
@@ -249,10 +249,10 @@ SearchResult search(TwinRunner& quick_runner, const Fitter& quick, const Fitter&
     }
     if (!better) break;
     tangents = linearise(best.state);
-    Fit refined = quick.fit(best.state, &tangents, {10, 1e-7, true});
+    Fit refined = quick.fit(best.state, &tangents, {8, 1e-4, true});
     // The tangents held where the fit began; where it went far they are taken anew.
     tangents = linearise(refined.state);
-    now = quick.fit(refined.state, &tangents, {10, 1e-7, true});
+    now = quick.fit(refined.state, &tangents, {8, 1e-4, true});
     // What was found earlier may have stood for what has been found now.
     for (std::size_t m = 0; m < now.state.members.size() && now.state.members.size() > 1;) {
       const Fit less = quick.fit(without(now.state, m), &tangents, {6, 1e-3, true});

@@ -82,6 +82,7 @@ struct Explanation {
 struct ExplainOptions {
   SearchOptions search;
   StructureOptions structure;
+  double least_heldout_reduction = 0.1;  ///< [1] of the held-out squares above the noise
   double least_evenness =
       0.04;  ///< an effect whose size differs more from test to test stands for another cause
 };

@@ -17,7 +17,7 @@ struct SearchOptions {
   int final_substeps = 8;
   std::size_t fitted_per_round = 5;  ///< hypotheses that a round fits after screening
   std::size_t most_effects = 4;
-  double least_gain = 30.0;  ///< [1] difference of BIC below which nothing is named
+  double least_gain = 100.0;  ///< [1] difference of BIC below which nothing is named
   double least_prior_gain =
       3.0;  ///< [1] the same where it comes from nominal values that need not be pulled off any more
   double twin_accuracy = 2e-4;  ///< [1] of the signal, by which two faithful simulations differ
