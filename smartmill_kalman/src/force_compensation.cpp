@@ -24,6 +24,9 @@ constexpr double RETUNE = 1e-6;
 /// below this share.
 constexpr std::size_t TRACK_EVERY = 32;
 constexpr double TRACKED = 1e-4;
+/// A harmonic tells the speed when a standard deviation of it moves the harmonic by less than this share of
+/// the harmonics' spacing; a few always do.
+constexpr double TELLING = 0.15, LEAST_TELLING = 8.0;
 constexpr double STEADY_TIME = 0.05;  // [s] without a change of speed before filters are laid out
 
 void require(const char* key, double value, bool good, const char* due) {
@@ -61,7 +64,8 @@ void ForceCompensation::setSensor(std::size_t axis, const ModalModel& sensor, do
 }
 
 void ForceCompensation::setMatrix(const SensorMatrix& matrix) {
-  if (parameters_.lag > 0.0) throw Error("lag: with a sensor matrix 0 is due, the smoother knows no cross-talk");
+  if (parameters_.lag > 0.0)
+    throw Error("lag: with a sensor matrix 0 is due, the smoother knows no cross-talk");
   for (std::size_t axis = 0; axis < 3; ++axis) setSensor(axis, matrix.h[axis][axis]);
   matrix_ = matrix;
 }
@@ -329,14 +333,16 @@ void ForceCompensation::run(std::array<std::vector<double>, 3>& force, double sa
       for (double& sample : force[axis]) take(axis, sample);
     }
   } else {
-    // Root of the sum of n^2: what harmonics of noise make of a slope.
-    const double n = filters_.front().harmonics();
-    const double slope_gain = std::sqrt(n * (n + 1.0) * (2.0 * n + 1.0) / 6.0);
     for (std::size_t i = 0; i < count; ++i) {
       const std::size_t level = std::min({filters_[0].level(), filters_[1].level(), filters_[2].level()});
       const double memory = parameters_.filter.memory(level) * units::TWO_PI / speed_;
+      // A harmonic that may lie nearer to its neighbour's place than to its own would mislead.
+      const double highest = std::max(LEAST_TELLING, TELLING * speed_ / tracker_->speedStd());
+      // Root of the sum of n^2: what harmonics of noise make of a slope.
+      const double n = std::min(highest, static_cast<double>(filters_.front().harmonics()));
+      const double slope_gain = std::sqrt(n * (n + 1.0) * (2.0 * n + 1.0) / 6.0);
       for (std::size_t axis = 0; axis < 3; ++axis) {
-        const double slope = filters_[axis].slope();
+        const double slope = filters_[axis].slope(highest);
         take(axis, force[axis][i]);
         tracker_->update(axis, filters_[axis].innovation(), slope, noise_rms_[axis],
                          noise_rms_[axis] * slope_gain / std::sqrt(memory * sample_rate));

@@ -310,13 +310,15 @@ void HarmonicFilter::adopt(const HarmonicFilter& other) {
   setState(state);
 }
 
-double HarmonicFilter::slope() const {
+double HarmonicFilter::slope(double highest) const {
   // d/d angle of Re(H W), W turning with exp(i n angle): n (c2 re - c1 im).
   Four sum = {};
   const double first = -static_cast<double>(modes_);
   Four order = {first, first + 1.0, first + 2.0, first + 3.0};
   for (const Block& block : blocks_) {
-    const Four n = order > 0.0 ? order : Four{};  // modes come first and do not turn with the spindle
+    // Modes come first and do not turn with the spindle.
+    Four n = order > 0.0 ? order : Four{};
+    n = order > highest ? Four{} : n;
     sum += n * (block.c2 * block.re - block.c1 * block.im);
     order += 4.0;
   }

@@ -109,8 +109,8 @@ class HarmonicFilter {
   }
 
   /// Slope of the sample expected next over the spindle's angle [N/rad], of the harmonics in their steady
-  /// state.
-  double slope() const;
+  /// state. @param highest harmonic that counts
+  double slope(double highest = 1e9) const;
 
   /// Takes the force of another filter over (harmonics beyond its own: zero), so that a new layout starts
   /// without a jump. The sensor's modes must be as many.
