@@ -6,6 +6,7 @@
 #include "smartmill_msgs/CuttingCondition.h"
 #include "smartmill_msgs/IdentifyCoefficientsActionGoal.h"
 #include "smartmill_msgs/LoadSample.h"
+#include "smartmill_msgs/SampleBlock.h"
 #include "smartmill_ros/bag_reader.h"
 #include "smartmill_ros/conversions.h"
 
@@ -13,8 +14,15 @@ namespace smartmill::loadmeter {
 
 std::vector<IdentifyResult> identifyFromBag(const std::string& path, const MachineModel& model,
                                             const NodeParameters& parameters,
-                                            const std::function<void(double)>& progress) {
+                                            const std::function<void(double)>& progress,
+                                            const std::function<void(const MotorForce&)>& force) {
   SortedIdentification identification(model, parameters.identification, parameters.hold_back);
+  if (!parameters.motor_calibration.empty()) {
+    identification.identification().setMotors(readMotorCalibration(parameters.motor_calibration));
+    identification.identification().onMotorForce([&](const MotorForce& f) {
+      if (force) force(f);
+    });
+  }
   std::vector<IdentifyResult> results;
   identification.identification().onResult([&](const IdentifyResult& result) {
     if (!result.reset) results.push_back(result);
@@ -26,6 +34,9 @@ std::vector<IdentifyResult> identifyFromBag(const std::string& path, const Machi
   bag.on<smartmill_msgs::LoadSample>("cnc/load", [&](const smartmill_msgs::LoadSample& m, double) {
     ++loads;
     identification.push(fromMsg(m));
+  });
+  bag.on<smartmill_msgs::SampleBlock>("daq/motor_current", [&](const smartmill_msgs::SampleBlock& m, double) {
+    if (!parameters.motor_calibration.empty()) identification.push(fromMsg(m));
   });
   bag.on<smartmill_msgs::CuttingCondition>("cut/condition", [&](const smartmill_msgs::CuttingCondition& m,
                                                                 double) { identification.push(fromMsg(m)); });

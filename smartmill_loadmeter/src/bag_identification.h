@@ -9,14 +9,16 @@
 
 namespace smartmill::loadmeter {
 
-/// Runs a recorded bag through the class that the node runs: cnc/state, cnc/load, cut/condition and the
-/// action's goals.
+/// Runs a recorded bag through the class that the node runs: cnc/state, cnc/load, daq/motor_current,
+/// cut/condition and the action's goals.
 /// @param progress called now and then with the share read, 0..1.
+/// @param force called with each cut's force by the motors, where parameters name a motor calibration.
 /// @return the answer to each goal in the bag that asked for coefficients; to one at its end when there is
 /// none.
 /// @throws Error on a bad bag.
 std::vector<IdentifyResult> identifyFromBag(const std::string& path, const MachineModel& model,
                                             const NodeParameters& parameters,
-                                            const std::function<void(double)>& progress);
+                                            const std::function<void(double)>& progress,
+                                            const std::function<void(const MotorForce&)>& force = {});
 
 }  // namespace smartmill::loadmeter

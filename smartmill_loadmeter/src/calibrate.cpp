@@ -1,3 +1,4 @@
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <exception>
@@ -11,6 +12,7 @@
 #include "smartmill_core/units.h"
 #include "smartmill_loadmeter/campaign_identification.h"
 #include "smartmill_loadmeter/machine_calibration.h"
+#include "smartmill_loadmeter/motor_calibration.h"
 
 namespace {
 
@@ -68,23 +70,68 @@ void run(const std::string& path, const std::string& model_file) {
               load.friction.viscous / ratio, load.friction.coulomb / ratio);
 }
 
+void runMotors(const std::string& standard, const std::string& currents, double base_speed_rpm,
+               const std::string& output) {
+  const MotorCalibration c = calibrateMotors(readStandardCuts(standard), readMachineCurrents(currents),
+                                             units::radPerSecFromRpm(base_speed_rpm));
+  for (const std::string& note : c.notes) std::fprintf(stderr, "calibrate: %s\n", note.c_str());
+  const std::array<const char*, 3> names{"X", "Y", "Z"};
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (!c.drive[a]) {
+      std::printf("drive %s: not calibrated, it moves in no standard cut\n", names[a]);
+      continue;
+    }
+    const DriveCalibration& d = *c.drive[a];
+    std::printf("drive %s: %.2f +- %.2f N/A, scatter of a cut %.1f N, from %d cuts\n", names[a],
+                d.newton_per_ampere.value, d.newton_per_ampere.std_dev, d.scatter, d.cuts);
+  }
+  if (c.spindle) {
+    std::printf("spindle: T = a(N) dI^b(N), base speed %.0f rpm, scatter of a cut %.3f Nm, R2 %.4f\n",
+                c.spindle->baseSpeed(), c.spindle->scatter(), c.spindle->rSquared());
+  }
+  if (!output.empty()) writeMotorCalibration(c, output);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   CLI::App app(
       "Friction, load-meter constant and bandwidth of a machine from a campaign's air cuts and from cuts "
       "whose "
-      "forces a dynamometer recorded.");
+      "forces a dynamometer recorded; or feed drives and spindle from standard cuts and motor currents.");
   std::string path, model;
-  app.add_option("CAMPAIGN", path, "campaign folder")->required();
+  std::string standard, currents, output;
+  double base_speed = 1e9;
+  auto* campaign = app.add_option("CAMPAIGN", path, "campaign folder");
+  auto* cuts = app.add_option("--standard-cuts", standard,
+                              "CSV of standard cuts whose forces a remote dynamometer recorded: "
+                              "cut,force_x[N],force_y[N],force_z[N],torque[N m]");
+  auto* own =
+      app.add_option("--currents", currents,
+                     "CSV of this machine's current ranges in the same cuts and in air: "
+                     "cut,spindle_speed[rpm],current_x[A],air_x[A],..,current_spindle[A],air_spindle[A]");
+  cuts->needs(own)->excludes(campaign);
+  own->needs(cuts);
+  app.add_option("--base-speed", base_speed, "of the spindle motor in rpm (default: below it throughout)")
+      ->check(CLI::PositiveNumber)
+      ->needs(cuts);
+  app.add_option("-o,--output", output, "motor calibration for the node (parameter motor_calibration)")
+      ->needs(cuts);
   app.add_option("--model", model, "model file (default: the campaign's)");
   try {
     app.parse(argc, argv);
+    if (path.empty() && standard.empty()) {
+      throw CLI::RequiredError("CAMPAIGN, or --standard-cuts and --currents,");
+    }
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;
   }
   try {
-    run(path, model);
+    if (!standard.empty()) {
+      runMotors(standard, currents, base_speed, output);
+    } else {
+      run(path, model);
+    }
   } catch (const std::exception& error) {
     std::fprintf(stderr, "calibrate: %s\n", error.what());
     return 1;

@@ -237,6 +237,15 @@ void addRotating(double towards, double square, double phase,
 /// shows undistorted. @return numbers written.
 std::size_t lowOrders(const std::array<std::array<double, ANGLES>, 3>& force, int orders, double* out) {
   const double n = static_cast<double>(ANGLES);
+  static const auto CIRCLE = [] {
+    std::array<std::array<double, ANGLES>, 2> circle{};
+    for (std::size_t i = 0; i < ANGLES; ++i) {
+      const double at = TWO_PI * static_cast<double>(i) / static_cast<double>(ANGLES);
+      circle[0][i] = std::cos(at);
+      circle[1][i] = std::sin(at);
+    }
+    return circle;
+  }();
   std::size_t written = 0;
   for (const auto& axis : force) {
     double sum = 0.0;
@@ -245,8 +254,8 @@ std::size_t lowOrders(const std::array<std::array<double, ANGLES>, 3>& force, in
     for (int k = 1; k <= orders; ++k) {
       double c = 0.0, s = 0.0;
       for (std::size_t i = 0; i < ANGLES; ++i) {
-        const double at = TWO_PI * static_cast<double>(i * static_cast<std::size_t>(k) % ANGLES) / n;
-        c += axis[i] * std::cos(at), s += axis[i] * std::sin(at);
+        const std::size_t at = i * static_cast<std::size_t>(k) % ANGLES;
+        c += axis[i] * CIRCLE[0][at], s += axis[i] * CIRCLE[1][at];
       }
       out[written++] = std::sqrt(2.0) * c / n;
       out[written++] = std::sqrt(2.0) * s / n;

@@ -51,6 +51,7 @@ void IdentificationParameters::validate() const {
   require(minimum_readings >= 2, "minimum_readings", minimum_readings, ">= 2");
   require(production_memory > 0.0 && production_memory <= 1e7, "production_memory", production_memory,
           "0 < value <= 1e7");
+  motor.validate();
   require(maximum_gap > 0.0 && maximum_gap <= 60.0, "maximum_gap", maximum_gap, "0 < value <= 60");
 }
 
@@ -72,6 +73,9 @@ void LoadMeterIdentification::reset() {
   path_since_.reset();
   last_reading_ = last_state_ = 0.0;
   readings_.clear();
+  motor_record_.clear();
+  path_first_.reset();
+  path_last_.reset();
   air_cuts_.clear();
   cuts_.clear();
   dropped_.clear();
@@ -100,13 +104,60 @@ bool LoadMeterIdentification::onPath(const CncState& state) const {
 void LoadMeterIdentification::handle(const CncState& state) {
   const bool gap = state.stamp - last_state_ > parameters_.maximum_gap;
   last_state_ = state.stamp;
-  if (!condition_ || condition_->kind != CuttingCondition::Kind::cut) return;
+  if (!condition_ || condition_->kind == CuttingCondition::Kind::none) return;
+  // In air the tool need not move; where it does the feed drives show their friction.
   const bool on_path = onPath(state);
   if (path_since_ && (!on_path || gap)) {
-    dropAfter(state.stamp - parameters_.guard_time);
+    if (condition_->kind == CuttingCondition::Kind::cut) dropAfter(state.stamp - parameters_.guard_time);
+    motor_record_.dropAfter(state.stamp - parameters_.guard_time);
     path_since_.reset();
   }
-  if (on_path && !path_since_) path_since_ = state.stamp;
+  if (!on_path) return;
+  if (!path_since_) {
+    path_since_ = state.stamp;
+    if (!path_first_) motor_record_.clear();  // standing still before it
+  }
+  PathPoint point{state.stamp, {}};
+  const std::array<const char*, 3> names{"X", "Y", "Z"};
+  for (std::size_t a = 0; a < 3; ++a) {
+    const auto axis = std::find(state.axes.begin(), state.axes.end(), names[a]);
+    point.position[a] = state.position[static_cast<std::size_t>(axis - state.axes.begin())];
+  }
+  if (!path_first_) path_first_ = point;
+  path_last_ = point;
+}
+
+void LoadMeterIdentification::handle(const SampleBlock& block) {
+  if (!motors_ || !condition_ || condition_->kind == CuttingCondition::Kind::none) return;
+  if (!speed_since_ || block.stamp - last_reading_ > parameters_.maximum_gap) return;
+  double since = *speed_since_;
+  // In air without motion the spindle alone is read.
+  if (!path_since_ && (path_first_ || condition_->kind == CuttingCondition::Kind::cut)) return;
+  if (path_since_) since = std::max(since, *path_since_);
+  if (block.stamp < since + parameters_.settle_time_constants * timeConstant(spindle_.load_meter_bandwidth)) {
+    return;
+  }
+  motor_record_.add(block);
+}
+
+void LoadMeterIdentification::readMotorsOf(LoadTest* test) {
+  if (!motors_ || motor_record_.empty()) return;
+  std::array<double, 3> velocity{{0.0, 0.0, 0.0}};
+  if (path_first_ && path_last_ && path_last_->stamp > path_first_->stamp) {
+    for (std::size_t a = 0; a < 3; ++a) {
+      velocity[a] =
+          (path_last_->position[a] - path_first_->position[a]) / (path_last_->stamp - path_first_->stamp);
+    }
+  }
+  test->motor = readMotors(motor_record_, parameters_.motor, velocity, test->speed);
+  if (test->condition.kind != CuttingCondition::Kind::cut) return;
+  std::vector<MotorReading> air;
+  for (const LoadTest& one : air_cuts_) {
+    if (one.motor) air.push_back(*one.motor);
+  }
+  test->force = forceFromMotors(*test->motor, air, *motors_, parameters_.motor);
+  test->force->stamp = test->stamp;
+  test->force->name = test->condition.name;
 }
 
 void LoadMeterIdentification::handle(const LoadSample& sample) {
@@ -126,6 +177,7 @@ void LoadMeterIdentification::handle(const LoadSample& sample) {
                       parameters_.speed_tolerance * condition_->spindle_speed;
   if (speed_since_ && (!steady || gap)) {
     dropAfter(sample.stamp - parameters_.guard_time);
+    motor_record_.dropAfter(sample.stamp - parameters_.guard_time);
     speed_since_.reset();
   }
   if (!steady) return;
@@ -157,6 +209,7 @@ void LoadMeterIdentification::dropAfter(double stamp) {
 void LoadMeterIdentification::closeTest() {
   if (condition_ && condition_->kind != CuttingCondition::Kind::none) {
     dropAfter(last_reading_ - parameters_.guard_time);
+    motor_record_.dropAfter(last_reading_ - parameters_.guard_time);
     const std::size_t n = readings_.size();
     if (n < static_cast<std::size_t>(parameters_.minimum_readings)) {
       dropped_.push_back("'" + condition_->name + "' has " + countOf(n, "steady reading") + ", " +
@@ -178,12 +231,17 @@ void LoadMeterIdentification::closeTest() {
       test.readings = static_cast<int>(n);
       test.stamp = readings_.back().stamp;
       test.duration = readings_.back().stamp - readings_.front().stamp;
+      readMotorsOf(&test);
       (condition_->kind == CuttingCondition::Kind::air ? air_cuts_ : cuts_).push_back(test);
       if (condition_->kind == CuttingCondition::Kind::cut) follow(test);
       if (test_) test_(test);
+      if (motor_force_ && test.force) motor_force_(*test.force);
     }
   }
   readings_.clear();
+  motor_record_.clear();
+  path_first_.reset();
+  path_last_.reset();
 }
 
 void LoadMeterIdentification::follow(const LoadTest& cut) {
@@ -219,6 +277,7 @@ void LoadMeterIdentification::handle(const IdentifyGoal& goal) {
   if (goal.reset) {
     // The condition that holds stays: its test begins anew.
     readings_.clear();
+    motor_record_.clear();
     air_cuts_.clear();
     cuts_.clear();
     dropped_.clear();
@@ -266,6 +325,7 @@ IdentifyResult LoadMeterIdentification::identify(const IdentifyGoal& goal) const
     result.message = error.what() + aside;
     return result;
   }
+  aside = addFromMotors(cuts, &result.record) + aside;
   CoefficientSet& k = result.record.set;
   if (!goal.tool.empty()) k.tool = goal.tool;
   if (!goal.material.empty()) k.material = goal.material;
@@ -277,6 +337,53 @@ IdentifyResult LoadMeterIdentification::identify(const IdentifyGoal& goal) const
       k.std_dev.kte / units::N_PER_MM, air_cuts_.size(), cuts.size());
   result.message = text + aside;
   return result;
+}
+
+// Radial and axial coefficients; Ktc and Kte stay those of the torque, which know the friction they share.
+// @return what to add to the message.
+std::string LoadMeterIdentification::addFromMotors(const std::vector<LoadTest>& cuts,
+                                                   CoefficientRecord* record) const {
+  std::vector<JointReading> readings;
+  bool any = false;
+  const IdleTorque idle = idleTorque(air_cuts_, spindle_, spindle_uncertainty_);
+  for (const LoadTest& cut : cuts) {
+    JointReading r;
+    r.tool = cut.condition.tool;
+    r.engagement = cut.condition.engagement;
+    const auto& from = cut.condition.steady_from;
+    const auto& to = cut.condition.steady_to;
+    r.heading = std::atan2(to[1] - from[1], to[0] - from[0]);
+    const double watt = spindle_.load_meter_gain * cut.speed;
+    const Estimate torque{cut.voltage.mean / watt - idle.torque(cut), cut.torqueStdAsVoltage() / watt};
+    if (torque.std_dev > 0.0) r.torque = torque;
+    if (cut.force) r.axis_force = cut.force->force;
+    for (const auto& force : r.axis_force) any = any || force;
+    readings.push_back(r);
+  }
+  if (!any) return "";
+  JointResult joint;
+  try {
+    joint = identifyJointly(readings);
+  } catch (const Error& error) {
+    return std::string("; motor currents: ") + error.what();
+  }
+  std::string text;
+  for (std::size_t i = 0; i < cuttingKeys().size(); ++i) {
+    if (i == 0 || i == 3) continue;
+    const auto coefficient = cuttingKeys()[i].coefficient;
+    record->set.value.*coefficient = joint.value.*coefficient;
+    record->set.std_dev.*coefficient = joint.std_dev.*coefficient;
+    for (std::size_t j = 0; j < cuttingKeys().size(); ++j) {
+      const double c = joint.covariance[6 * i + j];
+      if (std::isfinite(c)) {
+        record->covariance[CoefficientRecord::covarianceIndex(std::min(i, j), std::max(i, j))] = c;
+      }
+    }
+  }
+  for (const std::string& name : joint.not_observable) text += (text.empty() ? "" : ", ") + name;
+  record->set.source = "load_meter and motor_current";
+  return text.empty() ? "; motor currents give all six"
+                      : "; not observable from the axes that moved: " + text;
 }
 
 // T = V / (K omega): the shares of both add up.

@@ -190,12 +190,11 @@ TorquePowerLaw::TorquePowerLaw(const std::vector<SpindleCut>& cuts, double base_
       for (const SpindleCut& cut : own) *out++ = evaluate(s, cut.speed_rpm, cut.rise) - cut.torque;
     };
     const FitResult found = fit(residuals, own.size(), start, 1e-10);
-    (above ? above_ : below_) = sideOf(found.value);
-    (above ? has_above_ : has_below_) = true;
+    sides_[above ? 1 : 0] = sideOf(found.value);
     left += found.squares;
     unknowns += static_cast<double>(start.size());
   }
-  if (!has_below_ && !has_above_) throw Error("spindle calibration: no cut with a rise of current");
+  if (!sides_[0] && !sides_[1]) throw Error("spindle calibration: no cut with a rise of current");
   double total = 0.0, middle = 0.0;
   for (const SpindleCut& cut : cuts) middle += cut.torque / static_cast<double>(cuts.size());
   for (const SpindleCut& cut : cuts) total += (cut.torque - middle) * (cut.torque - middle);
@@ -205,11 +204,11 @@ TorquePowerLaw::TorquePowerLaw(const std::vector<SpindleCut>& cuts, double base_
 
 double TorquePowerLaw::torque(double speed_rpm, double rise) const {
   const bool above = speed_rpm > base_;
-  if (above ? !has_above_ : !has_below_) {
+  if (!side(above)) {
     throw Error("spindle calibration: no cut " + std::string(above ? "above" : "below") +
                 " base speed: torque at " + std::to_string(speed_rpm) + " rpm is not known");
   }
-  return evaluate(above ? above_ : below_, speed_rpm, rise);
+  return evaluate(*side(above), speed_rpm, rise);
 }
 
 VarianceSplit splitVariance(const std::vector<double>& dynamometer, const std::vector<double>& current) {

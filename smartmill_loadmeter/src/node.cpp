@@ -1,5 +1,6 @@
 #include "node.h"
 
+#include <geometry_msgs/WrenchStamped.h>
 #include <boost/function.hpp>
 
 #include "smartmill_core/error.h"
@@ -8,6 +9,7 @@
 #include "smartmill_msgs/CuttingCoefficients.h"
 #include "smartmill_msgs/CuttingCondition.h"
 #include "smartmill_msgs/LoadSample.h"
+#include "smartmill_msgs/SampleBlock.h"
 #include "smartmill_ros/conversions.h"
 
 namespace smartmill::loadmeter {
@@ -50,12 +52,34 @@ LoadMeterNode::LoadMeterNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
   subscribe("cnc/state", smartmill_msgs::CncState());
   subscribe("cnc/load", smartmill_msgs::LoadSample());
   subscribe("cut/condition", smartmill_msgs::CuttingCondition());
+  if (!parameters_.motor_calibration.empty()) {
+    identification_.identification().setMotors(readMotorCalibration(parameters_.motor_calibration));
+    identification_.identification().onMotorForce([this](const MotorForce& force) { publish(force); });
+    force_publisher_ = nh.advertise<geometry_msgs::WrenchStamped>("force/motor_current", 10, true);
+    subscribe("daq/motor_current", smartmill_msgs::SampleBlock());
+  }
   find_service_ = nh.advertiseService("loadmeter/find_coefficients", &LoadMeterNode::find, this);
   diagnostics_.setHardwareID("spindle load meter");
   diagnostics_.add("load meter", this, &LoadMeterNode::diagnose);
   last_input_ = ros::WallTime::now();
   timer_ = nh.createWallTimer(ros::WallDuration(0.2), [this](const ros::WallTimerEvent&) { watch(); });
   server_.start();
+}
+
+// Mean force of a cut on the tool; NaN: not observable, nothing is put in its place.
+void LoadMeterNode::publish(const MotorForce& force) {
+  geometry_msgs::WrenchStamped message;
+  message.header.stamp = fromSec(force.stamp);
+  message.header.frame_id = "machine";
+  const auto valueOf = [](const std::optional<Estimate>& e) { return e ? e->value : NOT_A_NUMBER; };
+  message.wrench.force.x = valueOf(force.force[0]);
+  message.wrench.force.y = valueOf(force.force[1]);
+  message.wrench.force.z = valueOf(force.force[2]);
+  message.wrench.torque.x = message.wrench.torque.y = NOT_A_NUMBER;
+  message.wrench.torque.z = valueOf(force.torque);
+  force_publisher_.publish(message);
+  last_force_ = "'" + force.name + "': " + force.text();
+  ROS_INFO("motors, test %s", last_force_.c_str());
 }
 
 template <typename Message>
@@ -185,6 +209,7 @@ void LoadMeterNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status
                 production->kteStd() / units::N_PER_MM);
     status.addf("last cut's surprise", "%.1f sigma", production->surprise());
   }
+  if (!last_force_.empty()) status.add("force by motor currents", last_force_);
   status.add("late inputs", identification_.late());
   status.add("waiting for", identification_.waitingFor());
   status.add("last result", last_message_);

@@ -31,6 +31,7 @@ class LoadMeterNode {
   void feedback();
   bool find(smartmill_msgs::FindCoefficients::Request& request,
             smartmill_msgs::FindCoefficients::Response& response);
+  void publish(const MotorForce& force);
   void watch();
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
   template <typename Message>
@@ -43,9 +44,9 @@ class LoadMeterNode {
   std::uint64_t next_id_ = 1;
   ros::WallTime last_input_;
   bool any_input_ = false;
-  std::string last_message_;
+  std::string last_message_, last_force_;
 
-  ros::Publisher publisher_;
+  ros::Publisher publisher_, force_publisher_;
   std::vector<ros::Subscriber> subscribers_;
   ros::ServiceServer find_service_;
   diagnostic_updater::Updater diagnostics_;

@@ -16,19 +16,20 @@ SortedIdentification::SortedIdentification(const MachineModel& model,
     : identification_(model, parameters), sorter_(hold_back) {
   states_ = sorter_.addRegular("cnc/state");
   loads_ = sorter_.addRegular("cnc/load");
+  motors_ = sorter_.addEvents("daq/motor_current");
   conditions_ = sorter_.addEvents("cut/condition");
   goals_ = sorter_.addEvents("loadmeter/identify_coefficients");
-  last_.assign(4, NEVER);
+  last_.assign(5, NEVER);
 }
 
 template <typename Input>
 void SortedIdentification::sort(StreamSorter::Stream stream, const Input& input) {
   // Only sensors tell of a restart: a latched condition is old by nature.
-  const bool regular = stream == states_ || stream == loads_;
+  const bool regular = stream == states_ || stream == loads_ || stream == motors_;
   if (regular && input.stamp < last_[stream] - RESTART_JUMP) {
     sorter_.reset();
     identification_.reset();
-    last_.assign(4, NEVER);
+    last_.assign(5, NEVER);
     newest_ = 0.0;
   }
   last_[stream] = std::max(last_[stream], input.stamp);
@@ -41,6 +42,10 @@ void SortedIdentification::push(const CncState& state) {
 }
 void SortedIdentification::push(const LoadSample& sample) {
   sort(loads_, sample);
+}
+void SortedIdentification::push(const SampleBlock& block) {
+  sorter_.setRegular(motors_, true);
+  sort(motors_, block);
 }
 void SortedIdentification::push(const CuttingCondition& condition) {
   sort(conditions_, condition);

@@ -1,7 +1,9 @@
 #include <actionlib/client/simple_action_client.h>
+#include <geometry_msgs/WrenchStamped.h>
 #include <ros/ros.h>
 
 #include <cmath>
+#include <mutex>
 
 #include <gtest/gtest.h>
 
@@ -12,6 +14,7 @@
 #include "smartmill_msgs/FindCoefficients.h"
 #include "smartmill_msgs/IdentifyCoefficientsAction.h"
 #include "smartmill_msgs/LoadSample.h"
+#include "smartmill_msgs/SampleBlock.h"
 #include "smartmill_ros/conversions.h"
 
 namespace smartmill::loadmeter {
@@ -34,11 +37,20 @@ TEST(LoadMeterNode, identifiesPublishesAndAnswers) {
   spinner.start();
   const auto states = nh.advertise<smartmill_msgs::CncState>("cnc/state", 1000);
   const auto loads = nh.advertise<smartmill_msgs::LoadSample>("cnc/load", 1000);
+  const auto currents = nh.advertise<smartmill_msgs::SampleBlock>("daq/motor_current", 1000);
+  geometry_msgs::WrenchStamped force;
+  std::mutex force_lock;
+  const boost::function<void(const geometry_msgs::WrenchStamped&)> take = [&](const auto& m) {
+    const std::lock_guard<std::mutex> guard(force_lock);
+    force = m;
+  };
+  const auto forces = nh.subscribe<geometry_msgs::WrenchStamped>("force/motor_current", 10, take);
   const auto conditions = nh.advertise<smartmill_msgs::CuttingCondition>("cut/condition", 100, true);
   Client client("loadmeter/identify_coefficients", false);
   ASSERT_TRUE(client.waitForServer(ros::Duration(20.0)));
-  for (int i = 0; i < 200 && !(states.getNumSubscribers() && loads.getNumSubscribers() &&
-                               conditions.getNumSubscribers());
+  for (int i = 0;
+       i < 200 && !(states.getNumSubscribers() && loads.getNumSubscribers() && currents.getNumSubscribers() &&
+                    forces.getNumPublishers() && conditions.getNumSubscribers());
        ++i) {
     ros::WallDuration(0.05).sleep();
   }
@@ -52,6 +64,8 @@ TEST(LoadMeterNode, identifiesPublishesAndAnswers) {
     if (++sent % 10 == 0)
       ros::WallDuration(0.002).sleep();  // far faster than a machine, yet not faster than the queue
   };
+  session.cutting = {TRUTH.ktc, 420e6, 0.0, TRUTH.kte, 21e3, 0.0};
+  session.currents = [&](const SampleBlock& b) { currents.publish(toMsg(b)); };
   session.condition = [&](const CuttingCondition& c) { conditions.publish(toMsg(c)); };
 
   // A plan that was forgotten does not count.
@@ -98,6 +112,25 @@ TEST(LoadMeterNode, identifiesPublishesAndAnswers) {
   EXPECT_EQ(call.response.code, smartmill_msgs::FindCoefficients::Response::NOT_FOUND);
   EXPECT_TRUE(std::isnan(call.response.coefficients.ktc));
   EXPECT_NE(call.response.message.find("endmill / aluminium"), std::string::npos);
+
+  // After a pass in air the X drive tells the force of a cut; Y and Z stood still: nothing is told of them.
+  session.airPass(6000.0, 6e-5, 4.0);
+  session.slot(6000.0, 6e-5, 4.0);
+  session.air(2000.0, 0.3);
+  const double truth = MechanisticForce({3, 0.012, units::radFromDeg(35.0), {}}, session.cutting,
+                                        {0.0, units::PI, 0.002, 6e-5})
+                           .mean()
+                           .fx;
+  geometry_msgs::WrenchStamped last;
+  for (int i = 0; i < 200; ++i) {
+    ros::WallDuration(0.05).sleep();
+    const std::lock_guard<std::mutex> guard(force_lock);
+    last = force;
+    if (std::isfinite(last.wrench.force.x) && last.wrench.force.x != 0.0) break;
+  }
+  EXPECT_NEAR(last.wrench.force.x, truth, 4.0);  // scatter of the calibration: 1 N
+  EXPECT_TRUE(std::isnan(last.wrench.force.y));
+  EXPECT_TRUE(std::isnan(last.wrench.force.z));
 }
 
 }  // namespace

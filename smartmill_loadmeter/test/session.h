@@ -55,11 +55,29 @@ class Session {
     position_ = 0.1 - 0.3 * speed;
     run(0.3, speed, 0.0);  // in air, then at once in full cut
     const Engagement e{0.0, units::PI, 0.002, feed};
-    run(seconds, speed, MechanisticForce(TOOL, TRUTH, e).mean().torque);
+    const CuttingForce force = MechanisticForce(TOOL, cutting, e).mean();
+    x_force_ = force.fx;
+    run(seconds, speed, force.torque);
+    x_force_ = 0.0;
     run(0.3, speed, 0.0);
     announce(CuttingCondition::Kind::none, 0.0, 0.0, "");
     run(0.1, 0.0, 0.0);
   }
+
+  /// Along X in air, the spindle turning: what the feed drive takes without a cut.
+  void airPass(double rpm, double feed, double seconds) {
+    announce(CuttingCondition::Kind::air, rpm, feed, "pass_" + std::to_string(feed));
+    turnTo(rpm);
+    position_ = 0.1;
+    run(seconds, units::radPerSecFromRpm(rpm) / units::TWO_PI * 3 * feed, 0.0);
+    announce(CuttingCondition::Kind::none, 0.0, 0.0, "");
+    run(0.1, 0.0, 0.0);
+  }
+
+  /// Phase currents at 1 kHz when set; channels x, y at rest, spindle.
+  std::function<void(const SampleBlock&)> currents;
+  CuttingCoefficients cutting = TRUTH;
+  static constexpr double X_NEWTON_PER_AMPERE = 200.0, X_AIR = 1.5, PHASE_PER_METRE = 400.0;
 
   double now() const { return time_; }
   std::string tool = "endmill", material = "aluminium";
@@ -99,6 +117,24 @@ class Session {
     const double power = (torque + VISCOUS * speed_ + COULOMB) * speed_;
     const double a = std::exp(-1.0 / RATE / timeConstant(7.0));
     lagged_ = a * lagged_ + (1.0 - a) * 3.88e-4 * power;
+    if (currents) {
+      SampleBlock block;
+      block.sample_rate = 1000.0;
+      block.stamp = time_ - 1.0 / RATE;
+      block.first_index = index_;
+      block.channels = {"x", "y"};
+      block.units = {"A", "A"};
+      index_ += 20;
+      // At rest the brake holds and the phases stand: noise only.
+      const double range = feed_speed > 0.0 ? X_AIR - x_force_ / X_NEWTON_PER_AMPERE : 0.0;
+      for (int i = 0; i < 20; ++i) {
+        phase_ += units::TWO_PI * PHASE_PER_METRE * feed_speed / block.sample_rate;
+        block.samples.push_back(0.5 * range * (std::sin(phase_) + 0.05 * std::sin(5.0 * phase_)) +
+                                0.05 * hall_(hall_random_));
+        block.samples.push_back(3.0 + 0.05 * hall_(hall_random_));
+      }
+      currents(block);
+    }
     CncState s;
     s.stamp = time_ - 0.004;
     s.connected = true;
@@ -119,6 +155,10 @@ class Session {
   std::normal_distribution<double> normal_;
   double noise_;
   double time_ = 1000.0, position_ = 0.0, speed_ = 0.0, lagged_ = 0.0;
+  double x_force_ = 0.0, phase_ = 0.0;
+  std::uint64_t index_ = 0;
+  std::mt19937 hall_random_{9};
+  std::normal_distribution<double> hall_;
 };
 
 /// Three air cuts and three slots.

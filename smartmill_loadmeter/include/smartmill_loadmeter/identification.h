@@ -12,6 +12,7 @@
 #include "smartmill_core/signal/streams.h"
 #include "smartmill_loadmeter/database.h"
 #include "smartmill_loadmeter/load_meter.h"
+#include "smartmill_loadmeter/motor_chain.h"
 #include "smartmill_loadmeter/production.h"
 
 namespace smartmill::loadmeter {
@@ -24,6 +25,7 @@ struct IdentificationParameters {
   double path_tolerance = 1.0e-3;     ///< [m] distance from the line of the steady cut
   int minimum_readings = 10;          ///< [1] >= 2, of a test
   double production_memory = 1800.0;  ///< [s] > 0 of cutting after which a production cut counts 1/e
+  MotorParameters motor;              ///< of daq/motor_current
   double maximum_gap = 0.5;           ///< [s] > 0, without controller state or load: steadiness is lost
 
   /// @throws Error naming key and value.
@@ -58,6 +60,8 @@ struct LoadTest {
   int readings = 0;
   double stamp = 0.0;     ///< [s] of its last reading
   double duration = 0.0;  ///< [s] steady
+  std::optional<MotorReading> motor;
+  std::optional<MotorForce> force;  ///< of a cut, where motors are calibrated
 
   /// Standard deviation of the mean torque at the motor as one of the voltage: meter and speed [V].
   double torqueStdAsVoltage() const;
@@ -75,10 +79,16 @@ class LoadMeterIdentification {
   LoadMeterIdentification(const MachineModel& model, const IdentificationParameters& parameters);
 
   void onResult(std::function<void(const IdentifyResult&)> callback) { result_ = std::move(callback); }
+  /// Uses motor currents too. Tests made so far keep what they had.
+  void setMotors(const MotorCalibration& calibration) { motors_ = calibration; }
+  /// Force of each cut by its motors.
+  void onMotorForce(std::function<void(const MotorForce&)> callback) { motor_force_ = std::move(callback); }
   void onTest(std::function<void(const LoadTest&)> callback) { test_ = std::move(callback); }
 
   void handle(const CncState& state);
   void handle(const LoadSample& sample);
+  /// Topic daq/motor_current: channels x, y, z, spindle [A], phase currents by Hall sensors.
+  void handle(const SampleBlock& block);
   void handle(const CuttingCondition& condition);
   void handle(const IdentifyGoal& goal);
 
@@ -101,6 +111,8 @@ class LoadMeterIdentification {
   void closeTest();
   void follow(const LoadTest& cut);
   IdentifyResult identify(const IdentifyGoal& goal) const;
+  std::string addFromMotors(const std::vector<LoadTest>& cuts, CoefficientRecord* record) const;
+  void readMotorsOf(LoadTest* test);
 
   std::string file_;
   Spindle spindle_;
@@ -113,6 +125,14 @@ class LoadMeterIdentification {
   std::optional<double> speed_since_, path_since_;  // [s] steady since then
   double last_reading_ = 0.0, last_state_ = 0.0;    // [s]
   std::vector<Reading> readings_;
+  MotorRecord motor_record_;
+  std::optional<MotorCalibration> motors_;
+  std::function<void(const MotorForce&)> motor_force_;
+  struct PathPoint {
+    double stamp;
+    std::array<double, 3> position;
+  };
+  std::optional<PathPoint> path_first_, path_last_;  // of the steady cut, or of moving along its line in air
   std::vector<LoadTest> air_cuts_, cuts_;
   std::optional<RecursiveCoefficients> production_;
   std::string production_of_;         // tool and material

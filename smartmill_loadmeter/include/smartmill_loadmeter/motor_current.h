@@ -2,6 +2,8 @@
 
 #include <array>
 #include <cstddef>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include "smartmill_loadmeter/machine_calibration.h"
@@ -64,21 +66,27 @@ class TorquePowerLaw {
   /// three cuts on a side that has any.
   TorquePowerLaw(const std::vector<SpindleCut>& cuts, double base_speed_rpm);
 
+  /// Polynomials in (N - middle) / span, lowest power first; N, middle, span in rpm.
+  struct Side {
+    std::vector<double> a, b;
+    double middle = 0.0, span = 1.0;
+  };
+  /// As found earlier. @param scatter [N m].
+  TorquePowerLaw(std::optional<Side> below, std::optional<Side> above, double base_speed_rpm, double scatter)
+      : base_(base_speed_rpm), sides_{std::move(below), std::move(above)}, scatter_(scatter) {}
+
   double torque(double speed_rpm, double rise) const;  ///< [N m]
   /// Standard deviation of one new torque: scatter about the law, [N m].
   double scatter() const { return scatter_; }
-  double rSquared() const { return r_squared_; }
+  double rSquared() const { return r_squared_; }  ///< [1] of the cuts it was made from
+  double baseSpeed() const { return base_; }      ///< [rpm]
+  const std::optional<Side>& side(bool above) const { return sides_[above ? 1 : 0]; }
 
  private:
-  struct Side {
-    std::vector<double> a, b;  // polynomials in (N - middle) / span
-    double middle = 0.0, span = 1.0;
-  };
   static double evaluate(const Side& side, double speed_rpm, double rise);
 
   double base_;
-  Side below_, above_;
-  bool has_below_ = false, has_above_ = false;
+  std::array<std::optional<Side>, 2> sides_;  // below and above base speed
   double scatter_ = 0.0, r_squared_ = 0.0;
 };
 

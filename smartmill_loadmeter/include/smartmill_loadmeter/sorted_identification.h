@@ -23,6 +23,8 @@ class SortedIdentification {
 
   void push(const CncState& state);
   void push(const LoadSample& sample);
+  /// daq/motor_current: may be absent; from its first block on it is waited for as the others are.
+  void push(const SampleBlock& block);
   void push(const CuttingCondition& condition);
   void push(const IdentifyGoal& goal);
 
@@ -39,7 +41,7 @@ class SortedIdentification {
 
   LoadMeterIdentification identification_;
   StreamSorter sorter_;
-  StreamSorter::Stream states_, loads_, conditions_, goals_;
+  StreamSorter::Stream states_, loads_, motors_, conditions_, goals_;
   std::vector<double> last_;  // [s] newest stamp of each stream
   double newest_ = 0.0;
 };

@@ -1,0 +1,203 @@
+// The database under load: `lookup` among many records beside a named baseline; `crash`, writers killed while
+// they write.
+#include <signal.h>
+#include <sqlite3.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <exception>
+#include <random>
+#include <set>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/signal/streams.h"
+#include "smartmill_core/testing/temporary_folder.h"
+#include "smartmill_loadmeter/database.h"
+
+namespace {
+
+using namespace smartmill;             // NOLINT
+using namespace smartmill::loadmeter;  // NOLINT
+using Clock = std::chrono::steady_clock;
+
+double since(Clock::time_point begin) {
+  return std::chrono::duration<double>(Clock::now() - begin).count();
+}
+
+CoefficientRecord recordOf(const std::string& tool, double stamp, double ktc, double cutting_speed) {
+  CoefficientRecord r;
+  r.set.tool = tool;
+  r.set.material = "1018";
+  r.set.source = "load_meter";
+  r.set.stamp = stamp;
+  r.set.tests = 3;
+  r.set.value = {ktc, NOT_A_NUMBER, NOT_A_NUMBER, 17e3, NOT_A_NUMBER, NOT_A_NUMBER};
+  r.set.std_dev = {2e6, NOT_A_NUMBER, NOT_A_NUMBER, 100.0, NOT_A_NUMBER, NOT_A_NUMBER};
+  r.teeth = 3;
+  r.diameter = 0.012;
+  r.cutting_speed = cutting_speed;
+  r.feed_per_tooth = 6e-5;
+  return r;
+}
+
+void report(const char* name, std::vector<double> times) {
+  std::sort(times.begin(), times.end());
+  std::printf("%-62s median %8.2f ms, slowest %8.2f ms\n", name, 1e3 * times[times.size() / 2],
+              1e3 * times.back());
+}
+
+void lookup(const std::string& file, int records) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> uniform;
+  CoefficientDatabase database(file);
+  std::vector<CoefficientRecord> many;
+  for (int i = 0; i < records; ++i) {
+    // Half of them one pair: the worst case of an index.
+    const std::string tool = i % 2 ? "common" : "tool " + std::to_string(i % 200);
+    many.push_back(recordOf(tool, i, 1e9 * (0.8 + 0.4 * uniform(random)), 0.5 + 10.0 * uniform(random)));
+  }
+  database.add(many);
+  std::vector<double> ours, scan, memory;
+  sqlite3* db = nullptr;
+  if (sqlite3_open(file.c_str(), &db) != SQLITE_OK) throw Error(file + ": cannot be opened");
+  for (int i = 0; i < 60; ++i) {
+    const CoefficientQuery query{i % 3 ? "common" : "tool 42", "1018", 0.5 + 10.0 * uniform(random), 6e-5};
+    Clock::time_point begin = Clock::now();
+    const auto found = database.estimate(query);
+    const auto newest = database.find(query.tool, query.material);
+    ours.push_back(since(begin));
+    if (!found || !newest) throw Error("a pair that is there was not found");
+    if (i % 6) continue;
+    // "+" keeps the index out: every row is read.
+    const std::string sql =
+        "SELECT max(stamp), avg(ktc) FROM coefficients WHERE +material = '1018' AND +tool = '" + query.tool +
+        "' AND +cutting_speed BETWEEN " + std::to_string(0.9 * query.cutting_speed) + " AND " +
+        std::to_string(1.1 * query.cutting_speed);
+    begin = Clock::now();
+    if (sqlite3_exec(db, sql.c_str(), nullptr, nullptr, nullptr) != SQLITE_OK)
+      throw Error(sqlite3_errmsg(db));
+    scan.push_back(since(begin));
+    begin = Clock::now();
+    const auto all = database.records(query.tool, query.material);
+    memory.push_back(since(begin));
+    if (all.empty()) throw Error("a pair that is there was not read");
+  }
+  sqlite3_close(db);
+  std::printf("%d records in a file, half of them one work-tool pair\n", records);
+  report("estimate() with uncertainty, and find()", ours);
+  report("baseline: SQLite scan of the table, no index", scan);
+  report("baseline: every record of the pair read into memory", memory);
+}
+
+// @return whether every acknowledged record is in the file.
+bool crash(const std::string& file, int writers, double seconds, double every) {
+  int ends[2];
+  if (pipe(ends) != 0) throw Error("no pipe");
+  int next = 0;
+  const auto launch = [&] {
+    const int writer = next++;
+    const pid_t pid = fork();
+    if (pid < 0) throw Error("no process");
+    if (pid != 0) return pid;
+    close(ends[0]);
+    try {
+      CoefficientDatabase database(file);
+      for (int i = 0;; ++i) {
+        const int stamp = writer * 1000000 + i;
+        database.add(recordOf("t", stamp, 1e9, 2.0));
+        if (write(ends[1], &stamp, sizeof stamp) != sizeof stamp) break;
+      }
+    } catch (const std::exception& error) {
+      std::fprintf(stderr, "writer %d: %s\n", writer, error.what());
+    }
+    _exit(1);
+  };
+  std::vector<pid_t> running;
+  for (int i = 0; i < writers; ++i) running.push_back(launch());
+  const Clock::time_point begin = Clock::now();
+  std::set<int> acknowledged;
+  int kills = 0;
+  bool by_itself = false;
+  const auto end = [&](pid_t pid) {
+    kill(pid, SIGKILL);
+    int status = 0;
+    waitpid(pid, &status, 0);
+    by_itself = by_itself || !WIFSIGNALED(status);
+  };
+  // The pipe is read all the time, or full it would hold the writers up.
+  const auto readFor = [&](double time) {
+    const Clock::time_point start = Clock::now();
+    for (double left = time; left > 0.0; left = time - since(start)) {
+      fd_set set;
+      FD_ZERO(&set);
+      FD_SET(ends[0], &set);
+      timeval wait{static_cast<time_t>(left),
+                   static_cast<suseconds_t>(1e6 * (left - static_cast<int>(left)))};
+      if (select(ends[0] + 1, &set, nullptr, nullptr, &wait) <= 0) break;
+      int stamp = 0;
+      if (read(ends[0], &stamp, sizeof stamp) == sizeof stamp) acknowledged.insert(stamp);
+    }
+  };
+  while (since(begin) < seconds) {
+    readFor(every);
+    pid_t& victim = running[static_cast<std::size_t>(kills++) % running.size()];
+    end(victim);
+    victim = launch();
+    if (isatty(STDERR_FILENO)) std::fprintf(stderr, "\r%.0f of %.0f s", since(begin), seconds);
+  }
+  if (isatty(STDERR_FILENO)) std::fprintf(stderr, "\n");
+  for (const pid_t pid : running) end(pid);
+  close(ends[1]);
+  for (int stamp = 0; read(ends[0], &stamp, sizeof stamp) == sizeof stamp;) acknowledged.insert(stamp);
+  close(ends[0]);
+  const CoefficientDatabase database(file);
+  std::set<int> there;
+  for (const CoefficientRecord& r : database.records("", "")) there.insert(static_cast<int>(r.set.stamp));
+  std::size_t lost = 0;
+  for (const int one : acknowledged) lost += there.count(one) == 0;
+  std::printf(
+      "%d writers for %.0f s, %d killed in between: %zu records acknowledged, %zu in the file, %zu lost%s\n",
+      writers, since(begin), kills, acknowledged.size(), there.size(), lost,
+      by_itself ? "; a writer stopped by itself" : "");
+  return lost == 0 && !by_itself;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("The database of coefficients under load.");
+  int records = 100000, writers = 8;
+  double seconds = 60.0, every = 1.0;
+  auto* look = app.add_subcommand("lookup", "time of a look-up among many records, beside baselines");
+  look->add_option("--records", records)->capture_default_str()->check(CLI::Range(1000, 10000000));
+  auto* kills =
+      app.add_subcommand("crash", "writers killed while they write: is every acknowledged record there?");
+  kills->add_option("--writers", writers)->capture_default_str()->check(CLI::Range(1, 64));
+  kills->add_option("--seconds", seconds)->capture_default_str()->check(CLI::PositiveNumber);
+  kills->add_option("--kill-every", every, "s")->capture_default_str()->check(CLI::PositiveNumber);
+  app.require_subcommand(1);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  try {
+    const TemporaryFolder folder;
+    const std::string file = folder.file("study.sqlite");
+    if (look->parsed()) {
+      lookup(file, records);
+      return 0;
+    }
+    return crash(file, writers, seconds, every) ? 0 : 1;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "database_study: %s\n", error.what());
+    return 1;
+  }
+}
