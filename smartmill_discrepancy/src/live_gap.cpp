@@ -15,7 +15,7 @@ LiveGap liveGap(const MachineModel& model, const Stretch& stretch, double limit)
     throw Error(model.file + ": force_sensor.noise_rms_n is missing (needed to measure a gap)");
   sim::SimulationOptions options;
   options.noise = false;
-  options.substeps = 2;
+  options.substeps = 4;
   const Record simulated = sim::simulateTest(model, stretch.test, stretch.record, options);
   LiveGap result;
   result.stamp = stretch.stamp;
