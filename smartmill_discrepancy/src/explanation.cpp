@@ -38,7 +38,6 @@ double gapOf(const std::vector<double>& residual) {
 struct Trace {
   std::vector<double> values;
   double total = 0.0, evenness = 0.0;
-  bool every_test_better = true;  // of those in which it shows
 };
 
 Trace traceOf(const Fitter& fitter, const Fit& fit, std::size_t member) {
@@ -63,7 +62,6 @@ Trace traceOf(const Fitter& fitter, const Fit& fit, std::size_t member) {
     if (sums.first < 1e-6 * trace.total) continue;
     variance += sums.second * sums.second / sums.first;
     count += 1.0;
-    trace.every_test_better = trace.every_test_better && sums.first + 2.0 * sums.second > 0.0;
   }
   trace.evenness = std::max(0.0, (variance - count) / trace.total);
   return trace;
@@ -260,22 +258,21 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
                ? std::clamp(1.0 - std::max(with - floor, 0.0) / (without_it - floor), -1.0, 1.0)
                : 0.0;
   };
-  // An effect stands for another cause when the tests do not agree on its size, unless it helps in every one
-  // of them and in those that it never saw; or when it leaves much at the very places where it acts.
+  // An effect stands for another cause when the tests do not agree on its size, unless it helps in those that
+  // it never saw; or when it leaves much at the very places where it acts.
   while (!result.unexplained.empty() && !found.best.state.members.empty()) {
     std::size_t worst = 0;
     double worst_score = 1.0;
     for (std::size_t m = 0; m < found.best.state.members.size(); ++m) {
       const Trace trace = traceOf(exact, found.best, m);
       const double rest = leftWhere(exact_runner, trace, result.unexplained, structure);
-      const bool helps =
-          trace.every_test_better && heldoutReduction(found.best.state, m) > options.least_heldout_reduction;
+      const bool helps = heldoutReduction(found.best.state, m) > options.least_heldout_reduction;
       const double score = std::max(helps ? 0.0 : trace.evenness / options.least_evenness,
                                     2.0 * rest / std::max(found.contribution[m], 1.0));
       std::snprintf(line, sizeof line,
                     "  %s: tests differ by %.3g, left where it acts %.3g, contribution %.3g%s",
                     found.best.state.members[m].hypothesis->title().c_str(), trace.evenness, rest,
-                    found.contribution[m], helps ? ", helps everywhere" : "");
+                    found.contribution[m], helps ? ", helps where it was not fitted" : "");
       say(line);
       if (score > worst_score) {
         worst_score = score;

@@ -111,7 +111,9 @@ void refine(TwinRunner& quick_runner, const Fitter& quick, const Fitter& exact, 
     // All tangents at one point: only these tell what is known along a valley.
     Fit here = quick.fit(from, &tangents, {0, 1e-8, true});
     if (!here.converged) break;
-    const Eigen::MatrixXd covariance = here.covariance;
+    // Where structure is left the noise does not tell how well values are known.
+    const double scale = std::max(1.0, here.chi2 / static_cast<double>(quick.runner().size()));
+    const Eigen::MatrixXd covariance = scale * here.covariance;
     result->best = std::move(here);
     if (pass == PASSES) break;
     const Fit next = quick.fit(from, &tangents, {6, 1e-5, true});
@@ -204,7 +206,6 @@ SearchResult search(TwinRunner& quick_runner, const Fitter& quick, const Fitter&
   now = quick.fit(state, &tangents, {3, 1e-5, true});
   result.null = now;
   const double samples = static_cast<double>(quick.runner().size());
-  const auto free_count = static_cast<double>(free.size());
   say(text("nominal model, values free within their uncertainty: gap %.4f", std::sqrt(now.chi2 / samples),
            0.0));
   for (std::size_t round = 0; round < options.most_effects; ++round) {
@@ -213,8 +214,7 @@ SearchResult search(TwinRunner& quick_runner, const Fitter& quick, const Fitter&
     const double least = std::max(options.least_gain, options.least_share * (now.chi2 - samples));
     // With next to nothing left but nominal values far off, an effect may do what they do; only all values
     // moved together go along that valley.
-    const bool strained = now.chi2 - samples < 0.01 * samples &&
-                          now.penalty > 4.0 * options.least_prior_gain + 2.0 * free_count;
+    const bool strained = now.chi2 - samples < 0.01 * samples && now.penalty > 4.0 * options.least_prior_gain;
     Fit best = now;
     double best_promise = 0.0;
     std::size_t fitted = 0;
