@@ -185,7 +185,8 @@ EffectEntry drawEffect(const std::string& name, const MachineModel& machine, Ran
   }
   if (name == "gain_error") {
     e.words["channel"] = oneOf<std::string>(random, {"fx", "fy", "fz", "load_meter"});
-    n = {{"gain", 1.0 + size(0.06, 0.2)}};
+    // What the stated uncertainty of the load meter's constant covers is no effect.
+    n = {{"gain", 1.0 + (e.words["channel"] == "load_meter" ? size(0.15, 0.3) : size(0.06, 0.2))}};
   }
   if (name == "saturation") n = {{"limit_n", between(random, 150.0, 350.0)}};
   if (name == "stribeck_friction")
