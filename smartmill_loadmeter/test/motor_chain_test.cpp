@@ -180,7 +180,7 @@ TEST(MotorChain, movingAxisTellsItsForceAndRestingAxesAreNotObservable) {
   EXPECT_THAT(m.results[0].message, HasSubstr("not observable from the axes that moved: Kac, Kae"));
 }
 
-TEST(MotorChain, throughTheSorterIsTheSameToTheLastDigit) {
+TEST(MotorChain, throughTheSorterAgreesWithTheInputsAsTheyCame) {
   MotorSession direct, sorted;
   LoadMeterIdentification identification(model(), direct.parameters);
   direct.feed(identification, identification);
