@@ -176,14 +176,15 @@ void KalmanNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
   const double silent = (ros::WallTime::now() - last_block_).toSec();
   const SpindleSensorHealth* spindle = sorted_.spindleHealth();
   const std::size_t invalid = spindle ? spindle->unloaded + spindle->overloaded : 0;
-  if (silent > parameters_.input_timeout) {
-    status.summary(diagnostic_msgs::DiagnosticStatus::STALE, "no samples from the force sensor");
-  } else if (!rotation_known_) {
-    status.summary(diagnostic_msgs::DiagnosticStatus::ERROR, "no transform of the force sensor");
-  } else if (spindle && invalid != invalid_told_) {
+  // Told once, whatever came after.
+  if (spindle && invalid != invalid_told_) {
     invalid_told_ = invalid;
     status.summary(diagnostic_msgs::DiagnosticStatus::ERROR,
                    "a sensor of the spindle was unloaded or overloaded: those samples are no measurement");
+  } else if (silent > parameters_.input_timeout) {
+    status.summary(diagnostic_msgs::DiagnosticStatus::STALE, "no samples from the force sensor");
+  } else if (!rotation_known_) {
+    status.summary(diagnostic_msgs::DiagnosticStatus::ERROR, "no transform of the force sensor");
   } else if (health.gaps + health.not_finite + health.clipped > 0) {
     status.summary(diagnostic_msgs::DiagnosticStatus::WARN, "samples were lost, clipped or not numbers");
   } else if (health.innovation_ratio > 3.0) {

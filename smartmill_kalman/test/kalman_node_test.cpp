@@ -111,7 +111,7 @@ TEST(KalmanNode, takesSixSensorsInTheSpindle) {
   auto angles = nh.advertise<smartmill_msgs::SpindleAngle>("spindle/angle", 2000);
   ASSERT_TRUE(waitUntil([&] {
     return blocks.getNumSubscribers() > 0 && angles.getNumSubscribers() > 0 && sub1.getNumPublishers() > 0 &&
-           sub2.getNumPublishers() > 0;
+           sub2.getNumPublishers() > 0 && sub3.getNumPublishers() > 0;
   }));
   constexpr int COUNT = 60, BAD = 50;
   const double start = std::floor(ros::Time::now().toSec());
