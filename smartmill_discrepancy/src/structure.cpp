@@ -6,6 +6,7 @@
 #include <complex>
 #include <numeric>
 #include <set>
+#include <tuple>
 
 #include "smartmill_core/signal/fourier.h"
 #include "smartmill_core/units.h"
@@ -15,6 +16,7 @@ namespace {
 
 constexpr double LEAST_P = 1e-300;
 constexpr std::size_t ORDERS = 36;
+constexpr std::size_t HALF_ORDERS = 4;  // 0.5, 1.5, ..
 constexpr std::size_t PADDED = 1 << 16;
 
 using Turn = std::complex<double>;
@@ -94,7 +96,7 @@ void subtract(std::vector<double>& values, const Phase& phase, const Line& line)
     values[i] -= line.sine * std::sin(phase(i)) + line.cosine * std::cos(phase(i));
 }
 
-enum class Kind { level, trend, order, frequency };
+enum class Kind { level, trend, settling, order, frequency };
 
 struct Candidate {
   Kind kind = Kind::level;
@@ -122,10 +124,30 @@ std::pair<double, double> trendOf(const std::vector<double>& v) {
   return {xy / xx, xy * xy / xx};
 }
 
+// Of something that settles from the record's start on, place: its time constant [s].
+double settled(double time_constant, const Stretch& s, std::size_t i) {
+  return std::exp(-static_cast<double>(i) / (s.rate * time_constant));
+}
+
+// Size of it and squares that it takes.
+std::pair<double, double> settlingOf(double time_constant, const Stretch& s) {
+  double xy = 0.0, xx = 0.0;
+  for (std::size_t i = 0; i < s.values.size(); ++i) {
+    const double shape = settled(time_constant, s, i);
+    xy += shape * s.values[i];
+    xx += shape * shape;
+  }
+  return {xy / xx, xy * xy / xx};
+}
+
 std::vector<Candidate> candidatesOf(const std::vector<Stretch>& stretches) {
   std::vector<Candidate> all;
   Candidate level{Kind::level, 0.0, 0.0, 0, 1.0}, trend{Kind::trend, 0.0, 0.0, 0, 1.0};
   std::vector<Candidate> orders;
+  std::vector<Candidate> halves, settling;
+  for (std::size_t k = 0; k < HALF_ORDERS; ++k)
+    halves.push_back({Kind::order, static_cast<double>(k) + 0.5, 0.0, 0, 1.0});
+  for (const double t : {0.02, 0.035, 0.06, 0.1}) settling.push_back({Kind::settling, t, 0.0, 0, 2.0});
   for (std::size_t k = 1; k <= ORDERS; ++k)
     orders.push_back({Kind::order, static_cast<double>(k), 0.0, 0, 1.0});
   double rate = 0.0;
@@ -137,10 +159,18 @@ std::vector<Candidate> candidatesOf(const std::vector<Stretch>& stretches) {
     ++level.freedom;
     trend.squares += trendOf(s.values).second;
     ++trend.freedom;
+    for (Candidate& c : settling) {
+      c.squares += settlingOf(c.place, s).second;
+      ++c.freedom;
+    }
     rate = std::max(rate, s.rate);
     longest = std::max(longest, s.values.size());
     if (!s.angle.empty()) {
       const std::array<Line, ORDERS> lines = orderLines(s.values, s.turns);
+      for (Candidate& o : halves) {
+        o.squares += lineOf(s.values, [&](std::size_t i) { return o.place * s.angle[i]; }).squares;
+        o.freedom += 2;
+      }
       for (std::size_t k = 0; k < ORDERS; ++k) {
         Candidate& o = orders[k];
         if (o.place * s.test->test.spindle_speed / units::TWO_PI > 0.45 * s.rate) continue;
@@ -163,6 +193,8 @@ std::vector<Candidate> candidatesOf(const std::vector<Stretch>& stretches) {
   }
   all.push_back(level);
   all.push_back(trend);
+  all.insert(all.end(), settling.begin(), settling.end());
+  all.insert(all.end(), halves.begin(), halves.end());
   all.insert(all.end(), orders.begin(), orders.end());
   if (used > 0) {
     // Below one cycle a record a line is a trend.
@@ -344,13 +376,14 @@ std::vector<Finding> findStructure(const TwinRunner& runner, const std::vector<d
       }
       Finding f;
       f.channel = channel;
-      f.domain = best->kind == Kind::level   ? "level"
-                 : best->kind == Kind::trend ? "time"
-                 : best->kind == Kind::order ? "order"
-                                             : "frequency";
+      f.domain = best->kind == Kind::level                                   ? "level"
+                 : best->kind == Kind::trend || best->kind == Kind::settling ? "time"
+                 : best->kind == Kind::order                                 ? "order"
+                                                                             : "frequency";
       if (best->kind == Kind::order) f.location["order"] = best->place;
       if (best->kind == Kind::frequency) f.location["frequency_hz"] = best->place;
       if (best->kind == Kind::trend) f.location["time_s"] = 0.0;
+      if (best->kind == Kind::settling) f.location["time_s"] = best->place;
       f.p_value = p;
       f.share_of_gap = (best->squares - static_cast<double>(best->freedom)) / all_excess;
       f.squares = best->squares;
@@ -370,6 +403,11 @@ std::vector<Finding> findStructure(const TwinRunner& runner, const std::vector<d
           std_dev = s.rate * std::sqrt(12.0 / (n * n * n));
           for (std::size_t i = 0; i < s.values.size(); ++i)
             s.values[i] -= slope * (static_cast<double>(i) - 0.5 * (n - 1.0));
+        } else if (best->kind == Kind::settling) {
+          std::tie(amplitude, squares) = settlingOf(best->place, s);
+          std_dev = std::sqrt(2.0 / (s.rate * best->place));
+          for (std::size_t i = 0; i < s.values.size(); ++i)
+            s.values[i] -= amplitude * settled(best->place, s, i);
         } else {
           if (best->kind == Kind::order && s.angle.empty()) continue;
           const auto phase = [&](std::size_t i) {
