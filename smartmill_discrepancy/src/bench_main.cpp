@@ -27,13 +27,13 @@ using namespace smartmill;
 using namespace smartmill::discrepancy;
 
 struct Case {
-  std::string kind;  // single, pair, none, outside
+  std::string kind;  // single, pair, triple, none, outside
   std::vector<std::string> names;
 };
 
 struct Options {
   std::string out, only;
-  int singles = 0, pairs = 0, none = 0, outside = 0, threads = 2, substeps = 16;
+  int singles = 0, pairs = 0, triples = 0, none = 0, outside = 0, threads = 2, substeps = 16;
   std::uint64_t seed = 1;
   bool keep = false, exact_nominal = false;
 };
@@ -53,10 +53,16 @@ std::vector<Case> drawCases(const Options& o, std::mt19937_64& random) {
     for (const std::string& name : names) cases.push_back({"single", {name}});
   }
   std::uniform_int_distribution<std::size_t> pick(0, names.size() - 1);
-  while (static_cast<int>(cases.size()) < o.singles * static_cast<int>(names.size()) + o.pairs) {
-    const std::string a = names[pick(random)], b = names[pick(random)];
-    if (a != b) cases.push_back({"pair", {a, b}});
-  }
+  const auto several = [&](const std::string& kind, std::size_t effects) {
+    std::vector<std::string> drawn;
+    while (drawn.size() < effects) {
+      const std::string& name = names[pick(random)];
+      if (std::find(drawn.begin(), drawn.end(), name) == drawn.end()) drawn.push_back(name);
+    }
+    cases.push_back({kind, drawn});
+  };
+  for (int k = 0; k < o.pairs; ++k) several("pair", 2);
+  for (int k = 0; k < o.triples; ++k) several("triple", 3);
   for (int k = 0; k < o.none; ++k) cases.push_back({"none", {}});
   for (int k = 0; k < o.outside; ++k) cases.push_back({"outside", {}});
   return cases;
@@ -169,7 +175,7 @@ void drawConfusion(const std::vector<Case>& cases, const std::vector<Outcome>& o
     if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
   };
   for (std::size_t k = 0; k < cases.size(); ++k) {
-    if (cases[k].kind == "pair") continue;
+    if (cases[k].names.size() > 1) continue;
     const std::string truth = cases[k].kind == "outside" ? "outside" : outcomes[k].expected;
     known(hidden, truth);
     ++all[truth];
@@ -315,6 +321,7 @@ int main(int argc, char** argv) {
   app.add_option("-o,--out", o.out, "folder of cases and scores")->required();
   app.add_option("--singles", o.singles, "cases of each single effect");
   app.add_option("--pairs", o.pairs, "pairs of effects");
+  app.add_option("--triples", o.triples, "cases of three effects");
   app.add_option("--none", o.none, "cases with nothing hidden");
   app.add_option("--outside", o.outside, "cases with a cause outside the catalogue");
   app.add_option("--only", o.only, "effects to draw from, comma separated");
