@@ -13,11 +13,13 @@ namespace {
 
 using units::TWO_PI;
 
-constexpr int NODES = 2048;  // of the surface over a turn
+constexpr int NODES = 4096;  // of the surface over a turn
 constexpr double NODE_ANGLE = TWO_PI / NODES;
 constexpr double SLICE_ANGLE = 0.02;  // [rad] lag over a slice: the mid-slice rule errs by 2e-5
 constexpr double NO_GAP = 1e-9;       // [m] below this gap the edge still rubs: chips near 0 are rounded
-constexpr double MARGIN = 2.0 * NODE_ANGLE;  // surface kept beyond an arc, for interpolation at its end
+constexpr int BEHIND = 2;             // nodes right behind a tooth that are still as it found them
+constexpr double MARGIN = (1 + BEHIND) * NODE_ANGLE;  // surface kept beyond an arc, for the chip at its end
+constexpr double ON_WALL = 0.5 * NODE_ANGLE;          // [rad] a node this near to where the feed is tangent
 
 constexpr std::size_t PASSAGES = 64;              // kept: eight nodes' worth
 constexpr double PASSAGE_ANGLE = NODE_ANGLE / 8;  // at least between two
@@ -82,8 +84,9 @@ double CuttingProcess::steadySurface(double node_angle, double lag, const ToolMo
   const double along = now.velocity[0] * s + now.velocity[1] * c;  // [m/s] into the work
   double reach = -1e300;
   for (int j = 0; j < tool_.teeth; ++j) {
-    // As in cut(): the node right behind a tooth is still as the tooth found it.
-    const double past = wrapped(now.angle + tool_.toothAngle(j) - lag - node_angle - NODE_ANGLE) + NODE_ANGLE;
+    // As in cut(): the nodes right behind a tooth are still as the tooth found them.
+    constexpr double NEAR = BEHIND * NODE_ANGLE;
+    const double past = wrapped(now.angle + tool_.toothAngle(j) - lag - node_angle - NEAR) + NEAR;
     const double since = now.speed > 0.0 ? past / now.speed : 0.0;
     reach = std::max(reach, offset_[static_cast<std::size_t>(j)] - along * since);
   }
@@ -138,6 +141,22 @@ void CuttingProcess::setDepths(const std::vector<double>& depths, const ToolMoti
   }
 }
 
+// Where the feed is tangent, on the walls of a slot, nothing takes a mark away again that a tooth has left.
+// Such a node tells of a point only: the chip beside it is taken from the two nodes next to it in the
+// material.
+long CuttingProcess::leftNode(long left, const ToolMotion& now) const {
+  const double speed = std::hypot(now.velocity[0], now.velocity[1]);
+  const auto inside = [&](long n) {
+    const auto i = static_cast<std::size_t>(nodeIndex(n));
+    return now.velocity[0] * sin_[i] + now.velocity[1] * cos_[i] > ON_WALL * speed;
+  };
+  if (inside(left)) return inside(left + 1) ? left : left - 1;
+  for (long next = left + 1; next <= left + BEHIND; ++next) {
+    if (inside(next)) return next;
+  }
+  return left;
+}
+
 void CuttingProcess::cut(Slice& slice, int tooth, double before, double angle, const ContactArc& arc,
                          const ToolMotion& now, CuttingForce& sum) {
   const auto j = static_cast<std::size_t>(tooth);
@@ -158,9 +177,11 @@ void CuttingProcess::cut(Slice& slice, int tooth, double before, double angle, c
     // At the exit the surface behind the slice's middle is this tooth's own: the chip of the middle serves.
     const double at = std::max(angle, middle);
     if (at <= arc.exit) {
-      const double place = at / NODE_ANGLE, whole = std::floor(place), share = place - whole;
-      const auto a = static_cast<std::size_t>(nodeIndex(static_cast<long>(whole)));
-      const auto b = static_cast<std::size_t>(nodeIndex(static_cast<long>(whole) + 1));
+      const double place = at / NODE_ANGLE;
+      const long left = leftNode(static_cast<long>(std::floor(place)), now);
+      const double share = place - static_cast<double>(left);
+      const auto a = static_cast<std::size_t>(nodeIndex(left));
+      const auto b = static_cast<std::size_t>(nodeIndex(left + 1));
       // Against the tool's centre, where the surface is smooth enough to be interpolated.
       const double sa = slice.surface[a] - now.centre[0] * sin_[a] - now.centre[1] * cos_[a];
       const double sb = slice.surface[b] - now.centre[0] * sin_[b] - now.centre[1] * cos_[b];
@@ -195,10 +216,10 @@ void CuttingProcess::cut(Slice& slice, int tooth, double before, double angle, c
       sum.torque += ft * tool_.radius();
     }
   }
-  // Cut the nodes passed since the last step, up to the last one before the tooth: the one right behind it is
-  // still needed as it was. Each is left where the tip was when the tooth passed it.
-  const long first = static_cast<long>(std::floor(before / NODE_ANGLE));
-  const long last = static_cast<long>(std::floor(angle / NODE_ANGLE)) - 1;
+  // Cut the nodes passed since the last step, but those right behind the tooth, still needed as they were.
+  // Each is left where the tip was when the tooth passed it.
+  const long first = static_cast<long>(std::floor(before / NODE_ANGLE)) + 1 - BEHIND;
+  const long last = static_cast<long>(std::floor(angle / NODE_ANGLE)) - BEHIND;
   for (long n = first; n <= last; ++n) {
     const auto i = static_cast<std::size_t>(nodeIndex(n));
     const auto [x, y] = tipBack(angle - static_cast<double>(n) * NODE_ANGLE);

@@ -89,6 +89,8 @@ class CuttingProcess {
   /// [rad] of the middle of the slice's part in the arc.
   double lagOf(const Slice& slice, const ContactArc& arc) const;
   void growTo(double depth);
+  /// The first of the two nodes whose surface gives the chip between node `left` and the next.
+  long leftNode(long left, const ToolMotion& now) const;
   void cut(Slice& slice, int tooth, double before, double angle, const ContactArc& arc, const ToolMotion& now,
            CuttingForce& sum);
 
