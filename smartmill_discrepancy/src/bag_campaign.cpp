@@ -9,25 +9,33 @@
 
 namespace smartmill::discrepancy {
 
-Campaign campaignOfBag(const std::string& bag, const std::string& model_file, const std::string& folder) {
-  constexpr double LENGTH = 0.3, PATH_TOLERANCE = 1e-4, HOLD_BACK = 0.05;
+Campaign campaignOfBag(const std::string& bag, const std::string& model_file, const std::string& folder,
+                       const std::function<void(const std::string&)>& progress) {
+  constexpr double HOLD_BACK = 0.05;
   const MachineModel model = readMachineModel(model_file);
   std::set<std::string> taken;
-  SortedStretches stretches(LENGTH, PATH_TOLERANCE, HOLD_BACK, [&](const Stretch& stretch) {
-    if (taken.insert(stretch.test.name).second) recordStretch(model, stretch, folder);
+  bool recorded = false;
+  SortedStretches stretches(StretchParameters(), HOLD_BACK, [&](const Stretch& stretch) {
+    if (!taken.insert(stretch.test.name).second) return;
+    if (model.force_sensor.noise_rms && liveGap(model, stretch, {}).at_the_edge) {
+      progress(stretch.test.name + ": left out, the model's tool is about to chatter there");
+      return;
+    }
+    recordStretch(model, stretch, folder);
+    recorded = true;
   });
   BagReader reader(bag);
-  reader.on<smartmill_msgs::CuttingCondition>("cut/condition", [&](const smartmill_msgs::CuttingCondition& m,
-                                                                   double) { stretches.push(fromMsg(m)); });
-  reader.on<smartmill_msgs::CncState>(
-      "cnc/state", [&](const smartmill_msgs::CncState& m, double) { stretches.push(fromMsg(m)); });
-  reader.on<smartmill_msgs::SpindleAngle>(
-      "spindle/angle", [&](const smartmill_msgs::SpindleAngle& m, double) { stretches.push(fromMsg(m)); });
-  reader.on<smartmill_msgs::SampleBlock>(
-      "daq/dynamometer", [&](const smartmill_msgs::SampleBlock& m, double) { stretches.push(fromMsg(m)); });
+  const auto follow = [&](const char* topic, auto message) {
+    using Message = decltype(message);
+    reader.on<Message>(topic, [&](const Message& m, double) { stretches.push(fromMsg(m)); });
+  };
+  follow("cut/condition", smartmill_msgs::CuttingCondition());
+  follow("cnc/state", smartmill_msgs::CncState());
+  follow("spindle/angle", smartmill_msgs::SpindleAngle());
+  follow("daq/dynamometer", smartmill_msgs::SampleBlock());
   reader.run();
   stretches.flush();
-  if (taken.empty()) throw Error(bag + ": no steady stretch of 0.3 s under a cutting condition");
+  if (!recorded) throw Error(bag + ": no steady stretch of 0.3 s under a cutting condition");
   return readCampaign(folder);
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <string>
 
 #include "smartmill_core/campaign/campaign.h"
@@ -7,8 +8,10 @@
 namespace smartmill::discrepancy {
 
 /// Makes a campaign of the steady stretches of a recorded bag, the first of each cutting condition, in a
-/// folder.
+/// folder; what the model does not follow because it is about to chatter is left out.
+/// @param progress told what was left out, a line each
 /// @throws Error on a bad bag or one without a steady stretch.
-Campaign campaignOfBag(const std::string& bag, const std::string& model_file, const std::string& folder);
+Campaign campaignOfBag(const std::string& bag, const std::string& model_file, const std::string& folder,
+                       const std::function<void(const std::string&)>& progress);
 
 }  // namespace smartmill::discrepancy

@@ -33,7 +33,7 @@ struct Case {
 
 struct Options {
   std::string out, only;
-  int singles = 0, pairs = 0, triples = 0, none = 0, outside = 0, threads = 2, substeps = 16;
+  int singles = 0, pairs = 0, triples = 0, none = 0, outside = 0, threads = 2, substeps = 16, only_case = -1;
   std::uint64_t seed = 1;
   bool keep = false, exact_nominal = false;
 };
@@ -118,6 +118,8 @@ Outcome runCase(const Options& o, const Case& c, int number, std::uint64_t seed)
     const Dataset data = loadDataset(campaign, readMachineModel(campaign.modelPath()));
     ExplainOptions options;
     options.search.threads = 1;
+    if (o.only_case >= 0)
+      options.search.progress = [](const std::string& line) { std::fprintf(stderr, "%s\n", line.c_str()); };
     std::filesystem::create_directories(folder + "/report");
     e = explain(data, options, folder + "/report");
     writeReport(e, folder + "/report");
@@ -271,6 +273,7 @@ void run(const Options& o) {
   std::vector<Outcome> outcomes(cases.size());
   std::mutex mutex;
   runParallel(cases.size(), o.threads, [&](std::size_t k) {
+    if (o.only_case >= 0 && static_cast<int>(k) != o.only_case) return;
     Outcome outcome = runCase(o, cases[k], static_cast<int>(k), seeds[k]);
     const Explanation& e = outcome.explanation;
     char line[600];
@@ -286,6 +289,7 @@ void run(const Options& o) {
   std::map<std::string, std::pair<int, int>> score;  // right, all
   std::map<std::pair<std::string, std::string>, int> confusion;
   int named = 0, low_gap = 0, false_effects = 0, close = 0, scored = 0;
+  if (o.only_case >= 0) return;
   for (std::size_t k = 0; k < cases.size(); ++k) {
     const Outcome& r = outcomes[k];
     ++confusion[{r.expected, r.found}];
@@ -325,6 +329,7 @@ int main(int argc, char** argv) {
   app.add_option("--none", o.none, "cases with nothing hidden");
   app.add_option("--outside", o.outside, "cases with a cause outside the catalogue");
   app.add_option("--only", o.only, "effects to draw from, comma separated");
+  app.add_option("--case", o.only_case, "only this case of those drawn, with its progress");
   app.add_option("--seed", o.seed, "of everything drawn");
   app.add_option("--threads", o.threads, "cases at a time")->check(CLI::Range(1, 64));
   app.add_option("--substeps", o.substeps, "integration steps a sample of the hidden machine")

@@ -32,7 +32,7 @@ void run(const std::string& folder, const std::string& model_file, const std::st
   if (std::filesystem::path(folder).extension() == ".bag") {
     if (model_file.empty()) throw Error(folder + ": a bag holds no model, give one with --model");
     std::filesystem::remove_all(out + "/campaign", failed);
-    campaign = campaignOfBag(folder, model_file, out + "/campaign");
+    campaign = campaignOfBag(folder, model_file, out + "/campaign", options.search.progress);
   } else {
     campaign = readCampaign(folder);
   }

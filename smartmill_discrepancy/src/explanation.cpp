@@ -118,6 +118,18 @@ double leftWhere(const TwinRunner& runner, const Trace& trace, const std::vector
   return left;
 }
 
+// One cause that is missing shows at one place; what is left at many places, none of which stands out, speaks
+// of a model too coarse, and not of an effect that stands for another.
+bool atOnePlace(const std::vector<Finding>& unexplained) {
+  constexpr double SHARE = 0.3;
+  double all = 0.0, largest = 0.0;
+  for (const Finding& f : unexplained) {
+    all += f.squares;
+    largest = std::max(largest, f.squares);
+  }
+  return largest > SHARE * all;
+}
+
 FitState without(const FitState& state, std::size_t member) {
   FitState less = state;
   less.members.erase(less.members.begin() + static_cast<std::ptrdiff_t>(member));
@@ -263,12 +275,13 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
   while (!result.unexplained.empty() && !found.best.state.members.empty()) {
     std::size_t worst = 0;
     double worst_score = 1.0;
+    const bool one_place = atOnePlace(result.unexplained);
     for (std::size_t m = 0; m < found.best.state.members.size(); ++m) {
       const Trace trace = traceOf(exact, found.best, m);
       const double rest = leftWhere(exact_runner, trace, result.unexplained, structure);
       const bool helps = heldoutReduction(found.best.state, m) > options.least_heldout_reduction;
       const double score = std::max(helps ? 0.0 : trace.evenness / options.least_evenness,
-                                    2.0 * rest / std::max(found.contribution[m], 1.0));
+                                    one_place ? 2.0 * rest / std::max(found.contribution[m], 1.0) : 0.0);
       std::snprintf(line, sizeof line,
                     "  %s: tests differ by %.3g, left where it acts %.3g, contribution %.3g%s",
                     found.best.state.members[m].hypothesis->title().c_str(), trace.evenness, rest,

@@ -27,9 +27,10 @@ constexpr double TANGENT = 0.02;
 /// leaves cost, gradient and normal equations as they are.
 class CampaignCost : public ceres::CostFunction {
  public:
-  CampaignCost(const Fitter& fitter, const FitState& start, const NominalTangents* frozen, bool nominal_free)
-      : fitter_(fitter), start_(start), frozen_(frozen) {
-    if (nominal_free) coordinates_ = fitter.freedom().coordinates();
+  CampaignCost(const Fitter& fitter, const FitState& start, const NominalTangents* frozen,
+               const FitOptions& options)
+      : fitter_(fitter), start_(start), frozen_(frozen), prior_root_(std::sqrt(options.prior_weight)) {
+    if (options.nominal_free) coordinates_ = fitter.freedom().coordinates();
     nominal_ = coordinates_.size();
     for (const Member& m : start.members)
       coordinates_.insert(coordinates_.end(), m.hypothesis->coordinates.begin(),
@@ -130,7 +131,7 @@ class CampaignCost : public ceres::CostFunction {
     r[count] = std::sqrt(squares);
     for (Index c = 0; c < count; ++c) {
       const Coordinate& k = coordinates_[static_cast<std::size_t>(c)];
-      r[count + 1 + c] = (p[c] - k.null) / k.prior_std;
+      r[count + 1 + c] = prior_root_ * (p[c] - k.null) / k.prior_std;
     }
     if (!tangents) return true;
     using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
@@ -149,7 +150,7 @@ class CampaignCost : public ceres::CostFunction {
     }
     r[count] = std::sqrt(std::max(squares - r.head(count).squaredNorm(), 0.0));
     for (Index c = 0; c < count; ++c)
-      j(count + 1 + c, c) = 1.0 / coordinates_[static_cast<std::size_t>(c)].prior_std;
+      j(count + 1 + c, c) = prior_root_ / coordinates_[static_cast<std::size_t>(c)].prior_std;
     return true;
   }
 
@@ -163,6 +164,7 @@ class CampaignCost : public ceres::CostFunction {
   const Fitter& fitter_;
   FitState start_;
   const NominalTangents* frozen_;
+  double prior_root_;
   std::size_t nominal_;
   std::vector<Coordinate> coordinates_;
   mutable Values last_, last_simulated_;
@@ -201,7 +203,7 @@ NominalTangents Fitter::nominalTangents(const FitState& state) const {
 }
 
 Fit Fitter::fit(const FitState& start, const NominalTangents* frozen, const FitOptions& options) const {
-  auto* cost = new CampaignCost(*this, start, frozen, options.nominal_free);  // owned by the problem
+  auto* cost = new CampaignCost(*this, start, frozen, options);  // owned by the problem
   const std::vector<Coordinate> coordinates = cost->coordinates();
   Values p = cost->pack(start);
   for (std::size_t c = 0; c < coordinates.size(); ++c)
@@ -262,8 +264,9 @@ Fit Fitter::fit(const FitState& start, const NominalTangents* frozen, const FitO
   fit.residual.assign(residual.data(), residual.data() + residual.size());
   for (Index c = 0; c < count; ++c) {
     const Coordinate& k = coordinates[static_cast<std::size_t>(c)];
-    fit.penalty += std::pow((p[static_cast<std::size_t>(c)] - k.null) / k.prior_std, 2);
-    information(c, c) += 1.0 / (k.prior_std * k.prior_std);
+    const double precision = options.prior_weight / (k.prior_std * k.prior_std);
+    fit.penalty += precision * std::pow(p[static_cast<std::size_t>(c)] - k.null, 2);
+    information(c, c) += precision;
   }
   std::size_t own = 0;
   for (const Member& m : fit.state.members) own += m.values.size();

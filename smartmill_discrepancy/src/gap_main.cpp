@@ -13,13 +13,15 @@
 
 namespace {
 
-void run(const std::string& folder, const std::string& model_file) {
+void run(const std::string& folder, const std::string& model_file, int threads) {
   using namespace smartmill;
   const Campaign campaign = readCampaign(folder);
-  const MachineModel model = readMachineModel(model_file.empty() ? campaign.modelPath() : model_file);
-  const discrepancy::CampaignGap gap = discrepancy::campaignGap(campaign, model, [](const std::string& test) {
-    std::fprintf(stderr, "simulating %s\n", test.c_str());
-  });
+  const MachineModel nominal = readMachineModel(campaign.modelPath());
+  // Noise and phase are those of the campaign, whatever model is compared with it.
+  const discrepancy::Dataset data = discrepancy::loadDataset(campaign, nominal);
+  for (const std::string& note : data.notes) std::fprintf(stderr, "note: %s\n", note.c_str());
+  const discrepancy::CampaignGap gap =
+      discrepancy::campaignGap(data, model_file.empty() ? nominal : readMachineModel(model_file), threads);
   std::map<std::string, double> largest;
   std::printf("%-24s %-12s %8s %14s\n", "test", "channel", "gap", "residual rms");
   for (const auto& row : gap.channels) {
@@ -28,7 +30,7 @@ void run(const std::string& folder, const std::string& model_file) {
     largest[row.channel] = std::max(largest[row.channel], row.gap);
   }
   for (const auto& [channel, value] : largest) {
-    std::printf("largest %-12s %8.3f (noise %.4g)\n", channel.c_str(), value, gap.noise.at(channel));
+    std::printf("largest %-12s %8.3f (noise %.4g)\n", channel.c_str(), value, data.noise.at(channel));
   }
   std::printf("overall gap %.4f\n", gap.overall);
 }
@@ -37,18 +39,20 @@ void run(const std::string& folder, const std::string& model_file) {
 
 int main(int argc, char** argv) {
   std::string campaign, model;
+  int threads = 2;
   CLI::App app{
       "Gap between a campaign's records and the twin: RMS of the difference over the noise; 1 is the noise "
       "floor."};
   app.add_option("campaign", campaign, "campaign folder")->required();
   app.add_option("--model", model, "machine model file (default: the campaign's)");
+  app.add_option("--threads", threads, "computing threads")->check(CLI::Range(1, 64));
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? 0 : 2;
   }
   try {
-    run(campaign, model);
+    run(campaign, model, threads);
   } catch (const std::exception& e) {
     std::cerr << "gap: " << e.what() << "\n";
     return 1;

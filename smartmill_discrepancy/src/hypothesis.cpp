@@ -175,13 +175,14 @@ Hypothesis unevenPitch(const ToolGeometry& tool) {
   return h;
 }
 
-Hypothesis extraMode(const std::string& axis) {
+Hypothesis extraMode(const std::string& axis, bool second) {
   Hypothesis h;
   h.effect = "extra_mode";
-  h.variant = axis;
+  h.variant = second ? axis + ", second" : axis;
+  if (second) h.after = axis;
   h.coordinates = {{"ln frequency_hz", std::log(800.0), std::log(20.0), std::log(12000.0), 2.5e-06, 1.5},
                    {"ln damping_ratio", std::log(0.03), std::log(0.001), std::log(0.6), 0.00025, 1.0},
-                   {"gain", 0.0, -1.0, 1.0, 2.5e-05, 0.2}};
+                   {"gain", 0.0, -3.0, 3.0, 2.5e-05, 0.2}};
   h.entry = [axis](const Values& v) {
     EffectEntry e;
     e.name = "extra_mode";
@@ -238,11 +239,15 @@ std::vector<Hypothesis> catalogueHypotheses(const Dataset& data, std::vector<std
 
   if (scope.cuts) {
     all.push_back(planar("runout", "offset_um", 1.0, 200.0, 20.0));
-    all.push_back(amplitudes("edge_forces",
-                             {{"Kte_n_per_mm", 0.0, -200.0, 200.0, 0.005, 20.0},
-                              {"Kre_n_per_mm", 0.0, -200.0, 200.0, 0.005, 20.0},
-                              {"Kae_n_per_mm", 0.0, -200.0, 200.0, 0.005, 20.0}},
-                             2.0));
+    // No edge pulls: what is added takes away no more than the model has.
+    const auto edge = [&](const char* key, double stated) {
+      return Coordinate{key, 0.0, -1e-3 * stated, 200.0, 0.005, 20.0};
+    };
+    const CuttingCoefficients stated = model.cutting.value_or(CuttingCoefficients{});
+    all.push_back(amplitudes(
+        "edge_forces",
+        {edge("Kte_n_per_mm", stated.kte), edge("Kre_n_per_mm", stated.kre), edge("Kae_n_per_mm", stated.kae)},
+        2.0));
     all.push_back(powerLaw("size_effect", "reference_chip_um", 60.0, 1.0, 3000.0));
     if (scope.known_wear) {
       all.push_back(amplitudes("tool_wear", {{"edge_growth_per_min", 0.0, -0.2, 20.0, 0.000125, 1.0}}, 0.1));
@@ -269,7 +274,8 @@ std::vector<Hypothesis> catalogueHypotheses(const Dataset& data, std::vector<std
   }
   if (scope.forces()) {
     for (const char* axis : {"x", "y", "z"}) {
-      if (scope.channels.count(std::string("f") + axis)) all.push_back(extraMode(axis));
+      if (!scope.channels.count(std::string("f") + axis)) continue;
+      for (const bool second : {false, true}) all.push_back(extraMode(axis, second));
     }
     if (sensor_modes) {
       // A light mode answers in proportion only while it moves by less than its width.

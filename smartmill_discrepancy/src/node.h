@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <string>
 #include <vector>
 
@@ -14,14 +15,14 @@ namespace smartmill::discrepancy {
 
 /// Keys of launch/config/monitor.yaml.
 struct MonitorParameters {
-  std::string model;             ///< path of a smartmill-model/1 file
-  double length = 0.3;           ///< [s] of a stretch, > 0.1
-  double path_tolerance = 1e-4;  ///< [m] beside the condition's line
-  double hold_back = 0.05;       ///< [s] that an event may be late
-  double limit = 1.5;            ///< [1] gap above which the model does not fit
-  std::string record_folder;     ///< stretches that do not fit are kept here as a campaign; empty: not kept
-  int most_recorded = 40;        ///< stretches
-  void validate() const;         ///< @throws Error naming key and value
+  std::string model;           ///< path of a smartmill-model/1 file
+  StretchParameters stretch;   ///< length, settle, path_tolerance
+  double hold_back = 0.05;     ///< [s] that an event may be late
+  LiveGapOptions gap;          ///< limit, load_step
+  std::string record_folder;   ///< stretches that do not fit are kept here as a campaign; empty: not kept
+  int most_recorded = 40;      ///< [1] stretches
+  int most_per_condition = 3;  ///< [1] stretches
+  void validate() const;       ///< @throws Error naming key and value
 };
 
 /// Shell around SortedStretches and liveGap(): the twin follows the running machine, discrepancy/state out.
@@ -34,6 +35,7 @@ class MonitorNode {
   template <typename Message>
   void subscribe(ros::NodeHandle& nh, const char* topic);
   void judge(const Stretch& stretch);
+  void record(const Stretch& stretch);
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
   MonitorParameters parameters_;
@@ -42,6 +44,7 @@ class MonitorNode {
   LiveGap last_;
   std::string problem_;  // why the last stretch could not be judged
   int recorded_ = 0;
+  std::map<std::string, int> recorded_of_;  // by condition
   ros::Publisher state_;
   std::vector<ros::Subscriber> subscribers_;
   diagnostic_updater::Updater diagnostics_;

@@ -146,7 +146,7 @@ std::vector<Hypothesis::Probe> modeProbes(const Hypothesis& h, const Projection&
   for (const TestData& t : runner.data().tests) rate = std::max(rate, t.test.sample_rate);
   if (h.effect == "extra_mode") {
     constexpr double DAMPING = 0.04;
-    const std::size_t axis = h.variant == "x" ? 0 : h.variant == "y" ? 1 : 2;
+    const auto axis = static_cast<std::size_t>(h.variant.front() - 'x');
     for (const double f : bestFrequencies(
              projection, ModeProbes::grid(60.0, 0.42 * rate, 1.06),
              [&](double at) { return probes.sensorMode(axis, at, DAMPING); }, false, runner.threads())) {
@@ -185,10 +185,12 @@ std::vector<Promise> screen(const Fitter& fitter, const Fit& now, const NominalT
   std::map<char, std::vector<double>> tip;
   std::vector<Promise> promises;
   for (const Hypothesis& h : tried) {
-    const bool taken = std::any_of(now.state.members.begin(), now.state.members.end(), [&](const Member& m) {
-      return m.hypothesis->effect == h.effect && m.hypothesis->variant == h.variant;
-    });
-    if (taken) continue;
+    const auto has = [&](const std::string& variant) {
+      return std::any_of(now.state.members.begin(), now.state.members.end(), [&](const Member& m) {
+        return m.hypothesis->effect == h.effect && m.hypothesis->variant == variant;
+      });
+    };
+    if (has(h.variant) || (!h.after.empty() && !has(h.after))) continue;
     Promise best;
     best.hypothesis = &h;
     for (const Hypothesis::Probe& probe :

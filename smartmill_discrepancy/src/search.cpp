@@ -104,19 +104,24 @@ void refine(TwinRunner& quick_runner, const Fitter& quick, const Fitter& exact, 
   constexpr double SETTLED = 0.1;
   NominalTangents tangents;
   FitState from = state;
+  double weight = 1.0;
   for (int pass = 0; pass <= PASSES; ++pass) {
     const MachineModel model = quick.model(from);
-    quick_runner.correctTo(model, exact.runner().simulate(model));
+    const std::vector<double> simulated = exact.runner().simulate(model);
+    quick_runner.correctTo(model, simulated);
+    // Where structure is left the noise does not tell how well values are known; what is stated of them does.
+    double squares = 0.0;
+    for (std::size_t i = 0; i < simulated.size(); ++i)
+      squares += std::pow(exact.runner().measured()[i] - simulated[i], 2);
+    weight = std::max(1.0, squares / static_cast<double>(simulated.size()));
     tangents = quick.nominalTangents(from);
     // All tangents at one point: only these tell what is known along a valley.
-    Fit here = quick.fit(from, &tangents, {0, 1e-8, true});
+    Fit here = quick.fit(from, &tangents, {0, 1e-8, true, weight});
     if (!here.converged) break;
-    // Where structure is left the noise does not tell how well values are known.
-    const double scale = std::max(1.0, here.chi2 / static_cast<double>(quick.runner().size()));
-    const Eigen::MatrixXd covariance = scale * here.covariance;
+    const Eigen::MatrixXd covariance = weight * here.covariance;
     result->best = std::move(here);
     if (pass == PASSES) break;
-    const Fit next = quick.fit(from, &tangents, {6, 1e-5, true});
+    const Fit next = quick.fit(from, &tangents, {6, 1e-5, true, weight});
     if (!next.converged) break;
     double moved = 0.0;
     Eigen::Index k = 0;
@@ -138,7 +143,7 @@ void refine(TwinRunner& quick_runner, const Fitter& quick, const Fitter& exact, 
   const double bic = result->best.bic;
   for (std::size_t m = 0; m < at.members.size(); ++m) {
     const FitState less = without(at, m);
-    const Fit rest = quick.fit(less, &tangents, {6, 1e-3, true});
+    const Fit rest = quick.fit(less, &tangents, {6, 1e-3, true, weight});
     const double lost = rest.bic;
     result->contribution.push_back(lost - bic);
     result->needed.push_back(tells(quick.runner(), rest, result->best, options));
@@ -160,7 +165,7 @@ void refine(TwinRunner& quick_runner, const Fitter& quick, const Fitter& exact, 
       if (member || !r.hypothesis) continue;
       FitState with = less;
       with.members.push_back({r.hypothesis, r.values});
-      const Fit fit = quick.fit(with, &tangents, {6, 1e-3, true});
+      const Fit fit = quick.fit(with, &tangents, {6, 1e-3, true, weight});
       if (fit.converged) result->rivals.push_back({m, r.effect, r.variant, lost - fit.bic, fit.state});
     }
   }

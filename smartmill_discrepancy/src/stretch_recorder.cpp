@@ -13,46 +13,71 @@ namespace {
 
 constexpr double RESTARTED = 1.0;         // [s] a jump back of stamps: a bag was restarted
 constexpr double SPEED_TOLERANCE = 0.02;  // of the stated speed, within which the spindle is there
+constexpr double ANGLE_TOLERANCE = 0.02;  // [rad] from an even turn
+constexpr double KEPT_AFTER = 1.0;        // [s] beyond a stretch's length that angles and loads are kept
 
 }  // namespace
 
-StretchRecorder::StretchRecorder(double length, double path_tolerance,
+StretchRecorder::StretchRecorder(const StretchParameters& parameters,
                                  std::function<void(const Stretch&)> deliver)
-    : length_(length), path_tolerance_(path_tolerance), deliver_(std::move(deliver)) {
+    : parameters_(parameters), deliver_(std::move(deliver)) {
 }
 
 void StretchRecorder::reset() {
-  condition_.reset();
-  steady_ = false;
+  forget();
+  first_.reset();
+  cut_time_ = 0.0;
   angles_.clear();
+  loads_.clear();
+}
+
+void StretchRecorder::forget() {
+  condition_.reset();
+  unsteady();
+}
+
+void StretchRecorder::unsteady() {
+  steady_since_.reset();
   blocks_.clear();
 }
 
 void StretchRecorder::handle(const CuttingCondition& condition) {
-  reset();
+  forget();
   condition_ = condition;
 }
 
 void StretchRecorder::handle(const CncState& state) {
   if (!condition_ || condition_->kind == CuttingCondition::Kind::none) return;
-  const bool path =
-      condition_->kind == CuttingCondition::Kind::air || onSteadyPath(*condition_, state, path_tolerance_);
-  steady_ = path && std::abs(state.spindle_speed / condition_->spindle_speed - 1.0) < SPEED_TOLERANCE;
-  if (!steady_) blocks_.clear();
+  const bool cut = condition_->kind == CuttingCondition::Kind::cut;
+  const bool path = !cut || onSteadyPath(*condition_, state, parameters_.path_tolerance);
+  const bool steady =
+      path && std::abs(state.spindle_speed / condition_->spindle_speed - 1.0) < SPEED_TOLERANCE;
+  if (steady && !steady_since_) steady_since_ = state.stamp;
+  if (!steady && steady_since_) {
+    if (cut) cut_time_ += state.stamp - *steady_since_;
+    unsteady();
+  }
 }
 
 void StretchRecorder::handle(const SpindleAngle& angle) {
   angles_.push_back(angle);
-  while (!angles_.empty() && angles_.front().stamp < angle.stamp - length_ - 1.0) angles_.pop_front();
+  while (angles_.front().stamp < angle.stamp - parameters_.length - KEPT_AFTER) angles_.pop_front();
+}
+
+void StretchRecorder::handle(const LoadSample& load) {
+  loads_.push_back(load);
+  while (loads_.front().stamp < load.stamp - parameters_.length - KEPT_AFTER) loads_.pop_front();
 }
 
 void StretchRecorder::handle(const SampleBlock& dynamometer) {
-  if (!steady_ || dynamometer.size() == 0) return;
+  if (dynamometer.size() == 0) return;
+  if (!first_) first_ = dynamometer.stamp;
+  if (!steady_since_ || dynamometer.stamp < *steady_since_ + parameters_.settle) return;
   const bool gap =
       !blocks_.empty() && dynamometer.first_index != blocks_.back().first_index + blocks_.back().size();
   if (gap) blocks_.clear();
   blocks_.push_back(dynamometer);
-  if (dynamometer.timeOf(dynamometer.size()) - blocks_.front().stamp >= length_) finish();
+  if (dynamometer.timeOf(dynamometer.size()) - blocks_.front().stamp >= parameters_.length) finish();
 }
 
 void StretchRecorder::finish() {
@@ -82,6 +107,15 @@ void StretchRecorder::finish() {
     return;
   }
   const double speed = (n * sta - st * sa) / det, phase = (sa - speed * st) / n;
+  const bool even = std::all_of(angles_.begin(), angles_.end(), [&](const SpindleAngle& a) {
+    return a.stamp < begin || a.stamp > end ||
+           std::abs(std::remainder(a.angle - phase - speed * (a.stamp - begin), units::TWO_PI)) <
+               ANGLE_TOLERANCE;
+  });
+  if (!even) {
+    blocks_.clear();
+    return;
+  }
   Stretch stretch;
   stretch.stamp = end;
   CampaignTest& test = stretch.test;
@@ -90,7 +124,12 @@ void StretchRecorder::finish() {
   test.kind = condition_->kind == CuttingCondition::Kind::air ? TestKind::air : TestKind::cut;
   test.sample_rate = blocks_.front().sample_rate;
   test.spindle_speed = speed;
-  if (test.kind == TestKind::cut) test.engagement = condition_->engagement;
+  test.running_before = begin - *steady_since_;
+  test.start_time = begin - *first_;
+  if (test.kind == TestKind::cut) {
+    test.engagement = condition_->engagement;
+    test.cut_time_before = cut_time_ + *test.running_before;
+  }
   Record& record = stretch.record;
   record.file = test.name;
   std::vector<double> angle;
@@ -110,17 +149,22 @@ void StretchRecorder::finish() {
   record.add("fy") = std::move(force[1]);
   record.add("fz") = std::move(force[2]);
   blocks_.clear();
+  for (const LoadSample& l : loads_) {
+    if (l.stamp >= begin && l.stamp <= end) stretch.load.push_back({l.stamp - begin, l.spindle_load});
+  }
   deliver_(stretch);
 }
 
-SortedStretches::SortedStretches(double length, double path_tolerance, double hold_back,
+SortedStretches::SortedStretches(const StretchParameters& parameters, double hold_back,
                                  std::function<void(const Stretch&)> deliver)
-    : recorder_(length, path_tolerance, std::move(deliver)),
+    : recorder_(parameters, std::move(deliver)),
       sorter_(hold_back),
       conditions_(sorter_.addEvents("cut/condition")),
       states_(sorter_.addRegular("cnc/state")),
       angles_(sorter_.addRegular("spindle/angle")),
-      blocks_(sorter_.addRegular("daq/dynamometer")) {
+      blocks_(sorter_.addRegular("daq/dynamometer")),
+      // Absent from some machines: waited for only by the hold-back.
+      loads_(sorter_.addEvents("cnc/load")) {
 }
 
 void SortedStretches::watch(double stamp) {
@@ -147,6 +191,10 @@ void SortedStretches::push(const SpindleAngle& angle) {
 
 void SortedStretches::push(const SampleBlock& dynamometer) {
   sorter_.push(blocks_, dynamometer.stamp, [this, dynamometer] { recorder_.handle(dynamometer); });
+}
+
+void SortedStretches::push(const LoadSample& load) {
+  sorter_.push(loads_, load.stamp, [this, load] { recorder_.handle(load); });
 }
 
 }  // namespace smartmill::discrepancy

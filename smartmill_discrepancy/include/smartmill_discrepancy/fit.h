@@ -44,6 +44,7 @@ struct FitOptions {
   int iterations = 8;
   double tolerance = 1e-4;  ///< relative change of the cost that ends a fit
   bool nominal_free = true;
+  double prior_weight = 1.0;  ///< [1] of the priors' squares: the residual's variance where structure is left
 };
 
 /// Fits models to a campaign by Ceres: nominal values under their Gaussian priors, effects within bounds and

@@ -47,6 +47,7 @@ struct Hypothesis {
 
   std::string effect;
   std::string variant;  ///< channel or axis, empty without one
+  std::string after;    ///< variant that must have been found before this one is tried, empty: none
   std::vector<Coordinate> coordinates;
   std::vector<Probe> probes;
   std::function<EffectEntry(const std::vector<double>&)> entry;
@@ -55,7 +56,6 @@ struct Hypothesis {
 };
 
 /// All hypotheses that a campaign can speak of; the rest is named in notes with its reason.
-/// @param without_null true: only to build a campaign, nothing is left out
 std::vector<Hypothesis> catalogueHypotheses(const Dataset& data, std::vector<std::string>* notes);
 
 /// Numbers of an entry with the names a report uses: offset_um; pitch_deg[0]; x[0].frequency_hz.

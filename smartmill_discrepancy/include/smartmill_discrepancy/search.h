@@ -16,12 +16,12 @@ struct SearchOptions {
   int screening_substeps = 1;
   int final_substeps = 8;
   std::size_t fitted_per_round = 5;  ///< hypotheses that a round fits after screening
-  std::size_t most_effects = 4;
+  std::size_t most_effects = 8;
   double least_gain = 100.0;  ///< [1] difference of BIC below which nothing is named
   double least_prior_gain =
       3.0;  ///< [1] the same where it comes from nominal values that need not be pulled off any more
   double twin_accuracy = 2e-4;  ///< [1] of the signal, by which two faithful simulations differ
-  double least_share = 0.01;    ///< [1] of the squares above the noise that an effect must take
+  double least_share = 0.05;    ///< [1] of the squares above the noise that an effect must take
   std::function<void(const std::string&)> progress;
 };
 

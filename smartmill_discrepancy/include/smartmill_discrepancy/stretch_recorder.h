@@ -3,6 +3,7 @@
 #include <deque>
 #include <functional>
 #include <optional>
+#include <vector>
 
 #include "smartmill_core/campaign/campaign.h"
 #include "smartmill_core/campaign/record.h"
@@ -11,47 +12,68 @@
 
 namespace smartmill::discrepancy {
 
+/// What the controller's load meter showed during a stretch.
+struct LoadReading {
+  double time = 0.0;  ///< [s] since the stretch began
+  double load = 0.0;  ///< [1] of full scale
+};
+
 /// A stretch of steady cutting, or of the spindle turning in air, as a test of a campaign.
 struct Stretch {
   double stamp = 0.0;  ///< [s] of its end
-  CampaignTest test;   ///< no engage_time: in cut throughout
-  Record record;       ///< time, spindle_angle, fx, fy, fz
+  /// In cut throughout: running_before is stated. start_time counts from the first input, cut_time_before
+  /// what was cut steadily since.
+  CampaignTest test;
+  Record record;  ///< time, spindle_angle, fx, fy, fz
+  std::vector<LoadReading> load;
+};
+
+struct StretchParameters {
+  double length = 0.3;           ///< [s] of a stretch, > 0.1
+  double settle = 0.2;           ///< [s] left out after a machine has come to steady motion, >= 0
+  double path_tolerance = 1e-4;  ///< [m] beside the condition's line, > 0
 };
 
 /// Cuts the streams of a running machine into stretches of equal length: condition, controller state, spindle
-/// angle and force sensor in stamp order.
+/// angle, force sensor and load meter in stamp order.
 class StretchRecorder {
  public:
-  /// @param length [s] of a stretch. @param path_tolerance [m] beside the condition's line
-  StretchRecorder(double length, double path_tolerance, std::function<void(const Stretch&)> deliver);
+  StretchRecorder(const StretchParameters& parameters, std::function<void(const Stretch&)> deliver);
 
   void handle(const CuttingCondition& condition);
   void handle(const CncState& state);
   void handle(const SpindleAngle& angle);
   void handle(const SampleBlock& dynamometer);
+  void handle(const LoadSample& load);
   void reset();
 
  private:
   void finish();
+  void unsteady();
+  void forget();
 
-  double length_, path_tolerance_;
+  StretchParameters parameters_;
   std::function<void(const Stretch&)> deliver_;
   std::optional<CuttingCondition> condition_;
-  bool steady_ = false;
+  std::optional<double> steady_since_;  // [s]
+  std::optional<double> first_;         // [s] stamp of the first samples
+  double cut_time_ = 0.0;               // [s] of steady cutting that is over
   std::deque<SpindleAngle> angles_;
   std::deque<SampleBlock> blocks_;
+  std::deque<LoadSample> loads_;
 };
 
 /// The same behind a sorter, for a node and for a bag alike.
 class SortedStretches {
  public:
-  SortedStretches(double length, double path_tolerance, double hold_back,
+  SortedStretches(const StretchParameters& parameters, double hold_back,
                   std::function<void(const Stretch&)> deliver);
 
   void push(const CuttingCondition& condition);
   void push(const CncState& state);
   void push(const SpindleAngle& angle);
   void push(const SampleBlock& dynamometer);
+  void push(const LoadSample& load);
   void flush() { sorter_.flush(); }
 
  private:
@@ -59,7 +81,7 @@ class SortedStretches {
 
   StretchRecorder recorder_;
   StreamSorter sorter_;
-  StreamSorter::Stream conditions_, states_, angles_, blocks_;
+  StreamSorter::Stream conditions_, states_, angles_, blocks_, loads_;
   double newest_ = -1e300;
 };
 
