@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <limits>
 #include <map>
+#include <optional>
 
 namespace smartmill::discrepancy {
 namespace {
@@ -62,6 +63,39 @@ FitState without(const FitState& state, std::size_t member) {
   FitState less = state;
   less.members.erase(less.members.begin() + static_cast<std::ptrdiff_t>(member));
   return less;
+}
+
+// A mode of the tool found beside another on the same axis may be what the other stood for, and modes found
+// axis by axis are one effect: the state with the newest modes of each axis in one member.
+std::optional<FitState> withOneFlexibility(const FitState& state, const std::vector<Hypothesis>& hypotheses) {
+  std::map<char, std::vector<double>> modes;
+  FitState merged{state.nominal, {}};
+  std::size_t members = 0;
+  for (const Member& m : state.members) {
+    if (m.hypothesis->effect != "tool_flexibility") {
+      merged.members.push_back(m);
+      continue;
+    }
+    ++members;
+    for (std::size_t a = 0; a < m.hypothesis->variant.size(); ++a) {
+      const auto from = m.values.begin() + static_cast<std::ptrdiff_t>(3 * a);
+      modes[m.hypothesis->variant[a]].assign(from, from + 3);
+    }
+  }
+  if (members < 2) return {};
+  Member one{nullptr, {}};
+  for (const Hypothesis& h : hypotheses) {
+    if (h.effect != "tool_flexibility" || h.variant.size() != modes.size()) continue;
+    one = {&h, {}};
+    for (const char axis : h.variant) {
+      if (modes.count(axis) == 0) one.hypothesis = nullptr;
+      one.values.insert(one.values.end(), modes[axis].begin(), modes[axis].end());
+    }
+    if (one.hypothesis) break;
+  }
+  if (!one.hypothesis) return {};
+  merged.members.push_back(std::move(one));
+  return merged;
 }
 
 // The promise is linear: of shorter ways from the null point to its start the one that fits best.
@@ -254,6 +288,13 @@ SearchResult search(TwinRunner& quick_runner, const Fitter& quick, const Fitter&
     }
     if (!better) break;
     tangents = linearise(best.state);
+    if (const auto one = withOneFlexibility(best.state, hypotheses)) {
+      const Fit merged = quick.fit(*one, &tangents, {8, 1e-4, true});
+      if (merged.bic < best.bic) {
+        best = merged;
+        tangents = linearise(best.state);
+      }
+    }
     Fit refined = quick.fit(best.state, &tangents, {8, 1e-4, true});
     // The tangents held where the fit began; where it went far they are taken anew.
     tangents = linearise(refined.state);
