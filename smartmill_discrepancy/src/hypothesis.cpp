@@ -244,10 +244,10 @@ std::vector<Hypothesis> catalogueHypotheses(const Dataset& data, std::vector<std
       return Coordinate{key, 0.0, -1e-3 * stated, 200.0, 0.005, 20.0};
     };
     const CuttingCoefficients stated = model.cutting.value_or(CuttingCoefficients{});
-    all.push_back(amplitudes(
-        "edge_forces",
-        {edge("Kte_n_per_mm", stated.kte), edge("Kre_n_per_mm", stated.kre), edge("Kae_n_per_mm", stated.kae)},
-        2.0));
+    all.push_back(amplitudes("edge_forces",
+                             {edge("Kte_n_per_mm", stated.kte), edge("Kre_n_per_mm", stated.kre),
+                              edge("Kae_n_per_mm", stated.kae)},
+                             2.0));
     all.push_back(powerLaw("size_effect", "reference_chip_um", 60.0, 1.0, 3000.0));
     if (scope.known_wear) {
       all.push_back(amplitudes("tool_wear", {{"edge_growth_per_min", 0.0, -0.2, 20.0, 0.000125, 1.0}}, 0.1));

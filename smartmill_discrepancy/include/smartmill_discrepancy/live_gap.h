@@ -28,7 +28,8 @@ struct LiveGap {
 /// half). load_meter, where the model has a spindle with its full scale and the stretch has five readings:
 /// each reading against the mean of the simulated load, since a controller's reading may be old by some
 /// revolutions; its noise is half a step of the reading and the simulated ripple. A cut that chatters is set
-/// aside: no model follows the phase of chatter.
+/// aside, as no model follows the phase of chatter; so is the begin of one near the stability limit, whose
+/// vibrations die out slowly.
 /// @throws Error when the model lacks noise_rms_n or cannot simulate the stretch.
 LiveGap liveGap(const MachineModel& model, const Stretch& stretch, const LiveGapOptions& options);
 

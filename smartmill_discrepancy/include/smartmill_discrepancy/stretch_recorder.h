@@ -30,7 +30,7 @@ struct Stretch {
 
 struct StretchParameters {
   double length = 0.3;           ///< [s] of a stretch, > 0.1
-  double settle = 0.2;           ///< [s] left out after a machine has come to steady motion, >= 0
+  double settle = 0.15;          ///< [s] left out after a machine has come to steady motion, >= 0
   double path_tolerance = 1e-4;  ///< [m] beside the condition's line, > 0
 };
 
