@@ -21,7 +21,7 @@ struct MonitorParameters {
   LiveGapOptions gap;          ///< limit, load_step
   std::string record_folder;   ///< stretches that do not fit are kept here as a campaign; empty: not kept
   int most_recorded = 40;      ///< [1] stretches
-  int most_per_condition = 3;  ///< [1] stretches
+  int most_per_condition = 2;  ///< [1] stretches
   void validate() const;       ///< @throws Error naming key and value
 };
 

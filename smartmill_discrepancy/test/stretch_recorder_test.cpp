@@ -19,12 +19,17 @@ struct Machine {
   double started_cutting = 0.0;  // [s]
   double actual_speed = SPEED;   // [rad/s]
   double begin = 100.0;          // [s] stamp of the begin
+  double settle = 0.0;           // [s]
+  double acceleration = 0.0;     // [rad/s2] of the spindle
 };
 
 /// A second of straight cutting through the recorder; fx counts samples.
 std::vector<Stretch> run(const Machine& machine, double length = 0.3) {
   std::vector<Stretch> stretches;
-  SortedStretches recorder(length, 1e-4, 0.05, [&](const Stretch& s) { stretches.push_back(s); });
+  StretchParameters parameters;
+  parameters.length = length;
+  parameters.settle = machine.settle;
+  SortedStretches recorder(parameters, 0.05, [&](const Stretch& s) { stretches.push_back(s); });
   CuttingCondition condition;
   condition.stamp = machine.begin;
   condition.kind = CuttingCondition::Kind::cut;
@@ -47,8 +52,13 @@ std::vector<Stretch> run(const Machine& machine, double length = 0.3) {
     SpindleAngle angle;
     angle.stamp = stamp;
     angle.speed = machine.actual_speed;
-    angle.angle = std::fmod(PHASE + machine.actual_speed * t, units::TWO_PI);
+    angle.angle =
+        std::fmod(PHASE + machine.actual_speed * t + 0.5 * machine.acceleration * t * t, units::TWO_PI);
     recorder.push(angle);
+    LoadSample load;
+    load.stamp = stamp + 0.004;
+    load.spindle_load = t;
+    recorder.push(load);
     if (std::abs(t - machine.lost_at) < 1e-6) continue;
     SampleBlock block;
     block.stamp = stamp;
@@ -83,6 +93,32 @@ TEST(StretchRecorder, cutsSteadyCuttingIntoEqualStretches) {
       ASSERT_NEAR(std::remainder(angle[i] - PHASE - SPEED * fx[i] / RATE, units::TWO_PI), 0.0, 1e-6);
     }
   }
+}
+
+// What explain's twin must know of the time before: how long it had cut like this.
+TEST(StretchRecorder, saysWhatWentBefore) {
+  Machine machine;
+  machine.settle = 0.2;
+  machine.started_cutting = 0.1;
+  const std::vector<Stretch> stretches = run(machine);
+  ASSERT_EQ(stretches.size(), 2U);  // 0.3..0.6, 0.6..0.9
+  for (std::size_t k = 0; k < 2; ++k) {
+    const CampaignTest& test = stretches[k].test;
+    const double begin = 0.3 + 0.3 * static_cast<double>(k);
+    EXPECT_FALSE(test.engage_time);
+    EXPECT_NEAR(*test.running_before, begin - 0.1, 1e-6);
+    EXPECT_NEAR(*test.cut_time_before, begin - 0.1, 1e-6);
+    EXPECT_NEAR(*test.start_time, begin, 1e-6);
+    const std::vector<LoadReading>& load = stretches[k].load;
+    ASSERT_GE(load.size(), 28U);
+    for (const LoadReading& r : load) EXPECT_NEAR(r.load, begin + r.time - 0.004, 1e-6);
+  }
+}
+
+TEST(StretchRecorder, leavesOutASpindleThatSpeedsUp) {
+  Machine machine;
+  machine.acceleration = 10.0;  // 0.1 rad from the middle to the ends of a stretch
+  EXPECT_TRUE(run(machine).empty());
 }
 
 TEST(StretchRecorder, leavesOutWhatIsNotSteady) {

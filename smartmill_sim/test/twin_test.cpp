@@ -113,6 +113,53 @@ Record tapOf(const std::string& answering) {
   return record;
 }
 
+// A record out of the midst of a cut begins in the steady state: it comes again with every tooth from its
+// first sample on, and is what a record with the engagement in it settles to.
+TEST(Twin, aRecordOutOfARunningCutIsSteady) {
+  MachineModel model = machine();
+  model.tool_tip.x.modes = {{1210.0, 0.031, 1.0 / 28e6}};
+  model.tool_tip.y.modes = {{1180.0, 0.029, 1.0 / 31e6}};
+  model.force_sensor.axis[0].modes = {{930.0, 0.02, 0.9}};
+  model.force_sensor.axis[1].modes = {{1080.0, 0.025, 0.9}};
+  SimulationOptions options;
+  options.noise = false;
+  CampaignTest whole = slot(), part = slot();
+  whole.engagement->axial_depth = part.engagement->axial_depth = 1e-3;
+  whole.engage_time = 0.0;
+  part.running_before = 0.4;
+  // 64 samples a tooth: 25600 / (4 * 100 Hz).
+  options.phase = 0.0;
+  const Record settled = simulateTest(model, whole, 0.6, options),
+               running = simulateTest(model, part, 0.1, options);
+  for (const char* channel : {"fx", "fy", "load_meter"}) {
+    const std::vector<double>&a = settled.column(channel), &b = running.column(channel);
+    double largest = 0.0;
+    for (const double v : a) largest = std::max(largest, std::abs(v));
+    // 50 revolutions of 256 samples lie between the two; the steady state is reached to 1e-4.
+    for (std::size_t i = 0; i < b.size(); ++i)
+      ASSERT_NEAR(b[i], a[i + 50 * 256], 5e-4 * largest) << channel << i;
+  }
+}
+
+// The mean of a sine over an interval is sin(x) / x of it, x = pi f / rate.
+TEST(Twin, meanSamplesAreMeansOverTheirIntervals) {
+  MachineModel model = machine();
+  model.effects = {effectEntry("unbalance", {{"mass_eccentricity_g_mm", 100.0}, {"angle_deg", 0.0}})};
+  CampaignTest air = slot();
+  air.kind = TestKind::air;
+  air.engagement.reset();
+  air.sample_rate = 2000.0;  // twenty samples a turn
+  SimulationOptions options;
+  options.noise = false;
+  options.phase = 0.0;
+  const Record instant = simulateTest(model, air, 0.2, options);
+  model.force_sensor.mean_samples = true;
+  const Record mean = simulateTest(model, air, 0.2, options);
+  const double x = units::PI * 100.0 / 2000.0, expected = std::sin(x) / x;
+  // Left out: of the order of x^4 / 20.
+  EXPECT_NEAR(rms(mean.column("fx")) / rms(instant.column("fx")), expected, 5e-5);
+}
+
 TEST(Twin, tapActsOnWhatAnswers) {
   MachineModel model = machine();
   model.tool_tip.x.modes = {{700.0, 0.03, 1.0 / 28e6}};

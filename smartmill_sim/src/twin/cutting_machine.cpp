@@ -18,7 +18,7 @@ ModalModel firstModeAt(ModalModel axis, double factor) {
 
 }  // namespace
 
-CuttingMachine::CuttingMachine(const MachineModel& model, double time_step, Feed feed)
+CuttingMachine::CuttingMachine(const MachineModel& model, double time_step, Feed feed, double slice_angle)
     : effects_(model),
       model_(model),
       time_step_(time_step),
@@ -39,7 +39,7 @@ CuttingMachine::CuttingMachine(const MachineModel& model, double time_step, Feed
     } else if (feed == Feed::steady) {
       regenerative_.emplace(*model_.tool, nominal_.law, time_step, setup.radius_offset);
     } else {
-      process_.emplace(*model_.tool, nominal_.law, setup.radius_offset);
+      process_.emplace(*model_.tool, nominal_.law, setup.radius_offset, slice_angle);
     }
   }
   state_ = nominal_;
@@ -92,6 +92,21 @@ void CuttingMachine::engage(const std::vector<ContactArc>& arcs, const ToolMotio
   if (regenerative_) regenerative_->engage(tilted, fed(now));
 }
 
+void CuttingMachine::setTiltedDepths(const ToolMotion& now) {
+  std::vector<double> depths;
+  for (const ContactArc& a : arcs_)
+    depths.push_back(std::max(a.depth + state_.depth_slope * feed_path_, LEAST_DEPTH));
+  if (process_) process_->setDepths(depths, fed(now));
+  if (rigid_) rigid_->setDepths(depths);
+  if (regenerative_) regenerative_->setDepths(depths);
+}
+
+void CuttingMachine::setDepth(double depth, const ToolMotion& now, double passed_over) {
+  for (ContactArc& a : arcs_) a.depth = depth;
+  feed_path_ += passed_over;
+  setTiltedDepths(now);
+}
+
 void CuttingMachine::resetLoadMeter(double spindle_speed) {
   if (!drive_) return;
   Input input;
@@ -140,14 +155,7 @@ void CuttingMachine::step(const Input& input, Output& out) {
   if (!effects_.empty() && (steps_to_update_ <= 0 || input.motion.speed != now_.speed)) {
     update(input);
     steps_to_update_ = UPDATE_STEPS;
-    if (state_.depth_slope != 0.0 && cutting()) {
-      std::vector<double> depths;
-      for (const ContactArc& a : arcs_)
-        depths.push_back(std::max(a.depth + state_.depth_slope * feed_path_, LEAST_DEPTH));
-      if (process_) process_->setDepths(depths, fed(input.motion));
-      if (rigid_) rigid_->setDepths(depths);
-      if (regenerative_) regenerative_->setDepths(depths);
-    }
+    if (state_.depth_slope != 0.0 && cutting()) setTiltedDepths(input.motion);
   }
   --steps_to_update_;
   now_.angle = input.motion.angle;

@@ -15,9 +15,11 @@ using units::TWO_PI;
 
 constexpr int NODES = 4096;  // of the surface over a turn
 constexpr double NODE_ANGLE = TWO_PI / NODES;
-constexpr double SLICE_ANGLE = 0.02;  // [rad] lag over a slice: the mid-slice rule errs by 2e-5
-constexpr double NO_GAP = 1e-9;       // [m] below this gap the edge still rubs: chips near 0 are rounded
-constexpr int BEHIND = 2;             // nodes right behind a tooth that are still as it found them
+constexpr double NO_GAP = 1e-9;  // [m] below this gap the edge still rubs: chips near 0 are rounded
+constexpr int BEHIND = 2;        // nodes right behind a tooth that are still as it found them
+// At the tip half as high: where runout or vibration lifts a tooth out of the work, a slice leaves it as a
+// whole, and what that does to a ringing sensor falls with the square of the height.
+constexpr std::size_t THIN_SLICES = 8;
 constexpr double MARGIN = (1 + BEHIND) * NODE_ANGLE;  // surface kept beyond an arc, for the chip at its end
 constexpr double ON_WALL = 0.5 * NODE_ANGLE;          // [rad] a node this near to where the feed is tangent
 
@@ -66,7 +68,7 @@ void checkOffsets(const ToolGeometry& tool, std::vector<double>& radius_offset) 
 }
 
 CuttingProcess::CuttingProcess(const ToolGeometry& tool, const CuttingLaw& law,
-                               std::vector<double> radius_offset)
+                               std::vector<double> radius_offset, double slice_angle)
     : tool_(tool), law_(law), offset_(std::move(radius_offset)), sin_(NODES), cos_(NODES) {
   validate(tool);
   checkOffsets(tool, offset_);
@@ -75,7 +77,7 @@ CuttingProcess::CuttingProcess(const ToolGeometry& tool, const CuttingLaw& law,
     cos_[static_cast<std::size_t>(n)] = std::cos(n * NODE_ANGLE);
   }
   // Without helix every height is alike: one slice of any height.
-  height_ = tool.lag() > 0.0 ? SLICE_ANGLE / tool.lag() : 1e3;
+  height_ = tool.lag() > 0.0 ? slice_angle / tool.lag() : 1e3;
 }
 
 // The latest reach of any tooth at this angle, had the tool always moved as now.
@@ -100,7 +102,8 @@ double CuttingProcess::lagOf(const Slice& slice, const ContactArc& arc) const {
 void CuttingProcess::growTo(double depth) {
   while (slices_.empty() || slices_.back().high < depth) {
     const double low = slices_.empty() ? 0.0 : slices_.back().high;
-    slices_.push_back({low, low + height_, std::vector<double>(NODES, 0.0),
+    const double height = slices_.size() < THIN_SLICES ? 0.5 * height_ : height_;
+    slices_.push_back({low, low + height, std::vector<double>(NODES, 0.0),
                        std::vector<double>(static_cast<std::size_t>(tool_.teeth), 0.0)});
   }
 }
@@ -129,8 +132,9 @@ void CuttingProcess::setDepths(const std::vector<double>& depths, const ToolMoti
   bool new_slice = false;
   for (std::size_t a = 0; a < arcs_.size(); ++a) {
     // Each arc's surface reaches to the end of its last slice.
-    const double filled = std::ceil(arcs_[a].depth / height_) * height_;
-    new_slice = new_slice || depths.at(a) > filled;
+    const auto last = std::find_if(slices_.begin(), slices_.end(),
+                                   [&](const Slice& slice) { return slice.high >= arcs_[a].depth; });
+    new_slice = new_slice || last == slices_.end() || depths.at(a) > last->high;
   }
   if (new_slice) {
     std::vector<ContactArc> arcs = arcs_;
@@ -154,6 +158,7 @@ long CuttingProcess::leftNode(long left, const ToolMotion& now) const {
   for (long next = left + 1; next <= left + BEHIND; ++next) {
     if (inside(next)) return next;
   }
+  if (inside(left - 1)) return left - 2;
   return left;
 }
 

@@ -22,6 +22,29 @@ namespace {
 
 const std::array<const char*, 2> TIP{{"tool_x", "tool_y"}};
 
+// What ran before the record: so much of it is simulated, the depth of cut growing over the first part, since
+// full cut at once makes the tool ring for long.
+constexpr double LONGEST_LEAD = 0.25;  // [s]
+constexpr double GROWING_SHARE = 0.6;  // [1] of the lead
+constexpr double LEAST_GROWTH = 0.01;  // [1] of the depth at the beginning
+constexpr long GROWTH_STEPS = 32;      // between two depths
+
+// Means over the samples' intervals: x + x'' dt^2 / 24, good to the fourth order of frequency over sample
+// rate.
+void average(std::vector<double>& x) {
+  double before = x.front();
+  for (std::size_t i = 1; i + 1 < x.size(); ++i) {
+    const double now = x[i];
+    x[i] += (x[i + 1] - 2.0 * now + before) / 24.0;
+    before = now;
+  }
+}
+
+// From 0 at 0 smoothly to 1 at 1.
+double growth(double x) {
+  return x >= 1.0 ? 1.0 : x * x * (3.0 - 2.0 * x);
+}
+
 // Columns that this twin gives: inputs and the channels of the measuring chain.
 bool gives(const std::string& column, const CampaignTest& test) {
   if (column == "spindle_angle" || column == "hammer") return true;
@@ -168,7 +191,7 @@ void run(const MachineModel& model, const CampaignTest& test, const SimulationOp
   machine.setClock(clockOf(model, test, record));
   if (record.has("load_meter")) {
     model.needSpindle("simulate load_meter");
-    machine.resetLoadMeter(test.spindle_speed);
+    if (!test.running_before) machine.resetLoadMeter(test.spindle_speed);
   }
   std::array<std::vector<double>*, CHANNELS> out{};
   std::vector<std::size_t> shown;
@@ -187,6 +210,11 @@ void run(const MachineModel& model, const CampaignTest& test, const SimulationOp
     }
   }
 
+  if (model.force_sensor.mean_samples) {
+    for (const std::size_t c : {FX, FY, FZ}) {
+      if (out[c]) average(*out[c]);
+    }
+  }
   std::mt19937_64 random(options.seed);
   std::normal_distribution<double> normal;
   const std::vector<Tone*> tones = machine.tones();
@@ -216,7 +244,8 @@ void run(const MachineModel& model, const CampaignTest& test, const SimulationOp
 Record simulate(const MachineModel& model, const CampaignTest& test, const Record* recorded, Record record,
                 double phase, const SimulationOptions& options) {
   if (options.substeps < 1) throw Error("simulation: substeps below 1");
-  CuttingMachine machine(model, 1.0 / (test.sample_rate * options.substeps), Feed::steady);
+  CuttingMachine machine(model, 1.0 / (test.sample_rate * options.substeps),
+                         options.stored_surface ? Feed::any : Feed::steady);
   if (test.kind == TestKind::tap) {
     const std::vector<double> hammer = contactForce(record.column("hammer"));
     const std::size_t axis = test.direction == "x" ? 0 : test.direction == "y" ? 1 : 2;
@@ -250,22 +279,49 @@ Record simulate(const MachineModel& model, const CampaignTest& test, const Recor
   }
   const double start = test.engage_time.value_or(record.time.front() - 1.0);
   const double dt = 1.0 / test.sample_rate;
+  const auto inputAt = [&](double t) {
+    CuttingMachine::Input input;
+    input.motion.angle = phase + test.spindle_speed * (t - record.time[0]);
+    input.motion.speed = test.spindle_speed;
+    input.motion.velocity[0] = feed;
+    input.motion.centre[0] = feed * (t - record.time[0]);
+    return input;
+  };
   bool engaged = false;
+  const auto engage = [&](const ToolMotion& now, double depth) {
+    machine.engage({{test.engagement->entry, test.engagement->exit, depth}}, now,
+                   ENGAGEMENT_RISE * options.substeps);
+    engaged = true;
+  };
+  if (test.running_before) {
+    machine.setClock(clockOf(model, test, record));
+    if (record.has("load_meter")) machine.resetLoadMeter(test.spindle_speed);
+    const double lead = std::min(*test.running_before, LONGEST_LEAD);
+    const auto steps = static_cast<long>(lead * test.sample_rate * options.substeps);
+    const double step = dt / options.substeps;
+    CuttingMachine::Output ignored;
+    for (long k = steps; k > 0; --k) {
+      const CuttingMachine::Input input = inputAt(record.time[0] - static_cast<double>(k) * step);
+      if (cut && (k % GROWTH_STEPS == 0 || !engaged)) {
+        const double share =
+            LEAST_GROWTH + (1.0 - LEAST_GROWTH) * growth(static_cast<double>(steps - k) /
+                                                         (GROWING_SHARE * static_cast<double>(steps)));
+        if (!engaged) engage(input.motion, share * test.engagement->axial_depth);
+        machine.setDepth(share * test.engagement->axial_depth, input.motion);
+      }
+      machine.step(input, ignored);
+    }
+    if (engaged)
+      machine.setDepth(test.engagement->axial_depth, inputAt(record.time[0]).motion,
+                       feed * (*test.running_before - lead));
+  }
   run(
       model, test, options, machine,
       [&](std::size_t i, double share) {
         const double t = record.time[i] + share * dt;
-        CuttingMachine::Input input;
-        input.motion.angle = phase + test.spindle_speed * (t - record.time[0]);
-        input.motion.speed = test.spindle_speed;
-        input.motion.velocity[0] = feed;
-        input.motion.centre[0] = feed * (t - record.time[0]);
+        const CuttingMachine::Input input = inputAt(t);
         // A rounded time stamp must not put the sample of engagement on the wrong side.
-        if (cut && !engaged && t >= start - 1e-3 * dt) {
-          machine.engage({{test.engagement->entry, test.engagement->exit, test.engagement->axial_depth}},
-                         input.motion, ENGAGEMENT_RISE * options.substeps);
-          engaged = true;
-        }
+        if (cut && !engaged && t >= start - 1e-3 * dt) engage(input.motion, test.engagement->axial_depth);
         return input;
       },
       recorded, record);

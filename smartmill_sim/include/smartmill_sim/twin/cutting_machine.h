@@ -48,14 +48,18 @@ class CuttingMachine {
   };
 
   /// Without tool and cutting sections nothing can be cut: engage() then refuses.
-  /// @param time_step [s] > 0. @throws Error naming what of the model this twin cannot run.
-  CuttingMachine(const MachineModel& model, double time_step, Feed feed = Feed::any);
+  /// @param time_step [s] > 0. @param slice_angle [rad] of CuttingProcess, which runs Feed::any
+  /// @throws Error naming what of the model this twin cannot run.
+  CuttingMachine(const MachineModel& model, double time_step, Feed feed = Feed::any,
+                 double slice_angle = CuttingProcess::SLICE_ANGLE);
 
   /// Changes where the tool meets material, see CuttingProcess.
   /// @param rise [1] share of the change in force that comes on linearly over the step that ends now; the
   /// rest jumps at its end.
   void engage(const std::vector<ContactArc>& arcs, const ToolMotion& now, double rise = 1.0);
   bool cutting() const { return !arcs_.empty(); }
+  /// Another axial depth [m] > 0 of every arc, the surface as it is. Feed [m] is passed over unseen.
+  void setDepth(double depth, const ToolMotion& now, double passed_over = 0.0);
 
   /// A record begins now: drift and hum start anew. A new edge has edge_time 0.
   void setClock(const Clock& clock);
@@ -81,6 +85,7 @@ class CuttingMachine {
 
  private:
   void update(const Input& input);
+  void setTiltedDepths(const ToolMotion& now);
   ToolMotion fed(const ToolMotion& commanded) const;
 
   EffectSet effects_;

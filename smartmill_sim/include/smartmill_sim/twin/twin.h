@@ -18,10 +18,13 @@ struct SimulationOptions {
   std::optional<double> phase;
   /// Tones (mains hum) with a phase of the seed, not with the one that the recorded signals show.
   bool random_phases = false;
+  /// Surface of the cut stored over the turn instead of the last passes: several times slower, but it keeps
+  /// what a tool near its stability limit leaves on the walls of a slot.
+  bool stored_surface = false;
 };
 
-/// [1] The force of a cut comes on over this part of a sample before the engagement (so it fits campaigns that
-/// another program made).
+/// [1] The force of a cut comes on over this part of a sample before the engagement (so it fits campaigns
+/// that another program made).
 constexpr double ENGAGEMENT_RISE = 1.0 / 6.0;
 
 /// [rad] Spindle angle at a record's first sample: the phase that fits its angles best at the test's speed.
@@ -34,7 +37,8 @@ double recordedPhase(const CampaignTest& test, const Record& recorded);
 /// recorded signals.
 ///
 /// Before engage_time the tool is out of cut; from there full engagement with the surface that steady cutting
-/// leaves. The sensor begins at rest, the load meter at its air-cut value.
+/// leaves. The sensor begins at rest, the load meter at its air-cut value. With running_before the record
+/// begins in the steady state: the last quarter of a second before it is simulated, the depth of cut growing.
 /// @param recorded gives columns, times, phase and hammer force
 /// @throws Error naming what the model lacks or what this twin cannot run.
 Record simulateTest(const MachineModel& model, const CampaignTest& test, const Record& recorded,

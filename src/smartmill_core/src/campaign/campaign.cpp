@@ -72,6 +72,11 @@ CampaignTest readTest(const StrictYaml& map) {
     test.engagement = e;
     test.engage_time = map.optionalNumber("engage_time_s", NOT_NEGATIVE);
   }
+  if (test.kind != TestKind::tap) {
+    test.running_before = map.optionalNumber("running_before_s", NOT_NEGATIVE);
+    if (test.running_before && test.engage_time)
+      map.fail("running_before_s", yamlNumber(*test.running_before) + " contradicts engage_time_s");
+  }
   test.start_time = map.optionalNumber("start_time_s", NOT_NEGATIVE);
   test.cut_time_before = map.optionalNumber("cut_time_before_s", NOT_NEGATIVE);
   map.finish();
@@ -141,6 +146,7 @@ void writeCampaign(const Campaign& campaign, const std::string& folder) {
       number("exit_deg", units::degFromRad(test.engagement->exit));
     }
     if (test.engage_time) number("engage_time_s", *test.engage_time);
+    if (test.running_before) number("running_before_s", *test.running_before);
     if (test.start_time) number("start_time_s", *test.start_time);
     if (test.cut_time_before) number("cut_time_before_s", *test.cut_time_before);
     if (!test.direction.empty()) out << "  direction: " << test.direction << "\n";

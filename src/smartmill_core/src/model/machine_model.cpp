@@ -115,6 +115,7 @@ void readForceSensor(const StrictYaml& map, ForceSensor& sensor) {
     sensor.measures_workpiece =
         map.oneOf("measures", {"force_on_tool", "force_on_workpiece"}) == "force_on_workpiece";
   }
+  if (map.has("samples")) sensor.mean_samples = map.oneOf("samples", {"instant", "mean"}) == "mean";
   map.finish();
 }
 
@@ -416,6 +417,7 @@ void writeMachineModel(const MachineModel& model, const std::string& file) {
   if (model.force_sensor.noise_rms)
     out << "  noise_rms_n: " << point(*model.force_sensor.noise_rms, 1.0) << "\n";
   if (model.force_sensor.measures_workpiece) out << "  measures: force_on_workpiece\n";
+  if (model.force_sensor.mean_samples) out << "  samples: mean\n";
   if (model.spindle) {
     const Spindle& s = *model.spindle;
     out << "spindle:\n";

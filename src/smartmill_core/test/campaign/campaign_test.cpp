@@ -33,7 +33,7 @@ tests:
   engage_time_s: 0.02
   start_time_s: 405.0
   cut_time_before_s: 20.0
-- {name: air, kind: air, file: air.csv, sample_rate_hz: 100, spindle_speed_rpm: 1000}
+- {name: air, kind: air, file: air.csv, sample_rate_hz: 100, spindle_speed_rpm: 1000, running_before_s: 0.4}
 - {name: tap, kind: tap, file: tap.csv, sample_rate_hz: 100, spindle_speed_rpm: 0, direction: z}
 )";
 
@@ -55,6 +55,8 @@ void expectCampaign(const Campaign& c, const std::string& folder) {
   EXPECT_DOUBLE_EQ(*c.tests[0].engage_time, 0.02);
   EXPECT_EQ(c.tests[1].kind, TestKind::air);
   EXPECT_FALSE(c.tests[1].start_time);
+  EXPECT_FALSE(c.tests[0].running_before);
+  EXPECT_DOUBLE_EQ(*c.tests[1].running_before, 0.4);
   EXPECT_EQ(c.tests[2].direction, "z");
   EXPECT_EQ(c.tests[2].spindle_speed, 0.0);
 }
@@ -86,6 +88,8 @@ TEST(Campaign, refusesWithFileKeyAndValue) {
       {"  axial_depth_mm: 2.0\n", "", "tests[0].axial_depth_mm: is missing"},
       {"sample_rate_hz: 100", "sample_rate_hz: fast", "tests[0].sample_rate_hz: 'fast' is not a number"},
       {"direction: z", "direction: u", "tests[2].direction: 'u' is not one of x | y | z"},
+      {"  engage_time_s: 0.02\n", "  engage_time_s: 0.02\n  running_before_s: 0.3\n",
+       "tests[0].running_before_s: 0.3 contradicts engage_time_s"},
       {"kind: air,", "kind: air, depth: 2,", "tests[1].depth: unknown key (its value: '2')"},
       {"model: model.yaml\n", "", "model: is missing"},
       {"tests:", "runs:", "tests: is missing"},

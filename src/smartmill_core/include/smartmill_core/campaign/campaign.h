@@ -23,6 +23,7 @@ struct CampaignTest {
   double spindle_speed = 0.0;               ///< [rad/s]
   std::optional<Engagement> engagement;     ///< of a cut
   std::optional<double> engage_time;        ///< [s] absent: in cut throughout
+  std::optional<double> running_before;     ///< [s] of a cut or air: it ran like this before the record began
   std::optional<double> start_time;         ///< [s]
   std::optional<double> cut_time_before;    ///< [s]
   std::string direction;                    ///< of a tap: x, y or z

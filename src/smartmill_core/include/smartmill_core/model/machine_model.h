@@ -26,6 +26,7 @@ struct ForceSensor {
   std::array<ModalModel, 3> axis;
   std::optional<Axes3> noise_rms;    ///< [N]
   bool measures_workpiece = false;   ///< the reaction on the workpiece; turned where samples enter
+  bool mean_samples = false;         ///< a sample is the mean over its interval, not an instant
 };
 
 /// Spindle friction, load meter and limits.
