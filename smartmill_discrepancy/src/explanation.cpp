@@ -10,6 +10,7 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_discrepancy/labels.h"
+#include "smartmill_discrepancy/phase.h"
 #include "smartmill_sim/twin/twin.h"
 
 namespace smartmill::discrepancy {
@@ -221,11 +222,12 @@ void addChatter(const Dataset& data, Explanation* result) {
 
 }  // namespace
 
-Explanation explain(const Dataset& data, const ExplainOptions& options, const std::string& folder) {
+Explanation explain(const Dataset& loaded, const ExplainOptions& options, const std::string& folder) {
   const auto begin = std::chrono::steady_clock::now();
   const auto say = [&](const std::string& line) {
     if (options.search.progress) options.search.progress(line);
   };
+  Dataset data = loaded;  // its records without spindle angle are turned as the model becomes better
   Explanation result;
   result.notes = data.notes;
   const auto refuse = [&](const std::vector<std::string>& reasons) {
@@ -242,8 +244,8 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
   if (!labels.doubtful.empty()) s.most_effects = std::min<std::size_t>(s.most_effects, 2);
   const NominalFreedom freedom(data.nominal);
   TwinRunner quick_runner(data, fitted, s.threads, s.screening_substeps);
-  const TwinRunner exact_runner(data, fitted, s.threads, s.final_substeps);
-  const TwinRunner heldout_runner(data, heldout, s.threads, s.final_substeps);
+  TwinRunner exact_runner(data, fitted, s.threads, s.final_substeps);
+  TwinRunner heldout_runner(data, heldout, s.threads, s.final_substeps);
   const Fitter quick(quick_runner, freedom), exact(exact_runner, freedom);
 
   const std::vector<double> before = residualOf(exact_runner, data.nominal);
@@ -254,6 +256,14 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
                 result.before.heldout);
   say(line);
 
+  if (std::any_of(data.tests.begin(), data.tests.end(),
+                  [](const TestData& t) { return t.phase_estimated; })) {
+    s.turn_phases = [&](const MachineModel& model) {
+      const double turn = turnPhases(data, model);
+      for (TwinRunner* runner : {&quick_runner, &exact_runner, &heldout_runner}) runner->readPhases();
+      return turn;
+    };
+  }
   SearchResult found = search(quick_runner, quick, exact, hypotheses, s);
   result.ladder = found.ladder;
   StructureOptions structure = options.structure;

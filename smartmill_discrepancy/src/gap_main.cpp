@@ -10,6 +10,7 @@
 #include <CLI/CLI.hpp>
 
 #include "smartmill_discrepancy/gap.h"
+#include "smartmill_discrepancy/phase.h"
 
 namespace {
 
@@ -17,11 +18,12 @@ void run(const std::string& folder, const std::string& model_file, int threads) 
   using namespace smartmill;
   const Campaign campaign = readCampaign(folder);
   const MachineModel nominal = readMachineModel(campaign.modelPath());
-  // Noise and phase are those of the campaign, whatever model is compared with it.
-  const discrepancy::Dataset data = discrepancy::loadDataset(campaign, nominal);
+  // The noise is that of the campaign, whatever model is compared with it.
+  discrepancy::Dataset data = discrepancy::loadDataset(campaign, nominal);
   for (const std::string& note : data.notes) std::fprintf(stderr, "note: %s\n", note.c_str());
-  const discrepancy::CampaignGap gap =
-      discrepancy::campaignGap(data, model_file.empty() ? nominal : readMachineModel(model_file), threads);
+  const MachineModel model = model_file.empty() ? nominal : readMachineModel(model_file);
+  discrepancy::turnPhases(data, model);
+  const discrepancy::CampaignGap gap = discrepancy::campaignGap(data, model, threads);
   std::map<std::string, double> largest;
   std::printf("%-24s %-12s %8s %14s\n", "test", "channel", "gap", "residual rms");
   for (const auto& row : gap.channels) {

@@ -1,5 +1,6 @@
 #include "smartmill_discrepancy/phase.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <complex>
@@ -32,6 +33,58 @@ void setAngle(TestData& t, double phase) {
         std::fmod(phase + t.test.spindle_speed * static_cast<double>(i) / t.test.sample_rate, TWO_PI);
     angle[i] = a < 0.0 ? a + TWO_PI : a;
   }
+}
+
+/// Lines of a record and of a model at the orders of the spindle, forces over their noise.
+struct Lines {
+  std::vector<std::complex<double>> measured, simulated;  // [order - 1] a channel, one after the other
+  int orders = 0;
+
+  /// How well they agree when the model is turned by a phase [rad]: half of the squares it takes away.
+  double match(double phase) const {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < measured.size(); ++i) {
+      const int order = static_cast<int>(i) % orders + 1;
+      sum += std::real(std::conj(simulated[i] * std::polar(1.0, order * phase)) * measured[i]);
+    }
+    return sum;
+  }
+
+  /// Best phase near one, within a range [rad] each way.
+  double best(double from, double range, int points) const {
+    double at = from, largest = -1e300;
+    const double step = 2.0 * range / points;
+    for (int p = 0; p <= points; ++p) {
+      const double phase = from - range + step * p, m = match(phase);
+      if (m > largest) {
+        largest = m;
+        at = phase;
+      }
+    }
+    const double a = match(at - step), c = match(at + step), curve = 2.0 * largest - a - c;
+    return curve > 0.0 ? at + 0.5 * step * (c - a) / curve : at;
+  }
+};
+
+Lines linesOf(const Dataset& data, const TestData& t, const Record& model, std::size_t from, std::size_t to) {
+  constexpr int MOST_ORDERS = 60;
+  const double step = t.test.spindle_speed / t.test.sample_rate;
+  Lines lines;
+  lines.orders = std::min(MOST_ORDERS, static_cast<int>(0.9 * units::PI / step));
+  for (const std::string& channel : FORCES) {
+    if (!t.record.has(channel) || data.noise.count(channel) == 0) continue;
+    const auto part = [&](const std::vector<double>& v) {
+      return std::vector<double>(v.begin(), v.begin() + static_cast<std::ptrdiff_t>(to));
+    };
+    const std::vector<double> measured = part(t.record.column(channel)),
+                              simulated = part(model.column(channel));
+    const double noise = data.noise.at(channel);
+    for (int k = 1; k <= lines.orders; ++k) {
+      lines.measured.push_back(lineAt(measured, from, k * step) / noise);
+      lines.simulated.push_back(lineAt(simulated, from, k * step) / noise);
+    }
+  }
+  return lines;
 }
 
 }  // namespace
@@ -73,6 +126,7 @@ std::vector<std::string> estimatePhases(Dataset& data) {
     if (!t.phase_estimated) continue;
     if (t.test.kind != TestKind::cut || !data.nominal.tool) {
       setAngle(t, 0.0);
+      turned.push_back(&t);
       continue;
     }
     const int teeth = data.nominal.tool->teeth;
@@ -114,13 +168,13 @@ std::vector<std::string> estimatePhases(Dataset& data) {
   }
   if (turned.size() < 2) return notes;
   // Lines of once a revolution against the spindle angle, all records turned like the strongest.
-  const int teeth = data.nominal.tool->teeth;
   const auto once = [&](const TestData& t) {
     std::array<std::complex<double>, 3> line{};
     const double phase = t.record.column("spindle_angle").front();
+    const std::size_t from = t.first_cut < t.record.size() ? t.first_cut : 0;
     for (std::size_t a = 0; a < 3; ++a) {
       if (t.record.has(FORCES[a]))
-        line[a] = lineAt(t.record.column(FORCES[a]), t.first_cut, t.test.spindle_speed / t.test.sample_rate) *
+        line[a] = lineAt(t.record.column(FORCES[a]), from, t.test.spindle_speed / t.test.sample_rate) *
                   std::polar(1.0, -phase);
     }
     return line;
@@ -135,6 +189,8 @@ std::vector<std::string> estimatePhases(Dataset& data) {
   }
   for (TestData* t : turned) {
     const auto line = once(*t);
+    // The force of the cut has left the tooth open, an air cut any angle.
+    const int teeth = t->test.kind == TestKind::cut ? data.nominal.tool->teeth : 360;
     int best = 0;
     double largest = -1e300;
     for (int k = 0; k < teeth; ++k) {
@@ -149,6 +205,44 @@ std::vector<std::string> estimatePhases(Dataset& data) {
     if (best != 0) setAngle(*t, t->record.column("spindle_angle").front() + TWO_PI * best / teeth);
   }
   return notes;
+}
+
+double turnPhases(Dataset& data, const MachineModel& model) {
+  constexpr double LEAST_GAIN = 25.0;  // of squares over noise: less tells no phase
+  constexpr int ALL_ROUND = 1440, NEAR = 40;
+  double largest = 0.0;
+  for (TestData& t : data.tests) {
+    if (!t.phase_estimated) continue;
+    sim::SimulationOptions options;
+    options.noise = false;
+    options.substeps = 2;
+    const Record simulated = sim::simulateTest(model, t.test, t.record, options);
+    const std::size_t from = t.first_cut < t.record.size() ? t.first_cut : 0, end = t.record.size();
+    const Lines all = linesOf(data, t, simulated, from, end);
+    double turn = all.best(0.0, units::PI, ALL_ROUND);
+    const auto samples = static_cast<double>(end - from);
+    double size = 0.0;
+    for (const auto& line : all.simulated) size += 4.0 * samples * std::norm(line);
+    if (size < LEAST_GAIN) continue;
+    // What the halves of a record differ by is the speed.
+    const double span = samples / t.test.sample_rate;
+    double early = turn, late = turn;
+    if (t.test.kind == TestKind::cut && span * t.test.spindle_speed > 4.0 * TWO_PI) {
+      const std::size_t middle = from + (end - from) / 2;
+      const double range = 0.25 * TWO_PI / all.orders;
+      early = linesOf(data, t, simulated, from, middle).best(turn, range, NEAR);
+      late = linesOf(data, t, simulated, middle, end).best(turn, range, NEAR);
+    }
+    turn = 0.5 * (early + late);
+    const double rate = (late - early) / (0.5 * span);  // [rad/s]
+    const double at_start = turn - rate * (0.5 * span + static_cast<double>(from) / t.test.sample_rate);
+    const double phase = t.record.column("spindle_angle").front() + at_start;
+    t.test.spindle_speed += rate;
+    setAngle(t, phase);
+    largest =
+        std::max({largest, std::abs(std::remainder(early, TWO_PI)), std::abs(std::remainder(late, TWO_PI))});
+  }
+  return largest;
 }
 
 }  // namespace smartmill::discrepancy

@@ -10,6 +10,8 @@
 namespace smartmill::discrepancy {
 namespace {
 
+constexpr double PHASE_SETTLED = 1e-4;  // [rad] of a turn of the records
+
 std::string text(const char* format, double a, double b) {
   char line[160];
   std::snprintf(line, sizeof line, format, a, b);
@@ -141,6 +143,7 @@ void refine(TwinRunner& quick_runner, const Fitter& quick, const Fitter& exact, 
   double weight = 1.0;
   for (int pass = 0; pass <= PASSES; ++pass) {
     const MachineModel model = quick.model(from);
+    const bool turned = options.turn_phases && options.turn_phases(model) > PHASE_SETTLED;
     const std::vector<double> simulated = exact.runner().simulate(model);
     quick_runner.correctTo(model, simulated);
     // Where structure is left the noise does not tell how well values are known; what is stated of them does.
@@ -166,7 +169,7 @@ void refine(TwinRunner& quick_runner, const Fitter& quick, const Fitter& exact, 
     compare(from.nominal, next.state.nominal);
     for (std::size_t m = 0; m < from.members.size(); ++m)
       compare(from.members[m].values, next.state.members[m].values);
-    if (moved < SETTLED) break;
+    if (moved < SETTLED && !turned) break;
     from = next.state;
   }
   const FitState& at = result->best.state;
@@ -230,6 +233,15 @@ SearchResult search(TwinRunner& quick_runner, const Fitter& quick, const Fitter&
     quick_runner.correctTo(model, exact.runner().simulate(model));
     return quick.nominalTangents(at);
   };
+  const auto turnPhases = [&](Fit fit, NominalTangents& tangents) {
+    constexpr int PASSES = 4;
+    for (int pass = 0; pass < PASSES && options.turn_phases; ++pass) {
+      if (options.turn_phases(quick.model(fit.state)) < PHASE_SETTLED) break;
+      tangents = linearise(fit.state);
+      fit = quick.fit(fit.state, &tangents, {8, 1e-4, true});
+    }
+    return fit;
+  };
   // Nominal values that are off far: tangents are taken anew where the fit went.
   NominalTangents tangents;
   Fit now;
@@ -242,7 +254,7 @@ SearchResult search(TwinRunner& quick_runner, const Fitter& quick, const Fitter&
     if (settled) break;
   }
   tangents = linearise(state);
-  now = quick.fit(state, &tangents, {3, 1e-5, true});
+  now = turnPhases(quick.fit(state, &tangents, {3, 1e-5, true}), tangents);
   result.null = now;
   const double samples = static_cast<double>(quick.runner().size());
   say(text("nominal model, values free within their uncertainty: gap %.4f", std::sqrt(now.chi2 / samples),
@@ -298,7 +310,7 @@ SearchResult search(TwinRunner& quick_runner, const Fitter& quick, const Fitter&
     Fit refined = quick.fit(best.state, &tangents, {8, 1e-4, true});
     // The tangents held where the fit began; where it went far they are taken anew.
     tangents = linearise(refined.state);
-    now = quick.fit(refined.state, &tangents, {8, 1e-4, true});
+    now = turnPhases(quick.fit(refined.state, &tangents, {8, 1e-4, true}), tangents);
     // What was found earlier may have stood for what has been found now.
     for (std::size_t m = 0; m < now.state.members.size() && now.state.members.size() > 1;) {
       const Fit less = quick.fit(without(now.state, m), &tangents, {6, 1e-3, true});

@@ -90,7 +90,6 @@ TwinRunner::TwinRunner(const Dataset& data, std::vector<std::size_t> tests, int 
   for (const std::size_t t : tests_) {
     const TestData& test = data_.tests[t];
     Kept& kept = kept_.emplace_back();
-    kept.phase = sim::recordedPhase(test.test, test.record);
     kept.record.file = test.record.file;
     kept.record.time = test.record.time;
     for (const std::string& name : test.record.names) {
@@ -105,6 +104,16 @@ TwinRunner::TwinRunner(const Dataset& data, std::vector<std::size_t> tests, int 
     }
   }
   first_block_.push_back(blocks_.size());
+  readPhases();
+}
+
+void TwinRunner::readPhases() {
+  for (std::size_t k = 0; k < tests_.size(); ++k) {
+    const TestData& test = data_.tests[tests_[k]];
+    const std::lock_guard<std::mutex> lock(kept_[k].mutex);
+    kept_[k].phase = sim::recordedPhase(test.test, test.record);
+    kept_[k].results.clear();
+  }
 }
 
 std::vector<double> TwinRunner::simulateOne(const MachineModel& model, std::size_t chosen) const {

@@ -45,6 +45,9 @@ class TwinRunner {
   /// is. Takes the error of few substeps out, which is nearly alike for models nearby.
   void correctTo(const MachineModel& reference, const std::vector<double>& exact);
 
+  /// The phases and speeds of the dataset's records are others now.
+  void readPhases();
+
   /// What each model says. @throws Error of the twin.
   std::vector<std::vector<double>> simulate(const std::vector<MachineModel>& models) const;
   std::vector<double> simulate(const MachineModel& model) const;
