@@ -95,6 +95,7 @@ void MonitorNode::judge(const Stretch& stretch) {
   message.gap = last_.gap;
   message.model_fits = last_.model_fits;
   state_.publish(message);
+  diagnostics_.force_update();
   if (!last_.model_fits && !last_.at_the_edge) record(stretch);
 }
 

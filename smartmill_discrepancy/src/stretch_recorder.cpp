@@ -77,7 +77,9 @@ void StretchRecorder::handle(const SampleBlock& dynamometer) {
       !blocks_.empty() && dynamometer.first_index != blocks_.back().first_index + blocks_.back().size();
   if (gap) blocks_.clear();
   blocks_.push_back(dynamometer);
-  if (dynamometer.timeOf(dynamometer.size()) - blocks_.front().stamp >= parameters_.length) finish();
+  // Stamps are rounded: half a sample is enough.
+  const double length = dynamometer.timeOf(dynamometer.size()) - blocks_.front().stamp;
+  if (length >= parameters_.length - 0.5 / dynamometer.sample_rate) finish();
 }
 
 void StretchRecorder::finish() {
