@@ -1,6 +1,7 @@
 #include "bag_campaign.h"
 
-#include <set>
+#include <algorithm>
+#include <vector>
 
 #include "smartmill_core/error.h"
 #include "smartmill_discrepancy/live_gap.h"
@@ -13,16 +14,15 @@ Campaign campaignOfBag(const std::string& bag, const std::string& model_file, co
                        const std::function<void(const std::string&)>& progress) {
   constexpr double HOLD_BACK = 0.05;
   const MachineModel model = readMachineModel(model_file);
-  std::set<std::string> taken;
-  bool recorded = false;
+  std::vector<Stretch> chosen;
   SortedStretches stretches(StretchParameters(), HOLD_BACK, [&](const Stretch& stretch) {
-    if (!taken.insert(stretch.test.name).second) return;
-    if (model.force_sensor.noise_rms && liveGap(model, stretch, {}).at_the_edge) {
-      progress(stretch.test.name + ": left out, the model's tool is about to chatter there");
-      return;
+    const auto same = [&](const Stretch& other) { return other.test.name == stretch.test.name; };
+    const auto earlier = std::find_if(chosen.begin(), chosen.end(), same);
+    if (earlier == chosen.end()) {
+      chosen.push_back(stretch);
+    } else {
+      *earlier = stretch;
     }
-    recordStretch(model, stretch, folder);
-    recorded = true;
   });
   BagReader reader(bag);
   const auto follow = [&](const char* topic, auto message) {
@@ -35,6 +35,15 @@ Campaign campaignOfBag(const std::string& bag, const std::string& model_file, co
   follow("daq/dynamometer", smartmill_msgs::SampleBlock());
   reader.run();
   stretches.flush();
+  bool recorded = false;
+  for (const Stretch& stretch : chosen) {
+    if (model.force_sensor.noise_rms && liveGap(model, stretch, {}).at_the_edge) {
+      progress(stretch.test.name + ": left out, the model's tool is about to chatter there");
+      continue;
+    }
+    recordStretch(model, stretch, folder);
+    recorded = true;
+  }
   if (!recorded) throw Error(bag + ": no steady stretch of 0.3 s under a cutting condition");
   return readCampaign(folder);
 }

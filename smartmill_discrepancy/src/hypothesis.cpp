@@ -175,14 +175,16 @@ Hypothesis unevenPitch(const ToolGeometry& tool) {
   return h;
 }
 
-Hypothesis extraMode(const std::string& axis, bool second) {
+// The direct share gives the gain; how large that is, a nominal model may not know well.
+Hypothesis extraMode(const std::string& axis, double direct, bool second) {
+  const double most = std::max(direct, 0.2);
   Hypothesis h;
   h.effect = "extra_mode";
   h.variant = second ? axis + ", second" : axis;
   if (second) h.after = axis;
   h.coordinates = {{"ln frequency_hz", std::log(800.0), std::log(20.0), std::log(12000.0), 2.5e-06, 1.5},
                    {"ln damping_ratio", std::log(0.03), std::log(0.001), std::log(0.6), 0.00025, 1.0},
-                   {"gain", 0.0, -3.0, 3.0, 2.5e-05, 0.2}};
+                   {"gain", 0.0, -most, most, 2.5e-05, 0.2}};
   h.entry = [axis](const Values& v) {
     EffectEntry e;
     e.name = "extra_mode";
@@ -275,7 +277,10 @@ std::vector<Hypothesis> catalogueHypotheses(const Dataset& data, std::vector<std
   if (scope.forces()) {
     for (const char* axis : {"x", "y", "z"}) {
       if (!scope.channels.count(std::string("f") + axis)) continue;
-      for (const bool second : {false, true}) all.push_back(extraMode(axis, second));
+      for (const bool second : {false, true}) {
+        all.push_back(
+            extraMode(axis, model.force_sensor.axis[static_cast<std::size_t>(axis[0] - 'x')].direct, second));
+      }
     }
     if (sensor_modes) {
       // A light mode answers in proportion only while it moves by less than its width.

@@ -27,6 +27,7 @@ MonitorParameters readParameters(const ros::NodeHandle& private_nh) {
   reader.read("record_folder", p.record_folder);
   reader.read("most_recorded", p.most_recorded);
   reader.read("most_per_condition", p.most_per_condition);
+  reader.read("record_after", p.record_after);
   reader.finish();
   p.validate();
   return p;
@@ -45,6 +46,7 @@ void MonitorParameters::validate() const {
   if (!(hold_back >= 0.0)) wrong("hold_back", hold_back, "s is negative");
   if (!(gap.limit > 1.0)) wrong("limit", gap.limit, "is not above 1, the noise floor");
   if (!(gap.load_step >= 0.0)) wrong("load_step", gap.load_step, "is negative");
+  if (!(record_after >= 0.0)) wrong("record_after", record_after, "s is negative");
   if (most_recorded < 0) wrong("most_recorded", most_recorded, "is negative");
   if (most_per_condition < 0) wrong("most_per_condition", most_per_condition, "is negative");
 }
@@ -102,7 +104,8 @@ void MonitorNode::judge(const Stretch& stretch) {
 void MonitorNode::record(const Stretch& stretch) {
   int& of_condition = recorded_of_[stretch.test.name];
   if (parameters_.record_folder.empty() || recorded_ >= parameters_.most_recorded ||
-      of_condition >= parameters_.most_per_condition)
+      of_condition >= parameters_.most_per_condition ||
+      *stretch.test.running_before < parameters_.record_after)
     return;
   recordStretch(model_, stretch, parameters_.record_folder);
   ++recorded_;

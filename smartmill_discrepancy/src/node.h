@@ -22,6 +22,7 @@ struct MonitorParameters {
   std::string record_folder;   ///< stretches that do not fit are kept here as a campaign; empty: not kept
   int most_recorded = 40;      ///< [1] stretches
   int most_per_condition = 2;  ///< [1] stretches
+  double record_after = 0.4;   ///< [s] that a cut has run before a stretch is kept
   void validate() const;       ///< @throws Error naming key and value
 };
 

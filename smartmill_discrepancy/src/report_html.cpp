@@ -124,6 +124,17 @@ void writeHtml(const Explanation& e, const std::string& campaign, const std::vec
     out << "<h2>" << (caption != CAPTIONS.end() ? caption->second : name) << "</h2>\n<img alt=\"" << name
         << "\" src=\"data:image/png;base64," << base64(bytes) << "\">\n";
   }
+  if (!e.ladder.empty()) {
+    out << "<h2>Candidates fitted</h2>\n<table><tr><th>round<th>effect<th>evidence promised by its "
+           "tangents<th>evidence gained<th>tests simulated<th>seconds</tr>\n";
+    for (const Rung& r : e.ladder) {
+      out << "<tr><td>" << r.round + 1 << "<td>" << (r.taken ? "<b>" : "") << r.effect
+          << (r.variant.empty() ? "" : " (" + r.variant + ")") << (r.taken ? "</b>" : "") << "<td>"
+          << number(r.promised) << "<td>" << number(r.delta_bic) << "<td>" << r.simulations << "<td>"
+          << number(r.seconds, "%.1f") << "</tr>\n";
+    }
+    out << "</table>\n";
+  }
   if (!e.notes.empty()) {
     out << "<h2>Notes</h2>\n<ul>";
     for (const std::string& note : e.notes) out << "<li>" << escaped(note) << "</li>";

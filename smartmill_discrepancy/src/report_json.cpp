@@ -72,6 +72,17 @@ void writeReport(const Explanation& e, const std::string& folder) {
          {"after", rounded(g.after)},
          {"interval", {rounded(g.after - 1.96 * g.std_dev), rounded(g.after + 1.96 * g.std_dev)}}});
   }
+  report["candidates"] = Json::array();
+  for (const Rung& r : e.ladder) {
+    report["candidates"].push_back({{"round", r.round + 1},
+                                    {"name", r.effect},
+                                    {"variant", r.variant},
+                                    {"promised", rounded(r.promised)},
+                                    {"delta_bic", rounded(r.delta_bic)},
+                                    {"taken", r.taken},
+                                    {"simulations", r.simulations},
+                                    {"seconds", rounded(r.seconds)}});
+  }
   report["notes"] = e.notes;
   report["seconds"] = rounded(e.seconds);
   const std::string file = folder + "/report.json";

@@ -1,6 +1,7 @@
 #include "smartmill_discrepancy/search.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <limits>
@@ -278,10 +279,14 @@ SearchResult search(TwinRunner& quick_runner, const Fitter& quick, const Fitter&
       if (best.chi2 - samples < 0.02 * (now.chi2 - samples) && p.gain < 0.5 * best_promise) break;
       FitState with = now.state;
       with.members.push_back({p.hypothesis, startOf(quick, now, p)});
+      const auto begin = std::chrono::steady_clock::now();
+      const std::size_t simulations = quick.runner().simulations();
       const Fit tried = quick.fit(with, strained ? nullptr : &tangents, {6, 1e-3, true});
       ++fitted;
       rungs.push_back({round, p.hypothesis->effect, p.hypothesis->variant, p.gain, now.bic - tried.bic, false,
-                       p.hypothesis, tried.state.members.back().values});
+                       std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(),
+                       quick.runner().simulations() - simulations, p.hypothesis,
+                       tried.state.members.back().values});
       say(text("  promise %.4g, gain %.4g  ", p.gain, now.bic - tried.bic) +
           describe(tried.state.members.back()));
       if (tried.bic < best.bic) {

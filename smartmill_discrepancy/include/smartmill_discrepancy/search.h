@@ -35,6 +35,8 @@ struct Rung {
   double promised = 0.0;   ///< gain of the screening
   double delta_bic = 0.0;  ///< of the fit against the round's start; positive is better
   bool taken = false;
+  double seconds = 0.0;         ///< [s] that its fit took
+  std::size_t simulations = 0;  ///< of single tests, for its fit
   const Hypothesis* hypothesis = nullptr;
   std::vector<double> values;  ///< as fitted then
 };
