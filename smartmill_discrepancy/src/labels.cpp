@@ -23,6 +23,7 @@ constexpr double RELABELLED =
 constexpr double AS_WELL = 1.5;
 constexpr double SPEED_TOLERANCE = 0.02;
 constexpr double UNIT = 30.0;  // factor that no gain error reaches
+constexpr double ALIKE = 0.5;  // squared correlation of a channel with the model's, turned about
 
 double squaresBetween(const std::vector<double>& a, const std::vector<double>& b) {
   double s = 0.0;
@@ -81,9 +82,10 @@ Labels checkLabels(const Dataset& data, int threads) {
     own[i] = sim::simulateTest(data.nominal, data.tests[i].test, data.tests[i].record, options);
   });
 
-  // Units: one factor over all records of a channel.
+  // Units and signs: one factor over all records of a channel.
+  std::vector<std::string> turned;
   for (const auto& [channel, noise] : data.noise) {
-    double product = 0.0, square = 0.0;
+    double product = 0.0, square = 0.0, measured = 0.0;
     for (std::size_t i = 0; i < count; ++i) {
       if (data.tests[i].test.kind != TestKind::cut || !data.tests[i].record.has(channel) ||
           !own[i].has(channel))
@@ -92,8 +94,10 @@ Labels checkLabels(const Dataset& data, int threads) {
       for (std::size_t k = 0; k < m.size(); ++k) {
         product += m[k] * s[k];
         square += s[k] * s[k];
+        measured += m[k] * m[k];
       }
     }
+    if (product < 0.0 && product * product > ALIKE * square * measured) turned.push_back(channel);
     if (square <= noise * noise) continue;
     const double factor = std::abs(product / square);
     if (factor > UNIT || (factor < 1.0 / UNIT && product * product / square > 100.0 * noise * noise)) {
@@ -103,6 +107,9 @@ Labels checkLabels(const Dataset& data, int threads) {
       wrong.push_back(line);
     }
   }
+  if (!turned.empty())
+    wrong.push_back(joined(turned) +
+                    " read minus what the model says: sign or force_sensor.measures looks wrong");
   if (!wrong.empty()) return labels;
 
   // Swapped channels.

@@ -75,7 +75,7 @@ TEST(Explain, namesStribeckFrictionWithinThreeStandardDeviations) {
   EXPECT_LE(e.after.fit, 1.05);
 }
 
-TEST(Labels, nameSwappedChannelsAndAnotherSpeed) {
+TEST(Labels, nameSwappedChannelsWrongSignsAndAnotherSpeed) {
   if (!std::filesystem::exists(campaigns())) {
     std::cout << campaigns() << " is absent, not checked\n";
     return;
@@ -92,6 +92,16 @@ TEST(Labels, nameSwappedChannelsAndAnotherSpeed) {
   const std::vector<std::string> wrong = checkLabels(swapped, 2).wrong;
   ASSERT_EQ(wrong.size(), 1u);
   EXPECT_EQ(wrong.front(), "fx and fy look swapped in tests " + swapped.tests[2].test.name);
+
+  Dataset turned = data;
+  for (TestData& t : turned.tests) {
+    for (const char* channel : {"fx", "fz"}) {
+      for (double& v : t.record.add(channel)) v = -v;
+    }
+  }
+  ASSERT_EQ(checkLabels(turned, 2).wrong.size(), 1u);
+  EXPECT_EQ(checkLabels(turned, 2).wrong.front(),
+            "fx, fz read minus what the model says: sign or force_sensor.measures looks wrong");
 
   Dataset speed = data;
   speed.tests[2].test.spindle_speed *= 1.25;
