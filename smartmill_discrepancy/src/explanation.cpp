@@ -17,7 +17,6 @@ namespace smartmill::discrepancy {
 namespace {
 
 constexpr double TWIN_ACCURACY = 2e-4;  // share of a value by which two faithful simulations differ
-constexpr double ALIKE = 10.0;          // difference of BIC below which two effects are not told apart
 
 double squaresOf(const std::vector<double>& v) {
   double s = 0.0;
@@ -340,7 +339,9 @@ Explanation explain(const Dataset& loaded, const ExplainOptions& options, const 
       if (rival.member != m) continue;
       effect.confidence = std::min(effect.confidence, confidenceBetween(exact, best.state, rival.state));
       effect.alternatives.emplace_back(rival.effect, rival.delta_bic);
-      if (rival.delta_bic > effect.delta_bic - ALIKE) {
+      // What would not be enough to name an effect is not enough to tell it from another.
+      const double alike = std::min(s.least_gain, 0.5 * effect.delta_bic);
+      if (rival.delta_bic > effect.delta_bic - alike) {
         result.not_separable.push_back({effect.name, rival.effect});
         if (!result.suggested_test)
           result.suggested_test = separatingTest(data, exact.model(best.state), exact.model(rival.state));

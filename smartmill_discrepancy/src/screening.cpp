@@ -40,12 +40,6 @@ class Projection {
     Eigen::VectorXd prior = Eigen::VectorXd::Zero(basis_.cols());
     for (std::size_t c = 0; c < freedom.size(); ++c)
       prior[static_cast<Index>(c)] = 1.0 / (freedom[c].prior_std * freedom[c].prior_std);
-    // One that stands at its bound moves no further.
-    for (std::size_t c = 0; c < freedom.size(); ++c) {
-      const double room =
-          std::min(now.state.nominal[c] - freedom[c].low, freedom[c].high - now.state.nominal[c]);
-      if (room < 0.01 * freedom[c].prior_std) basis_.col(static_cast<Index>(c)).setZero();
-    }
     Eigen::VectorXd pull = Eigen::VectorXd::Zero(basis_.cols());
     for (std::size_t c = 0; c < freedom.size(); ++c)
       pull[static_cast<Index>(c)] = -now.state.nominal[c] * prior[static_cast<Index>(c)];
@@ -60,8 +54,41 @@ class Projection {
     residual_ = Eigen::Map<const Eigen::VectorXd>(now.residual.data(), samples);
     Eigen::MatrixXd information = basis_.transpose() * basis_;
     information.diagonal() += prior;
-    information_.compute(information);
-    solved_residual_ = information_.solve(basis_.transpose() * residual_ + pull);
+    Eigen::VectorXd right = basis_.transpose() * residual_ + pull;
+    const auto hold = [&](std::size_t coordinate) {
+      const auto c = static_cast<Index>(coordinate);
+      basis_.col(c).setZero();
+      information.row(c).setZero();
+      information.col(c).setZero();
+      information(c, c) = prior[c];
+      right[c] = 0.0;
+    };
+    // One that stands at its bound moves no further, nor does one that the rest would push over it.
+    std::vector<bool> held(freedom.size(), false);
+    for (std::size_t c = 0; c < freedom.size(); ++c) {
+      const double room =
+          std::min(now.state.nominal[c] - freedom[c].low, freedom[c].high - now.state.nominal[c]);
+      held[c] = room < 0.01 * freedom[c].prior_std;
+      if (held[c]) hold(c);
+    }
+    for (bool over = true; over;) {
+      information_.compute(information);
+      solved_residual_ = information_.solve(right);
+      double worst = 0.01;  // standard deviations
+      std::size_t which = freedom.size();
+      for (std::size_t c = 0; c < freedom.size(); ++c) {
+        const double at = now.state.nominal[c] + solved_residual_[static_cast<Index>(c)];
+        const double beyond = std::max(freedom[c].low - at, at - freedom[c].high) / freedom[c].prior_std;
+        if (held[c] || beyond <= worst) continue;
+        worst = beyond;
+        which = c;
+      }
+      over = which < freedom.size();
+      if (over) {
+        held[which] = true;
+        hold(which);
+      }
+    }
   }
 
   const std::vector<double>& base() const { return base_; }
