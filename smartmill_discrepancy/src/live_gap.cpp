@@ -16,7 +16,7 @@ namespace smartmill::discrepancy {
 namespace {
 
 constexpr double LEAST_RUNNING = 0.1;      // [s] before a stretch, within which the twin settles
-constexpr double EDGE_SETTLING = 0.45;     // [s] that vibrations near the stability limit take to die out
+constexpr double EDGE_SETTLING = 0.6;     // [s] that vibrations near the stability limit take to die out
 constexpr std::size_t LEAST_READINGS = 5;  // of the load meter
 
 // RMS difference from one revolution to the next [N], the larger of fx and fy.
