@@ -135,9 +135,10 @@ TEST(Twin, aRecordOutOfARunningCutIsSteady) {
     const std::vector<double>&a = settled.column(channel), &b = running.column(channel);
     double largest = 0.0;
     for (const double v : a) largest = std::max(largest, std::abs(v));
-    // 50 revolutions of 256 samples lie between the two; the steady state is reached to 1e-4.
+    // 50 revolutions of 256 samples lie between the two. Four time constants of the load meter after the cut
+    // has come to its full depth a hundredth of the last of its growth is left.
     for (std::size_t i = 0; i < b.size(); ++i)
-      ASSERT_NEAR(b[i], a[i + 50 * 256], 5e-4 * largest) << channel << i;
+      ASSERT_NEAR(b[i], a[i + 50 * 256], 2e-3 * largest) << channel << i;
   }
 }
 
