@@ -24,10 +24,8 @@ const std::array<const char*, 2> TIP{{"tool_x", "tool_y"}};
 
 // What ran before the record: so much of it is simulated, the depth of cut growing over the first part, since
 // full cut at once makes the tool ring for long.
-constexpr double LEAD = 0.25;          // [s]
-constexpr double LONG_LEAD = 1.0;      // [s] where the tool has not settled by then
+constexpr double LEAD = 0.4;           // [s]
 constexpr double LEAST_STEADY = 0.1;   // [s] of running before a record that make it steady
-constexpr double SETTLED = 6e-3;       // [1] of the tip's vibration, change from one revolution to the next
 constexpr double GROWING_SHARE = 0.6;  // [1] of the lead
 constexpr double LEAST_GROWTH = 0.01;  // [1] of the depth at the beginning
 constexpr long GROWTH_STEPS = 32;      // between two depths
@@ -70,26 +68,6 @@ double interpolated(const std::vector<double>& samples, std::size_t i, double sh
   const double a = at(k - 1), b = at(k), c = at(k + 1), d = at(k + 2);
   return b +
          0.5 * share * (c - a + share * (2.0 * a - 5.0 * b + 4.0 * c - d + share * (3.0 * (b - c) + d - a)));
-}
-
-// RMS change of the tip's way over the last revolution, over its own deviation; 0 where two revolutions are
-// not there. @param turn [1] steps of a revolution
-double changeOfTurn(const std::array<std::vector<double>, 2>& tip, double turn) {
-  const std::size_t n = tip[0].size();
-  if (static_cast<double>(n) < 2.0 * turn + 3.0) return 0.0;
-  const auto whole = static_cast<std::size_t>(turn) + 1;
-  double change = 0.0, sum2 = 0.0;
-  for (const std::vector<double>& x : tip) {
-    double sum = 0.0, squares = 0.0;
-    for (std::size_t i = n - whole; i < n; ++i) {
-      const double before = interpolated(x, i - whole, static_cast<double>(whole) - turn);
-      change += (x[i] - before) * (x[i] - before);
-      sum += x[i];
-      squares += x[i] * x[i];
-    }
-    sum2 += squares - sum * sum / static_cast<double>(whole);
-  }
-  return sum2 > 0.0 ? std::sqrt(change / sum2) : 0.0;
 }
 
 // The force of a tap: zero outside the contact (Dunwoody section 4.3.1), where the record shows only noise,
@@ -269,14 +247,14 @@ Record simulate(const MachineModel& model, const CampaignTest& test, const Recor
   if (options.substeps < 1) throw Error("simulation: substeps below 1");
   const double step_time = 1.0 / (test.sample_rate * options.substeps);
   const Feed feed_kind = options.stored_surface ? Feed::any : Feed::steady;
-  std::optional<CuttingMachine> machine(std::in_place, model, step_time, feed_kind);
+  CuttingMachine machine(model, step_time, feed_kind);
   if (test.kind == TestKind::tap) {
     const std::vector<double> hammer = contactForce(record.column("hammer"));
     const std::size_t axis = test.direction == "x" ? 0 : test.direction == "y" ? 1 : 2;
-    if (axis < 2) machine->setProbe(axis);
+    if (axis < 2) machine.setProbe(axis);
     const TapTarget target = targetOf(recorded ? *recorded : record, axis);
     run(
-        model, test, options, *machine,
+        model, test, options, machine,
         [&](std::size_t i, double share) {
           CuttingMachine::Input input;
           const double force = interpolated(hammer, i, share);
@@ -313,17 +291,17 @@ Record simulate(const MachineModel& model, const CampaignTest& test, const Recor
   };
   bool engaged = false;
   const auto engage = [&](const ToolMotion& now, double depth) {
-    machine->engage({{test.engagement->entry, test.engagement->exit, depth}}, now,
-                    ENGAGEMENT_RISE * options.substeps);
+    machine.engage({{test.engagement->entry, test.engagement->exit, depth}}, now,
+                   ENGAGEMENT_RISE * options.substeps);
     engaged = true;
   };
-  // What ran before. Returns how much the tip's way differs from one revolution to the next at the end [1].
-  const auto runBefore = [&](double lead) {
-    machine->setClock(clockOf(model, test, record));
-    if (record.has("load_meter")) machine->resetLoadMeter(test.spindle_speed);
+  if (test.running_before) {
+    // The same for every model, or what is compared would jump between models.
+    const double lead = *test.running_before < LEAST_STEADY ? *test.running_before : LEAD;
+    machine.setClock(clockOf(model, test, record));
+    if (record.has("load_meter")) machine.resetLoadMeter(test.spindle_speed);
     const auto steps = static_cast<long>(lead * test.sample_rate * options.substeps);
     const double step = dt / options.substeps;
-    std::array<std::vector<double>, 2> tip;
     CuttingMachine::Output out;
     for (long k = steps; k > 0; --k) {
       const CuttingMachine::Input input = inputAt(record.time[0] - static_cast<double>(k) * step);
@@ -332,25 +310,16 @@ Record simulate(const MachineModel& model, const CampaignTest& test, const Recor
             LEAST_GROWTH + (1.0 - LEAST_GROWTH) * growth(static_cast<double>(steps - k) /
                                                          (GROWING_SHARE * static_cast<double>(steps)));
         if (!engaged) engage(input.motion, share * test.engagement->axial_depth);
-        machine->setDepth(share * test.engagement->axial_depth, input.motion);
+        machine.setDepth(share * test.engagement->axial_depth, input.motion);
       }
-      machine->step(input, out);
-      for (std::size_t axis = 0; axis < 2; ++axis) tip[axis].push_back(out.early[TOOL_X + axis]);
+      machine.step(input, out);
     }
     if (engaged)
-      machine->setDepth(test.engagement->axial_depth, inputAt(record.time[0]).motion,
-                        feed * (*test.running_before - lead));
-    return changeOfTurn(tip, units::TWO_PI / test.spindle_speed / step);
-  };
-  if (test.running_before && *test.running_before < LEAST_STEADY) {
-    runBefore(*test.running_before);
-  } else if (test.running_before && runBefore(LEAD) > SETTLED) {
-    machine.emplace(model, step_time, feed_kind);
-    engaged = false;
-    runBefore(LONG_LEAD);
+      machine.setDepth(test.engagement->axial_depth, inputAt(record.time[0]).motion,
+                       feed * (*test.running_before - lead));
   }
   run(
-      model, test, options, *machine,
+      model, test, options, machine,
       [&](std::size_t i, double share) {
         const double t = record.time[i] + share * dt;
         const CuttingMachine::Input input = inputAt(t);
