@@ -14,7 +14,8 @@ namespace {
 constexpr double RESTARTED = 1.0;         // [s] a jump back of stamps: a bag was restarted
 constexpr double SPEED_TOLERANCE = 0.02;  // of the stated speed, within which the spindle is there
 constexpr double ANGLE_TOLERANCE = 0.02;  // [rad] from an even turn
-constexpr double KEPT_AFTER = 1.0;        // [s] beyond a stretch's length that angles and loads are kept
+constexpr double CONFIRMED = 0.05;  // [s] of steady motion beyond a stretch: a controller's state may be old
+constexpr double KEPT_AFTER = 1.0;  // [s] beyond a stretch's length that angles and loads are kept
 
 }  // namespace
 
@@ -39,6 +40,7 @@ void StretchRecorder::forget() {
 void StretchRecorder::unsteady() {
   steady_since_.reset();
   blocks_.clear();
+  unconfirmed_.clear();
 }
 
 void StretchRecorder::handle(const CuttingCondition& condition) {
@@ -56,6 +58,11 @@ void StretchRecorder::handle(const CncState& state) {
   if (!steady && steady_since_) {
     if (cut) cut_time_ += state.stamp - *steady_since_;
     unsteady();
+  }
+  while (!unconfirmed_.empty() && state.stamp >= unconfirmed_.front().stamp + CONFIRMED) {
+    const Stretch stretch = std::move(unconfirmed_.front());
+    unconfirmed_.pop_front();
+    deliver_(stretch);
   }
 }
 
@@ -154,7 +161,7 @@ void StretchRecorder::finish() {
   for (const LoadSample& l : loads_) {
     if (l.stamp >= begin && l.stamp <= end) stretch.load.push_back({l.stamp - begin, l.spindle_load});
   }
-  deliver_(stretch);
+  unconfirmed_.push_back(std::move(stretch));
 }
 
 SortedStretches::SortedStretches(const StretchParameters& parameters, double hold_back,

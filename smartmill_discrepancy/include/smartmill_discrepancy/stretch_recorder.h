@@ -61,6 +61,7 @@ class StretchRecorder {
   std::deque<SpindleAngle> angles_;
   std::deque<SampleBlock> blocks_;
   std::deque<LoadSample> loads_;
+  std::deque<Stretch> unconfirmed_;  // until the controller says that the motion went on as it was
 };
 
 /// The same behind a sorter, for a node and for a bag alike.
