@@ -20,6 +20,7 @@ struct Machine {
   double actual_speed = SPEED;   // [rad/s]
   double begin = 100.0;          // [s] stamp of the begin
   double settle = 0.0;           // [s]
+  double stops = 1e300;          // [s] the controller shows another place from here on
   double acceleration = 0.0;     // [rad/s2] of the spindle
 };
 
@@ -46,6 +47,7 @@ std::vector<Stretch> run(const Machine& machine, double length = 0.3) {
       state.stamp = stamp;
       state.axes = {"X", "Y", "Z"};
       state.position = {FEED * (t - machine.started_cutting), machine.feed_offset, 0.0};
+      if (t > machine.stops) state.position[2] = 0.01;
       state.spindle_speed = machine.actual_speed;
       recorder.push(state);
     }
@@ -113,6 +115,13 @@ TEST(StretchRecorder, saysWhatWentBefore) {
     ASSERT_GE(load.size(), 28U);
     for (const LoadReading& r : load) EXPECT_NEAR(r.load, begin + r.time - 0.004, 1e-6);
   }
+}
+
+// What the controller shows may be old: samples of a cut that has ended came before its word of it.
+TEST(StretchRecorder, waitsForTheControllersWord) {
+  Machine machine;
+  machine.stops = 0.61;
+  EXPECT_EQ(run(machine).size(), 1U);  // not 0.3..0.6
 }
 
 TEST(StretchRecorder, leavesOutASpindleThatSpeedsUp) {
