@@ -208,7 +208,8 @@ std::vector<std::string> estimatePhases(Dataset& data) {
 }
 
 double turnPhases(Dataset& data, const MachineModel& model) {
-  constexpr double LEAST_GAIN = 25.0;  // of squares over noise: less tells no phase
+  constexpr double LEAST_GAIN = 25.0;   // of squares over noise: less tells no phase
+  constexpr double LEAST_SHOWN = 0.05;  // squares of the lines beside those of the tooth passing
   constexpr int ALL_ROUND = 1440, NEAR = 40;
   double largest = 0.0;
   for (TestData& t : data.tests) {
@@ -219,7 +220,16 @@ double turnPhases(Dataset& data, const MachineModel& model) {
     const Record simulated = sim::simulateTest(model, t.test, t.record, options);
     const std::size_t from = t.first_cut < t.record.size() ? t.first_cut : 0, end = t.record.size();
     const Lines all = linesOf(data, t, simulated, from, end);
-    double turn = all.best(0.0, units::PI, ALL_ROUND);
+    // A model that shows little of what tells the teeth apart must not choose another tooth.
+    const int teeth = t.test.kind == TestKind::cut && data.nominal.tool ? data.nominal.tool->teeth : 1;
+    double shown = 0.0, seen = 0.0;
+    for (std::size_t i = 0; i < all.simulated.size(); ++i) {
+      if ((static_cast<int>(i) % all.orders + 1) % teeth == 0 && teeth > 1) continue;
+      shown += std::norm(all.simulated[i]);
+      seen += std::norm(all.measured[i]);
+    }
+    const double reach = shown > LEAST_SHOWN * seen ? units::PI : units::PI / teeth;
+    double turn = all.best(0.0, reach, ALL_ROUND);
     const auto samples = static_cast<double>(end - from);
     double size = 0.0;
     for (const auto& line : all.simulated) size += 4.0 * samples * std::norm(line);

@@ -144,7 +144,7 @@ void refine(TwinRunner& quick_runner, const Fitter& quick, const Fitter& exact, 
   double weight = 1.0;
   for (int pass = 0; pass <= PASSES; ++pass) {
     const MachineModel model = quick.model(from);
-    const bool turned = options.turn_phases && options.turn_phases(model) > PHASE_SETTLED;
+    const bool turned = options.turn_phases && options.turn_phases(model) > PHASE_SETTLED * std::sqrt(weight);
     const std::vector<double> simulated = exact.runner().simulate(model);
     quick_runner.correctTo(model, simulated);
     // Where structure is left the noise does not tell how well values are known; what is stated of them does.
@@ -239,7 +239,10 @@ SearchResult search(TwinRunner& quick_runner, const Fitter& quick, const Fitter&
     for (int pass = 0; pass < PASSES && options.turn_phases; ++pass) {
       if (options.turn_phases(quick.model(fit.state)) < PHASE_SETTLED) break;
       tangents = linearise(fit.state);
+      const double before = fit.bic;
       fit = quick.fit(fit.state, &tangents, {8, 1e-4, true});
+      const double excess = fit.chi2 - static_cast<double>(quick.runner().size());
+      if (std::abs(before - fit.bic) < std::max(1.0, 0.01 * excess)) break;
     }
     return fit;
   };
