@@ -274,7 +274,8 @@ SearchResult search(TwinRunner& quick_runner, const Fitter& quick, const Fitter&
   };
   double exact_now = exactSquares(now.state);
   std::vector<const Hypothesis*> refused;
-  for (std::size_t round = 0; round < options.most_effects + refused.size(); ++round) {
+  std::size_t repeated = 0;
+  for (std::size_t round = 0; round < options.most_effects + repeated; ++round) {
     const std::vector<Promise> promises = screen(quick, now, tangents, hypotheses);
     // A trifle beside what is left is not what is missing.
     const double least = std::max(options.least_gain, options.least_share * (now.chi2 - samples));
@@ -347,11 +348,19 @@ SearchResult search(TwinRunner& quick_runner, const Fitter& quick, const Fitter&
     if (!(exact_squares < exact_now)) {
       say(text("gap %.4f when simulated exactly, not taken: ", std::sqrt(exact_squares / samples), 0.0) +
           newest->title());
-      refused.push_back(newest);
+      ++repeated;
+      if (quick_runner.substeps() < options.final_substeps) {
+        quick_runner.setSubsteps(std::min(4 * quick_runner.substeps(), options.final_substeps));
+        say("  again with smaller steps");
+      } else {
+        refused.push_back(newest);
+      }
       for (Rung& r : result.ladder) r.taken = r.taken && r.round != round;
       now = before;
       if (options.turn_phases) options.turn_phases(quick.model(now.state));
       tangents = linearise(now.state);
+      now = quick.fit(now.state, &tangents, {8, 1e-4, true});
+      exact_now = exactSquares(now.state);
       continue;
     }
     exact_now = exact_squares;

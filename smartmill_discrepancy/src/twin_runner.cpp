@@ -116,6 +116,14 @@ void TwinRunner::readPhases() {
   }
 }
 
+void TwinRunner::setSubsteps(int substeps) {
+  substeps_ = substeps;
+  for (Kept& kept : kept_) {
+    const std::lock_guard<std::mutex> lock(kept.mutex);
+    kept.results.clear();
+  }
+}
+
 std::vector<double> TwinRunner::simulateOne(const MachineModel& model, std::size_t chosen) const {
   const TestData& test = data_.tests[tests_[chosen]];
   Kept& kept = kept_[chosen];

@@ -48,6 +48,10 @@ class TwinRunner {
   /// The phases and speeds of the dataset's records are others now.
   void readPhases();
 
+  /// Steps of the twin a sample from here on.
+  void setSubsteps(int substeps);
+  int substeps() const { return substeps_; }
+
   /// What each model says. @throws Error of the twin.
   std::vector<std::vector<double>> simulate(const std::vector<MachineModel>& models) const;
   std::vector<double> simulate(const MachineModel& model) const;
