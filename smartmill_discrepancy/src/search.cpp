@@ -26,6 +26,13 @@ std::string describe(const Member& m) {
   return line;
 }
 
+double squaresLeft(const TwinRunner& runner, const std::vector<double>& simulated) {
+  double squares = 0.0;
+  for (std::size_t i = 0; i < simulated.size(); ++i)
+    squares += std::pow(runner.measured()[i] - simulated[i], 2);
+  return squares;
+}
+
 // Squares by channel.
 std::map<std::string, double> squaresOf(const TwinRunner& runner, const std::vector<double>& values) {
   std::map<std::string, double> squares;
@@ -118,11 +125,7 @@ std::vector<double> startOf(const Fitter& fitter, const Fit& now, const Promise&
   std::size_t best = 0;
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; k < simulated.size(); ++k) {
-    double squares = 0.0;
-    for (std::size_t i = 0; i < simulated[k].size(); ++i) {
-      const double r = fitter.runner().measured()[i] - simulated[k][i];
-      squares += r * r;
-    }
+    const double squares = squaresLeft(fitter.runner(), simulated[k]);
     if (squares < least) {
       least = squares;
       best = k;
@@ -148,10 +151,7 @@ void refine(TwinRunner& quick_runner, const Fitter& quick, const Fitter& exact, 
     const std::vector<double> simulated = exact.runner().simulate(model);
     quick_runner.correctTo(model, simulated);
     // Where structure is left the noise does not tell how well values are known; what is stated of them does.
-    double squares = 0.0;
-    for (std::size_t i = 0; i < simulated.size(); ++i)
-      squares += std::pow(exact.runner().measured()[i] - simulated[i], 2);
-    weight = std::max(1.0, squares / static_cast<double>(simulated.size()));
+    weight = std::max(1.0, squaresLeft(exact.runner(), simulated) / static_cast<double>(simulated.size()));
     tangents = quick.nominalTangents(from);
     // All tangents at one point: only these tell what is known along a valley.
     Fit here = quick.fit(from, &tangents, {0, 1e-8, true, weight});
@@ -266,11 +266,7 @@ SearchResult search(TwinRunner& quick_runner, const Fitter& quick, const Fitter&
   // The quick runner may lie far from where it was corrected: near its stability limit a tool vibrates in it
   // that is quiet in the exact one, or the reverse.
   const auto exactSquares = [&](const FitState& at) {
-    const std::vector<double> simulated = exact.runner().simulate(quick.model(at));
-    double squares = 0.0;
-    for (std::size_t i = 0; i < simulated.size(); ++i)
-      squares += std::pow(exact.runner().measured()[i] - simulated[i], 2);
-    return squares;
+    return squaresLeft(exact.runner(), exact.runner().simulate(quick.model(at)));
   };
   double exact_now = exactSquares(now.state);
   std::vector<const Hypothesis*> refused;
