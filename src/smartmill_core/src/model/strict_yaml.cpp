@@ -14,12 +14,6 @@ namespace smartmill {
 
 namespace {
 
-std::string shortNumber(double value) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%.10g", value);
-  return text;
-}
-
 // The value as it stands in the file, in one line.
 std::string shown(const YAML::Node& node) {
   switch (node.Type()) {
@@ -60,22 +54,6 @@ std::string lineOf(const std::string& text) {
 }
 
 }  // namespace
-
-bool Range::contains(double value) const {
-  return std::isfinite(value) && (low_open ? value > low : value >= low) &&
-         (high_open ? value < high : value <= high);
-}
-
-std::string Range::text() const {
-  const bool has_low = std::isfinite(low), has_high = std::isfinite(high);
-  if (has_low && has_high) {
-    return shortNumber(low) + (low_open ? " < value " : " <= value ") + (high_open ? "< " : "<= ") +
-           shortNumber(high);
-  }
-  if (has_low) return (low_open ? "> " : ">= ") + shortNumber(low);
-  if (has_high) return (high_open ? "< " : "<= ") + shortNumber(high);
-  return "finite";
-}
 
 struct StrictYaml::Impl {
   YAML::Node node;
@@ -147,7 +125,7 @@ double StrictYaml::number(const std::string& key, const Range& range) const {
   double value = 0.0;
   if (!parse(node, &value)) fail(key, shown(node) + " is not a number");
   if (!std::isfinite(value)) fail(key, shown(node) + " is not a finite number");
-  if (!range.contains(value)) fail(key, shortNumber(value) + " is out of range (" + range.text() + ")");
+  if (!range.contains(value)) fail(key, outOfRange(value, range));
   return value;
 }
 
@@ -191,7 +169,7 @@ std::vector<double> StrictYaml::numbers(const std::string& key, std::size_t coun
     double value = 0.0;
     if (!parse(node[i], &value)) fail(place, shown(node[i]) + " is not a number");
     if (!std::isfinite(value)) fail(place, shown(node[i]) + " is not a finite number");
-    if (!range.contains(value)) fail(place, shortNumber(value) + " is out of range (" + range.text() + ")");
+    if (!range.contains(value)) fail(place, outOfRange(value, range));
     values.push_back(value);
   }
   return values;
@@ -236,15 +214,29 @@ void StrictYaml::finish() const {
   }
 }
 
-std::string yamlNumber(double value, int digits) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%.*g", digits, value);
-  std::string number = text;
+namespace {
+
+// YAML 1.1 takes 5e-05 for a word: a point is due.
+std::string withPoint(std::string number) {
   if (number.find_first_of(".n") == std::string::npos) {
     const std::size_t exponent = number.find('e');
     number.insert(exponent == std::string::npos ? number.size() : exponent, ".0");
   }
   return number;
+}
+
+}  // namespace
+
+std::string yamlNumber(double value, int digits) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%.*g", digits, value);
+  return withPoint(text);
+}
+
+std::string yamlNumberExact(double value) {
+  char text[40];
+  const auto end = std::to_chars(text, text + sizeof text, value).ptr;
+  return withPoint(std::string(text, end));
 }
 
 std::string yamlWord(const std::string& word) {

@@ -20,13 +20,9 @@ StreamSorter::StreamSorter(double hold_back) : hold_back_(hold_back), delivered_
   }
 }
 
-StreamSorter::Stream StreamSorter::addRegular(std::string name) {
-  sources_.push_back({std::move(name), true, NEVER});
-  return sources_.size() - 1;
-}
-
-StreamSorter::Stream StreamSorter::addEvents(std::string name) {
-  sources_.push_back({std::move(name), false, NEVER});
+StreamSorter::Stream StreamSorter::add(std::string name, bool regular, bool optional, bool sampled,
+                                       bool latched) {
+  sources_.push_back({std::move(name), regular, optional, sampled, latched, NEVER, std::nullopt});
   return sources_.size() - 1;
 }
 
@@ -40,6 +36,9 @@ void StreamSorter::setRegular(Stream stream, bool regular) {
 void StreamSorter::push(Stream stream, double stamp, Deliver deliver) {
   Source& source = sources_.at(stream);
   if (!std::isfinite(stamp)) throw Error("stream " + source.name + ": stamp is not a finite number");
+  if (source.sampled && stamp < source.newest - RESTART) restart(stamp);
+  if (source.optional) source.regular = true;
+  if (source.latched) source.held = Item{stamp, deliver};
   source.newest = std::max(source.newest, stamp);
   if (stamp < delivered_) {
     ++late_;
@@ -48,6 +47,24 @@ void StreamSorter::push(Stream stream, double stamp, Deliver deliver) {
   }
   waiting_.emplace(Key{{stamp, stream}, arrivals_++}, std::move(deliver));
   release(passed());
+}
+
+void StreamSorter::pushNow(Stream stream, Deliver deliver) {
+  const double stamp = newest();
+  if (std::isfinite(stamp)) {
+    push(stream, stamp, std::move(deliver));
+  } else {
+    deliver();
+  }
+}
+
+void StreamSorter::restart(double stamp) {
+  reset();
+  if (forget_) forget_();
+  for (Stream stream = 0; stream < sources_.size(); ++stream) {
+    const std::optional<Item> held = sources_[stream].held;
+    if (held && held->stamp <= stamp + RESTART) push(stream, held->stamp, held->deliver);
+  }
 }
 
 void StreamSorter::flush() {
@@ -59,6 +76,14 @@ void StreamSorter::reset() {
   for (Source& source : sources_) source.newest = NEVER;
   delivered_ = NEVER;
   late_ = 0;
+}
+
+double StreamSorter::newest() const {
+  double newest = NEVER;
+  for (const Source& source : sources_) {
+    if (source.sampled) newest = std::max(newest, source.newest);
+  }
+  return newest;
 }
 
 std::string StreamSorter::waitingFor() const {

@@ -87,6 +87,69 @@ TEST(StreamSorter, resetForgetsStampsAndItems) {
   EXPECT_EQ(sorter.late(), 0u);
 }
 
+TEST(StreamSorter, aJumpBackOfTimeStartsAfreshAndTellsSo) {
+  StreamSorter sorter(0.0);
+  const auto a = sorter.addRegular("a"), b = sorter.addRegular("b"), goals = sorter.addEvents("goal");
+  std::string got;
+  sorter.onRestart([&] { got += "|"; });
+  sorter.push(a, 100.0, [&] { got += "x"; });
+  sorter.push(b, 101.0, [&] { got += "y"; });
+  sorter.push(goals, 50.0, [&] { got += "g"; });   // an event may be old: no restart
+  sorter.push(a, 99.5, [&] { got += "L"; });       // late, but within a second
+  sorter.push(b, 300.0, [&] { got += "never"; });  // one stream may run ahead of another
+  sorter.push(a, 100.0 - StreamSorter::RESTART - 0.001, [&] { got += "1"; });
+  EXPECT_EQ(got, "gL|");
+  sorter.push(b, 99.5, [&] { got += "2"; });
+  sorter.push(a, 99.6, [&] { got += "3"; });
+  EXPECT_EQ(sorter.newest(), 99.6);
+  sorter.flush();
+  EXPECT_EQ(got, "gL|123");
+}
+
+TEST(StreamSorter, aLatchedEventOfTheNewRunOutlivesTheRestart) {
+  StreamSorter sorter(0.0);
+  const auto a = sorter.addRegular("a"), condition = sorter.addLatched("condition");
+  std::string got;
+  sorter.onRestart([&] { got = "|"; });
+  sorter.push(condition, 90.0, [&] { got += "old"; });
+  sorter.push(a, 100.0, [&] { got += "x"; });
+  sorter.push(a, 101.0, [&] { got += "y"; });
+  sorter.push(a, 10.0, [&] { got += "1"; });  // the condition of the old run is not of this one
+  sorter.push(a, 200.0, [] {});
+  EXPECT_EQ(got, "|1");
+  sorter.push(condition, 10.0, [&] { got += "c"; });  // came before its run's first sample
+  sorter.push(a, 10.5, [&] { got += "1"; });
+  sorter.push(a, 11.0, [&] { got += "2"; });
+  EXPECT_EQ(got, "|c1");
+}
+
+TEST(StreamSorter, anEventWithoutAStampComesBehindTheSamplesThatHaveCome) {
+  StreamSorter sorter(0.0);
+  const auto a = sorter.addRegular("a"), events = sorter.addEvents("fault");
+  std::string got;
+  sorter.pushNow(events, [&] { got += "e"; });
+  EXPECT_EQ(got, "e");
+  sorter.push(a, 1.0, [&] { got += "1"; });
+  sorter.pushNow(events, [&] { got += "f"; });
+  sorter.push(a, 2.0, [&] { got += "2"; });
+  EXPECT_EQ(got, "e1f");
+}
+
+TEST(StreamSorter, anOptionalStreamIsWaitedForFromItsFirstItemOnAnUnawaitedOneNever) {
+  StreamSorter sorter(0.0);
+  const auto a = sorter.addRegular("a"), b = sorter.addOptional("b"), c = sorter.addUnawaited("c");
+  std::string got;
+  sorter.push(c, 0.5, [&] { got += "c"; });
+  sorter.push(a, 1.0, [&] { got += "1"; });
+  sorter.push(a, 2.0, [&] { got += "2"; });
+  EXPECT_EQ(got, "c1");
+  sorter.push(b, 2.0, [&] { got += "b"; });
+  sorter.push(a, 4.0, [&] { got += "4"; });
+  EXPECT_EQ(got, "c1");
+  sorter.setRegular(b, false);  // it has died
+  EXPECT_EQ(got, "c12b");
+}
+
 TEST(StreamSorter, eventsAloneAreSortedByTheHoldBack) {
   StreamSorter sorter(0.1);
   const auto events = sorter.addEvents("goal");

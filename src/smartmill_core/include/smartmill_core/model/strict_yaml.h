@@ -1,26 +1,13 @@
 #pragma once
 
-#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "smartmill_core/range.h"
+
 namespace smartmill {
-
-/// Numbers that a key may take. Infinite bounds are open.
-struct Range {
-  double low = -std::numeric_limits<double>::infinity();
-  double high = std::numeric_limits<double>::infinity();
-  bool low_open = false;   ///< low itself is not allowed
-  bool high_open = false;  ///< high itself is not allowed
-
-  bool contains(double value) const;
-  std::string text() const;  ///< e.g. "> 0", "0 <= value < 80"; "finite" without bounds
-
-  static Range positive() { return {0.0, std::numeric_limits<double>::infinity(), true, false}; }
-  static Range notNegative() { return {0.0, std::numeric_limits<double>::infinity(), false, false}; }
-};
 
 /// One map of a YAML file, read strictly: every key at most once, every value of the type and range asked
 /// for, every key read before finish(). Errors are one line "FILE: key.path: what", with the value.
@@ -64,6 +51,9 @@ class StrictYaml {
 
 /// Number for a YAML file that every reader takes for a number (1.0e-05, not 1e-05).
 std::string yamlNumber(double value, int digits = 10);
+
+/// The same with as few digits as read back to the very value.
+std::string yamlNumberExact(double value);
 
 /// Word for a YAML file, quoted where it must be.
 std::string yamlWord(const std::string& word);

@@ -1,0 +1,68 @@
+#pragma once
+
+#include <string>
+
+namespace smartmill::names {
+
+// Topics, services and actions, relative to the namespace /smartmill; nodes, tools and tests say them by these.
+constexpr const char* NAMESPACE = "/smartmill";
+
+constexpr const char* HAMMER = "daq/hammer";
+constexpr const char* DYNAMOMETER = "daq/dynamometer";
+constexpr const char* MOTOR_CURRENT = "daq/motor_current";
+constexpr const char* DISPLACEMENT = "daq/displacement";
+constexpr const char* SPINDLE_ANGLE = "spindle/angle";
+constexpr const char* CNC_STATE = "cnc/state";
+constexpr const char* CNC_LOAD = "cnc/load";
+constexpr const char* CUTTING_CONDITION = "cut/condition";
+constexpr const char* TOOL_FRF = "tool/frf";
+constexpr const char* TOOL_MODES = "tool/modes";
+constexpr const char* COEFFICIENTS = "material/coefficients";
+constexpr const char* FORCE_MEASURED = "force/measured";
+constexpr const char* FORCE_COMPENSATED = "force/compensated";
+constexpr const char* FORCE_WRENCH = "force/wrench";
+constexpr const char* FORCE_OF_MOTORS = "force/motor_current";
+constexpr const char* STABILITY_CHART = "stability/chart";
+constexpr const char* CHATTER_STATE = "chatter/state";
+constexpr const char* CHATTER_ADVICE = "chatter/advice";
+constexpr const char* DISCREPANCY_STATE = "discrepancy/state";
+constexpr const char* CONTROL_COMMAND = "control/command";
+constexpr const char* CONTROL_MACHINE = "control/machine";
+
+constexpr const char* TRUE_FRF = "sim/truth/frf";
+constexpr const char* TRUE_MODES = "sim/truth/modes";
+constexpr const char* TRUE_COEFFICIENTS = "sim/truth/coefficients";
+constexpr const char* TRUE_FORCE = "sim/truth/force";
+constexpr const char* TRUE_VIBRATION = "sim/truth/vibration";
+
+// Actions.
+constexpr const char* MEASURE_TOOL_FRF = "hammer/measure_frf";
+constexpr const char* MEASURE_SENSOR_FRF = "kalman/measure_frf";
+constexpr const char* IDENTIFY_COEFFICIENTS = "loadmeter/identify_coefficients";
+constexpr const char* RUN_PROGRAM = "cnc/run_program";
+constexpr const char* JOG = "cnc/jog";
+constexpr const char* ORIENT_SPINDLE = "cnc/orient_spindle";
+
+// Services.
+constexpr const char* STRIKE = "daq/strike";
+constexpr const char* ARM_MOTION = "cnc/arm_motion";
+constexpr const char* SET_MACRO = "cnc/set_macro";
+constexpr const char* FIND_COEFFICIENTS = "loadmeter/find_coefficients";
+constexpr const char* PREDICT_STABILITY = "stability/predict";
+
+/// A signal of the data acquisition, by its own name: daq/vibration.
+inline std::string daq(const std::string& signal) {
+  return "daq/" + signal;
+}
+
+/// The topic on which an action's goals stand in a recording.
+inline std::string goals(const std::string& action) {
+  return action + "/goal";
+}
+
+/// With the namespace, for what is not started in it.
+inline std::string absolute(const std::string& name) {
+  return !name.empty() && name.front() == '/' ? name : std::string(NAMESPACE) + "/" + name;
+}
+
+}  // namespace smartmill::names

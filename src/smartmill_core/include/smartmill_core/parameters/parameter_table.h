@@ -1,0 +1,109 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "smartmill_core/range.h"
+
+namespace smartmill {
+
+/// One parameter of a program: where its value lives and all that is said about it.
+struct Parameter {
+  using Place = std::variant<double*, int*, std::uint64_t*, bool*, std::string*, std::vector<double>*,
+                             std::array<double, 3>*>;
+  std::string key;
+  std::string unit;     ///< "1" of a number without one, empty of what is no number
+  std::string comment;  ///< what it means, for the shipped file and --help
+  Place place;
+  Range range = {};                     ///< of a number, of every number of a list
+  std::vector<std::string> words = {};  ///< allowed words; empty: any text
+  bool at_launch = false;               ///< the launch file gives it; the shipped file only says so
+
+  std::string value() const;        ///< as a YAML file writes it
+  std::string description() const;  ///< "[unit] bounds, comment", one line
+  /// @throws Error "KEY: VALUE is out of range (...)" or "KEY: 'WORD' is not one of ...".
+  void check() const;
+};
+
+/// The one declaration of a struct's parameters: key, member, unit, bounds, comment; the default is the
+/// member's initialiser. Reader, validation, the commented file of a node and --help come from it.
+///
+/// A struct declares itself in a member function `void declare(ParameterTable& table)`; the table points into
+/// that very object and must not outlive it. Structs compose by declaring their parts in turn.
+class ParameterTable {
+ public:
+  /// Head of the file.
+  void title(const std::string& text) { title_ = text; }
+  /// What follows stands in a paragraph of its own. @param text its headline; may be empty
+  void section(const std::string& text = "");
+
+  // @throws std::logic_error when the key stands already.
+  void number(const std::string& key, double& value, const std::string& unit, const Range& range,
+              const std::string& comment);
+  void number(const std::string& key, int& value, const std::string& unit, const Range& range,
+              const std::string& comment);
+  void number(const std::string& key, std::uint64_t& value, const std::string& unit, const Range& range,
+              const std::string& comment);
+  /// @param range of every number
+  void list(const std::string& key, std::vector<double>& values, const std::string& unit, const Range& range,
+            const std::string& comment);
+  void list(const std::string& key, std::array<double, 3>& values, const std::string& unit,
+            const Range& range, const std::string& comment);
+  void flag(const std::string& key, bool& value, const std::string& comment);
+  void text(const std::string& key, std::string& value, const std::string& comment);
+  void choice(const std::string& key, std::string& value, const std::vector<std::string>& words,
+              const std::string& comment);
+  /// A file or the like that belongs to the place, not to the node: the shipped file leaves it to the launch
+  /// file.
+  void atLaunch(const std::string& key, std::string& value, const std::string& comment);
+  void atLaunch(const std::string& key, bool& value, const std::string& comment);
+
+  /// The parameters of a part whose keys begin with a prefix here.
+  template <class Part>
+  void part(const std::string& prefix, Part& part) {
+    const std::string outer = prefix_;
+    prefix_ += prefix;
+    part.declare(*this);
+    prefix_ = outer;
+  }
+
+  const std::vector<Parameter>& parameters() const { return parameters_; }
+  /// nullptr when there is no such key.
+  const Parameter* find(const std::string& key) const;
+
+  /// Every value against its bounds, in order. @throws Error naming key and value.
+  void check() const;
+
+  /// The commented file: every key with its value, unit, bounds and meaning; reads back to the same values.
+  std::string yaml() const;
+
+ private:
+  struct Section {
+    std::size_t first;  // parameter that it stands before
+    std::string text;
+  };
+  void add(Parameter parameter);
+
+  std::string title_, prefix_;
+  std::vector<Parameter> parameters_;
+  std::vector<Section> sections_;
+};
+
+template <class Parameters>
+ParameterTable tableOf(Parameters& parameters) {
+  ParameterTable table;
+  parameters.declare(table);
+  return table;
+}
+
+/// The bounds of a struct's own table. @throws Error naming key and value.
+template <class Parameters>
+void checkBounds(const Parameters& parameters) {
+  Parameters copy = parameters;  // a table points to members that may change
+  tableOf(copy).check();
+}
+
+}  // namespace smartmill
