@@ -17,12 +17,8 @@ BagReader::BagReader(const std::string& path) : path_(path) {
   }
 }
 
-std::string BagReader::absolute(const std::string& topic) {
-  return !topic.empty() && topic.front() == '/' ? topic : "/smartmill/" + topic;
-}
-
 bool BagReader::has(const std::string& topic) const {
-  rosbag::View view(bag_, rosbag::TopicQuery(absolute(topic)));
+  rosbag::View view(bag_, rosbag::TopicQuery(names::absolute(topic)));
   return view.size() > 0;
 }
 

@@ -1,7 +1,9 @@
 #include "smartmill_ros/parameter_reader.h"
 
+#include <algorithm>
 #include <cmath>
 #include <regex>
+#include <variant>
 
 #include <yaml-cpp/yaml.h>
 
@@ -130,6 +132,14 @@ void ParameterReader::read(const std::string& key, int& value) {
   value = static_cast<int>(*found);
 }
 
+void ParameterReader::read(const std::string& key, std::uint64_t& value) {
+  int number = -1;
+  if (!find(key)) return;
+  read(key, number);
+  if (number < 0) throw Error("parameter " + prefix_ + key + ": " + outOfRange(number, Range::notNegative()));
+  value = static_cast<std::uint64_t>(number);
+}
+
 void ParameterReader::read(const std::string& key, bool& value) {
   XmlRpcValue* found = find(key);
   if (!found) return;
@@ -159,6 +169,27 @@ void ParameterReader::read(const std::string& key, std::vector<double>& value) {
     values.push_back(number(prefix_ + key + "[" + std::to_string(i) + "]", (*found)[i]));
   }
   value = std::move(values);
+}
+
+void ParameterReader::read(const std::string& key, std::array<double, 3>& value) {
+  std::vector<double> values(value.begin(), value.end());
+  read(key, values);
+  if (values.size() != value.size()) {
+    throw Error("parameter " + prefix_ + key + ": " + std::to_string(values.size()) +
+                " numbers, three are due");
+  }
+  std::copy(values.begin(), values.end(), value.begin());
+}
+
+void ParameterReader::read(const ParameterTable& table) {
+  for (const Parameter& parameter : table.parameters()) {
+    std::visit([&](auto* place) { read(parameter.key, *place); }, parameter.place);
+  }
+  try {
+    table.check();
+  } catch (const Error& error) {
+    throw Error("parameter " + prefix_ + error.what());
+  }
 }
 
 void ParameterReader::finish() const {

@@ -9,6 +9,7 @@
 #include <rosbag/message_instance.h>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/names.h"
 
 namespace smartmill {
 
@@ -23,7 +24,7 @@ class BagReader {
   /// reception [s].
   template <class Message>
   void on(const std::string& topic, std::function<void(const Message&, double)> handler) {
-    const std::string name = absolute(topic);
+    const std::string name = names::absolute(topic);
     handlers_[name] = [this, name, handler](const rosbag::MessageInstance& instance) {
       const boost::shared_ptr<Message> message = instance.instantiate<Message>();
       if (!message) {
@@ -43,8 +44,6 @@ class BagReader {
   double duration() const;  ///< [s] first to last message
 
  private:
-  static std::string absolute(const std::string& topic);
-
   std::string path_;
   rosbag::Bag bag_;
   std::map<std::string, std::function<void(const rosbag::MessageInstance&)>> handlers_;

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <map>
 #include <set>
 #include <string>
@@ -7,6 +9,8 @@
 
 #include <XmlRpcValue.h>
 #include <ros/node_handle.h>
+
+#include "smartmill_core/parameters/parameter_table.h"
 
 namespace smartmill {
 
@@ -25,9 +29,14 @@ class ParameterReader {
   /// @throws Error naming the parameter and its value: wrong type, NaN or infinite number.
   void read(const std::string& key, double& value);
   void read(const std::string& key, int& value);
+  void read(const std::string& key, std::uint64_t& value);
   void read(const std::string& key, bool& value);
   void read(const std::string& key, std::string& value);
   void read(const std::string& key, std::vector<double>& value);
+  void read(const std::string& key, std::array<double, 3>& value);
+
+  /// Every parameter of a table into its place. @throws Error as above, or on a value out of its bounds.
+  void read(const ParameterTable& table);
 
   /// As read(), but the parameter must be there. @throws Error "parameter X is missing".
   template <class T>
@@ -38,6 +47,17 @@ class ParameterReader {
 
   /// @throws Error on parameters that nobody read, naming one.
   void finish() const;
+
+  /// All that there is, into a struct that declares itself; what is not there keeps its default.
+  /// @throws Error on an unknown key, a wrong type, a value out of its bounds or one that validate() refuses.
+  template <class Parameters>
+  Parameters readAll() {
+    Parameters parameters;
+    read(tableOf(parameters));
+    finish();
+    parameters.validate();
+    return parameters;
+  }
 
  private:
   explicit ParameterReader(std::string prefix) : prefix_(std::move(prefix)) {}

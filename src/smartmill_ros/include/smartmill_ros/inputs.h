@@ -1,0 +1,84 @@
+#pragma once
+
+#include <deque>
+#include <functional>
+#include <string>
+#include <utility>
+
+#include <diagnostic_updater/DiagnosticStatusWrapper.h>
+#include <ros/node_handle.h>
+#include <boost/function.hpp>
+
+#include "smartmill_core/signal/watchdog.h"
+#include "smartmill_ros/conversions.h"
+
+namespace smartmill {
+
+/// One input of a node: when it was heard, and what its handler refused last. Wall time [s] is passed in.
+class InputHealth {
+ public:
+  InputHealth(std::string topic, double timeout, double now)
+      : topic_(std::move(topic)), watchdog_(timeout, now) {}
+
+  /// Hands on what came; whatever that throws stays here.
+  /// @return a line for the log, empty when there is nothing to say (again).
+  std::string take(double now, const std::function<void()>& handle);
+
+  const std::string& topic() const { return topic_; }
+  const Watchdog& watchdog() const { return watchdog_; }
+  /// What was refused since it was asked for last; empty: nothing.
+  std::string takeProblem();
+  std::size_t refused() const { return refused_; }  ///< [1] since the start
+
+ private:
+  std::string topic_, problem_;
+  Watchdog watchdog_;
+  bool told_ = false, standing_ = false;  // the problem was asked for; the newest message was refused
+  double said_ = -1e9;                    // [s] last line for the log
+  std::size_t refused_ = 0;
+};
+
+/// What a node listens to. on() has the signature of BagReader's, so that one function can connect either to
+/// the class that thinks. A handler that throws leaves one line in the log and in the diagnostics, and the
+/// node goes on.
+class Inputs {
+ public:
+  /// @param timeout [s] of wall time without a message after which an input counts as dead
+  Inputs(ros::NodeHandle nh, double timeout);
+
+  /// The handler gets the message and the time of its reception [s].
+  template <class Message>
+  void on(const std::string& topic, std::function<void(const Message&, double)> handler) {
+    InputHealth& health = add(topic);
+    const boost::function<void(const Message&)> callback = [this, &health, handler](const Message& message) {
+      take(health, [&] { handler(message, toSec(ros::Time::now())); });
+    };
+    subscribers_.push_back(nh_.subscribe<Message>(topic, QUEUE, callback, ros::VoidConstPtr(),
+                                                  ros::TransportHints().tcpNoDelay()));
+  }
+
+  /// Of one topic. @throws std::out_of_range when nobody listens to it.
+  const Watchdog& watchdog(const std::string& topic) const;
+  /// The first of these that is dead; nullptr: none.
+  const InputHealth* dead(std::initializer_list<const char*> topics) const;
+  /// Of all inputs together. ended() is the end of data: nothing more will come to release what waits.
+  Watchdog& any() { return any_; }
+
+  static double now();  ///< [s] wall time
+
+  /// What is silent and what was refused.
+  void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
+
+ private:
+  static constexpr std::uint32_t QUEUE = 2000;  // 20 s of blocks
+  InputHealth& add(const std::string& topic);
+  void take(InputHealth& health, const std::function<void()>& handle);
+
+  ros::NodeHandle nh_;
+  double timeout_;
+  std::deque<InputHealth> inputs_;  // their places stay
+  Watchdog any_;
+  std::deque<ros::Subscriber> subscribers_;
+};
+
+}  // namespace smartmill

@@ -1,0 +1,90 @@
+#include "smartmill_ros/inputs.h"
+
+#include <exception>
+#include <stdexcept>
+
+#include <ros/console.h>
+
+namespace smartmill {
+namespace {
+
+constexpr double SAY_EVERY = 5.0;  // [s] of lines in the log about one input
+
+}  // namespace
+
+std::string InputHealth::take(double now, const std::function<void()>& handle) {
+  watchdog_.heard(now);
+  try {
+    handle();
+    standing_ = false;
+    return {};
+  } catch (const std::exception& error) {
+    problem_ = error.what();
+    ++refused_;
+    standing_ = true;
+    told_ = false;
+  }
+  if (now - said_ < SAY_EVERY) return {};
+  said_ = now;
+  return topic_ + ": " + problem_;
+}
+
+std::string InputHealth::takeProblem() {
+  // Told at least once, and as long as it lasts.
+  if (told_ && !standing_) return {};
+  told_ = true;
+  return problem_;
+}
+
+Inputs::Inputs(ros::NodeHandle nh, double timeout)
+    : nh_(std::move(nh)), timeout_(timeout), any_(timeout, now()) {
+}
+
+double Inputs::now() {
+  return ros::WallTime::now().toSec();
+}
+
+InputHealth& Inputs::add(const std::string& topic) {
+  inputs_.emplace_back(topic, timeout_, now());
+  return inputs_.back();
+}
+
+void Inputs::take(InputHealth& health, const std::function<void()>& handle) {
+  const double received = now();
+  any_.heard(received);
+  const std::string line = health.take(received, handle);
+  if (!line.empty()) ROS_ERROR_STREAM(line);
+}
+
+const Watchdog& Inputs::watchdog(const std::string& topic) const {
+  for (const InputHealth& input : inputs_) {
+    if (input.topic() == topic) return input.watchdog();
+  }
+  throw std::out_of_range("no input " + topic);
+}
+
+const InputHealth* Inputs::dead(std::initializer_list<const char*> topics) const {
+  for (const InputHealth& input : inputs_) {
+    for (const char* topic : topics) {
+      if (input.topic() == topic && input.watchdog().dead(now())) return &input;
+    }
+  }
+  return nullptr;
+}
+
+void Inputs::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
+  using Level = diagnostic_msgs::DiagnosticStatus;
+  status.summary(Level::OK, "inputs are read");
+  for (InputHealth& input : inputs_) {
+    const std::string problem = input.takeProblem();
+    if (!problem.empty()) status.mergeSummary(Level::ERROR, input.topic() + ": " + problem);
+    if (input.watchdog().ever()) {
+      status.addf(input.topic(), "%.2f s since the last message, %zu refused", input.watchdog().silent(now()),
+                  input.refused());
+    } else {
+      status.add(input.topic(), "nothing yet");
+    }
+  }
+}
+
+}  // namespace smartmill
