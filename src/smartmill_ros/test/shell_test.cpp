@@ -1,13 +1,19 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <actionlib_msgs/GoalStatus.h>
 #include <diagnostic_msgs/DiagnosticArray.h>
 #include <ros/ros.h>
+#include <smartmill_msgs/MeasureFrfActionGoal.h>
+#include <smartmill_msgs/MeasureFrfActionResult.h>
+#include <smartmill_msgs/Strike.h>
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/names.h"
+#include "smartmill_ros/frf_server.h"
 #include "smartmill_ros/kept_topic.h"
 #include "smartmill_ros/node_shell.h"
+#include "smartmill_ros/strike_caller.h"
 
 namespace smartmill {
 namespace {
@@ -93,6 +99,118 @@ TEST(KeptTopic, ALateSubscriberGetsTheLastOfEveryKey) {
   ASSERT_TRUE(eventually([&] { return got.size() == 2; }));
   EXPECT_EQ(got["x"], 3.0);
   EXPECT_EQ(got["y"], 2.0);
+}
+
+// An action's client, without the library: goals and cancels out, results in.
+class Client {
+ public:
+  explicit Client(ros::NodeHandle& nh)
+      : goals_(nh.advertise<smartmill_msgs::MeasureFrfActionGoal>(names::goals("test/measure_frf"), 10)),
+        cancels_(nh.advertise<actionlib_msgs::GoalID>("test/measure_frf/cancel", 10)) {
+    const boost::function<void(const smartmill_msgs::MeasureFrfActionResult&)> listen =
+        [this](const smartmill_msgs::MeasureFrfActionResult& m) { results[m.status.goal_id.id] = m; };
+    results_ = nh.subscribe<smartmill_msgs::MeasureFrfActionResult>("test/measure_frf/result", 10, listen);
+  }
+  bool connected() const {
+    return goals_.getNumSubscribers() > 0 && cancels_.getNumSubscribers() > 0 &&
+           results_.getNumPublishers() > 0;
+  }
+  void send(const std::string& id) {
+    smartmill_msgs::MeasureFrfActionGoal goal;
+    goal.goal_id.id = id;
+    goal.goal.direction = id;
+    goals_.publish(goal);
+  }
+  void cancel(const std::string& id) {
+    actionlib_msgs::GoalID goal;
+    goal.id = id;
+    cancels_.publish(goal);
+  }
+  int statusOf(const std::string& id) { return results.count(id) ? results[id].status.status : -1; }
+
+  std::map<std::string, smartmill_msgs::MeasureFrfActionResult> results;
+
+ private:
+  ros::Publisher goals_, cancels_;
+  ros::Subscriber results_;
+};
+
+TEST(FrfServer, OneGoalAtATimeEachWithItsAnswer) {
+  using Status = actionlib_msgs::GoalStatus;
+  ros::NodeHandle nh;
+  std::map<std::string, std::function<bool(bool)>> begin;
+  std::function<bool()> cancel_due;
+  FrfServer server(
+      nh, "test/measure_frf", "test",
+      {[&](const MeasureFrfGoal& goal, std::function<bool(bool)> at) { begin[goal.direction] = at; },
+       [&](std::function<bool()> due) { cancel_due = due; }});
+  Client client(nh);
+  ASSERT_TRUE(eventually([&] { return client.connected(); }));
+  for (const char* id : {"x", "y", "z"}) client.send(id);
+  ASSERT_TRUE(eventually([&] { return begin.size() == 3; }));
+  EXPECT_TRUE(begin["x"](true));
+  EXPECT_FALSE(begin["y"](false));  // another one runs
+  EXPECT_TRUE(eventually([&] { return client.statusOf("y") == Status::REJECTED; }));
+  client.cancel("x");
+  ASSERT_TRUE(eventually([&] { return static_cast<bool>(cancel_due); }));
+  EXPECT_TRUE(cancel_due());
+  server.feedback("stage", 0.5, 3);
+  FrfServer::Result result;
+  result.message = "measured";
+  result.frf.direction = "x";
+  server.finish(result);
+  EXPECT_FALSE(cancel_due());
+  EXPECT_TRUE(eventually([&] { return client.statusOf("x") == Status::SUCCEEDED; }));
+  EXPECT_EQ(server.lastMessage(), "measured");
+
+  server.refuseWaiting("daq/hammer is silent", 1e3);  // patience
+  server.refuseWaiting("daq/hammer is silent", 0.0);
+  EXPECT_TRUE(eventually([&] { return client.statusOf("z") == Status::REJECTED; }));
+  EXPECT_EQ(client.results["z"].result.message, "daq/hammer is silent");
+  EXPECT_FALSE(begin["z"](true));  // it has its answer
+
+  client.send("again");
+  ASSERT_TRUE(eventually([&] { return begin.count("again") > 0; }));
+  EXPECT_TRUE(begin["again"](true));
+  server.restart();
+  EXPECT_TRUE(eventually([&] { return client.statusOf("again") == Status::ABORTED; }));
+}
+
+TEST(StrikeCaller, TellsWhatWentWrongOnce) {
+  using Kind = StrikeCaller::Answer::Kind;
+  using Strike = smartmill_msgs::Strike;
+  ros::NodeHandle nh;
+  StrikeCaller caller(nh, "tool");
+  std::optional<StrikeCaller::Answer> fault;
+  const auto told = [&] { return (fault = caller.takeFault()).has_value(); };
+  caller.strike("x");
+  ASSERT_TRUE(eventually([&] { return fault || told(); }));
+  EXPECT_EQ(fault->kind, Kind::nobody);
+
+  std::string struck;
+  std::uint8_t code = Strike::Response::OK;
+  const boost::function<bool(Strike::Request&, Strike::Response&)> serve = [&](Strike::Request& request,
+                                                                               Strike::Response& response) {
+    struck = request.point + " " + request.direction;
+    response.code = code;
+    response.message = "said";
+    return true;
+  };
+  const ros::ServiceServer server =
+      nh.advertiseService<Strike::Request, Strike::Response>(names::STRIKE, serve);
+  caller.strike("y");
+  EXPECT_TRUE(eventually([&] { return struck == "tool y"; }));
+  EXPECT_FALSE(caller.takeFault());
+  for (const auto& [answer, kind] :
+       {std::pair<std::uint8_t, Kind>{Strike::Response::NO_HAMMER, Kind::no_hammer},
+        {Strike::Response::FAILED, Kind::failed}}) {
+    code = answer;
+    fault.reset();
+    caller.strike("z");
+    ASSERT_TRUE(eventually([&] { return fault || told(); }));
+    EXPECT_EQ(fault->kind, kind);
+    EXPECT_EQ(fault->message, "daq/strike: said");
+  }
 }
 
 }  // namespace
