@@ -29,6 +29,7 @@ struct Parameters {
   std::vector<double> speeds{1.0, 2.0};
   std::array<double, 3> per_metre{{0.0, 0.0, 0.0}};
   Part part;
+  double memory = 0.25;
 
   void declare(ParameterTable& table) {
     table.number("bandwidth", bandwidth, "Hz", Range::positive(), "up to here");
@@ -39,6 +40,7 @@ struct Parameters {
     table.list("speeds", speeds, "rad/s", Range::positive(), "of air cuts");
     table.list("per_metre", per_metre, "1/m", Range::notNegative(), "of X, Y, Z");
     table.part("part_", part);
+    table.internal("memory", memory, "s", Range::positive());
   }
   void validate() const {
     checkBounds(*this);
@@ -91,6 +93,7 @@ TEST_F(ParameterFiles, ValuesComeIntoTheirPlaces) {
 
 TEST_F(ParameterFiles, EveryFaultIsOneLineWithKeyAndValue) {
   EXPECT_THAT(errorOf("bandwith: 1.0\n"), HasSubstr("bandwith is unknown"));
+  EXPECT_THAT(errorOf("memory: 0.1\n"), HasSubstr("memory is unknown"));
   EXPECT_THAT(errorOf("share: 0.1\n"), HasSubstr("share is unknown"));
   EXPECT_THAT(errorOf("bandwidth: 1e3\n"), HasSubstr("bandwidth: '1e3' is a string, a number is due"));
   EXPECT_THAT(errorOf("bandwidth: .nan\n"), HasSubstr("bandwidth: not a finite number"));

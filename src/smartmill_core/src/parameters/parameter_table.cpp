@@ -157,11 +157,16 @@ void ParameterTable::choice(const std::string& key, std::string& value, const st
 }
 
 void ParameterTable::atLaunch(const std::string& key, std::string& value, const std::string& comment) {
-  add({key, "", comment, &value, {}, {}, true});
+  add({key, "", comment, &value, {}, {}, Parameter::Where::at_launch});
 }
 
 void ParameterTable::atLaunch(const std::string& key, bool& value, const std::string& comment) {
-  add({key, "", comment, &value, {}, {}, true});
+  add({key, "", comment, &value, {}, {}, Parameter::Where::at_launch});
+}
+
+void ParameterTable::internal(const std::string& key, double& value, const std::string& unit,
+                              const Range& range) {
+  add({key, unit, "", &value, range, {}, Parameter::Where::internal});
 }
 
 const Parameter* ParameterTable::find(const std::string& key) const {
@@ -178,6 +183,7 @@ void ParameterTable::check() const {
 std::string ParameterTable::yaml() const {
   std::size_t column = 0;
   for (const Parameter& parameter : parameters_) {
+    if (parameter.where != Parameter::Where::shipped) continue;
     const std::size_t length = parameter.key.size() + 2 + parameter.value().size() + 1;
     if (length <= LAST_COLUMN) column = std::max(column, length);
   }
@@ -192,7 +198,8 @@ std::string ParameterTable::yaml() const {
       if (!section->text.empty()) wrap(out, section->text, "");
     }
     const Parameter& parameter = parameters_[i];
-    if (parameter.at_launch) {
+    if (parameter.where == Parameter::Where::internal) continue;
+    if (parameter.where == Parameter::Where::at_launch) {
       wrap(out, parameter.key + ": set by the launch file; " + parameter.description(), "");
       continue;
     }

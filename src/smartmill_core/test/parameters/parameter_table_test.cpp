@@ -35,6 +35,7 @@ struct Everything {
   std::vector<double> speeds{100.0, 3.141592653589793};
   std::array<double, 3> per_metre{{0.0, 0.0, 0.0}};
   std::string model;
+  double memory = 0.25;
 
   void declare(ParameterTable& table) {
     table.title("Parameters of a test.");
@@ -49,6 +50,7 @@ struct Everything {
     table.choice("method", method, {"auto", "exact"}, "how");
     table.list("speeds", speeds, "rad/s", Range::positive(), "of air cuts");
     table.list("per_metre", per_metre, "1/m", Range::notNegative(), "of X, Y, Z");
+    table.internal("memory", memory, "s", Range::positive());
   }
 };
 
@@ -81,6 +83,7 @@ TEST(ParameterTable, WhatIsOutOfItsBoundsIsNamedInOneLine) {
   EXPECT_EQ(with([](auto& e) { e.method = "guess"; }), "method: 'guess' is not one of auto | exact");
   EXPECT_EQ(with([](auto& e) { e.speeds[1] = -2.5; }), "speeds: -2.5 is out of range (> 0 rad/s)");
   EXPECT_EQ(with([](auto& e) { e.per_metre[2] = -1.0; }), "per_metre: -1 is out of range (>= 0 1/m)");
+  EXPECT_EQ(with([](auto& e) { e.memory = 0.0; }), "memory: 0 is out of range (> 0 s)");
   EXPECT_EQ(with([](auto& e) { e.speeds.clear(); }), "");
 }
 
@@ -124,6 +127,7 @@ TEST(ParameterTable, TheFileSaysEverythingAndReadsBack) {
   EXPECT_EQ(node["speeds"].as<std::vector<double>>(), e.speeds);
   EXPECT_EQ(node["per_metre"].size(), 3u);
   EXPECT_FALSE(node["model"]);
+  EXPECT_FALSE(node["memory"]);
 }
 
 TEST(ParameterTable, LongCommentsGoOnBelow) {

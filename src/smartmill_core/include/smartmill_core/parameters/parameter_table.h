@@ -20,7 +20,9 @@ struct Parameter {
   Place place;
   Range range = {};                     ///< of a number, of every number of a list
   std::vector<std::string> words = {};  ///< allowed words; empty: any text
-  bool at_launch = false;               ///< the launch file gives it; the shipped file only says so
+  /// shipped: stands in the node's file; at_launch: the launch file gives it, the shipped one only says so;
+  /// internal: set by programs alone, but bounded like the others.
+  enum class Where { shipped, at_launch, internal } where = Where::shipped;
 
   std::string value() const;        ///< as a YAML file writes it
   std::string description() const;  ///< "[unit] bounds, comment", one line
@@ -60,6 +62,8 @@ class ParameterTable {
   /// file.
   void atLaunch(const std::string& key, std::string& value, const std::string& comment);
   void atLaunch(const std::string& key, bool& value, const std::string& comment);
+  /// Bounds of a member that no file sets.
+  void internal(const std::string& key, double& value, const std::string& unit, const Range& range);
 
   /// The parameters of a part whose keys begin with a prefix here.
   template <class Part>
