@@ -91,7 +91,7 @@ void wrap(std::ostream& out, const std::string& text, std::string begin) {
 }  // namespace
 
 std::string Parameter::value() const {
-  return std::visit([](const auto* where) { return written(*where); }, place);
+  return std::visit([](const auto* it) { return written(*it); }, place);
 }
 
 std::string Parameter::description() const {
