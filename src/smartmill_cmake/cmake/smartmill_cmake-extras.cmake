@@ -29,9 +29,13 @@ function(smartmill_library name)
 endfunction()
 
 # smartmill_executable(NAME [TARGET target] SOURCES a.cpp ... LIBRARIES x ...): a program that rosrun finds as NAME.
+# Its main is apps/NAME.cpp; SOURCES are the others.
 # TARGET names the cmake target where NAME would collide with another package's (default PACKAGE_NAME).
 function(smartmill_executable name)
   cmake_parse_arguments(arg "" "TARGET" "SOURCES;LIBRARIES" ${ARGN})
+  if(EXISTS ${CMAKE_CURRENT_SOURCE_DIR}/apps/${name}.cpp)
+    list(PREPEND arg_SOURCES apps/${name}.cpp)
+  endif()
   if(NOT arg_TARGET)
     set(arg_TARGET ${PROJECT_NAME}_${name})
   endif()
