@@ -19,7 +19,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/signal/streams.h"
 #include "smartmill_core/testing/temporary_folder.h"
-#include "smartmill_loadmeter/database.h"
+#include "smartmill_loadmeter/database/database.h"
 
 namespace {
 

@@ -5,8 +5,8 @@
 #include <random>
 
 #include "smartmill_core/units.h"
-#include "smartmill_loadmeter/machine_calibration.h"
-#include "smartmill_loadmeter/runout.h"
+#include "smartmill_loadmeter/calibration/machine_calibration.h"
+#include "smartmill_loadmeter/identification/runout.h"
 
 namespace smartmill::loadmeter {
 

@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "smartmill_core/model/machine_model.h"
-#include "smartmill_loadmeter/campaign_identification.h"
+#include "smartmill_loadmeter/identification/campaign_identification.h"
 
 namespace smartmill::loadmeter {
 

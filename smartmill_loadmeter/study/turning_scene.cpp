@@ -7,7 +7,7 @@
 #include <memory>
 
 #include "smartmill_core/units.h"
-#include "smartmill_loadmeter/anfis.h"
+#include "smartmill_loadmeter/motor/anfis.h"
 
 namespace smartmill::loadmeter {
 

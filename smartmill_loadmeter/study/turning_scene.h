@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "smartmill_loadmeter/motor_current.h"
+#include "smartmill_loadmeter/motor/motor_current.h"
 
 namespace smartmill::loadmeter {
 

@@ -9,7 +9,7 @@
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/signal/streams.h"
 #include "smartmill_core/units.h"
-#include "smartmill_loadmeter/load_meter.h"
+#include "smartmill_loadmeter/calibration/load_meter.h"
 
 namespace smartmill::loadmeter {
 

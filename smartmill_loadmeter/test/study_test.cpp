@@ -6,7 +6,7 @@
 
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/units.h"
-#include "smartmill_loadmeter/runout_torque.h"
+#include "smartmill_loadmeter/identification/runout_torque.h"
 #include "study/machine_cases.h"
 
 namespace smartmill::loadmeter {

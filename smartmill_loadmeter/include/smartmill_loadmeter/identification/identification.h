@@ -1,0 +1,164 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "smartmill_core/cutting/coefficient_set.h"
+#include "smartmill_core/model/machine_model.h"
+#include "smartmill_core/signal/streams.h"
+#include "smartmill_loadmeter/calibration/load_meter.h"
+#include "smartmill_loadmeter/database/database.h"
+#include "smartmill_loadmeter/identification/production.h"
+#include "smartmill_loadmeter/motor/motor_chain.h"
+
+namespace smartmill::loadmeter {
+
+struct IdentificationParameters {
+  double speed_tolerance = 0.02;       ///< [1] share of the commanded speed within which it counts as reached
+  double settle_time_constants = 8.0;  ///< [1] >= 5, waited after a change; 8 leave 0.03 % of a step
+  double guard_time =
+      0.05;  ///< [s] >= 0, readings dropped before steadiness is lost (stamps are replies' times)
+  double path_tolerance = 1.0e-3;     ///< [m] distance from the line of the steady cut
+  int minimum_readings = 10;          ///< [1] >= 2, of a test
+  double production_memory = 1800.0;  ///< [s] > 0 of cutting after which a production cut counts 1/e
+  MotorParameters motor;              ///< of daq/motor_current
+  double maximum_gap = 0.5;           ///< [s] > 0, without controller state or load: steadiness is lost
+
+  /// @throws Error naming key and value.
+  void validate() const;
+};
+
+/// Goal of the action IdentifyCoefficients.
+struct IdentifyGoal {
+  double stamp = 0.0;    ///< [s]
+  std::string tool;      ///< empty: any
+  std::string material;  ///< empty: any
+  bool reset = false;    ///< forget earlier tests
+  std::uint64_t id = 0;  ///< handed back with the result
+};
+
+struct IdentifyResult {
+  enum class Code : std::uint8_t { ok = 0, cancelled = 1, too_few_tests = 2, bad_data = 3 };
+  Code code = Code::ok;
+  std::string message;  ///< one line
+  CoefficientSet coefficients;
+  CoefficientRecord record;  ///< the same with tool, engagement and covariance, for the database
+  bool reset = false;        ///< answers a goal with reset: no coefficients
+  std::uint64_t id = 0;      ///< of the goal
+};
+
+/// Mean of one test.
+struct LoadTest {
+  CuttingCondition condition;
+  double speed = 0.0;      ///< [rad/s] mean
+  double speed_std = 0.0;  ///< [rad/s] of the mean
+  MeanVoltage voltage;
+  int readings = 0;
+  double stamp = 0.0;     ///< [s] of its last reading
+  double duration = 0.0;  ///< [s] steady
+  std::optional<MotorReading> motor;
+  std::optional<MotorForce> force;  ///< of a cut, where motors are calibrated
+
+  /// Standard deviation of the mean torque at the motor as one of the voltage: meter and speed [V].
+  double torqueStdAsVoltage() const;
+};
+
+/// From controller state and load to cutting coefficients (Dunwoody chapter 3). Fed in stamp order; time
+/// comes from the stamps only, so live, replayed and offline runs agree. A test is one cut/condition from its
+/// stamp to the next one's: in air, readings at steady speed count; in a cut, readings while the tool moves
+/// between steady_from and steady_to; both after a settling time of the load meter's lag.
+class LoadMeterIdentification {
+ public:
+  /// Uses the model's load meter and, without air cuts only, its friction; never its cutting section.
+  /// @throws Error when the model lacks the spindle or load_meter_full_scale_v, or a parameter is out of
+  /// range.
+  LoadMeterIdentification(const MachineModel& model, const IdentificationParameters& parameters);
+
+  void onResult(std::function<void(const IdentifyResult&)> callback) { result_ = std::move(callback); }
+  /// Uses motor currents too. Tests made so far keep what they had.
+  void setMotors(const MotorCalibration& calibration) { motors_ = calibration; }
+  /// Force of each cut by its motors.
+  void onMotorForce(std::function<void(const MotorForce&)> callback) { motor_force_ = std::move(callback); }
+  void onTest(std::function<void(const LoadTest&)> callback) { test_ = std::move(callback); }
+
+  void handle(const CncState& state);
+  void handle(const LoadSample& sample);
+  /// Topic daq/motor_current: channels x, y, z, spindle [A], phase currents by Hall sensors.
+  void handle(const SampleBlock& block);
+  void handle(const CuttingCondition& condition);
+  void handle(const IdentifyGoal& goal);
+
+  /// As new: a bag was restarted.
+  void reset();
+
+  /// Ktc and Kte followed cut by cut since the tool or the material changed; empty before a cut with known
+  /// friction.
+  const std::optional<RecursiveCoefficients>& production() const { return production_; }
+
+  const std::vector<LoadTest>& airCuts() const { return air_cuts_; }
+  const std::vector<LoadTest>& cuts() const { return cuts_; }
+
+ private:
+  struct Reading {
+    double stamp, voltage, speed;
+  };
+  bool onPath(const CncState& state) const;
+  void dropAfter(double stamp);
+  void closeTest();
+  void follow(const LoadTest& cut);
+  IdentifyResult identify(const IdentifyGoal& goal) const;
+  std::string addFromMotors(const std::vector<LoadTest>& cuts, CoefficientRecord* record) const;
+  void readMotorsOf(LoadTest* test);
+
+  std::string file_;
+  Spindle spindle_;
+  double spindle_uncertainty_;
+  IdentificationParameters parameters_;
+  std::function<void(const IdentifyResult&)> result_;
+  std::function<void(const LoadTest&)> test_;
+
+  std::optional<CuttingCondition> condition_;
+  std::optional<double> speed_since_, path_since_;  // [s] steady since then
+  double last_reading_ = 0.0, last_state_ = 0.0;    // [s]
+  std::vector<Reading> readings_;
+  MotorRecord motor_record_;
+  std::optional<MotorCalibration> motors_;
+  std::function<void(const MotorForce&)> motor_force_;
+  struct PathPoint {
+    double stamp;
+    std::array<double, 3> position;
+  };
+  std::optional<PathPoint> path_first_, path_last_;  // of the steady cut, or of moving along its line in air
+  std::vector<LoadTest> air_cuts_, cuts_;
+  std::optional<RecursiveCoefficients> production_;
+  std::string production_of_;         // tool and material
+  std::vector<std::string> dropped_;  // why tests were not used
+  std::string bad_data_;
+};
+
+/// Friction torque in a test, and how it hangs on what was found in the air cuts.
+struct IdleTorque {
+  std::function<double(const LoadTest&)> torque;                 ///< [N m]
+  std::function<std::vector<double>(const LoadTest&)> gradient;  ///< to the unknowns
+  std::size_t unknowns = 0;
+  std::vector<double> covariance;                             ///< of the unknowns, row by row
+  double viscous = std::numeric_limits<double>::quiet_NaN();  ///< [N m s/rad] found in the air cuts
+  double coulomb = std::numeric_limits<double>::quiet_NaN();  ///< [N m]
+};
+/// From the air cuts, the law by evidence (Coulomb and viscous; Stribeck, warm-up from five air cuts on); the
+/// model's without any. @throws Error with air cuts at fewer than two speeds.
+IdleTorque idleTorque(const std::vector<LoadTest>& air_cuts, const Spindle& spindle,
+                      double spindle_uncertainty_percent);
+
+/// Coefficients and their standard deviations from means: friction from the air cuts (the model's without
+/// any), torque (eq. 3.5), regression (eq. 3.19 generalised); the standard deviations carry the friction's
+/// covariance, which all cuts share. With the means of tool and engagement. @throws Error naming what is
+/// missing.
+CoefficientRecord identifyFromTests(const std::vector<LoadTest>& air_cuts, const std::vector<LoadTest>& cuts,
+                                    const Spindle& spindle, double spindle_uncertainty_percent);
+
+}  // namespace smartmill::loadmeter

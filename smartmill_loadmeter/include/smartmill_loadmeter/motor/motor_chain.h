@@ -1,0 +1,73 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "smartmill_core/signal/streams.h"
+#include "smartmill_loadmeter/motor/joint.h"
+#include "smartmill_loadmeter/motor/motor_calibration.h"
+
+namespace smartmill::loadmeter {
+
+struct MotorParameters {
+  /// [1/m] electrical periods of the phase current to a metre of travel, X, Y, Z: pole pairs over the screw's
+  /// lead; 0: no current of that motor.
+  std::array<double, 3> phase_per_metre{{0.0, 0.0, 0.0}};
+  double phase_per_revolution = 0.0;  ///< [1] electrical periods to a revolution of the spindle; 0: none
+  double smallest_velocity = 1e-4;    ///< [m/s] > 0, below which an axis stands still
+
+  bool any() const;
+  /// @throws Error naming key and value.
+  void validate() const;
+};
+
+/// Samples of the channels x, y, z, spindle of daq/motor_current while a test is steady.
+class MotorRecord {
+ public:
+  void clear();
+  /// Goes on with what has come so far; after a jump of the running index a longer part replaces a shorter
+  /// one.
+  void add(const SampleBlock& block);
+  void dropAfter(double stamp);
+  bool empty() const { return rate_ == 0.0; }
+  double rate() const { return rate_; }  ///< [Hz]
+  /// [A] of channel x, y, z, spindle (0..3); empty without the channel.
+  const std::vector<double>& channel(std::size_t index) const { return samples_[index]; }
+
+ private:
+  static constexpr std::size_t LONGEST = 1u << 20;
+  std::array<std::vector<double>, 4> samples_;
+  double rate_ = 0.0, start_ = 0.0;
+  std::uint64_t next_ = 0;
+};
+
+/// One test by its motors.
+struct MotorReading {
+  std::array<double, 3> velocity{{0, 0, 0}};   ///< [m/s] of the tool, machine axes
+  double spindle_speed = 0.0;                  ///< [rad/s]
+  std::array<std::optional<double>, 3> range;  ///< [A] X, Y, Z; empty: at rest, or not measured
+  std::optional<double> spindle_range;         ///< [A]
+  std::array<std::string, 4> reason;           ///< why there is none
+};
+MotorReading readMotors(const MotorRecord& record, const MotorParameters& parameters,
+                        const std::array<double, 3>& velocity, double spindle_speed);
+
+/// Cutting force by the motors: F = m (I - Ia), T = a(N) dI^b(N).
+struct MotorForce {
+  double stamp = 0.0;                            ///< [s] last reading of the test
+  std::string name;                              ///< of the test
+  std::array<std::optional<Estimate>, 3> force;  ///< [N] mean force on the tool, machine X, Y, Z
+  std::optional<Estimate> torque;                ///< [N m] of the spindle
+  std::array<std::string, 4> reason;             ///< why X, Y, Z, torque are not known
+  /// E.g. "Fx -120.1 +- 3.0 N; Fy not observable: the axis stands still".
+  std::string text() const;
+};
+/// @param air readings of air cuts so far: the one in the same direction and nearest velocity (within a
+/// factor two) is subtracted, of the spindle the one at nearest speed (within a tenth).
+MotorForce forceFromMotors(const MotorReading& cut, const std::vector<MotorReading>& air,
+                           const MotorCalibration& calibration, const MotorParameters& parameters);
+
+}  // namespace smartmill::loadmeter

@@ -1,0 +1,105 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "smartmill_loadmeter/calibration/machine_calibration.h"
+
+namespace smartmill::loadmeter {
+
+/// Motor currents to forces: Cheng & Venuvinod, sections 7..9.
+
+/// Approximation of a signal by Daubechies-5 wavelets: the `level` finest bands of detail are taken out (GSL,
+/// dyadic; the signal is mirrored at its ends to a power of two). Level L keeps what lies below rate /
+/// 2^(L+1).
+/// @throws Error with fewer than 2^level samples.
+std::vector<double> denoise(const std::vector<double>& signal, int level);
+
+/// Coarsest level that leaves a sine of this frequency as it is, at most 10.
+int levelFor(double frequency, double sample_rate);
+
+/// Range (twice the amplitude) of one phase's current: the de-noised signal's sine. @param frequency [Hz] of
+/// the phase. @return [A]. @throws Error with less than two periods.
+double phaseRange(const std::vector<double>& current, double sample_rate, double frequency);
+
+/// A straight line y = slope x + level, with its covariance.
+struct Line {
+  Estimate slope, level;
+  double covariance = 0.0;
+  double scatter = 0.0;    ///< standard deviation about the line
+  double r_squared = 0.0;  ///< [1]
+  int count = 0;
+
+  double at(double x) const { return slope.value * x + level.value; }
+  /// Standard deviation of one new y at x.
+  double stdAt(double x) const;
+};
+
+/// Feed drive (Table 1): F = m I + c over calibration cuts; c = -(W + R), m takes the sign of W + R: negative
+/// where the weight aids the motion more than friction hinders it. @throws Error with fewer than three cuts.
+Line fitLine(const std::vector<double>& x, const std::vector<double>& y);
+
+/// What a drive's line says of its slide, from air cuts in both directions (section 9, ii): in the direction
+/// of the calibration m I = W + R, against it |m| I' = |W| + R.
+struct SlideLoad {
+  Estimate weight;    ///< [N] W, opposing the calibrated motion; negative: aids it
+  Estimate friction;  ///< [N] R
+};
+SlideLoad slideLoad(const Line& calibration, double air_current, double air_current_reverse,
+                    double current_std);
+
+/// One spindle cut: rise of the phase range over air cutting, and what torque the force made.
+struct SpindleCut {
+  double speed_rpm = 0.0;
+  double rise = 0.0;    ///< [A] I - Ia > 0
+  double torque = 0.0;  ///< [N m] T = Fy (r + ap / 2)
+};
+
+/// T = a(N) dI^b(N); a and b cubic polynomials in N, one pair below and one above base speed (Table 1, note
+/// 1).
+class TorquePowerLaw {
+ public:
+  /// Polynomials of lower degree where the cuts have fewer different speeds. @throws Error with fewer than
+  /// three cuts on a side that has any.
+  TorquePowerLaw(const std::vector<SpindleCut>& cuts, double base_speed_rpm);
+
+  /// Polynomials in (N - middle) / span, lowest power first; N, middle, span in rpm.
+  struct Side {
+    std::vector<double> a, b;
+    double middle = 0.0, span = 1.0;
+  };
+  /// As found earlier. @param scatter [N m].
+  TorquePowerLaw(std::optional<Side> below, std::optional<Side> above, double base_speed_rpm, double scatter)
+      : base_(base_speed_rpm), sides_{std::move(below), std::move(above)}, scatter_(scatter) {}
+
+  double torque(double speed_rpm, double rise) const;  ///< [N m]
+  /// Standard deviation of one new torque: scatter about the law, [N m].
+  double scatter() const { return scatter_; }
+  double rSquared() const { return r_squared_; }  ///< [1] of the cuts it was made from
+  double baseSpeed() const { return base_; }      ///< [rpm]
+  const std::optional<Side>& side(bool above) const { return sides_[above ? 1 : 0]; }
+
+ private:
+  static double evaluate(const Side& side, double speed_rpm, double rise);
+
+  double base_;
+  std::array<std::optional<Side>, 2> sides_;  // below and above base speed
+  double scatter_ = 0.0, r_squared_ = 0.0;
+};
+
+/// Section 12: replications of one cut, seen by the dynamometer (the process alone) and by the current.
+struct VarianceSplit {
+  double process_mean = 0.0, current_mean = 0.0;          ///< [N]
+  double process_variance = 0.0, current_variance = 0.0;  ///< [N2]
+  double sensor_variance = 0.0;  ///< [N2] of the current's way of measuring: the difference, not below 0
+  double f_means = 0.0;          ///< [1] F of the difference of the means (1 and 2 n - 2 degrees of freedom)
+  double p_means = 1.0;          ///< [1] chance of such an F without a difference
+  double p_variances = 1.0;      ///< [1] chance of such a ratio of variances without a difference, one-sided
+};
+/// @throws Error with fewer than three replications on either side.
+VarianceSplit splitVariance(const std::vector<double>& dynamometer, const std::vector<double>& current);
+
+}  // namespace smartmill::loadmeter

@@ -1,0 +1,415 @@
+#include "smartmill_loadmeter/database/database.h"
+
+#include <sqlite3.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <set>
+
+#include "record_fields.h"
+#include "smartmill_core/error.h"
+#include "smartmill_core/model/machine_model.h"
+
+namespace smartmill::loadmeter {
+
+namespace {
+
+constexpr int SCHEMA = 1;
+constexpr int BUSY_TIMEOUT = 30000;  // [ms] that a writer waits for others
+constexpr int NO_SPEED = -1000000;   // bucket of records without a cutting speed
+constexpr int BUCKETS = 7;           // half octaves of speed looked at on each side
+constexpr int NEWEST = 16;           // records of a bucket that count
+
+class Statement {
+ public:
+  Statement(sqlite3* db, const std::string& file, const std::string& sql) : db_(db), file_(file) {
+    if (sqlite3_prepare_v2(db, sql.c_str(), -1, &statement_, nullptr) != SQLITE_OK) fail();
+  }
+  ~Statement() { sqlite3_finalize(statement_); }
+  Statement(const Statement&) = delete;
+  Statement& operator=(const Statement&) = delete;
+
+  void bind(int at, const std::string& word) {
+    if (sqlite3_bind_text(statement_, at, word.c_str(), -1, SQLITE_TRANSIENT) != SQLITE_OK) fail();
+  }
+  void bind(int at, double number) {
+    const int code = std::isfinite(number) ? sqlite3_bind_double(statement_, at, number)
+                                           : sqlite3_bind_null(statement_, at);
+    if (code != SQLITE_OK) fail();
+  }
+  void bind(int at, int number) {
+    if (sqlite3_bind_int(statement_, at, number) != SQLITE_OK) fail();
+  }
+  /// @return a row is there.
+  bool step() {
+    const int code = sqlite3_step(statement_);
+    if (code != SQLITE_ROW && code != SQLITE_DONE) fail();
+    return code == SQLITE_ROW;
+  }
+  void reset() { sqlite3_reset(statement_); }
+  std::string word(int column) const {
+    const auto* text = reinterpret_cast<const char*>(sqlite3_column_text(statement_, column));
+    return text ? text : "";
+  }
+  double number(int column) const {
+    if (sqlite3_column_type(statement_, column) == SQLITE_NULL) return CoefficientRecord::UNKNOWN;
+    return sqlite3_column_double(statement_, column);
+  }
+  int integer(int column) const { return sqlite3_column_int(statement_, column); }
+
+ private:
+  [[noreturn]] void fail() const { throw Error(file_ + ": " + sqlite3_errmsg(db_)); }
+  sqlite3* db_;
+  const std::string& file_;
+  sqlite3_stmt* statement_ = nullptr;
+};
+
+std::string columns() {
+  std::string list;
+  for (const WordField& f : wordFields()) list += (list.empty() ? "" : ", ") + f.name;
+  for (const NumberField& f : numberFields()) list += ", " + f.name;
+  return list;
+}
+
+CoefficientRecord recordOf(const Statement& row) {
+  CoefficientRecord record;
+  int column = 0;
+  for (const WordField& f : wordFields()) f.at(record) = row.word(column++);
+  for (const NumberField& f : numberFields()) f.set(record, f.index, row.number(column++));
+  return record;
+}
+
+// Two FNV-1a hashes of everything that was identified: the same everywhere, so that merging twice adds
+// nothing.
+std::string identityOf(CoefficientRecord record) {
+  std::string text;
+  for (const WordField& f : wordFields()) {
+    if (f.name != "version") text += f.at(record) + '\x1f';
+  }
+  for (const NumberField& f : numberFields()) text += exactNumber(f.get(record, f.index)) + '\x1f';
+  std::uint64_t a = 14695981039346656037ull, b = 1099511628211ull * 2654435761ull;
+  for (const char c : text) {
+    a = (a ^ static_cast<unsigned char>(c)) * 1099511628211ull;
+    b = (b ^ static_cast<unsigned char>(c)) * 1099511628211ull + 0x9e3779b97f4a7c15ull;
+  }
+  char id[40];
+  std::snprintf(id, sizeof id, "%016llx%016llx", static_cast<unsigned long long>(a),
+                static_cast<unsigned long long>(b));
+  return id;
+}
+
+int bucketOf(double cutting_speed) {
+  if (!(cutting_speed > 0.0)) return NO_SPEED;
+  return static_cast<int>(std::floor(2.0 * std::log2(cutting_speed)));
+}
+
+}  // namespace
+
+struct CoefficientDatabase::Impl {
+  std::string file;
+  sqlite3* db = nullptr;
+
+  explicit Impl(const std::string& path) : file(path.empty() ? ":memory:" : path) {
+    const int code = sqlite3_open_v2(
+        file.c_str(), &db, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_FULLMUTEX, nullptr);
+    try {
+      if (code != SQLITE_OK) throw Error(file + ": " + (db ? sqlite3_errmsg(db) : "cannot be opened"));
+      sqlite3_busy_timeout(db, BUSY_TIMEOUT);
+      prepare();
+    } catch (...) {
+      sqlite3_close(db);
+      throw;
+    }
+  }
+  ~Impl() { sqlite3_close(db); }
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
+
+  void execute(const std::string& sql) const {
+    char* message = nullptr;
+    if (sqlite3_exec(db, sql.c_str(), nullptr, nullptr, &message) == SQLITE_OK) return;
+    const std::string what = message ? message : "failed";
+    sqlite3_free(message);
+    throw Error(file + ": " + what);
+  }
+
+  int version() const {
+    Statement s(db, file, "PRAGMA user_version");
+    return s.step() ? s.integer(0) : 0;
+  }
+
+  void prepare() const {
+    // The mode is kept in the file, so that one process only has to switch it.
+    Statement mode(db, file, "PRAGMA journal_mode");
+    const bool is_wal = mode.step() && mode.word(0) == "wal";
+    mode.reset();
+    for (int tries = 0; !is_wal; ++tries) {
+      try {
+        execute("PRAGMA journal_mode=WAL");
+        break;
+      } catch (const Error&) {
+        // Switching does not wait for other processes by itself.
+        if (tries == 200 || sqlite3_errcode(db) != SQLITE_BUSY) throw;
+        sqlite3_sleep(20);
+      }
+    }
+    execute("PRAGMA synchronous=FULL");
+    if (version() == 0) {
+      transaction([this] {
+        if (version() != 0) return;  // another process was first
+        {
+          Statement tables(db, file, "SELECT count(*) FROM sqlite_master");
+          if (tables.step() && tables.integer(0) > 0) {
+            throw Error(file + ": a database, but not of cutting coefficients");
+          }
+        }
+        std::string sql =
+            "CREATE TABLE coefficients (id INTEGER PRIMARY KEY, identity TEXT NOT NULL UNIQUE, "
+            "speed_bucket INTEGER NOT NULL";
+        for (const WordField& f : wordFields()) sql += ", " + f.name + " TEXT NOT NULL";
+        for (const NumberField& f : numberFields()) sql += ", " + f.name + " REAL";
+        execute(sql + ")");
+        execute("CREATE INDEX pair ON coefficients (material, tool, speed_bucket, stamp)");
+        execute("CREATE INDEX material_speed ON coefficients (material, speed_bucket, stamp)");
+        execute("CREATE INDEX newest ON coefficients (material, tool, stamp)");
+        execute("CREATE INDEX newest_of_tool ON coefficients (tool, stamp)");
+        execute("CREATE INDEX newest_of_material ON coefficients (material, stamp)");
+        execute("CREATE INDEX newest_of_all ON coefficients (stamp)");
+        execute("PRAGMA user_version=" + std::to_string(SCHEMA));
+      });
+    }
+    if (version() != SCHEMA) {
+      throw Error(file + ": schema " + std::to_string(version()) + " is not one this version knows (" +
+                  std::to_string(SCHEMA) + ")");
+    }
+  }
+
+  template <typename Work>
+  void transaction(const Work& work) const {
+    execute("BEGIN IMMEDIATE");
+    try {
+      work();
+      execute("COMMIT");
+    } catch (...) {
+      sqlite3_exec(db, "ROLLBACK", nullptr, nullptr, nullptr);
+      throw;
+    }
+  }
+
+  std::string where(const std::string& tool, const std::string& material) const {
+    std::string sql;
+    if (!material.empty()) sql += " WHERE material = ?1";
+    if (!tool.empty()) sql += std::string(sql.empty() ? " WHERE" : " AND") + " tool = ?2";
+    return sql;
+  }
+  static void bindPair(Statement& s, const std::string& tool, const std::string& material) {
+    if (!material.empty()) s.bind(1, material);
+    if (!tool.empty()) s.bind(2, tool);
+  }
+};
+
+CoefficientDatabase::CoefficientDatabase(const std::string& file) : impl_(std::make_unique<Impl>(file)) {
+}
+CoefficientDatabase::~CoefficientDatabase() = default;
+
+bool CoefficientDatabase::add(const CoefficientRecord& record) {
+  return add(std::vector<CoefficientRecord>{record}) == 1;
+}
+
+bool CoefficientDatabase::add(const CoefficientSet& set) {
+  CoefficientRecord record;
+  record.set = set;
+  return add(record);
+}
+
+std::size_t CoefficientDatabase::add(const std::vector<CoefficientRecord>& records) {
+  std::size_t added = 0;
+  impl_->transaction([&] {
+    std::string marks = "?1, ?2";
+    const std::size_t count = wordFields().size() + numberFields().size();
+    for (std::size_t i = 0; i < count; ++i) marks += ", ?" + std::to_string(i + 3);
+    Statement insert(impl_->db, impl_->file,
+                     "INSERT OR IGNORE INTO coefficients (identity, speed_bucket, " + columns() +
+                         ") VALUES (" + marks + ")");
+    for (CoefficientRecord record : records) {
+      if (!std::isfinite(record.set.stamp)) throw Error(impl_->file + ": stamp of a record is not a number");
+      if (record.version.empty()) record.version = SMARTMILL_VERSION;
+      int at = 1;
+      insert.bind(at++, identityOf(record));
+      insert.bind(at++, bucketOf(record.cutting_speed));
+      for (const WordField& f : wordFields()) insert.bind(at++, f.at(record));
+      for (const NumberField& f : numberFields()) insert.bind(at++, f.get(record, f.index));
+      insert.step();
+      added += static_cast<std::size_t>(sqlite3_changes(impl_->db));
+      insert.reset();
+    }
+  });
+  return added;
+}
+
+std::optional<CoefficientSet> CoefficientDatabase::find(const std::string& tool,
+                                                        const std::string& material) const {
+  Statement s(impl_->db, impl_->file,
+              "SELECT " + columns() + " FROM coefficients" + impl_->where(tool, material) +
+                  " ORDER BY stamp DESC, id DESC LIMIT 1");
+  Impl::bindPair(s, tool, material);
+  if (!s.step()) return std::nullopt;
+  return recordOf(s).set;
+}
+
+std::vector<CoefficientRecord> CoefficientDatabase::records(const std::string& tool,
+                                                            const std::string& material) const {
+  Statement s(
+      impl_->db, impl_->file,
+      "SELECT " + columns() + " FROM coefficients" + impl_->where(tool, material) + " ORDER BY stamp, id");
+  Impl::bindPair(s, tool, material);
+  std::vector<CoefficientRecord> found;
+  while (s.step()) found.push_back(recordOf(s));
+  return found;
+}
+
+std::size_t CoefficientDatabase::size() const {
+  Statement s(impl_->db, impl_->file, "SELECT count(*) FROM coefficients");
+  return s.step() ? static_cast<std::size_t>(s.number(0)) : 0;
+}
+
+std::size_t CoefficientDatabase::merge(const std::string& file) {
+  std::FILE* there = std::fopen(file.c_str(), "rb");
+  if (!there) throw Error(file + ": cannot be read");
+  std::fclose(there);
+  return add(CoefficientDatabase(file).records("", ""));
+}
+
+std::string CoefficientDatabase::contents() const {
+  Statement s(impl_->db, impl_->file, "SELECT DISTINCT tool, material FROM coefficients ORDER BY 1, 2");
+  std::string text;
+  while (s.step()) text += (text.empty() ? "" : ", ") + s.word(0) + " / " + s.word(1);
+  return text.empty() ? "nothing" : text;
+}
+
+double distance(const CoefficientRecord& record, const CoefficientQuery& query, const DistanceScale& scale) {
+  double sum = 0.0;
+  const auto add = [&](double share) {
+    if (std::isfinite(share)) sum += share * share;
+  };
+  add(std::log2(record.cutting_speed / query.cutting_speed) / scale.octaves);
+  add(std::log2(record.feed_per_tooth / query.feed_per_tooth) / scale.octaves);
+  add(std::log2(record.diameter / query.diameter) / scale.octaves);
+  add((record.helix - query.helix) / scale.angle);
+  add((record.rake - query.rake) / scale.angle);
+  add((record.edge_age - query.edge_age) / scale.age);
+  if (!query.tool.empty() && record.set.tool != query.tool) add(scale.other_tool);
+  return std::sqrt(sum);
+}
+
+std::optional<CoefficientEstimate> CoefficientDatabase::estimate(const CoefficientQuery& query,
+                                                                 const DistanceScale& scale) const {
+  CoefficientEstimate result;
+  std::vector<CoefficientRecord> near;
+  const auto collect = [&](const std::string& tool) {
+    std::string sql = "SELECT " + columns() + " FROM coefficients" + impl_->where(tool, query.material);
+    const bool speed = query.cutting_speed > 0.0;
+    if (speed)
+      sql += std::string(sql.find(" WHERE") == std::string::npos ? " WHERE" : " AND") + " speed_bucket = ?3";
+    sql += " ORDER BY stamp DESC LIMIT " + std::to_string(NEWEST);
+    Statement s(impl_->db, impl_->file, sql);
+    std::vector<int> buckets{NO_SPEED};
+    const int middle = bucketOf(query.cutting_speed);
+    for (int b = -BUCKETS; speed && b <= BUCKETS; ++b) buckets.push_back(middle + b);
+    for (const int bucket : buckets) {
+      Impl::bindPair(s, tool, query.material);
+      if (speed) s.bind(3, bucket);
+      while (s.step()) near.push_back(recordOf(s));
+      s.reset();
+      if (!speed) break;
+    }
+    // Nothing near: the newest, however far.
+    if (near.empty() && speed) {
+      Statement any(impl_->db, impl_->file,
+                    "SELECT " + columns() + " FROM coefficients" + impl_->where(tool, query.material) +
+                        " ORDER BY stamp DESC LIMIT " + std::to_string(NEWEST));
+      Impl::bindPair(any, tool, query.material);
+      while (any.step()) near.push_back(recordOf(any));
+    }
+  };
+  collect(query.tool);
+  if (near.empty() && !query.tool.empty()) {
+    collect("");
+    result.other_tool = true;
+  }
+  if (near.empty()) return std::nullopt;
+
+  result.set.value = result.set.std_dev = NOT_IDENTIFIED;
+  double nearest = std::numeric_limits<double>::infinity();
+  std::vector<double> distances;
+  for (const CoefficientRecord& r : near) {
+    distances.push_back(distance(r, query, scale));
+    if (distances.back() < nearest) {
+      nearest = distances.back();
+      result.set.tool = r.set.tool;
+      result.set.material = r.set.material;
+      result.set.source = r.set.source;
+    }
+    result.set.stamp = std::max(result.set.stamp, r.set.stamp);
+    result.set.tests += r.set.tests;
+  }
+  result.nearest = nearest;
+  result.records = static_cast<int>(near.size());
+  for (const CuttingKey& k : cuttingKeys()) {
+    double weight = 0.0, sum = 0.0, fade = std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i < near.size(); ++i) {
+      const double v = near[i].set.value.*k.coefficient, s = near[i].set.std_dev.*k.coefficient;
+      if (!std::isfinite(v)) continue;
+      // A set without a standard deviation counts as known to the growth of one distance.
+      const double own = std::isfinite(s) ? s : scale.growth * std::abs(v);
+      const double widened = scale.growth * distances[i] * v;
+      const double variance = std::max(own * own + widened * widened, 1e-12 * v * v + 1e-300);
+      weight += 1.0 / variance;
+      sum += v / variance;
+      fade = std::min(fade, std::abs(widened));
+    }
+    if (!(weight > 0.0)) continue;
+    const double value = sum / weight;
+    // Sets of one pair differ by more than their own noise when the process changes between them.
+    double scatter = 0.0;
+    int count = 0;
+    for (std::size_t i = 0; i < near.size(); ++i) {
+      const double v = near[i].set.value.*k.coefficient, s = near[i].set.std_dev.*k.coefficient;
+      if (!std::isfinite(v)) continue;
+      const double own = std::isfinite(s) ? s : scale.growth * std::abs(v);
+      const double widened = scale.growth * distances[i] * v;
+      scatter += (v - value) * (v - value) / (own * own + widened * widened + 1e-300);
+      ++count;
+    }
+    const double factor = count > 1 ? std::max(1.0, scatter / (count - 1)) : 1.0;
+    result.set.value.*k.coefficient = value;
+    // All of them share the distance: averaging does not take it away.
+    result.set.std_dev.*k.coefficient = std::sqrt(factor / weight + fade * fade);
+  }
+  return result;
+}
+
+FoundCoefficients findCoefficients(const CoefficientDatabase& database, const std::string& tool,
+                                   const std::string& material) {
+  FoundCoefficients found;
+  found.set = database.find(tool, material);
+  if (found.set) {
+    found.message = "source " + found.set->source + ", " + std::to_string(found.set->tests) + " tests";
+    return found;
+  }
+  CoefficientQuery query;
+  query.tool = tool;
+  query.material = material;
+  if (const auto estimate = database.estimate(query)) {
+    found.set = estimate->set;
+    found.message = "nothing with '" + tool + "' yet: from " + std::to_string(estimate->records) + " of '" +
+                    estimate->set.tool + "' and other tools, uncertainty widened";
+    return found;
+  }
+  found.message = "nothing for '" + tool + "' in '" + material + "'; known: " + database.contents();
+  return found;
+}
+
+}  // namespace smartmill::loadmeter

@@ -1,0 +1,187 @@
+#include "smartmill_loadmeter/identification/production.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <set>
+
+#include "smartmill_core/cutting/mechanistic.h"
+#include "smartmill_core/error.h"
+#include "smartmill_core/units.h"
+
+namespace smartmill::loadmeter {
+
+namespace {
+
+using Information = std::array<double, 3>;  // xx, xy, yy of (Ktc, Kte)
+
+double determinant(const Information& i) {
+  return i[0] * i[2] - i[1] * i[1];
+}
+
+struct Sensitivity {
+  double tc, te;  // [N m] per unit of Ktc, Kte
+};
+
+Sensitivity sensitivityOf(const ToolGeometry& tool, const Engagement& engagement) {
+  const auto map = meanForceMatrix(tool, engagement);
+  return {map[3][0], map[3][3]};
+}
+
+void add(Information& i, const Sensitivity& s, double variance) {
+  i[0] += s.tc * s.tc / variance;
+  i[1] += s.tc * s.te / variance;
+  i[2] += s.te * s.te / variance;
+}
+
+}  // namespace
+
+RecursiveCoefficients::RecursiveCoefficients(const Start& start, double memory)
+    : value_{start.ktc, start.kte}, memory_(memory) {
+  if (!(memory > 0.0) || !(start.ktc_std > 0.0) || !(start.kte_std > 0.0)) {
+    throw Error("recursive coefficients: memory and starting standard deviations must be > 0");
+  }
+  start_ = {1.0 / (start.ktc_std * start.ktc_std), 0.0, 1.0 / (start.kte_std * start.kte_std)};
+  information_ = start_;
+}
+
+void RecursiveCoefficients::update(const TorqueReading& reading) {
+  if (!(reading.torque_std > 0.0) || !std::isfinite(reading.torque)) {
+    throw Error("recursive coefficients: a torque with a standard deviation > 0 is due");
+  }
+  // What fades is replaced by the ignorance of the start about the present value.
+  const double keep = std::exp(-reading.cutting_time / memory_);
+  for (std::size_t i = 0; i < 3; ++i) information_[i] = keep * information_[i] + (1.0 - keep) * start_[i];
+  const Sensitivity s = sensitivityOf(reading.tool, reading.engagement);
+  const double variance = reading.torque_std * reading.torque_std;
+  const double d0 = determinant(information_);
+  const double expected =
+      (s.tc * s.tc * information_[2] - 2.0 * s.tc * s.te * information_[1] + s.te * s.te * information_[0]) /
+      d0;
+  const double error = reading.torque - s.tc * value_[0] - s.te * value_[1];
+  surprise_ = error / std::sqrt(variance + expected);
+  add(information_, s, variance);
+  const double d = determinant(information_);
+  value_[0] += (information_[2] * s.tc - information_[1] * s.te) / d * error / variance;
+  value_[1] += (information_[0] * s.te - information_[1] * s.tc) / d * error / variance;
+  ++readings_;
+}
+
+double RecursiveCoefficients::ktcStd() const {
+  return std::sqrt(information_[2] / determinant(information_));
+}
+double RecursiveCoefficients::kteStd() const {
+  return std::sqrt(information_[0] / determinant(information_));
+}
+double RecursiveCoefficients::covariance() const {
+  return -information_[1] / determinant(information_);
+}
+
+TestPlan planTests(const ToolGeometry& tool, const Spindle& spindle, const CuttingCoefficients& believed,
+                   const CandidateCuts& candidates, const CutLimits& limits, double voltage_std,
+                   double asked_ktc_std, double asked_kte_std, std::size_t most) {
+  struct Candidate {
+    PlannedCut cut;
+    Sensitivity s;
+    double variance;
+  };
+  std::vector<Candidate> allowed;
+  for (const double speed : candidates.speeds) {
+    for (const double feed : candidates.feeds) {
+      for (const double depth : candidates.axial_depths) {
+        Candidate c;
+        c.cut.speed = speed;
+        c.cut.engagement = {candidates.entry, candidates.exit, depth, feed};
+        c.s = sensitivityOf(tool, c.cut.engagement);
+        c.cut.torque = c.s.tc * believed.ktc + c.s.te * believed.kte;
+        c.cut.power = c.cut.torque * speed;
+        if (c.cut.torque > limits.torque || c.cut.power > limits.power) continue;
+        if (limits.stable_depth && depth > limits.stable_depth(speed, c.cut.engagement)) continue;
+        // eq. 3.12: a volt is worth less torque the faster the spindle turns. Friction is measured in air at
+        // the same speed: twice the variance.
+        const double std_dev = voltage_std / (spindle.load_meter_gain * speed);
+        c.variance = 2.0 * std_dev * std_dev;
+        allowed.push_back(c);
+      }
+    }
+  }
+  std::set<double> feeds;
+  for (const Candidate& c : allowed) feeds.insert(c.cut.engagement.feed_per_tooth);
+  if (feeds.size() < 3) {
+    throw Error("test plan: " + std::to_string(feeds.size()) +
+                " feeds keep the limits of torque, power and stability; three are due");
+  }
+  std::vector<std::size_t> chosen;
+  const auto stds = [&](const std::vector<std::size_t>& list) {
+    Information i{0.0, 0.0, 0.0};
+    for (const std::size_t k : list) add(i, allowed[k].s, allowed[k].variance);
+    const double d = determinant(i);
+    if (!(d > 1e-12 * i[0] * i[2])) return std::array<double, 2>{INFINITY, INFINITY};
+    return std::array<double, 2>{std::sqrt(i[2] / d), std::sqrt(i[0] / d)};
+  };
+  // Cost: the worse of the two against what is asked; too few feeds are impossible.
+  const auto cost = [&](const std::vector<std::size_t>& list) {
+    std::set<double> own;
+    for (const std::size_t k : list) own.insert(allowed[k].cut.engagement.feed_per_tooth);
+    const auto s = stds(list);
+    const std::size_t due = std::min<std::size_t>(3, list.size());
+    const double missing = own.size() < due ? 1e6 : 1.0;
+    // The sum breaks ties before both are finite.
+    Information i{0.0, 0.0, 0.0};
+    for (const std::size_t k : list) add(i, allowed[k].s, allowed[k].variance);
+    if (!std::isfinite(s[0])) return 1e12 * missing / (1e-300 + i[0] * asked_ktc_std * asked_ktc_std);
+    return missing * std::max(s[0] / asked_ktc_std, s[1] / asked_kte_std);
+  };
+  const auto improve = [&] {
+    double best = cost(chosen);
+    for (bool better = true; better;) {
+      better = false;
+      for (std::size_t at = 0; at < chosen.size(); ++at) {
+        for (std::size_t k = 0; k < allowed.size(); ++k) {
+          std::vector<std::size_t> other = chosen;
+          other[at] = k;
+          const double c = cost(other);
+          if (c < best * (1.0 - 1e-12)) {
+            best = c;
+            chosen = other;
+            better = true;
+          }
+        }
+      }
+    }
+    return best;
+  };
+  double reached = INFINITY;
+  while (chosen.size() < most) {
+    std::size_t pick = 0;
+    double best = INFINITY;
+    for (std::size_t k = 0; k < allowed.size(); ++k) {
+      std::vector<std::size_t> other = chosen;
+      other.push_back(k);
+      const double c = cost(other);
+      if (c < best) best = c, pick = k;
+    }
+    chosen.push_back(pick);
+    reached = improve();
+    if (chosen.size() >= 3 && reached <= 1.0) break;
+  }
+  if (!(reached <= 1.0)) {
+    const auto s = stds(chosen);
+    char text[200];
+    std::snprintf(
+        text, sizeof text,
+        "test plan: %zu cuts within the limits reach Ktc +- %.3g N/mm2 and Kte +- %.3g N/mm, more is asked",
+        most, s[0] / units::N_PER_MM2, s[1] / units::N_PER_MM);
+    throw Error(text);
+  }
+  TestPlan plan;
+  std::sort(chosen.begin(), chosen.end());
+  for (const std::size_t k : chosen) plan.cuts.push_back(allowed[k].cut);
+  const auto s = stds(chosen);
+  plan.ktc_std = s[0];
+  plan.kte_std = s[1];
+  return plan;
+}
+
+}  // namespace smartmill::loadmeter

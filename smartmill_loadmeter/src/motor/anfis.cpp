@@ -1,0 +1,199 @@
+#include "smartmill_loadmeter/motor/anfis.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include <Eigen/Cholesky>
+
+#include "smartmill_core/error.h"
+
+namespace smartmill::loadmeter {
+
+Anfis::Anfis(const std::vector<std::vector<double>>& inputs, const std::vector<double>& outputs,
+             const Parameters& parameters)
+    : inputs_(inputs.empty() ? 0 : inputs.front().size()),
+      memberships_(static_cast<std::size_t>(parameters.memberships)) {
+  if (parameters.memberships < 2 || parameters.memberships > 5 || parameters.epochs < 1 ||
+      !(parameters.step > 0.0) || !(parameters.ridge >= 0.0)) {
+    throw Error("anfis: memberships 2..5, epochs >= 1, step > 0 and ridge >= 0 are due");
+  }
+  if (inputs.size() != outputs.size() || inputs.size() < inputs_ + 2) {
+    throw Error("anfis: " + std::to_string(inputs.size()) + " samples are too few");
+  }
+  for (const auto& input : inputs) {
+    if (input.size() != inputs_) throw Error("anfis: samples of different length");
+  }
+  for (std::size_t i = 0; i < inputs_; ++i) {
+    double low = inputs[0][i], high = inputs[0][i];
+    for (const auto& input : inputs) {
+      low = std::min(low, input[i]);
+      high = std::max(high, input[i]);
+    }
+    low_.push_back(low);
+    span_.push_back(high > low ? high - low : 1.0);
+    for (std::size_t m = 0; m < memberships_; ++m) {
+      const double gap = 1.0 / static_cast<double>(memberships_ - 1);
+      bells_.push_back({0.5 * gap, 2.0, gap * static_cast<double>(m)});
+    }
+  }
+  const auto [least, most] = std::minmax_element(outputs.begin(), outputs.end());
+  out_middle_ = 0.5 * (*least + *most);
+  out_span_ = *most > *least ? *most - *least : 1.0;
+  std::vector<std::vector<double>> x;
+  std::vector<double> y;
+  for (std::size_t i = 0; i < inputs.size(); ++i) {
+    x.push_back(scaled(inputs[i]));
+    y.push_back((outputs[i] - out_middle_) / out_span_);
+  }
+  double step = parameters.step;
+  solveLines(x, y, parameters.ridge);
+  double before = squares(x, y);
+  int falls = 0;
+  for (int epoch = 0; epoch < parameters.epochs; ++epoch) {
+    // Backward pass: gradient to a, b, c of every bell, the lines held.
+    std::vector<double> gradient(3 * bells_.size(), 0.0);
+    std::vector<double> normalised;
+    const std::size_t width = inputs_ + 1;
+    for (std::size_t s = 0; s < x.size(); ++s) {
+      fire(x[s], &normalised);
+      std::vector<double> line(normalised.size());
+      double out = 0.0;
+      for (std::size_t r = 0; r < normalised.size(); ++r) {
+        line[r] = lines_[r * width + inputs_];
+        for (std::size_t i = 0; i < inputs_; ++i) line[r] += lines_[r * width + i] * x[s][i];
+        out += normalised[r] * line[r];
+      }
+      const double error = out - y[s];
+      for (std::size_t r = 0; r < normalised.size(); ++r) {
+        // d out / d ln(mu) of a membership of this rule is normalised (line - out).
+        const double share = 2.0 * error * normalised[r] * (line[r] - out);
+        std::size_t rest = r;
+        for (std::size_t i = 0; i < inputs_; ++i) {
+          const std::size_t at = i * memberships_ + rest % memberships_;
+          rest /= memberships_;
+          const Bell& bell = bells_[at];
+          const double d = x[s][i] - bell.c, ratio = std::abs(d / bell.a);
+          if (ratio < 1e-9) continue;
+          const double power = std::pow(ratio, 2.0 * bell.b), mu = 1.0 / (1.0 + power);
+          const double slope = mu * power;  // - d ln(mu) / d ln(power)
+          gradient[3 * at] += share * slope * 2.0 * bell.b / bell.a;
+          gradient[3 * at + 1] -= share * slope * 2.0 * std::log(ratio);
+          gradient[3 * at + 2] += share * slope * 2.0 * bell.b / d;
+        }
+      }
+    }
+    double norm = 0.0;
+    for (const double g : gradient) norm += g * g;
+    if (!(norm > 0.0)) break;
+    norm = std::sqrt(norm);
+    const std::vector<Bell> kept = bells_;
+    const std::vector<double> kept_lines = lines_;
+    for (std::size_t k = 0; k < bells_.size(); ++k) {
+      bells_[k].a = std::clamp(bells_[k].a - step * gradient[3 * k] / norm, 0.1, 2.0);
+      bells_[k].b = std::clamp(bells_[k].b - step * gradient[3 * k + 1] / norm, 0.5, 5.0);
+      bells_[k].c = std::clamp(bells_[k].c - step * gradient[3 * k + 2] / norm, -0.5, 1.5);
+    }
+    solveLines(x, y, parameters.ridge);
+    const double now = squares(x, y);
+    if (now < before) {
+      before = now;
+      if (++falls == 4) step *= 1.1, falls = 0;  // Jang's rule
+    } else {
+      bells_ = kept;
+      lines_ = kept_lines;
+      step *= 0.5;
+      falls = 0;
+      if (step < 1e-5) break;
+    }
+  }
+  rms_ = out_span_ * std::sqrt(before / static_cast<double>(x.size()));
+}
+
+std::size_t Anfis::rules() const {
+  std::size_t count = 1;
+  for (std::size_t i = 0; i < inputs_; ++i) count *= memberships_;
+  return count;
+}
+
+std::vector<double> Anfis::scaled(const std::vector<double>& input) const {
+  std::vector<double> x(inputs_);
+  for (std::size_t i = 0; i < inputs_; ++i) x[i] = (input[i] - low_[i]) / span_[i];
+  return x;
+}
+
+void Anfis::fire(const std::vector<double>& x, std::vector<double>* normalised) const {
+  std::vector<double> mu(bells_.size());
+  for (std::size_t k = 0; k < bells_.size(); ++k) {
+    const Bell& bell = bells_[k];
+    mu[k] = 1.0 / (1.0 + std::pow(std::abs((x[k / memberships_] - bell.c) / bell.a), 2.0 * bell.b));
+  }
+  normalised->assign(rules(), 1.0);
+  double sum = 0.0;
+  for (std::size_t r = 0; r < normalised->size(); ++r) {
+    std::size_t rest = r;
+    for (std::size_t i = 0; i < inputs_; ++i) {
+      (*normalised)[r] *= mu[i * memberships_ + rest % memberships_];
+      rest /= memberships_;
+    }
+    sum += (*normalised)[r];
+  }
+  for (double& w : *normalised) w /= sum;
+}
+
+void Anfis::solveLines(const std::vector<std::vector<double>>& x, const std::vector<double>& y,
+                       double ridge) {
+  const std::size_t width = inputs_ + 1, size = rules() * width;
+  const Eigen::Index n = static_cast<Eigen::Index>(size);
+  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(n, n);
+  Eigen::VectorXd right = Eigen::VectorXd::Zero(n), row(n);
+  std::vector<double> normalised;
+  for (std::size_t s = 0; s < x.size(); ++s) {
+    fire(x[s], &normalised);
+    for (std::size_t r = 0; r < normalised.size(); ++r) {
+      for (std::size_t i = 0; i <= inputs_; ++i) {
+        row[static_cast<Eigen::Index>(r * width + i)] = normalised[r] * (i < inputs_ ? x[s][i] : 1.0);
+      }
+    }
+    normal.selfadjointView<Eigen::Lower>().rankUpdate(row);
+    right += row * y[s];
+  }
+  normal.diagonal().array() += ridge * static_cast<double>(x.size()) / static_cast<double>(rules()) + 1e-12;
+  const Eigen::VectorXd found = normal.selfadjointView<Eigen::Lower>().ldlt().solve(right);
+  lines_.assign(found.data(), found.data() + n);
+}
+
+double Anfis::squares(const std::vector<std::vector<double>>& x, const std::vector<double>& y) const {
+  double sum = 0.0;
+  std::vector<double> normalised;
+  const std::size_t width = inputs_ + 1;
+  for (std::size_t s = 0; s < x.size(); ++s) {
+    fire(x[s], &normalised);
+    double out = 0.0;
+    for (std::size_t r = 0; r < normalised.size(); ++r) {
+      double line = lines_[r * width + inputs_];
+      for (std::size_t i = 0; i < inputs_; ++i) line += lines_[r * width + i] * x[s][i];
+      out += normalised[r] * line;
+    }
+    sum += (out - y[s]) * (out - y[s]);
+  }
+  return sum;
+}
+
+double Anfis::operator()(const std::vector<double>& input) const {
+  if (input.size() != inputs_) throw Error("anfis: " + std::to_string(inputs_) + " inputs are due");
+  const std::vector<double> x = scaled(input);
+  // squares() of one sample against zero would lose the sign.
+  std::vector<double> normalised;
+  fire(x, &normalised);
+  double out = 0.0;
+  const std::size_t width = inputs_ + 1;
+  for (std::size_t r = 0; r < normalised.size(); ++r) {
+    double line = lines_[r * width + inputs_];
+    for (std::size_t i = 0; i < inputs_; ++i) line += lines_[r * width + i] * x[i];
+    out += normalised[r] * line;
+  }
+  return out_middle_ + out_span_ * out;
+}
+
+}  // namespace smartmill::loadmeter

@@ -1,0 +1,296 @@
+#include "smartmill_loadmeter/motor/motor_calibration.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <limits>
+#include <map>
+#include <sstream>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/model/strict_yaml.h"
+#include "smartmill_core/units.h"
+
+namespace smartmill::loadmeter {
+
+namespace {
+
+constexpr const char* FORMAT = "smartmill-motor-calibration/1";
+const std::array<const char*, 3> AXES{"x", "y", "z"};
+
+/// Rows of a table whose first-named column is a word and all others numbers or empty.
+class Table {
+ public:
+  Table(const std::string& file, const std::vector<std::string>& known) : file_(file) {
+    std::ifstream stream(file);
+    if (!stream) throw Error(file + ": cannot be read");
+    std::string line;
+    if (!std::getline(stream, line)) throw Error(file + ": is empty");
+    names_ = cellsOf(line);
+    std::map<std::string, int> seen;
+    bool has_cut = false;
+    for (const std::string& name : names_) {
+      if (++seen[name] > 1) throw Error(file + ": line 1: column '" + name + "' stands twice");
+      if (name == "cut") {
+        has_cut = true;
+        continue;
+      }
+      if (std::find(known.begin(), known.end(), name) == known.end()) {
+        throw Error(file + ": line 1: column '" + name + "' is not known");
+      }
+    }
+    if (!has_cut) throw Error(file + ": line 1: column 'cut' is missing");
+    std::map<std::string, int> cuts;
+    for (int number = 2; std::getline(stream, line); ++number) {
+      if (line.find_first_not_of(" \t\r,") == std::string::npos) continue;
+      const std::vector<std::string> cells = cellsOf(line);
+      const std::string where = file + ": line " + std::to_string(number);
+      if (cells.size() != names_.size()) {
+        throw Error(where + ": " + std::to_string(cells.size()) + " cells, " + std::to_string(names_.size()) +
+                    " are due");
+      }
+      Row row;
+      row.line = number;
+      for (std::size_t c = 0; c < cells.size(); ++c) {
+        if (names_[c] == "cut") {
+          row.cut = cells[c];
+        } else if (!cells[c].empty()) {
+          double value = 0.0;
+          const char* last = cells[c].data() + cells[c].size();
+          const auto [end, code] = std::from_chars(cells[c].data(), last, value);
+          if (code != std::errc() || end != last || !std::isfinite(value)) {
+            throw Error(where + ": " + names_[c] + ": '" + cells[c] + "' is not a number");
+          }
+          row.values[names_[c]] = value;
+        }
+      }
+      if (row.cut.empty()) throw Error(where + ": cut: a name is due");
+      if (++cuts[row.cut] > 1) throw Error(where + ": cut '" + row.cut + "' stands twice");
+      rows_.push_back(row);
+    }
+    if (rows_.empty()) throw Error(file + ": no cut in the table");
+  }
+
+  struct Row {
+    int line = 0;
+    std::string cut;
+    std::map<std::string, double> values;
+
+    std::optional<double> at(const std::string& name) const {
+      const auto found = values.find(name);
+      if (found == values.end()) return std::nullopt;
+      return found->second;
+    }
+  };
+  const std::vector<Row>& rows() const { return rows_; }
+
+ private:
+  static std::vector<std::string> cellsOf(const std::string& line) {
+    std::vector<std::string> cells;
+    std::stringstream stream(line + ",");
+    for (std::string cell; std::getline(stream, cell, ',');) {
+      const std::size_t first = cell.find_first_not_of(" \t\r");
+      const std::size_t last = cell.find_last_not_of(" \t\r");
+      cells.push_back(first == std::string::npos ? "" : cell.substr(first, last - first + 1));
+    }
+    return cells;
+  }
+
+  std::string file_;
+  std::vector<std::string> names_;
+  std::vector<Row> rows_;
+};
+
+std::string numbersOf(const std::vector<double>& values) {
+  std::string text = "[";
+  for (std::size_t i = 0; i < values.size(); ++i) text += (i ? ", " : "") + yamlNumber(values[i], 17);
+  return text + "]";
+}
+
+}  // namespace
+
+Estimate DriveCalibration::opposing(double current, double air) const {
+  const double rise = current - air;
+  return {newton_per_ampere.value * rise, std::hypot(newton_per_ampere.std_dev * rise, scatter)};
+}
+
+std::vector<StandardCut> readStandardCuts(const std::string& file) {
+  const Table table(file, {"force_x[N]", "force_y[N]", "force_z[N]", "torque[N m]"});
+  std::vector<StandardCut> cuts;
+  for (const Table::Row& row : table.rows()) {
+    StandardCut cut;
+    cut.name = row.cut;
+    for (std::size_t a = 0; a < 3; ++a) cut.force[a] = row.at(std::string("force_") + AXES[a] + "[N]");
+    cut.torque = row.at("torque[N m]");
+    cuts.push_back(cut);
+  }
+  return cuts;
+}
+
+std::vector<MachineCurrents> readMachineCurrents(const std::string& file) {
+  std::vector<std::string> known{"spindle_speed[rpm]"};
+  for (const char* axis : {"x", "y", "z", "spindle"}) {
+    known.push_back(std::string("current_") + axis + "[A]");
+    known.push_back(std::string("air_") + axis + "[A]");
+  }
+  const Table table(file, known);
+  std::vector<MachineCurrents> all;
+  for (const Table::Row& row : table.rows()) {
+    const std::string where = file + ": line " + std::to_string(row.line) + ": ";
+    const auto pair = [&](const std::string& axis, std::optional<double>* current,
+                          std::optional<double>* air) {
+      *current = row.at("current_" + axis + "[A]");
+      *air = row.at("air_" + axis + "[A]");
+      if (current->has_value() != air->has_value()) {
+        throw Error(where + (*current ? "air_" : "current_") + axis +
+                    "[A]: empty; current in cut and in air are due together");
+      }
+    };
+    MachineCurrents c;
+    c.name = row.cut;
+    c.spindle_speed = units::radPerSecFromRpm(row.at("spindle_speed[rpm]").value_or(0.0));
+    for (std::size_t a = 0; a < 3; ++a) pair(AXES[a], &c.current[a], &c.air[a]);
+    pair("spindle", &c.spindle_current, &c.spindle_air);
+    if (c.spindle_current && !(c.spindle_speed > 0.0)) {
+      throw Error(where + "spindle_speed[rpm]: > 0 is due with a current of the spindle");
+    }
+    all.push_back(c);
+  }
+  return all;
+}
+
+MotorCalibration calibrateMotors(const std::vector<StandardCut>& cuts,
+                                 const std::vector<MachineCurrents>& currents, double base_speed) {
+  std::map<std::string, const StandardCut*> standard;
+  for (const StandardCut& cut : cuts) {
+    if (!standard.emplace(cut.name, &cut).second) throw Error("standard cut '" + cut.name + "' stands twice");
+  }
+  MotorCalibration result;
+  std::array<std::vector<double>, 3> rises, forces;
+  std::vector<SpindleCut> spindle;
+  for (const MachineCurrents& c : currents) {
+    const auto found = standard.find(c.name);
+    if (found == standard.end()) {
+      result.notes.push_back("cut '" + c.name + "' is no standard cut, left out");
+      continue;
+    }
+    const StandardCut& cut = *found->second;
+    for (std::size_t a = 0; a < 3; ++a) {
+      if (!c.current[a] || !cut.force[a]) continue;
+      rises[a].push_back(*c.current[a] - *c.air[a]);
+      forces[a].push_back(*cut.force[a]);
+    }
+    if (c.spindle_current && cut.torque) {
+      spindle.push_back(
+          {units::rpmFromRadPerSec(c.spindle_speed), *c.spindle_current - *c.spindle_air, *cut.torque});
+    }
+  }
+  for (std::size_t a = 0; a < 3; ++a) {
+    const std::size_t n = rises[a].size();
+    if (n == 0) continue;
+    if (n < 3) {
+      result.notes.push_back(std::string("axis ") + AXES[a] + ": " + std::to_string(n) +
+                             " standard cuts in which it moves, three are due; not calibrated");
+      continue;
+    }
+    double rr = 0.0, rf = 0.0, left = 0.0;
+    for (std::size_t i = 0; i < n; ++i) rr += rises[a][i] * rises[a][i], rf += rises[a][i] * forces[a][i];
+    if (!(rr > 0.0)) throw Error(std::string("axis ") + AXES[a] + ": its current never differs from air");
+    DriveCalibration drive;
+    drive.cuts = static_cast<int>(n);
+    drive.newton_per_ampere.value = rf / rr;
+    for (std::size_t i = 0; i < n; ++i) {
+      left += std::pow(forces[a][i] - drive.newton_per_ampere.value * rises[a][i], 2);
+    }
+    drive.scatter = std::sqrt(left / static_cast<double>(n - 1));
+    drive.newton_per_ampere.std_dev = drive.scatter / std::sqrt(rr);
+    // No current beyond air means no force: a line that misses zero tells of other air cuts than these.
+    const Line line = fitLine(rises[a], forces[a]);
+    if (std::abs(line.level.value) > 4.0 * line.level.std_dev + 1e-9 * std::sqrt(rf)) {
+      char text[160];
+      std::snprintf(
+          text, sizeof text,
+          "axis %s: forces are %.1f +- %.1f N where the current is that of air: were the air currents "
+          "taken in the same motion?",
+          AXES[a], line.level.value, line.level.std_dev);
+      result.notes.push_back(text);
+    }
+    result.drive[a] = drive;
+  }
+  if (!spindle.empty()) result.spindle = TorquePowerLaw(spindle, units::rpmFromRadPerSec(base_speed));
+  if (!result.drive[0] && !result.drive[1] && !result.drive[2] && !result.spindle) {
+    throw Error("motor calibration: no axis and no spindle with three standard cuts and their currents");
+  }
+  return result;
+}
+
+void writeMotorCalibration(const MotorCalibration& calibration, const std::string& file) {
+  std::ofstream out(file);
+  out << "format: " << FORMAT << "\ndrives:\n";
+  bool any = false;
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (!calibration.drive[a]) continue;
+    const DriveCalibration& d = *calibration.drive[a];
+    any = true;
+    out << "  " << AXES[a] << ": {newton_per_ampere: " << yamlNumber(d.newton_per_ampere.value, 17)
+        << ", newton_per_ampere_std: " << yamlNumber(d.newton_per_ampere.std_dev, 17)
+        << ", scatter_n: " << yamlNumber(d.scatter, 17) << ", cuts: " << d.cuts << "}\n";
+  }
+  if (!any) out << "  {}\n";
+  if (calibration.spindle) {
+    const TorquePowerLaw& law = *calibration.spindle;
+    out << "spindle:\n  base_speed_rpm: " << yamlNumber(law.baseSpeed(), 17)
+        << "\n  scatter_nm: " << yamlNumber(law.scatter(), 17) << "\n";
+    for (const bool above : {false, true}) {
+      const auto& side = law.side(above);
+      if (!side) continue;
+      out << "  " << (above ? "above" : "below") << ": {middle_rpm: " << yamlNumber(side->middle, 17)
+          << ", span_rpm: " << yamlNumber(side->span, 17) << ", a: " << numbersOf(side->a)
+          << ", b: " << numbersOf(side->b) << "}\n";
+    }
+  }
+  out.close();
+  if (!out) throw Error(file + ": cannot be written");
+}
+
+MotorCalibration readMotorCalibration(const std::string& file) {
+  const StrictYaml yaml = StrictYaml::fromFile(file);
+  yaml.oneOf("format", {FORMAT});
+  MotorCalibration calibration;
+  const StrictYaml drives = yaml.map("drives");
+  for (std::size_t a = 0; a < 3; ++a) {
+    const auto map = drives.optionalMap(AXES[a]);
+    if (!map) continue;
+    DriveCalibration d;
+    d.newton_per_ampere.value = map->number("newton_per_ampere");
+    d.newton_per_ampere.std_dev = map->number("newton_per_ampere_std", Range::notNegative());
+    d.scatter = map->number("scatter_n", Range::notNegative());
+    d.cuts = map->integer("cuts", 3, std::numeric_limits<int>::max());
+    map->finish();
+    calibration.drive[a] = d;
+  }
+  drives.finish();
+  if (const auto map = yaml.optionalMap("spindle")) {
+    std::array<std::optional<TorquePowerLaw::Side>, 2> sides;
+    for (const bool above : {false, true}) {
+      const auto one = map->optionalMap(above ? "above" : "below");
+      if (!one) continue;
+      TorquePowerLaw::Side side;
+      side.middle = one->number("middle_rpm", Range::positive());
+      side.span = one->number("span_rpm", Range::positive());
+      side.a = one->numbers("a", 0);
+      side.b = one->numbers("b", 0);
+      one->finish();
+      sides[above ? 1 : 0] = side;
+    }
+    calibration.spindle = TorquePowerLaw(sides[0], sides[1], map->number("base_speed_rpm", Range::positive()),
+                                         map->number("scatter_nm", Range::notNegative()));
+    map->finish();
+  }
+  yaml.finish();
+  return calibration;
+}
+
+}  // namespace smartmill::loadmeter

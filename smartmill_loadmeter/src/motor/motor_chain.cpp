@@ -1,0 +1,179 @@
+#include "smartmill_loadmeter/motor/motor_chain.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/units.h"
+
+namespace smartmill::loadmeter {
+
+namespace {
+
+const std::array<const char*, 4> CHANNELS{"x", "y", "z", "spindle"};
+const char* const AT_REST = "the axis stands still";
+const char* const NOT_MEASURED = "no current of this motor";
+
+}  // namespace
+
+bool MotorParameters::any() const {
+  return phase_per_revolution > 0.0 ||
+         std::any_of(phase_per_metre.begin(), phase_per_metre.end(), [](double p) { return p > 0.0; });
+}
+
+void MotorParameters::validate() const {
+  const auto require = [](bool good, const char* key, double value, const char* due) {
+    char text[120];
+    std::snprintf(text, sizeof text, "%s: %g is out of range (%s)", key, value, due);
+    if (!good) throw Error(text);
+  };
+  for (const double p : phase_per_metre)
+    require(p >= 0.0 && p < 1e7, "motor_phase_per_metre", p, "0 <= value < 1e7");
+  require(phase_per_revolution >= 0.0 && phase_per_revolution <= 1000.0, "motor_phase_per_revolution",
+          phase_per_revolution, "0 <= value <= 1000");
+  require(smallest_velocity > 0.0 && smallest_velocity <= 0.1, "motor_smallest_velocity", smallest_velocity,
+          "0 < value <= 0.1");
+}
+
+void MotorRecord::clear() {
+  *this = MotorRecord();
+}
+
+void MotorRecord::add(const SampleBlock& block) {
+  std::size_t longest = 0;
+  for (const auto& s : samples_) longest = std::max(longest, s.size());
+  if (rate_ > 0.0 && (block.first_index != next_ || block.sample_rate != rate_)) {
+    // Kept when it is long enough to read slow phases from.
+    if (static_cast<double>(longest) > 1.0 * rate_) return;
+    clear();
+    longest = 0;
+  }
+  if (longest + block.size() > LONGEST) return;
+  if (rate_ == 0.0) {
+    rate_ = block.sample_rate;
+    start_ = block.stamp;
+  }
+  next_ = block.first_index + block.size();
+  for (std::size_t c = 0; c < CHANNELS.size(); ++c) {
+    const auto found = std::find(block.channels.begin(), block.channels.end(), CHANNELS[c]);
+    if (found == block.channels.end()) continue;
+    const std::size_t at = static_cast<std::size_t>(found - block.channels.begin());
+    for (std::size_t i = 0; i < block.size(); ++i) samples_[c].push_back(block.at(i, at));
+  }
+}
+
+void MotorRecord::dropAfter(double stamp) {
+  if (rate_ == 0.0) return;
+  const double count = std::max(0.0, std::floor((stamp - start_) * rate_) + 1.0);
+  for (auto& s : samples_) {
+    if (static_cast<double>(s.size()) > count) s.resize(static_cast<std::size_t>(count));
+  }
+}
+
+MotorReading readMotors(const MotorRecord& record, const MotorParameters& parameters,
+                        const std::array<double, 3>& velocity, double spindle_speed) {
+  MotorReading reading;
+  reading.velocity = velocity;
+  reading.spindle_speed = spindle_speed;
+  for (std::size_t c = 0; c < CHANNELS.size(); ++c) {
+    const bool spindle = c == 3;
+    const double per = spindle ? parameters.phase_per_revolution : parameters.phase_per_metre[c];
+    if (!spindle && std::abs(velocity[c]) < parameters.smallest_velocity) {
+      reading.reason[c] = AT_REST;
+      continue;
+    }
+    const std::vector<double>& samples = record.channel(c);
+    if (!(per > 0.0) || samples.empty()) {
+      reading.reason[c] = NOT_MEASURED;
+      continue;
+    }
+    if (!std::all_of(samples.begin(), samples.end(), [](double v) { return std::isfinite(v); })) {
+      reading.reason[c] = "its current has a sample that is not a finite number";
+      continue;
+    }
+    const double frequency = per * (spindle ? spindle_speed / units::TWO_PI : std::abs(velocity[c]));
+    if (!(frequency < 0.4 * record.rate())) {
+      reading.reason[c] = "its phase turns faster than the current is sampled";
+      continue;
+    }
+    try {
+      (spindle ? reading.spindle_range : reading.range[c]) = phaseRange(samples, record.rate(), frequency);
+    } catch (const Error& error) {
+      reading.reason[c] = error.what();
+    }
+  }
+  return reading;
+}
+
+std::string MotorForce::text() const {
+  const std::array<const char*, 4> names{"Fx", "Fy", "Fz", "torque"};
+  std::string out;
+  for (std::size_t c = 0; c < 4; ++c) {
+    if (c == 3 && !torque && reason[3] == NOT_MEASURED) continue;
+    const std::optional<Estimate>& e = c == 3 ? torque : force[c];
+    char line[200];
+    if (e) {
+      std::snprintf(line, sizeof line, c == 3 ? "%s %.2f +- %.2f Nm" : "%s %.1f +- %.1f N", names[c],
+                    e->value, e->std_dev);
+    } else {
+      std::snprintf(line, sizeof line, "%s not observable: %s", names[c], reason[c].c_str());
+    }
+    out += (out.empty() ? "" : "; ") + std::string(line);
+  }
+  return out;
+}
+
+MotorForce forceFromMotors(const MotorReading& cut, const std::vector<MotorReading>& air,
+                           const MotorCalibration& calibration, const MotorParameters& parameters) {
+  MotorForce result;
+  result.reason = cut.reason;
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (!cut.range[a]) continue;
+    if (!calibration.drive[a]) {
+      result.reason[a] = "the drive is not calibrated";
+      continue;
+    }
+    const MotorReading* nearest = nullptr;
+    double least = std::log(2.0);
+    for (const MotorReading& one : air) {
+      if (!one.range[a] || one.velocity[a] * cut.velocity[a] <= 0.0) continue;
+      const double distance = std::abs(std::log(one.velocity[a] / cut.velocity[a]));
+      // The later one of equals: friction warms up.
+      if (distance <= least + 1e-3) nearest = &one, least = std::min(least, distance);
+    }
+    if (!nearest) {
+      result.reason[a] = "no air cut of this axis in this direction near this feed";
+      continue;
+    }
+    Estimate force = calibration.drive[a]->opposing(*cut.range[a], *nearest->range[a]);
+    if (cut.velocity[a] > 0.0) force.value = -force.value;
+    if (std::abs(cut.velocity[a]) >= parameters.smallest_velocity) result.force[a] = force;
+  }
+  if (cut.spindle_range) {
+    const MotorReading* nearest = nullptr;
+    double least = 0.1;
+    for (const MotorReading& one : air) {
+      if (!one.spindle_range) continue;
+      const double distance = std::abs(one.spindle_speed / cut.spindle_speed - 1.0);
+      if (distance <= least + 1e-3) nearest = &one, least = std::min(least, distance);
+    }
+    if (!calibration.spindle) {
+      result.reason[3] = "the spindle's current is not calibrated";
+    } else if (!nearest) {
+      result.reason[3] = "no air cut near this spindle speed";
+    } else {
+      try {
+        result.torque = Estimate{calibration.spindle->torque(units::rpmFromRadPerSec(cut.spindle_speed),
+                                                             *cut.spindle_range - *nearest->spindle_range),
+                                 calibration.spindle->scatter()};
+      } catch (const Error& error) {
+        result.reason[3] = error.what();
+      }
+    }
+  }
+  return result;
+}
+
+}  // namespace smartmill::loadmeter

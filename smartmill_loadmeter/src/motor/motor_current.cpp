@@ -1,0 +1,231 @@
+#include "smartmill_loadmeter/motor/motor_current.h"
+
+#include <gsl/gsl_cdf.h>
+#include <gsl/gsl_wavelet.h>
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <set>
+
+#include <Eigen/Dense>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/signal/statistics.h"
+#include "smartmill_core/units.h"
+#include "smartmill_loadmeter/calibration/fit.h"
+
+namespace smartmill::loadmeter {
+
+namespace {
+
+constexpr std::size_t DB5 = 10;  // GSL counts taps: Daubechies with 5 vanishing moments has 10
+constexpr int COARSEST = 10;
+constexpr double MARGIN = 6.0;  // a band must end this many times above the sine it is to keep
+
+}  // namespace
+
+std::vector<double> denoise(const std::vector<double>& signal, int level) {
+  const std::size_t n = signal.size();
+  if (level < 0 || level > 30 || n < (std::size_t{1} << level) || n < 2) {
+    throw Error("wavelet de-noising: " + std::to_string(n) + " samples are too few for level " +
+                std::to_string(level));
+  }
+  if (level == 0) return signal;
+  // Mirrored on both sides, so that the periodic transform sees no jump.
+  std::size_t size = 1;
+  while (size < 2 * n) size *= 2;
+  std::vector<double> data(size);
+  const std::size_t before = (size - n) / 2, period = 2 * n;
+  for (std::size_t i = 0; i < size; ++i) {
+    const std::size_t at = (i + period * (size / period + 1) - before) % period;
+    data[i] = signal[at < n ? at : period - 1 - at];
+  }
+  const std::unique_ptr<gsl_wavelet, void (*)(gsl_wavelet*)> wavelet(
+      gsl_wavelet_alloc(gsl_wavelet_daubechies, DB5), gsl_wavelet_free);
+  const std::unique_ptr<gsl_wavelet_workspace, void (*)(gsl_wavelet_workspace*)> space(
+      gsl_wavelet_workspace_alloc(size), gsl_wavelet_workspace_free);
+  gsl_wavelet_transform_forward(wavelet.get(), data.data(), 1, size, space.get());
+  // Coefficients stand from coarse to fine; the finest band fills the upper half.
+  std::fill(data.begin() + static_cast<std::ptrdiff_t>(size >> level), data.end(), 0.0);
+  gsl_wavelet_transform_inverse(wavelet.get(), data.data(), 1, size, space.get());
+  return {data.begin() + static_cast<std::ptrdiff_t>(before),
+          data.begin() + static_cast<std::ptrdiff_t>(before + n)};
+}
+
+int levelFor(double frequency, double sample_rate) {
+  const int level = static_cast<int>(std::floor(std::log2(sample_rate / (2.0 * MARGIN * frequency))));
+  return std::clamp(level, 0, COARSEST);
+}
+
+double phaseRange(const std::vector<double>& current, double sample_rate, double frequency) {
+  const double periods = static_cast<double>(current.size()) * frequency / sample_rate;
+  if (!(periods >= 2.0)) throw Error("phase current: less than two periods in the record");
+  const std::vector<double> smooth = denoise(current, levelFor(frequency, sample_rate));
+  // Amplitude by least squares of level, cosine and sine; the slip leaves the frequency free a little.
+  double best = -1.0, amplitude = 0.0, found_at = 0.0;
+  const auto tryAt = [&](double offset) {  // [1] of 1 / record
+    const double w = units::TWO_PI * frequency * (1.0 + offset / periods) / sample_rate;
+    Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d right = Eigen::Vector3d::Zero();
+    double c = 1.0, q = 0.0;  // cosine and sine by turning
+    const double cw = std::cos(w), sw = std::sin(w);
+    for (const double value : smooth) {
+      const Eigen::Vector3d row(1.0, c, q);
+      normal += row * row.transpose();
+      right += row * value;
+      const double turned = c * cw - q * sw;
+      q = q * cw + c * sw;
+      c = turned;
+    }
+    const Eigen::Vector3d found = normal.ldlt().solve(right);
+    const double explained = found.dot(right);
+    if (explained <= best) return;
+    best = explained;
+    amplitude = std::hypot(found[1], found[2]);
+    found_at = offset;
+  };
+  for (int step = -4; step <= 4; ++step) tryAt(0.25 * step);
+  const double middle = found_at;
+  for (int step = -4; step <= 4; ++step) tryAt(middle + 0.05 * step);
+  return 2.0 * amplitude;
+}
+
+double Line::stdAt(double x) const {
+  return std::sqrt(scatter * scatter + slope.std_dev * slope.std_dev * x * x + 2.0 * covariance * x +
+                   level.std_dev * level.std_dev);
+}
+
+Line fitLine(const std::vector<double>& x, const std::vector<double>& y) {
+  const std::size_t n = x.size();
+  if (n < 3 || y.size() != n) throw Error("calibration line: " + std::to_string(n) + " cuts, three are due");
+  const double count = static_cast<double>(n), mx = mean(x), my = mean(y);
+  double sxx = 0.0, sxy = 0.0, syy = 0.0;
+  for (std::size_t i = 0; i < n; ++i) {
+    sxx += (x[i] - mx) * (x[i] - mx);
+    sxy += (x[i] - mx) * (y[i] - my);
+    syy += (y[i] - my) * (y[i] - my);
+  }
+  if (!(sxx > 0.0)) throw Error("calibration line: all cuts at one current");
+  Line line;
+  line.count = static_cast<int>(n);
+  line.slope.value = sxy / sxx;
+  line.level.value = my - line.slope.value * mx;
+  const double left = std::max(0.0, syy - line.slope.value * sxy);
+  const double variance = left / (count - 2.0);
+  line.scatter = std::sqrt(variance);
+  line.slope.std_dev = std::sqrt(variance / sxx);
+  line.level.std_dev = std::sqrt(variance * (1.0 / count + mx * mx / sxx));
+  line.covariance = -variance * mx / sxx;
+  line.r_squared = syy > 0.0 ? 1.0 - left / syy : 1.0;
+  return line;
+}
+
+SlideLoad slideLoad(const Line& calibration, double air_current, double air_current_reverse,
+                    double current_std) {
+  const double m = calibration.slope.value, size = std::abs(m);
+  // W + R = m Ia; against it the weight changes sign: -W + R = |m| Ia'.
+  const double with = m * air_current, against = size * air_current_reverse;
+  SlideLoad load;
+  load.friction.value = 0.5 * (with + against);
+  load.weight.value = 0.5 * (with - against);
+  const double from_current = size * current_std / std::sqrt(2.0);
+  load.friction.std_dev = std::hypot(from_current, load.friction.value * calibration.slope.std_dev / size);
+  load.weight.std_dev = std::hypot(from_current, load.weight.value * calibration.slope.std_dev / size);
+  return load;
+}
+
+double TorquePowerLaw::evaluate(const Side& side, double speed_rpm, double rise) {
+  if (!(rise > 0.0)) return 0.0;
+  const double n = (speed_rpm - side.middle) / side.span;
+  const auto polynomial = [n](const std::vector<double>& c) {
+    double sum = 0.0;
+    for (std::size_t i = c.size(); i-- > 0;) sum = sum * n + c[i];
+    return sum;
+  };
+  return polynomial(side.a) * std::pow(rise, polynomial(side.b));
+}
+
+TorquePowerLaw::TorquePowerLaw(const std::vector<SpindleCut>& cuts, double base_speed_rpm)
+    : base_(base_speed_rpm) {
+  double left = 0.0, unknowns = 0.0;
+  for (const bool above : {false, true}) {
+    std::vector<SpindleCut> own;
+    std::set<double> speeds;
+    for (const SpindleCut& cut : cuts) {
+      if ((cut.speed_rpm > base_) != above) continue;
+      if (!(cut.rise > 0.0) || !(cut.torque > 0.0)) continue;  // nothing is cut
+      own.push_back(cut);
+      speeds.insert(cut.speed_rpm);
+    }
+    if (own.empty()) continue;
+    if (own.size() < 3) {
+      throw Error("spindle calibration: " + std::to_string(own.size()) + " cuts " +
+                  (above ? "above" : "below") + " base speed, three are due");
+    }
+    Side side;
+    side.middle = 0.5 * (*speeds.begin() + *speeds.rbegin());
+    side.span = std::max(1.0, 0.5 * (*speeds.rbegin() - *speeds.begin()));
+    const std::size_t degree = std::min({std::size_t{3}, speeds.size() - 1, own.size() / 2 - 1});
+    // A straight line of the logarithms starts the fit.
+    std::vector<double> x, y;
+    for (const SpindleCut& cut : own) {
+      x.push_back(std::log(cut.rise));
+      y.push_back(std::log(cut.torque));
+    }
+    const Line line = fitLine(x, y);
+    std::vector<FitParameter> start;
+    const double a0 = std::exp(line.level.value);
+    for (std::size_t i = 0; i <= degree; ++i) start.push_back({i ? 0.0 : a0, -20.0 * a0, 20.0 * a0, a0});
+    for (std::size_t i = 0; i <= degree; ++i) start.push_back({i ? 0.0 : line.slope.value, -5.0, 5.0, 0.5});
+    const auto sideOf = [&](const std::vector<double>& v) {
+      Side s = side;
+      const auto middle = v.begin() + static_cast<std::ptrdiff_t>(degree + 1);
+      s.a.assign(v.begin(), middle);
+      s.b.assign(middle, v.end());
+      return s;
+    };
+    const auto residuals = [&](const std::vector<double>& v, double* out) {
+      const Side s = sideOf(v);
+      for (const SpindleCut& cut : own) *out++ = evaluate(s, cut.speed_rpm, cut.rise) - cut.torque;
+    };
+    const FitResult found = fit(residuals, own.size(), start, 1e-10);
+    sides_[above ? 1 : 0] = sideOf(found.value);
+    left += found.squares;
+    unknowns += static_cast<double>(start.size());
+  }
+  if (!sides_[0] && !sides_[1]) throw Error("spindle calibration: no cut with a rise of current");
+  double total = 0.0, middle = 0.0;
+  for (const SpindleCut& cut : cuts) middle += cut.torque / static_cast<double>(cuts.size());
+  for (const SpindleCut& cut : cuts) total += (cut.torque - middle) * (cut.torque - middle);
+  scatter_ = std::sqrt(left / std::max(1.0, static_cast<double>(cuts.size()) - unknowns));
+  r_squared_ = total > 0.0 ? 1.0 - left / total : 1.0;
+}
+
+double TorquePowerLaw::torque(double speed_rpm, double rise) const {
+  const bool above = speed_rpm > base_;
+  if (!side(above)) {
+    throw Error("spindle calibration: no cut " + std::string(above ? "above" : "below") +
+                " base speed: torque at " + std::to_string(speed_rpm) + " rpm is not known");
+  }
+  return evaluate(*side(above), speed_rpm, rise);
+}
+
+VarianceSplit splitVariance(const std::vector<double>& dynamometer, const std::vector<double>& current) {
+  if (dynamometer.size() < 3 || current.size() < 3) throw Error("variance split: three replications are due");
+  VarianceSplit s;
+  s.process_mean = mean(dynamometer);
+  s.current_mean = mean(current);
+  s.process_variance = std::pow(standardDeviation(dynamometer), 2);
+  s.current_variance = std::pow(standardDeviation(current), 2);
+  s.sensor_variance = std::max(0.0, s.current_variance - s.process_variance);
+  const double na = static_cast<double>(dynamometer.size()), nb = static_cast<double>(current.size());
+  const double within = ((na - 1.0) * s.process_variance + (nb - 1.0) * s.current_variance) / (na + nb - 2.0);
+  const double difference = s.process_mean - s.current_mean;
+  s.f_means = difference * difference / (within * (1.0 / na + 1.0 / nb));
+  s.p_means = gsl_cdf_fdist_Q(s.f_means, 1.0, na + nb - 2.0);
+  s.p_variances = gsl_cdf_fdist_Q(s.current_variance / s.process_variance, nb - 1.0, na - 1.0);
+  return s;
+}
+
+}  // namespace smartmill::loadmeter

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <actionlib/server/action_server.h>
+#include <diagnostic_updater/diagnostic_updater.h>
+#include <ros/ros.h>
+
+#include <cstdint>
+#include <map>
+
+#include "parameters_ros.h"
+#include "smartmill_core/model/machine_model.h"
+#include "smartmill_loadmeter/database/database.h"
+#include "smartmill_loadmeter/identification/sorted_identification.h"
+#include "smartmill_msgs/FindCoefficients.h"
+#include "smartmill_msgs/IdentifyCoefficientsAction.h"
+
+namespace smartmill::loadmeter {
+
+/// Shell around SortedIdentification: topics in, action and service at the front, coefficients out.
+class LoadMeterNode {
+ public:
+  /// @throws Error on a wrong parameter, model or database.
+  LoadMeterNode(ros::NodeHandle nh, ros::NodeHandle private_nh);
+
+ private:
+  using Server = actionlib::ActionServer<smartmill_msgs::IdentifyCoefficientsAction>;
+
+  void goal(Server::GoalHandle handle);
+  void cancel(Server::GoalHandle handle);
+  void finish(const IdentifyResult& result);
+  void feedback();
+  bool find(smartmill_msgs::FindCoefficients::Request& request,
+            smartmill_msgs::FindCoefficients::Response& response);
+  void publish(const MotorForce& force);
+  void watch();
+  void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
+  template <typename Message>
+  void input(const Message& message);
+
+  NodeParameters parameters_;
+  SortedIdentification identification_;
+  CoefficientDatabase database_;
+  std::map<std::uint64_t, Server::GoalHandle> waiting_;
+  std::uint64_t next_id_ = 1;
+  ros::WallTime last_input_;
+  bool any_input_ = false;
+  std::string last_message_, last_force_;
+
+  ros::Publisher publisher_, force_publisher_;
+  std::vector<ros::Subscriber> subscribers_;
+  ros::ServiceServer find_service_;
+  diagnostic_updater::Updater diagnostics_;
+  ros::WallTimer timer_;
+  Server server_;
+};
+
+}  // namespace smartmill::loadmeter

@@ -1,0 +1,183 @@
+#include "smartmill_loadmeter/calibration/machine_calibration.h"
+
+#include <cmath>
+#include <random>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/testing/temporary_folder.h"
+#include "smartmill_core/units.h"
+
+namespace smartmill::loadmeter {
+namespace {
+
+using ::testing::HasSubstr;
+using units::radPerSecFromRpm;
+
+constexpr double STEP = 3e-4;                                 // [V] Dunwoody, below eq. 3.12
+constexpr double KB = 1.43e-7, KTCF = -2.51e-5, K = 3.88e-4;  // eq. 3.8, 3.10
+constexpr double ZERO_BELOW = 209.0;                          // [rad/s]
+
+double rounded(double v) {
+  return STEP * std::round(v / STEP);
+}
+
+double friction(double w) {
+  return w < ZERO_BELOW ? 0.0 : KB * w * w + KTCF * w;
+}
+
+struct Thesis {
+  std::vector<AirCut> air;
+  std::vector<ReferenceCut> cuts;
+  explicit Thesis(unsigned seed) {
+    std::mt19937 random(seed);
+    std::normal_distribution<double> normal;
+    for (int rpm = 1000; rpm <= 20000; rpm += 1000) {
+      const double w = radPerSecFromRpm(rpm);
+      air.push_back({w, rounded(friction(w) + 2e-4 * normal(random)), 0.0});
+      const double torque = 2.5 * (1.0 + 0.01 * normal(random));  // slots of 2..3 N m
+      cuts.push_back({w, rounded(friction(w) + K * w * torque + 2e-4 * normal(random)),
+                      torque * (1.0 + 0.005 * normal(random)), 0.005 * torque});
+    }
+  }
+};
+
+TEST(MachineCalibration, reproducesTheFiguresOfTheThesis) {
+  const Thesis data(1);
+  const IdleVoltage idle = fitIdleVoltage(data.air, ZERO_BELOW, STEP);
+  EXPECT_NEAR(idle.kb.value, 1.43e-7, 0.005e-7);    // printed digits
+  EXPECT_NEAR(idle.ktcf.value, -2.51e-5, 0.05e-5);  // rounding of 3e-4 V over the speed range
+  const MachineCalibration c = calibrateLoadMeter(idle, data.cuts, ZERO_BELOW, STEP);
+  EXPECT_NEAR(c.gain.value, 3.88e-4, 0.01e-4);
+  // 1.43e-7 / 3.88e-4 is 3.686e-4: the thesis prints 3.70e-4 from unrounded figures.
+  EXPECT_NEAR(c.viscous.value, 3.70e-4, 0.025e-4);
+  EXPECT_NEAR(c.coulomb.value, -0.0647, 0.0015);
+}
+
+TEST(MachineCalibration, standardDeviationsAreHonest) {
+  int kb = 0, ktcf = 0, gain = 0;
+  const int runs = 200;
+  for (int run = 0; run < runs; ++run) {
+    const Thesis data(static_cast<unsigned>(run) + 10);
+    const IdleVoltage idle = fitIdleVoltage(data.air, ZERO_BELOW, STEP);
+    const MachineCalibration c = calibrateLoadMeter(idle, data.cuts, ZERO_BELOW, STEP);
+    kb += std::abs(idle.kb.value - KB) < 1.96 * idle.kb.std_dev;
+    ktcf += std::abs(idle.ktcf.value - KTCF) < 1.96 * idle.ktcf.std_dev;
+    gain += std::abs(c.gain.value - K) < 1.96 * c.gain.std_dev;
+  }
+  for (const int inside : {kb, ktcf, gain}) {
+    EXPECT_GE(inside, 0.90 * runs);
+    EXPECT_LE(inside, 0.995 * runs);
+  }
+}
+
+TEST(MachineCalibration, saysWhatIsMissing) {
+  EXPECT_THAT(errorOf([] { fitIdleVoltage({{100.0, 0.1, 0.0}}, 0.0, STEP); }), HasSubstr("1 usable"));
+  EXPECT_THAT(errorOf([] { calibrateLoadMeter(IdleVoltage(), {}, 0.0, STEP); }),
+              HasSubstr("no reference cut"));
+}
+
+std::vector<double> leaving(double bandwidth, double interval, double noise, unsigned seed,
+                            double exit_time) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal;
+  std::vector<double> voltage;
+  const double tau = 1.0 / (units::TWO_PI * bandwidth);
+  for (int i = 0; i * interval < 1.5; ++i) {
+    const double t = i * interval;
+    const double v = t < exit_time ? 0.35 : 0.05 + 0.30 * std::exp(-(t - exit_time) / tau);
+    voltage.push_back(rounded(v + noise * normal(random)));
+  }
+  return voltage;
+}
+
+TEST(ExitOfACut, givesTheBandwidthOfTheThesis) {
+  const ExitFit fast = fitExit(leaving(7.0, 1e-3, 2e-4, 1, 0.5003), 1e-3, STEP);
+  EXPECT_NEAR(fast.bandwidth.value, 7.0, 0.02);
+  EXPECT_NEAR(fast.exit_time.value, 0.5003, 1e-4);
+  EXPECT_NEAR(fast.before, 0.35, 1e-4);
+  EXPECT_NEAR(fast.after, 0.05, 1e-4);
+  // Samples of the controller every 20 ms: two or three on the fall.
+  const ExitFit slow = fitExit(leaving(7.0, 0.02, 2e-4, 1, 0.507), 0.02, STEP);
+  EXPECT_NEAR(slow.bandwidth.value, 7.0, 0.1);
+  EXPECT_GT(slow.bandwidth.std_dev, fast.bandwidth.std_dev);
+  EXPECT_THAT(errorOf([] { fitExit(std::vector<double>(50, 0.2), 0.02, STEP); }), HasSubstr("shows no fall"));
+}
+
+TEST(ExitOfACut, bandwidthIsHonest) {
+  int inside = 0;
+  const int runs = 150;
+  for (int run = 0; run < runs; ++run) {
+    const double exit_time = 0.5 + 0.0131 * (run % 7);
+    const ExitFit f =
+        fitExit(leaving(7.0, 5e-3, 2e-4, static_cast<unsigned>(run + 1), exit_time), 5e-3, STEP);
+    inside += std::abs(f.bandwidth.value - 7.0) < 1.96 * f.bandwidth.std_dev;
+  }
+  EXPECT_GE(inside, 0.90 * runs);
+}
+
+// Friction as Armstrong draws it: the thesis' negative Coulomb term is what a straight line makes of it.
+std::vector<TimedAirCut> airCuts(double breakaway, double stribeck_rpm, double cold, double warmup,
+                                 unsigned seed) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal;
+  FrictionLaw law;
+  law.viscous = 3.0e-4;
+  law.coulomb = 0.08;
+  law.breakaway = breakaway;
+  law.stribeck_speed = radPerSecFromRpm(stribeck_rpm);
+  law.cold_ratio = cold;
+  law.warmup_time = warmup;
+  std::vector<TimedAirCut> cuts;
+  double time = 0.0;
+  for (const int round : {0, 1}) {
+    for (int rpm = 1000; rpm <= 19000; rpm += 2000) {
+      const double w = radPerSecFromRpm(round ? 20000 - rpm : rpm);
+      const double v = K * w * law.torque(w, time);
+      cuts.push_back({{w, v + 5e-5 * normal(random), 5e-5}, time});
+      time += 60.0;
+    }
+  }
+  return cuts;
+}
+
+TEST(FrictionLaws, theEvidenceChoosesWhatIsThere) {
+  const auto plain = fitFrictionLaws(airCuts(0.0, 2500, 0.0, 600.0, 1), K, 0.0).front();
+  EXPECT_EQ(plain.shape.name(), "Coulomb and viscous");
+  EXPECT_NEAR(plain.law.coulomb, 0.08, 3.0 * plain.std_dev[1]);
+  const auto stribeck = fitFrictionLaws(airCuts(0.3, 2500, 0.0, 600.0, 2), K, 0.0).front();
+  EXPECT_EQ(stribeck.shape.name(), "Coulomb and viscous, Stribeck");
+  EXPECT_NEAR(stribeck.law.breakaway, 0.3, 3.0 * stribeck.std_dev[2]);
+  EXPECT_NEAR(units::rpmFromRadPerSec(stribeck.law.stribeck_speed), 2500.0, 30.0);
+  const auto cold = fitFrictionLaws(airCuts(0.0, 2500, 0.25, 500.0, 3), K, 0.0).front();
+  EXPECT_EQ(cold.shape.name(), "Coulomb and viscous, warm-up");
+  EXPECT_NEAR(cold.law.cold_ratio, 0.25, 3.0 * cold.std_dev[2]);
+  const auto both = fitFrictionLaws(airCuts(0.3, 2500, 0.25, 500.0, 4), K, 0.0).front();
+  EXPECT_EQ(both.shape.name(), "Coulomb and viscous, Stribeck, warm-up");
+  EXPECT_NEAR(both.law.warmup_time, 500.0, 3.0 * both.std_dev[5]);
+}
+
+TEST(FrictionLaws, falseChoicesAreRare) {
+  int wrong = 0;
+  for (unsigned seed = 1; seed <= 60; ++seed) {
+    const auto best = fitFrictionLaws(airCuts(0.0, 2500, 0.0, 600.0, seed + 100), K, 0.0).front();
+    wrong += best.shape.stribeck || best.shape.warmup;
+  }
+  EXPECT_LE(wrong, 3);  // two more unknowns pay off by chance in 5 % at most
+}
+
+TEST(FrictionLaws, aLineThroughStribeckDataHasANegativeCoulombTerm) {
+  std::vector<AirCut> air;
+  for (int rpm = 1000; rpm <= 20000; rpm += 1000) {
+    const double w = radPerSecFromRpm(rpm);
+    // Viscous friction dominates except under 2000 rpm, and grows with speed (windage).
+    air.push_back(
+        {w, K * w * (2.5e-4 * w + 6e-8 * w * w + 0.05 * std::exp(-std::pow(rpm / 1500.0, 2))), 0.0});
+  }
+  EXPECT_LT(fitIdleVoltage(air, radPerSecFromRpm(2000), STEP).ktcf.value, 0.0);
+}
+
+}  // namespace
+}  // namespace smartmill::loadmeter

@@ -1,0 +1,228 @@
+#include "smartmill_loadmeter/identification/identification.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <random>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "../session.h"
+#include "smartmill_core/error.h"
+#include "smartmill_core/signal/stream_sorter.h"
+#include "smartmill_loadmeter/calibration/friction_law.h"
+
+namespace smartmill::loadmeter {
+namespace {
+
+using ::testing::HasSubstr;
+void connect(Session& session, LoadMeterIdentification& identification) {
+  session.state = [&](const CncState& s) { identification.handle(s); };
+  session.load = [&](const LoadSample& l) { identification.handle(l); };
+  session.condition = [&](const CuttingCondition& c) { identification.handle(c); };
+}
+
+IdentifyResult ask(LoadMeterIdentification& identification, const IdentifyGoal& goal) {
+  IdentifyResult result;
+  identification.onResult([&](const IdentifyResult& r) { result = r; });
+  identification.handle(goal);
+  return result;
+}
+
+TEST(LoadMeterIdentification, findsTheTruthWithHonestStandardDeviations) {
+  const int runs = 100;
+  int inside_c = 0, inside_e = 0;
+  for (int run = 0; run < runs; ++run) {
+    Session session(static_cast<unsigned>(run + 1), 2e-4);
+    LoadMeterIdentification identification(model(), {});
+    connect(session, identification);
+    takeThrough(session);
+    const IdentifyResult r = ask(identification, {session.now(), "endmill", "aluminium", false, 0});
+    ASSERT_EQ(r.code, IdentifyResult::Code::ok) << r.message;
+    ASSERT_EQ(identification.airCuts().size(), 3u);
+    ASSERT_EQ(r.coefficients.tests, 3);
+    const CoefficientSet& k = r.coefficients;
+    // A mean over some 180 readings of 0.22 mV on 0.1..0.3 V: far below one percent.
+    EXPECT_NEAR(k.value.ktc, TRUTH.ktc, 0.01 * TRUTH.ktc);
+    EXPECT_NEAR(k.value.kte, TRUTH.kte, 0.03 * TRUTH.kte);
+    EXPECT_TRUE(std::isnan(k.value.krc));
+    EXPECT_NEAR(k.friction_viscous, VISCOUS, 0.02 * VISCOUS);
+    EXPECT_EQ(k.source, "load_meter");
+    EXPECT_EQ(k.tool, "endmill");
+    inside_c += std::abs(k.value.ktc - TRUTH.ktc) < 1.96 * k.std_dev.ktc;
+    inside_e += std::abs(k.value.kte - TRUTH.kte) < 1.96 * k.std_dev.kte;
+  }
+  EXPECT_GE(inside_c, 90);
+  EXPECT_GE(inside_e, 90);
+}
+
+TEST(LoadMeterIdentification, resetForgetsAndWrongPlansAreNamed) {
+  Session session(1, 2e-4);
+  LoadMeterIdentification identification(model(), {});
+  connect(session, identification);
+  EXPECT_EQ(ask(identification, {session.now(), "", "", false, 0}).code, IdentifyResult::Code::too_few_tests);
+  session.air(2000.0, 2.0);
+  IdentifyResult r = ask(identification, {session.now(), "", "", false, 0});
+  EXPECT_EQ(r.code, IdentifyResult::Code::too_few_tests);
+  EXPECT_THAT(r.message, HasSubstr("air cuts at two or more speeds are due, 1 usable"));
+  session.air(6000.0, 2.0);
+  session.slot(6000.0, 3e-5, 2.0);
+  session.slot(6000.0, 6e-5, 0.1);  // too short to settle
+  r = ask(identification, {session.now(), "", "", false, 0});
+  EXPECT_EQ(r.code, IdentifyResult::Code::too_few_tests);
+  EXPECT_THAT(r.message, HasSubstr("at least three are due"));
+  EXPECT_THAT(r.message, HasSubstr("steady readings, 10 are due"));
+  takeThrough(session);
+  r = ask(identification, {session.now(), "endmill", "steel", false, 0});
+  EXPECT_THAT(r.message, HasSubstr("cuts with another tool or material left out"));
+  r = ask(identification, {session.now(), "", "", true, 0});
+  EXPECT_EQ(r.code, IdentifyResult::Code::ok);
+  EXPECT_TRUE(identification.cuts().empty());
+  EXPECT_TRUE(std::isnan(r.coefficients.value.ktc));
+}
+
+TEST(LoadMeterIdentification, aLoadThatIsNoNumberIsBadData) {
+  Session session(1, 2e-4);
+  LoadMeterIdentification identification(model(), {});
+  connect(session, identification);
+  int n = 0;
+  session.load = [&](LoadSample l) {
+    if (++n == 300) l.spindle_load = NOT_A_NUMBER;
+    identification.handle(l);
+  };
+  takeThrough(session);
+  const IdentifyResult r = ask(identification, {session.now(), "", "", false, 0});
+  EXPECT_EQ(r.code, IdentifyResult::Code::bad_data);
+  EXPECT_THAT(r.message, HasSubstr("is not a finite number"));
+}
+
+TEST(LoadMeterIdentification, withoutAirCutsTheModelsFrictionStandsWithItsUncertainty) {
+  MachineModel m = model();
+  m.spindle->viscous = VISCOUS;
+  m.spindle->coulomb = COULOMB;
+  m.uncertainty.spindle = 3.0;
+  Session session(2, 2e-4);
+  LoadMeterIdentification identification(m, {});
+  connect(session, identification);
+  for (const double feed : {3e-5, 6e-5, 1e-4}) session.slot(6000.0, feed, 4.0);
+  const IdentifyResult r = ask(identification, {session.now(), "", "", false, 0});
+  ASSERT_EQ(r.code, IdentifyResult::Code::ok) << r.message;
+  EXPECT_TRUE(std::isnan(r.coefficients.friction_viscous));
+  EXPECT_NEAR(r.coefficients.value.kte, TRUTH.kte, 4.0 * r.coefficients.std_dev.kte);
+  // 3 % of a friction torque of 0.30 and 0.067 N m over the torque of one N/m of edge, R N a / 2 = 1.8e-5 m2.
+  EXPECT_NEAR(r.coefficients.std_dev.kte, 0.03 * std::hypot(0.298, 0.0671) / 1.8e-5, 60.0);
+}
+
+// The same data through the sorter in another order of arrival: the same figures to the last digit.
+TEST(LoadMeterIdentification, arrivalDoesNotMatter) {
+  std::vector<double> found;
+  for (unsigned seed = 0; seed < 3; ++seed) {
+    struct Item {
+      double arrival;
+      std::function<void()> push;
+    };
+    std::vector<Item> items;
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> delay(0.0, seed ? 0.04 : 0.0);
+    LoadMeterIdentification identification(model(), {});
+    StreamSorter sorter(0.05);
+    const auto states = sorter.addRegular("cnc/state"), loads = sorter.addRegular("cnc/load");
+    const auto events = sorter.addEvents("cut/condition");
+    Session session(9, 2e-4);
+    session.state = [&](const CncState& s) {
+      items.push_back({s.stamp + delay(random),
+                       [&, s] { sorter.push(states, s.stamp, [&, s] { identification.handle(s); }); }});
+    };
+    session.load = [&](const LoadSample& l) {
+      items.push_back({l.stamp + delay(random),
+                       [&, l] { sorter.push(loads, l.stamp, [&, l] { identification.handle(l); }); }});
+    };
+    session.condition = [&](const CuttingCondition& c) {
+      items.push_back({c.stamp + delay(random),
+                       [&, c] { sorter.push(events, c.stamp, [&, c] { identification.handle(c); }); }});
+    };
+    takeThrough(session);
+    std::stable_sort(items.begin(), items.end(),
+                     [](const Item& l, const Item& r) { return l.arrival < r.arrival; });
+    for (const Item& item : items) item.push();
+    sorter.flush();
+    found.push_back(ask(identification, {session.now(), "", "", false, 0}).coefficients.value.ktc);
+  }
+  EXPECT_EQ(found[0], found[1]);
+  EXPECT_EQ(found[0], found[2]);
+}
+
+TEST(LoadMeterIdentification, refusesWhatItCannotUse) {
+  MachineModel m = model();
+  m.spindle->load_meter_full_scale.reset();
+  try {
+    LoadMeterIdentification identification(m, {});
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("model.yaml: spindle.load_meter_full_scale_v is missing"));
+  }
+  IdentificationParameters p;
+  p.settle_time_constants = 2.0;
+  try {
+    p.validate();
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("settle_time_constants: 2 is out of range"));
+  }
+}
+
+// Five and more air cuts let the evidence choose the friction law; a straight line would bias the cuts.
+TEST(Tests, theFrictionLawIsChosenByEvidence) {
+  const Spindle spindle = *model().spindle;
+  FrictionLaw law;
+  law.viscous = VISCOUS;
+  law.coulomb = COULOMB;
+  law.breakaway = 0.4;
+  law.stribeck_speed = units::radPerSecFromRpm(2500.0);
+  std::mt19937 random(8);
+  std::normal_distribution<double> normal;
+  std::vector<LoadTest> air, cuts;
+  const auto add = [&](double rpm, double feed) {
+    LoadTest t;
+    t.condition.tool = ToolGeometry{3, 0.012, 0.6, {}};
+    t.condition.engagement = {0.0, units::PI, 0.002, feed};
+    t.speed = units::radPerSecFromRpm(rpm);
+    t.stamp = 10.0 * static_cast<double>(air.size() + cuts.size());
+    const double torque =
+        feed > 0.0 ? MechanisticForce(t.condition.tool, TRUTH, t.condition.engagement).mean().torque : 0.0;
+    t.voltage = {
+        spindle.load_meter_gain * t.speed * (torque + law.torque(t.speed, t.stamp)) + 2e-5 * normal(random),
+        2e-5};
+    (feed > 0.0 ? cuts : air).push_back(t);
+  };
+  for (const double rpm : {1000.0, 2000.0, 3000.0, 4500.0, 6000.0, 9000.0, 12000.0}) add(rpm, 0.0);
+  for (const double feed : {3e-5, 6e-5, 1e-4}) add(2500.0, feed);
+  const CoefficientSet k = identifyFromTests(air, cuts, spindle, 3.0).set;
+  EXPECT_NEAR(k.value.ktc, TRUTH.ktc, 3.0 * k.std_dev.ktc);
+  EXPECT_NEAR(k.value.kte, TRUTH.kte, 3.0 * k.std_dev.kte);
+  EXPECT_LT(k.std_dev.kte, 0.02 * TRUTH.kte);
+  EXPECT_NEAR(k.friction_viscous, VISCOUS, 0.02 * VISCOUS);
+}
+
+TEST(Production, cutsOfASessionAreFollowedWithoutAGoal) {
+  LoadMeterIdentification identification(model(), {});
+  Session session(5, 2e-4);
+  session.state = [&](const CncState& s) { identification.handle(s); };
+  session.load = [&](const LoadSample& l) { identification.handle(l); };
+  session.condition = [&](const CuttingCondition& c) { identification.handle(c); };
+  EXPECT_FALSE(identification.production());
+  takeThrough(session);
+  ASSERT_TRUE(identification.production());
+  const RecursiveCoefficients& k = *identification.production();
+  EXPECT_EQ(k.readings(), 3);
+  EXPECT_NEAR(k.ktc(), TRUTH.ktc, 4.0 * k.ktcStd());
+  EXPECT_NEAR(k.kte(), TRUTH.kte, 4.0 * k.kteStd());
+  EXPECT_LT(k.ktcStd(), 0.05 * TRUTH.ktc);
+  session.tool = "another";
+  session.slot(6000.0, 5e-5, 4.0);
+  EXPECT_EQ(identification.production()->readings(), 1);
+}
+
+}  // namespace
+}  // namespace smartmill::loadmeter

@@ -1,0 +1,221 @@
+#include "smartmill_loadmeter/identification/production.h"
+
+#include <cmath>
+#include <random>
+#include <set>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "smartmill_core/cutting/mechanistic.h"
+#include "smartmill_core/cutting/regression.h"
+#include "smartmill_core/error.h"
+#include "smartmill_core/testing/temporary_folder.h"
+#include "smartmill_core/units.h"
+
+namespace smartmill::loadmeter {
+namespace {
+
+using ::testing::HasSubstr;
+using units::radPerSecFromRpm;
+
+const ToolGeometry TOOL{3, 0.012, units::radFromDeg(35.0), {}};
+
+double torqueOf(const Engagement& e, double ktc, double kte) {
+  return MechanisticForce(TOOL, {ktc, 0, 0, kte, 0, 0}, e).mean().torque;
+}
+
+// Production: whatever engagement, depth and feed comes.
+TorqueReading reading(std::mt19937& random, double ktc, double kte, double std_dev) {
+  std::uniform_real_distribution<double> uniform;
+  std::normal_distribution<double> normal;
+  TorqueReading r;
+  r.tool = TOOL;
+  r.engagement.entry = uniform(random) < 0.5 ? 0.0 : 1.5 * uniform(random);
+  r.engagement.exit = r.engagement.entry + 0.5 + (units::PI - r.engagement.entry - 0.5) * uniform(random);
+  r.engagement.axial_depth = 0.001 + 0.004 * uniform(random);
+  r.engagement.feed_per_tooth = 3e-5 + 9e-5 * uniform(random);
+  r.torque = torqueOf(r.engagement, ktc, kte) + std_dev * normal(random);
+  r.torque_std = std_dev;
+  r.cutting_time = 10.0;
+  return r;
+}
+
+TEST(Recursive, withoutForgettingIsTheBatchRegression) {
+  std::mt19937 random(1);
+  RecursiveCoefficients recursive({}, 1e12);
+  std::vector<MeanTorqueTest> batch;
+  for (int i = 0; i < 40; ++i) {
+    const TorqueReading r = reading(random, 953e6, 17.3e3, 0.005);
+    recursive.update(r);
+    batch.push_back({r.tool, r.engagement, r.torque, r.torque_std});
+  }
+  const IdentifiedCoefficients all = identifyFromTorque(batch);
+  EXPECT_NEAR(recursive.ktc(), all.value.ktc, 1e-4 * all.value.ktc);  // the start's ignorance
+  EXPECT_NEAR(recursive.kte(), all.value.kte, 1e-3 * all.value.kte);
+  EXPECT_NEAR(recursive.ktcStd(), all.std_dev.ktc, 0.35 * all.std_dev.ktc);  // batch scales by its scatter
+}
+
+TEST(Recursive, isHonest) {
+  int ktc = 0, kte = 0;
+  const int runs = 200;
+  for (int run = 0; run < runs; ++run) {
+    std::mt19937 random(static_cast<unsigned>(run) + 1);
+    RecursiveCoefficients recursive({}, 300.0);
+    for (int i = 0; i < 60; ++i) recursive.update(reading(random, 953e6, 17.3e3, 0.01));
+    ktc += std::abs(recursive.ktc() - 953e6) < 1.96 * recursive.ktcStd();
+    kte += std::abs(recursive.kte() - 17.3e3) < 1.96 * recursive.kteStd();
+  }
+  // Exponential weights make the stated variance at most twice the true one.
+  for (const int inside : {ktc, kte}) EXPECT_GE(inside, 0.93 * runs);
+}
+
+TEST(Recursive, watchesTheEdgeWear) {
+  std::mt19937 random(7);
+  RecursiveCoefficients recursive({}, 120.0);
+  double minutes = 0.0;
+  for (int i = 0; i < 300; ++i) {
+    minutes += 10.0 / 60.0;
+    recursive.update(reading(random, 953e6, 17.3e3 * (1.0 + 0.05 * minutes), 0.01));
+  }
+  // After 50 minutes; the estimate runs behind by the memory of two minutes.
+  EXPECT_NEAR(recursive.kte(), 17.3e3 * (1.0 + 0.05 * (minutes - 2.0)), 4.0 * recursive.kteStd());
+  EXPECT_NEAR(recursive.ktc(), 953e6, 4.0 * recursive.ktcStd());
+  EXPECT_GT(recursive.kte(), 3.0 * 17.3e3);
+}
+
+TEST(Recursive, oneFeedOnlyDoesNotBlowUpAndAChippedEdgeSurprises) {
+  std::mt19937 random(9);
+  std::normal_distribution<double> normal;
+  RecursiveCoefficients recursive({900e6, 15e3, 90e6, 5e3}, 60.0);
+  TorqueReading r;
+  r.tool = TOOL;
+  r.engagement = {0.0, units::PI, 0.003, 6e-5};
+  r.torque_std = 0.01;
+  r.cutting_time = 10.0;
+  for (int i = 0; i < 2000; ++i) {
+    r.torque = torqueOf(r.engagement, 953e6, 17.3e3) + 0.01 * normal(random);
+    recursive.update(r);
+    ASSERT_LE(recursive.ktcStd(), 90e6 * 1.0001);
+    ASSERT_LE(recursive.kteStd(), 5e3 * 1.0001);
+  }
+  // What these cuts do tell is known well: the torque.
+  EXPECT_NEAR(torqueOf(r.engagement, recursive.ktc(), recursive.kte()), torqueOf(r.engagement, 953e6, 17.3e3),
+              0.01);
+  r.torque *= 1.2;
+  recursive.update(r);
+  EXPECT_GT(recursive.surprise(), 5.0);
+  r.torque_std = 0.0;
+  EXPECT_THAT(errorOf([&] { recursive.update(r); }), HasSubstr("standard deviation > 0"));
+}
+
+Spindle spindleOf() {
+  Spindle s;
+  s.load_meter_gain = 3.88e-4;
+  return s;
+}
+
+CandidateCuts candidates() {
+  CandidateCuts c;
+  for (const double rpm : {2000.0, 4000.0, 6000.0, 9000.0}) c.speeds.push_back(radPerSecFromRpm(rpm));
+  c.feeds = {3e-5, 5e-5, 7e-5, 9e-5, 1.1e-4};
+  c.axial_depths = {0.001, 0.002, 0.003};
+  return c;
+}
+
+TEST(Plan, keepsEveryLimitAndReachesWhatIsAskedInASimulatedMachine) {
+  CutLimits limits{3.5, 1500.0, [](double speed, const Engagement&) {
+                     return speed > radPerSecFromRpm(5000) && speed < radPerSecFromRpm(7000) ? 0.0015
+                                                                                             : 0.0025;
+                   }};
+  const CuttingCoefficients believed{953e6, 0, 0, 17.3e3, 0, 0};
+  const TestPlan plan = planTests(TOOL, spindleOf(), believed, candidates(), limits, 1e-3, 10e6, 0.6e3, 20);
+  std::set<double> feeds;
+  for (const PlannedCut& cut : plan.cuts) {
+    EXPECT_LE(cut.torque, 3.5);
+    EXPECT_LE(cut.power, 1500.0);
+    EXPECT_LE(cut.engagement.axial_depth, limits.stable_depth(cut.speed, cut.engagement));
+    feeds.insert(cut.engagement.feed_per_tooth);
+  }
+  EXPECT_GE(feeds.size(), 3u);
+  EXPECT_LE(plan.ktc_std, 10e6);
+  EXPECT_LE(plan.kte_std, 0.6e3);
+  // Cut the plan 200 times.
+  std::mt19937 random(2);
+  std::normal_distribution<double> normal;
+  double ktc2 = 0.0, kte2 = 0.0;
+  for (int run = 0; run < 200; ++run) {
+    std::vector<MeanTorqueTest> tests;
+    for (const PlannedCut& cut : plan.cuts) {
+      const double s = std::sqrt(2.0) * 1e-3 / (3.88e-4 * cut.speed);
+      tests.push_back({TOOL, cut.engagement, cut.torque + s * normal(random), s});
+    }
+    const CuttingCoefficients k = identifyFromTorque(tests).value;
+    ktc2 += std::pow(k.ktc - believed.ktc, 2) / 200.0;
+    kte2 += std::pow(k.kte - believed.kte, 2) / 200.0;
+  }
+  EXPECT_NEAR(std::sqrt(ktc2), plan.ktc_std, 0.2 * plan.ktc_std);  // 4 sigma of 200 runs
+  EXPECT_NEAR(std::sqrt(kte2), plan.kte_std, 0.2 * plan.kte_std);
+}
+
+TEST(Plan, noFewerCutsWouldDo) {
+  CandidateCuts few = candidates();
+  few.speeds = {radPerSecFromRpm(3000), radPerSecFromRpm(6000)};
+  few.axial_depths = {0.002};
+  const CutLimits limits{100.0, 1e5, {}};
+  const CuttingCoefficients believed{953e6, 0, 0, 17.3e3, 0, 0};
+  const double asked_ktc = 40e6, asked_kte = 1.5e3;
+  for (const double voltage_std : {2e-3, 3e-3, 3.6e-3}) {
+    const TestPlan plan =
+        planTests(TOOL, spindleOf(), believed, few, limits, voltage_std, asked_ktc, asked_kte, 30);
+    const std::size_t n = plan.cuts.size();
+    if (n <= 3) continue;
+    // Every choice of one cut fewer, with repetition.
+    struct Row {
+      double tc, te, v;
+    };
+    std::vector<Row> rows;
+    for (const double w : few.speeds) {
+      for (const double f : few.feeds) {
+        const auto m = meanForceMatrix(TOOL, {0.0, units::PI, 0.002, f});
+        rows.push_back({m[3][0], m[3][3], 2.0 * std::pow(voltage_std / (3.88e-4 * w), 2)});
+      }
+    }
+    bool reached = false;
+    std::vector<std::size_t> at(n - 1, 0);
+    for (bool more = n <= 6; more;) {
+      double a = 0.0, b = 0.0, c = 0.0;
+      for (const std::size_t k : at) {
+        a += rows[k].tc * rows[k].tc / rows[k].v;
+        b += rows[k].tc * rows[k].te / rows[k].v;
+        c += rows[k].te * rows[k].te / rows[k].v;
+      }
+      const double d = a * c - b * b;
+      reached = reached || (d > 0.0 && std::sqrt(c / d) <= asked_ktc && std::sqrt(a / d) <= asked_kte);
+      std::size_t i = 0;
+      while (i < at.size() && at[i] + 1 == rows.size()) ++i;
+      more = i < at.size();
+      if (more) {
+        ++at[i];
+        for (std::size_t j = 0; j < i; ++j) at[j] = at[i];
+      }
+    }
+    // Three different feeds are due besides: one more cut than without that rule at most.
+    EXPECT_TRUE(!reached || n <= 4u) << voltage_std;
+  }
+}
+
+TEST(Plan, saysWhenTheLimitsForbidIt) {
+  const CuttingCoefficients believed{953e6, 0, 0, 17.3e3, 0, 0};
+  EXPECT_THAT(errorOf([&] {
+                planTests(TOOL, spindleOf(), believed, candidates(), {0.1, 1e5, {}}, 1e-3, 1e7, 1e3, 10);
+              }),
+              HasSubstr("0 feeds keep the limits"));
+  EXPECT_THAT(errorOf([&] {
+                planTests(TOOL, spindleOf(), believed, candidates(), {10.0, 1e5, {}}, 1e-2, 1e5, 10.0, 10);
+              }),
+              HasSubstr("more is asked"));
+}
+
+}  // namespace
+}  // namespace smartmill::loadmeter

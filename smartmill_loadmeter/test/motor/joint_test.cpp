@@ -1,0 +1,142 @@
+#include "smartmill_loadmeter/motor/joint.h"
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "smartmill_core/cutting/mechanistic.h"
+#include "smartmill_core/error.h"
+#include "smartmill_core/testing/temporary_folder.h"
+#include "smartmill_core/units.h"
+
+namespace smartmill::loadmeter {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+/// A machine whose slides draw current for friction, weight and cutting force, at rest nothing of it.
+struct Machine {
+  std::mt19937 random;
+  std::normal_distribution<double> normal;
+  CuttingCoefficients truth;
+  ToolGeometry tool{4, 0.016, units::radFromDeg(30.0), {}};
+  std::array<FeedDrive, 3> drives{
+      FeedDrive{215.9, 2.0, 1.1, 0.03}, FeedDrive{198.0, 2.0, 1.3, 0.03},
+      FeedDrive{-198.45, 2.0, 1.3, 0.03}};  // Z: its weight aids the feed downwards
+  std::array<double, 3> actual{};
+  double torque_std = 0.01;
+
+  explicit Machine(unsigned seed) : random(seed) {
+    std::uniform_real_distribution<double> uniform;
+    const double ktc = 400e6 + 1600e6 * uniform(random), kte = 10e3 + 25e3 * uniform(random);
+    truth = {ktc, ktc * (0.2 + 0.3 * uniform(random)), ktc * (0.15 + 0.2 * uniform(random)),
+             kte, kte * (0.8 + 0.5 * uniform(random)), kte * (0.2 + 0.5 * uniform(random))};
+    for (std::size_t a = 0; a < 3; ++a) {
+      actual[a] = drives[a].newton_per_ampere + drives[a].newton_per_ampere_std * normal(random);
+    }
+  }
+
+  JointReading cut(const Engagement& e, double heading, const std::array<double, 3>& velocity) {
+    const CuttingForce f = MechanisticForce(tool, truth, e).mean();
+    const double c = std::cos(heading), s = std::sin(heading);
+    const std::array<double, 3> force{c * f.fx - s * f.fy, s * f.fx + c * f.fy, f.fz};
+    JointReading r;
+    r.tool = tool;
+    r.engagement = e;
+    r.heading = heading;
+    r.torque = Estimate{f.torque + torque_std * normal(random), torque_std};
+    for (std::size_t a = 0; a < 3; ++a) {
+      const double opposing = velocity[a] > 0.0 ? -force[a] : force[a];
+      const double moving = std::abs(velocity[a]) > 0.0 ? drives[a].air_current + opposing / actual[a] : 0.0;
+      r.axis_force[a] =
+          axisForce(drives[a], moving + drives[a].current_std * normal(random), velocity[a], 1e-6);
+    }
+    return r;
+  }
+};
+
+const double PI = units::PI;
+
+TEST(Joint, torqueAndTheFeedAxisGiveTangentialAndRadialButNotAxial) {
+  Machine m(1);
+  std::vector<JointReading> readings;
+  for (const double feed : {4e-5, 7e-5, 1e-4, 1.3e-4}) {
+    readings.push_back(m.cut({0.0, PI, 0.003, feed}, 0.0, {0.01, 0.0, 0.0}));
+  }
+  EXPECT_FALSE(readings[0].axis_force[1]);  // Y stands still: passive
+  EXPECT_FALSE(readings[0].axis_force[2]);
+  const JointResult k = identifyJointly(readings);
+  EXPECT_THAT(k.not_observable, ElementsAre("Kac", "Kae"));
+  EXPECT_TRUE(std::isnan(k.value.kac) && std::isnan(k.std_dev.kae) && std::isnan(k.covariance[2]));
+  EXPECT_NEAR(k.value.krc, m.truth.krc, 3.0 * k.std_dev.krc);
+  EXPECT_NEAR(k.value.ktc, m.truth.ktc, 3.0 * k.std_dev.ktc);
+}
+
+TEST(Joint, torqueAloneGivesTangentialOnly) {
+  Machine m(2);
+  std::vector<JointReading> readings;
+  for (const double feed : {4e-5, 7e-5, 1e-4})
+    readings.push_back(m.cut({0.0, PI, 0.003, feed}, 0.0, {0, 0, 0}));
+  const JointResult k = identifyJointly(readings);
+  EXPECT_THAT(k.not_observable, ElementsAre("Krc", "Kac", "Kre", "Kae"));
+  EXPECT_NEAR(k.value.ktc, m.truth.ktc, 3.0 * k.std_dev.ktc);
+}
+
+TEST(Joint, rampsShowTheAxialCoefficientsToo) {
+  Machine m(3);
+  std::vector<JointReading> readings;
+  for (const double feed : {4e-5, 7e-5, 1e-4, 1.3e-4}) {
+    readings.push_back(m.cut({0.0, PI, 0.003, feed}, 0.0, {0.01, 0.0, -0.0005}));
+    readings.push_back(m.cut({0.0, PI, 0.003, feed}, 0.7, {0.007, 0.006, 0.0}));
+  }
+  const JointResult k = identifyJointly(readings);
+  EXPECT_THAT(k.not_observable, IsEmpty());
+  EXPECT_NEAR(k.value.kac, m.truth.kac, 3.0 * k.std_dev.kac);
+  EXPECT_NEAR(k.value.kae, m.truth.kae, 3.0 * k.std_dev.kae);
+}
+
+TEST(Joint, oneFeedSeparatesNothingAndSaysSo) {
+  Machine m(4);
+  std::vector<JointReading> readings;
+  for (int i = 0; i < 5; ++i) readings.push_back(m.cut({0.0, PI, 0.003, 7e-5}, 0.0, {0.01, 0.0, 0.0}));
+  EXPECT_THAT(errorOf([&] { identifyJointly(readings); }), HasSubstr("separate none of the six"));
+  JointReading silent;
+  silent.tool = m.tool;
+  silent.engagement = {0.0, PI, 0.003, 7e-5};
+  EXPECT_THAT(errorOf([&] { identifyJointly({silent}); }), HasSubstr("no torque and no moving axis"));
+}
+
+TEST(Joint, overManyMachinesRadialAndAxialAreWithinTenPercentInTheMedianAndHonest) {
+  std::vector<double> krc, kac;
+  int inside_rc = 0, inside_ac = 0;
+  const int runs = 200;
+  for (int run = 0; run < runs; ++run) {
+    Machine m(static_cast<unsigned>(run) + 10);
+    std::vector<JointReading> readings;
+    for (const double feed : {3e-5, 6e-5, 9e-5, 1.2e-4, 1.5e-4}) {
+      readings.push_back(m.cut({0.0, PI, 0.003, feed}, 0.0, {0.01, 0.0, -0.0005}));
+      readings.push_back(m.cut({0.0, PI / 2, 0.003, feed}, PI / 2, {0.0, 0.01, 0.0}));
+    }
+    const JointResult k = identifyJointly(readings);
+    krc.push_back(std::abs(k.value.krc / m.truth.krc - 1.0));
+    kac.push_back(std::abs(k.value.kac / m.truth.kac - 1.0));
+    inside_rc += std::abs(k.value.krc - m.truth.krc) < 1.96 * k.std_dev.krc;
+    inside_ac += std::abs(k.value.kac - m.truth.kac) < 1.96 * k.std_dev.kac;
+  }
+  std::sort(krc.begin(), krc.end());
+  std::sort(kac.begin(), kac.end());
+  std::printf("radial within %.1f %% in the median, axial %.1f %%; inside 1.96 std %d and %d of %d\n",
+              100 * krc[runs / 2], 100 * kac[runs / 2], inside_rc, inside_ac, runs);
+  EXPECT_LT(krc[runs / 2], 0.10);
+  EXPECT_LT(kac[runs / 2], 0.10);
+  EXPECT_GE(inside_rc, 0.90 * runs);
+  EXPECT_GE(inside_ac, 0.90 * runs);
+}
+
+}  // namespace
+}  // namespace smartmill::loadmeter

@@ -1,0 +1,122 @@
+#include <cmath>
+#include <filesystem>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <rosbag/bag.h>
+
+#include "../../src/node/bag_identification.h"
+#include "../session.h"
+#include "smartmill_core/testing/temporary_folder.h"
+#include "smartmill_msgs/IdentifyCoefficientsActionGoal.h"
+#include "smartmill_ros/conversions.h"
+
+namespace smartmill::loadmeter {
+namespace {
+
+using ::testing::HasSubstr;
+
+/// Plays a session into a bag and, the same messages, into a class; the goals too.
+class Recorder {
+ public:
+  explicit Recorder(const std::string& file) : bag_(file, rosbag::bagmode::Write), direct(model(), {}) {
+    direct.onResult([this](const IdentifyResult& result) {
+      if (!result.reset) results.push_back(result);
+    });
+    session.state = [this](const CncState& s) { write("/smartmill/cnc/state", s); };
+    session.load = [this](const LoadSample& l) { write("/smartmill/cnc/load", l); };
+    session.condition = [this](const CuttingCondition& c) { write("/smartmill/cut/condition", c); };
+  }
+
+  void goal(bool reset) {
+    smartmill_msgs::IdentifyCoefficientsActionGoal m;
+    m.goal.header.stamp = fromSec(session.now());
+    m.goal.tool = "endmill";
+    m.goal.material = "aluminium";
+    m.goal.reset = reset;
+    bag_.write("/smartmill/loadmeter/identify_coefficients/goal", m.goal.header.stamp, m);
+    direct.handle(IdentifyGoal{toSec(m.goal.header.stamp), m.goal.tool, m.goal.material, reset, 0});
+  }
+
+  Session session{21, 2e-4};
+  std::vector<IdentifyResult> results;
+
+ private:
+  template <typename Input>
+  void write(const std::string& topic, const Input& input) {
+    const auto message = toMsg(input);
+    bag_.write(topic, message.header.stamp, message);
+    direct.handle(fromMsg(message));
+  }
+
+  rosbag::Bag bag_;
+
+ public:
+  LoadMeterIdentification direct;
+};
+
+TEST(Bag, givesTheFiguresOfTheLiveRunToTheLastDigit) {
+  const TemporaryFolder folder;
+  const std::string file = folder.file("run.bag");
+  std::vector<IdentifyResult> live;
+  {
+    Recorder recorder(file);
+    recorder.session.air(9000.0, 2.0);
+    recorder.goal(true);
+    takeThrough(recorder.session);
+    recorder.goal(false);
+    live = recorder.results;
+  }
+  const std::vector<IdentifyResult> found = identifyFromBag(file, model(), {}, [](double) {});
+  ASSERT_EQ(live.size(), 1u);
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].message, live[0].message);
+  EXPECT_EQ(found[0].coefficients.value.ktc, live[0].coefficients.value.ktc);
+  EXPECT_EQ(found[0].coefficients.std_dev.kte, live[0].coefficients.std_dev.kte);
+  EXPECT_EQ(found[0].coefficients.stamp, live[0].coefficients.stamp);
+
+  // Half a bag is refused in one line.
+  std::filesystem::resize_file(file, std::filesystem::file_size(file) / 2);
+  const std::string message = errorOf([&] { identifyFromBag(file, model(), {}, [](double) {}); });
+  EXPECT_THAT(message, HasSubstr("run.bag"));
+  EXPECT_EQ(message.find('\n'), std::string::npos);
+}
+
+TEST(Bag, withoutAGoalIsAskedAtItsEnd) {
+  const TemporaryFolder folder;
+  {
+    Recorder recorder(folder.file("run.bag"));
+    takeThrough(recorder.session);
+  }
+  const auto found = identifyFromBag(folder.file("run.bag"), model(), {}, [](double) {});
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_NEAR(found[0].coefficients.value.ktc, TRUTH.ktc, 0.01 * TRUTH.ktc);
+}
+
+TEST(Parameters, theShippedFileIsTheDefaultsAndWrongOnesAreNamed) {
+  ParameterReader reader = ParameterReader::fromFile(std::string(LAUNCH_CONFIG_FOLDER) + "/loadmeter.yaml");
+  const NodeParameters p = readParameters(reader);
+  const IdentificationParameters defaults;
+  EXPECT_EQ(p.identification.speed_tolerance, defaults.speed_tolerance);
+  EXPECT_EQ(p.identification.settle_time_constants, defaults.settle_time_constants);
+  EXPECT_EQ(p.identification.guard_time, defaults.guard_time);
+  EXPECT_EQ(p.identification.path_tolerance, defaults.path_tolerance);
+  EXPECT_EQ(p.identification.minimum_readings, defaults.minimum_readings);
+  EXPECT_EQ(p.identification.maximum_gap, defaults.maximum_gap);
+  EXPECT_EQ(p.identification.production_memory, defaults.production_memory);
+  EXPECT_EQ(p.hold_back, NodeParameters().hold_back);
+  EXPECT_EQ(p.input_timeout, NodeParameters().input_timeout);
+  const TemporaryFolder folder;
+  const auto messageOf = [&](const std::string& text) {
+    return errorOf([&] {
+      ParameterReader bad = ParameterReader::fromFile(folder.write("p.yaml", text));
+      readParameters(bad);
+    });
+  };
+  EXPECT_THAT(messageOf("path_tolerance: 1e-3\n"), HasSubstr("path_tolerance"));
+  EXPECT_THAT(messageOf("path_tolerance: -1.0\n"), HasSubstr("path_tolerance: -1 is out of range"));
+  EXPECT_THAT(messageOf("settle: 8.0\n"), HasSubstr("settle"));
+}
+
+}  // namespace
+}  // namespace smartmill::loadmeter

@@ -1,0 +1,143 @@
+#include <actionlib/client/simple_action_client.h>
+#include <geometry_msgs/WrenchStamped.h>
+#include <ros/ros.h>
+
+#include <cmath>
+#include <mutex>
+
+#include <gtest/gtest.h>
+
+#include "../session.h"
+#include "smartmill_msgs/CncState.h"
+#include "smartmill_msgs/CuttingCoefficients.h"
+#include "smartmill_msgs/CuttingCondition.h"
+#include "smartmill_msgs/FindCoefficients.h"
+#include "smartmill_msgs/IdentifyCoefficientsAction.h"
+#include "smartmill_msgs/LoadSample.h"
+#include "smartmill_msgs/SampleBlock.h"
+#include "smartmill_ros/conversions.h"
+
+namespace smartmill::loadmeter {
+namespace {
+
+using Client = actionlib::SimpleActionClient<smartmill_msgs::IdentifyCoefficientsAction>;
+
+smartmill_msgs::IdentifyCoefficientsGoal goalAt(double stamp, bool reset) {
+  smartmill_msgs::IdentifyCoefficientsGoal goal;
+  goal.header.stamp = fromSec(stamp);
+  goal.tool = "endmill";
+  goal.material = "aluminium";
+  goal.reset = reset;
+  return goal;
+}
+
+TEST(LoadMeterNode, identifiesPublishesAndAnswers) {
+  ros::NodeHandle nh;
+  ros::AsyncSpinner spinner(1);
+  spinner.start();
+  const auto states = nh.advertise<smartmill_msgs::CncState>("cnc/state", 1000);
+  const auto loads = nh.advertise<smartmill_msgs::LoadSample>("cnc/load", 1000);
+  const auto currents = nh.advertise<smartmill_msgs::SampleBlock>("daq/motor_current", 1000);
+  geometry_msgs::WrenchStamped force;
+  std::mutex force_lock;
+  const boost::function<void(const geometry_msgs::WrenchStamped&)> take = [&](const auto& m) {
+    const std::lock_guard<std::mutex> guard(force_lock);
+    force = m;
+  };
+  const auto forces = nh.subscribe<geometry_msgs::WrenchStamped>("force/motor_current", 10, take);
+  const auto conditions = nh.advertise<smartmill_msgs::CuttingCondition>("cut/condition", 100, true);
+  Client client("loadmeter/identify_coefficients", false);
+  ASSERT_TRUE(client.waitForServer(ros::Duration(20.0)));
+  for (int i = 0;
+       i < 200 && !(states.getNumSubscribers() && loads.getNumSubscribers() && currents.getNumSubscribers() &&
+                    forces.getNumPublishers() && conditions.getNumSubscribers());
+       ++i) {
+    ros::WallDuration(0.05).sleep();
+  }
+  ASSERT_TRUE(states.getNumSubscribers() && loads.getNumSubscribers() && conditions.getNumSubscribers());
+
+  Session session(4, 2e-4);
+  int sent = 0;
+  session.state = [&](const CncState& s) { states.publish(toMsg(s)); };
+  session.load = [&](const LoadSample& l) {
+    loads.publish(toMsg(l));
+    if (++sent % 10 == 0)
+      ros::WallDuration(0.002).sleep();  // far faster than a machine, yet not faster than the queue
+  };
+  session.cutting = {TRUTH.ktc, 420e6, 0.0, TRUTH.kte, 21e3, 0.0};
+  session.currents = [&](const SampleBlock& b) { currents.publish(toMsg(b)); };
+  session.condition = [&](const CuttingCondition& c) { conditions.publish(toMsg(c)); };
+
+  // A plan that was forgotten does not count.
+  session.air(9000.0, 2.0);
+  client.sendGoal(goalAt(session.now(), true));
+  session.air(2000.0, 0.2);
+  ASSERT_TRUE(client.waitForResult(ros::Duration(10.0)));
+  EXPECT_EQ(client.getResult()->code, smartmill_msgs::IdentifyCoefficientsResult::OK);
+
+  client.sendGoal(goalAt(session.now(), false));
+  session.air(2000.0, 0.2);
+  ASSERT_TRUE(client.waitForResult(ros::Duration(10.0)));
+  EXPECT_EQ(client.getState(), actionlib::SimpleClientGoalState::ABORTED);
+  EXPECT_EQ(client.getResult()->code, smartmill_msgs::IdentifyCoefficientsResult::TOO_FEW_TESTS);
+
+  takeThrough(session);
+  client.sendGoal(goalAt(session.now(), false));
+  // Nothing follows: the node must not wait for ever for a stream that has ended.
+  ASSERT_TRUE(client.waitForResult(ros::Duration(15.0)));
+  const auto result = client.getResult();
+  ASSERT_EQ(result->code, smartmill_msgs::IdentifyCoefficientsResult::OK) << result->message;
+  EXPECT_NEAR(result->coefficients.ktc, TRUTH.ktc, 0.01 * TRUTH.ktc);
+  EXPECT_NEAR(result->coefficients.kte, TRUTH.kte, 0.03 * TRUTH.kte);
+  EXPECT_GT(result->coefficients.ktc_std, 0.0);
+  EXPECT_TRUE(std::isnan(result->coefficients.krc));
+  EXPECT_EQ(result->coefficients.test_count, 3u);
+  EXPECT_EQ(result->coefficients.source, "load_meter");
+
+  // Latched: who comes late gets it.
+  const auto latched = ros::topic::waitForMessage<smartmill_msgs::CuttingCoefficients>(
+      "material/coefficients", nh, ros::Duration(10.0));
+  ASSERT_TRUE(latched);
+  EXPECT_EQ(latched->ktc, result->coefficients.ktc);
+
+  auto find = nh.serviceClient<smartmill_msgs::FindCoefficients>("loadmeter/find_coefficients");
+  smartmill_msgs::FindCoefficients call;
+  call.request.tool = "endmill";
+  call.request.material = "aluminium";
+  ASSERT_TRUE(find.call(call));
+  EXPECT_EQ(call.response.code, smartmill_msgs::FindCoefficients::Response::OK);
+  EXPECT_EQ(call.response.coefficients.ktc, result->coefficients.ktc);
+  call.request.material = "steel";
+  ASSERT_TRUE(find.call(call));
+  EXPECT_EQ(call.response.code, smartmill_msgs::FindCoefficients::Response::NOT_FOUND);
+  EXPECT_TRUE(std::isnan(call.response.coefficients.ktc));
+  EXPECT_NE(call.response.message.find("endmill / aluminium"), std::string::npos);
+
+  // After a pass in air the X drive tells the force of a cut; Y and Z stood still: nothing is told of them.
+  session.airPass(6000.0, 6e-5, 4.0);
+  session.slot(6000.0, 6e-5, 4.0);
+  session.air(2000.0, 0.3);
+  const double truth = MechanisticForce({3, 0.012, units::radFromDeg(35.0), {}}, session.cutting,
+                                        {0.0, units::PI, 0.002, 6e-5})
+                           .mean()
+                           .fx;
+  geometry_msgs::WrenchStamped last;
+  for (int i = 0; i < 200; ++i) {
+    ros::WallDuration(0.05).sleep();
+    const std::lock_guard<std::mutex> guard(force_lock);
+    last = force;
+    if (std::isfinite(last.wrench.force.x) && last.wrench.force.x != 0.0) break;
+  }
+  EXPECT_NEAR(last.wrench.force.x, truth, 4.0);  // scatter of the calibration: 1 N
+  EXPECT_TRUE(std::isnan(last.wrench.force.y));
+  EXPECT_TRUE(std::isnan(last.wrench.force.z));
+}
+
+}  // namespace
+}  // namespace smartmill::loadmeter
+
+int main(int argc, char** argv) {
+  testing::InitGoogleTest(&argc, argv);
+  ros::init(argc, argv, "loadmeter_node_test");
+  return RUN_ALL_TESTS();
+}
