@@ -13,8 +13,8 @@
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/signal/streams.h"
 #include "smartmill_core/units.h"
-#include "smartmill_hammer/hammer_sequence.h"
-#include "smartmill_hammer/offset_factor.h"
+#include "smartmill_hammer/analysis/offset_factor.h"
+#include "smartmill_hammer/sequence/hammer_sequence.h"
 
 namespace smartmill {
 namespace hammer {

@@ -12,10 +12,10 @@
 
 #include <CLI/CLI.hpp>
 
-#include "bag_replay.h"
+#include "../src/node/bag_replay.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/units.h"
-#include "smartmill_hammer/tap_records.h"
+#include "smartmill_hammer/analysis/tap_records.h"
 
 namespace smartmill {
 namespace hammer {

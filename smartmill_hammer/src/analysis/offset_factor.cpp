@@ -1,4 +1,4 @@
-#include "smartmill_hammer/offset_factor.h"
+#include "smartmill_hammer/analysis/offset_factor.h"
 
 #include <cstdio>
 

@@ -9,7 +9,7 @@
 #include "smartmill_core/modal/modal_filter.h"
 #include "smartmill_core/signal/hit_collector.h"
 #include "smartmill_core/units.h"
-#include "smartmill_hammer/offset_factor.h"
+#include "smartmill_hammer/analysis/offset_factor.h"
 
 namespace smartmill {
 namespace hammer {

@@ -1,4 +1,4 @@
-#include "smartmill_hammer/hammer_sequence.h"
+#include "smartmill_hammer/sequence/hammer_sequence.h"
 
 #include <algorithm>
 #include <cctype>
@@ -9,7 +9,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/units.h"
-#include "smartmill_hammer/offset_factor.h"
+#include "smartmill_hammer/analysis/offset_factor.h"
 
 namespace smartmill {
 namespace hammer {

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "smartmill_hammer/hammer_sequence.h"
+#include "smartmill_hammer/sequence/hammer_sequence.h"
 
 namespace smartmill {
 

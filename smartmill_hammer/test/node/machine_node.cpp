@@ -15,7 +15,7 @@
 #include <smartmill_msgs/SpindleAngle.h>
 #include <smartmill_msgs/Strike.h>
 
-#include "closed_form_machine.h"
+#include "../closed_form_machine.h"
 #include "smartmill_ros/conversions.h"
 
 namespace smartmill {

@@ -1,4 +1,4 @@
-#include "smartmill_hammer/sensor_calibration.h"
+#include "smartmill_hammer/search/sensor_calibration.h"
 
 #include <cmath>
 #include <iostream>

@@ -18,8 +18,8 @@
 #include <smartmill_msgs/SampleBlock.h>
 #include <smartmill_msgs/SpindleAngle.h>
 
-#include "../src/bag_replay.h"
-#include "closed_form_machine.h"
+#include "../../src/node/bag_replay.h"
+#include "../closed_form_machine.h"
 
 namespace smartmill {
 namespace hammer {

@@ -23,7 +23,7 @@
 #include <smartmill_msgs/SpindleAngle.h>
 
 #include "smartmill_core/signal/stream_sorter.h"
-#include "smartmill_hammer/hammer_sequence.h"
+#include "smartmill_hammer/sequence/hammer_sequence.h"
 
 namespace smartmill {
 namespace hammer {

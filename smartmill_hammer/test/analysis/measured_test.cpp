@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "smartmill_core/error.h"
-#include "smartmill_hammer/tap_records.h"
+#include "smartmill_hammer/analysis/tap_records.h"
 
 namespace smartmill {
 namespace hammer {

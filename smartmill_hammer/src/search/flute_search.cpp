@@ -1,4 +1,4 @@
-#include "smartmill_hammer/flute_search.h"
+#include "smartmill_hammer/search/flute_search.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "smartmill_hammer/tap_records.h"
+#include "smartmill_hammer/analysis/tap_records.h"
 
 #include <algorithm>
 #include <cmath>

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "smartmill_hammer/hammer_sequence.h"
+#include "smartmill_hammer/sequence/hammer_sequence.h"
 
 namespace smartmill {
 namespace hammer {

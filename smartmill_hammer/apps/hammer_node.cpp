@@ -1,6 +1,6 @@
 #include <ros/ros.h>
 
-#include "hammer_server.h"
+#include "../src/node/hammer_server.h"
 #include "smartmill_core/error.h"
 
 int main(int argc, char** argv) {

@@ -1,4 +1,4 @@
-#include "smartmill_hammer/hammer_sequence.h"
+#include "smartmill_hammer/sequence/hammer_sequence.h"
 
 #include <cmath>
 #include <functional>
@@ -7,7 +7,7 @@
 
 #include <gtest/gtest.h>
 
-#include "closed_form_machine.h"
+#include "../closed_form_machine.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/signal/stream_sorter.h"
 

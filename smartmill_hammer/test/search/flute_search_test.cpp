@@ -1,11 +1,11 @@
-#include "smartmill_hammer/flute_search.h"
+#include "smartmill_hammer/search/flute_search.h"
 
 #include <cmath>
 #include <random>
 
 #include <gtest/gtest.h>
 
-#include "closed_form_machine.h"
+#include "../closed_form_machine.h"
 
 namespace smartmill {
 namespace hammer {

@@ -12,8 +12,8 @@
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/signal/hit_collector.h"
 #include "smartmill_core/signal/streams.h"
-#include "smartmill_hammer/flute_search.h"
-#include "smartmill_hammer/sensor_calibration.h"
+#include "smartmill_hammer/search/flute_search.h"
+#include "smartmill_hammer/search/sensor_calibration.h"
 
 namespace smartmill {
 namespace hammer {
