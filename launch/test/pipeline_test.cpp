@@ -16,7 +16,7 @@
 #include <smartmill_msgs/SpindleAngle.h>
 #include <tf2_ros/transform_listener.h>
 
-#include "../src/session_parameters.h"
+#include "../src/session/session_parameters.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/machine_model.h"
 

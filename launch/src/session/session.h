@@ -21,7 +21,7 @@
 #include "session_parameters.h"
 #include "session_summary.h"
 #include "smartmill_core/model/machine_model.h"
-#include "smartmill_launch/session_plan.h"
+#include "smartmill_launch/session/session_plan.h"
 
 namespace smartmill::session {
 

@@ -3,7 +3,7 @@
 #include <optional>
 #include <string>
 
-#include "smartmill_launch/session_report.h"
+#include "smartmill_launch/report/session_report.h"
 
 namespace smartmill::report {
 

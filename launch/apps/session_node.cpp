@@ -3,7 +3,7 @@
 #include <cstdlib>
 #include <exception>
 
-#include "session.h"
+#include "../src/session/session.h"
 
 namespace {
 std::atomic<bool> stop{false};

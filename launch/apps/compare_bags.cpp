@@ -16,7 +16,7 @@
 #include <CLI/CLI.hpp>
 
 #include "smartmill_core/error.h"
-#include "smartmill_launch/topic_comparison.h"
+#include "smartmill_launch/comparison/topic_comparison.h"
 #include "smartmill_ros/bag_reader.h"
 
 namespace {

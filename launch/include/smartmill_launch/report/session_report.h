@@ -8,8 +8,8 @@
 #include "smartmill_core/cutting/coefficient_set.h"
 #include "smartmill_core/modal/results.h"
 #include "smartmill_core/signal/streams.h"
-#include "smartmill_launch/report_statistics.h"
-#include "smartmill_launch/session_plan.h"
+#include "smartmill_launch/report/report_statistics.h"
+#include "smartmill_launch/session/session_plan.h"
 
 namespace smartmill::report {
 

@@ -14,9 +14,9 @@
 
 #include <CLI/CLI.hpp>
 
-#include "report_pictures.h"
-#include "session_bag.h"
-#include "shell.h"
+#include "../src/report/report_pictures.h"
+#include "../src/report/session_bag.h"
+#include "../src/shell.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/units.h"

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "smartmill_launch/session_plan.h"
+#include "smartmill_launch/session/session_plan.h"
 #include "smartmill_ros/parameter_reader.h"
 
 namespace smartmill::session {

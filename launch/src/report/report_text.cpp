@@ -7,7 +7,7 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/units.h"
-#include "smartmill_launch/session_report.h"
+#include "smartmill_launch/report/session_report.h"
 
 namespace smartmill::report {
 namespace {

@@ -1,4 +1,4 @@
-#include "smartmill_launch/session_report.h"
+#include "smartmill_launch/report/session_report.h"
 
 #include <cmath>
 

@@ -1,4 +1,4 @@
-#include "../src/session_bag.h"
+#include "../../src/report/session_bag.h"
 
 #include <cmath>
 #include <fstream>

@@ -16,12 +16,12 @@
 #include <ros/package.h>
 #include <CLI/CLI.hpp>
 
-#include "session_bag.h"
-#include "shell.h"
+#include "../src/report/session_bag.h"
+#include "../src/shell.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/strict_yaml.h"
 #include "smartmill_core/units.h"
-#include "smartmill_launch/offline_comparison.h"
+#include "smartmill_launch/comparison/offline_comparison.h"
 
 namespace {
 

@@ -1,4 +1,4 @@
-#include "smartmill_launch/topic_comparison.h"
+#include "smartmill_launch/comparison/topic_comparison.h"
 
 #include <algorithm>
 #include <cmath>

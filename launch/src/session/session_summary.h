@@ -5,7 +5,7 @@
 
 #include "smartmill_core/cutting/coefficient_set.h"
 #include "smartmill_core/modal/results.h"
-#include "smartmill_launch/session_plan.h"
+#include "smartmill_launch/session/session_plan.h"
 
 namespace smartmill::session {
 

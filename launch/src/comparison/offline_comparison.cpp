@@ -1,4 +1,4 @@
-#include "smartmill_launch/offline_comparison.h"
+#include "smartmill_launch/comparison/offline_comparison.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "smartmill_launch/session_plan.h"
+#include "smartmill_launch/session/session_plan.h"
 
 #include <cmath>
 #include <functional>

@@ -1,4 +1,4 @@
-#include "smartmill_launch/report_statistics.h"
+#include "smartmill_launch/report/report_statistics.h"
 
 #include <algorithm>
 #include <cmath>
