@@ -1,6 +1,6 @@
 #include <ros/ros.h>
 
-#include "node.h"
+#include "../src/node/node.h"
 #include "smartmill_core/error.h"
 
 int main(int argc, char** argv) {
