@@ -1,6 +1,5 @@
 #include "smartmill_loadmeter/motor/motor_current.h"
 
-#include <gsl/gsl_cdf.h>
 #include <gsl/gsl_wavelet.h>
 
 #include <algorithm>
@@ -121,20 +120,6 @@ Line fitLine(const std::vector<double>& x, const std::vector<double>& y) {
   return line;
 }
 
-SlideLoad slideLoad(const Line& calibration, double air_current, double air_current_reverse,
-                    double current_std) {
-  const double m = calibration.slope.value, size = std::abs(m);
-  // W + R = m Ia; against it the weight changes sign: -W + R = |m| Ia'.
-  const double with = m * air_current, against = size * air_current_reverse;
-  SlideLoad load;
-  load.friction.value = 0.5 * (with + against);
-  load.weight.value = 0.5 * (with - against);
-  const double from_current = size * current_std / std::sqrt(2.0);
-  load.friction.std_dev = std::hypot(from_current, load.friction.value * calibration.slope.std_dev / size);
-  load.weight.std_dev = std::hypot(from_current, load.weight.value * calibration.slope.std_dev / size);
-  return load;
-}
-
 double TorquePowerLaw::evaluate(const Side& side, double speed_rpm, double rise) {
   if (!(rise > 0.0)) return 0.0;
   const double n = (speed_rpm - side.middle) / side.span;
@@ -209,23 +194,6 @@ double TorquePowerLaw::torque(double speed_rpm, double rise) const {
                 " base speed: torque at " + std::to_string(speed_rpm) + " rpm is not known");
   }
   return evaluate(*side(above), speed_rpm, rise);
-}
-
-VarianceSplit splitVariance(const std::vector<double>& dynamometer, const std::vector<double>& current) {
-  if (dynamometer.size() < 3 || current.size() < 3) throw Error("variance split: three replications are due");
-  VarianceSplit s;
-  s.process_mean = mean(dynamometer);
-  s.current_mean = mean(current);
-  s.process_variance = std::pow(standardDeviation(dynamometer), 2);
-  s.current_variance = std::pow(standardDeviation(current), 2);
-  s.sensor_variance = std::max(0.0, s.current_variance - s.process_variance);
-  const double na = static_cast<double>(dynamometer.size()), nb = static_cast<double>(current.size());
-  const double within = ((na - 1.0) * s.process_variance + (nb - 1.0) * s.current_variance) / (na + nb - 2.0);
-  const double difference = s.process_mean - s.current_mean;
-  s.f_means = difference * difference / (within * (1.0 / na + 1.0 / nb));
-  s.p_means = gsl_cdf_fdist_Q(s.f_means, 1.0, na + nb - 2.0);
-  s.p_variances = gsl_cdf_fdist_Q(s.current_variance / s.process_variance, nb - 1.0, na - 1.0);
-  return s;
 }
 
 }  // namespace smartmill::loadmeter

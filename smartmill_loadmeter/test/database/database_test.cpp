@@ -226,7 +226,7 @@ TEST(Estimate, isHonestWhereCuttingSpeedActs) {
 }
 
 TEST(Database, hundredThousandRecordsAreLookedUpInUnderFiveMilliseconds) {
-  CoefficientDatabase database("");  // the same tables; from a file: database_study lookup
+  CoefficientDatabase database("");  // the same tables; from a file: loadmeter_database lookup
   std::mt19937 random(1);
   std::uniform_real_distribution<double> uniform;
   std::vector<CoefficientRecord> many;
@@ -253,7 +253,7 @@ TEST(Database, hundredThousandRecordsAreLookedUpInUnderFiveMilliseconds) {
   EXPECT_LT(times[30], 5e-3);
 }
 
-// The full minute is database_study crash. Writers tell through a pipe what add() has acknowledged; one after
+// The full minute is loadmeter_database crash. Writers tell through a pipe what add() has acknowledged; one after
 // the other is killed and started anew.
 TEST(Database, whatWasAcknowledgedSurvivesKilledWriters) {
   const TemporaryFolder folder;

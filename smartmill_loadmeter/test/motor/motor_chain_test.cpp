@@ -1,7 +1,6 @@
 #include "smartmill_loadmeter/motor/motor_chain.h"
 
 #include <cmath>
-#include <fstream>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,70 +9,11 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_loadmeter/identification/sorted_identification.h"
-#include "study/turning_scene.h"
 
 namespace smartmill::loadmeter {
 namespace {
 
 using ::testing::HasSubstr;
-
-// The turning centre's 120 cuts as the two tables: forces of the remote dynamometer, this machine's currents.
-struct Tables {
-  TurningCentre centre{3, {}};
-  std::string standard, currents;
-
-  explicit Tables(const TemporaryFolder& folder) {
-    standard = folder.file("standard.csv");
-    currents = folder.file("currents.csv");
-    std::ofstream forces(standard), machine(currents);
-    forces << "cut,force_x[N],force_z[N],torque[N m]\n";
-    machine << "cut,spindle_speed[rpm],current_x[A],air_x[A],current_z[A],air_z[A],current_spindle[A],"
-               "air_spindle[A]\n";
-    int number = 0;
-    for (const TurningCut& c : centre.calibrationTests(120)) {
-      const std::string name = "c" + std::to_string(number++);
-      // The dynamometer shows the passive force too; the axis at rest has no current beside it.
-      forces << name << "," << c.force[0] << "," << c.force[2] << ","
-             << c.force[1] * (c.radius + 0.5 * c.depth) << "\n";
-      machine << name << "," << c.speed_rpm << ",";
-      if (c.moves_x) machine << c.current[0] << "," << 258.0 / 198.45;
-      machine << (c.moves_x ? "," : ",,");
-      if (c.moves_z) machine << c.current[2] << ",0.0";
-      machine << (c.moves_z ? "," : ",,") << c.current[1] << "," << c.spindle_air << "\n";
-    }
-  }
-};
-
-TEST(StandardCuts, giveTheLawsOfTheTurningCentre) {
-  const TemporaryFolder folder;
-  Tables tables(folder);
-  const MotorCalibration made =
-      calibrateMotors(readStandardCuts(tables.standard), readMachineCurrents(tables.currents),
-                      units::radPerSecFromRpm(1570.0));
-  writeMotorCalibration(made, folder.file("motors.yaml"));
-  const MotorCalibration c = readMotorCalibration(folder.file("motors.yaml"));
-  ASSERT_TRUE(c.drive[0] && c.drive[2] && c.spindle);
-  EXPECT_FALSE(c.drive[1]);
-  // Table 1: weight pulls the X slide, its slope is negative. Noise of the current flattens slopes a little.
-  EXPECT_NEAR(c.drive[0]->newton_per_ampere.value, -198.45,
-              4.0 * c.drive[0]->newton_per_ampere.std_dev + 6.0);
-  EXPECT_NEAR(c.drive[2]->newton_per_ampere.value, 215.9, 4.0 * c.drive[2]->newton_per_ampere.std_dev);
-  EXPECT_EQ(c.drive[2]->newton_per_ampere.value, made.drive[2]->newton_per_ampere.value);  // 17 digits
-  // 300 cuts the calibration has not seen: scatter stated is scatter met. Table 2: sensor 260 N2 for Fz.
-  double squares = 0.0, n = 0.0, torque2 = 0.0, all = 0.0;
-  for (const TurningCut& cut : tables.centre.predictionTests(300)) {
-    if (cut.moves_z) {
-      const Estimate e = c.drive[2]->opposing(cut.current[2], 0.0);
-      squares += std::pow((e.value - cut.force[2]) / e.std_dev, 2);
-      n += 1.0;
-    }
-    const double torque = c.spindle->torque(cut.speed_rpm, cut.current[1] - cut.spindle_air);
-    torque2 += std::pow(torque / (cut.radius + 0.5 * cut.depth) - cut.force[1], 2);
-    all += 1.0;
-  }
-  EXPECT_NEAR(squares / n, 1.0, 0.3);
-  EXPECT_LT(std::sqrt(torque2 / all), 36.0);  // the paper's RMSE of Fy
-}
 
 TEST(StandardCuts, sayWhatIsWrong) {
   const TemporaryFolder folder;

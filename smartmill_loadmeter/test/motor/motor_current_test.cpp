@@ -9,8 +9,6 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_core/units.h"
-#include "smartmill_loadmeter/motor/anfis.h"
-#include "study/turning_scene.h"
 
 namespace smartmill::loadmeter {
 namespace {
@@ -67,18 +65,6 @@ TEST(PhaseRange, isTwiceTheAmplitudeThroughHarmonicsAndNoise) {
               HasSubstr("less than two periods"));
 }
 
-TEST(FeedDrive, weightAndFrictionOfTheSlideAreThoseOfThePaper) {
-  Line x;
-  x.slope = {-198.45, 2.0};
-  // Air currents 1.3 A inward and 1.9 A outward (258 N / 198.45 N/A; the paper prints 13 and 19).
-  const SlideLoad load = slideLoad(x, 1.3, 1.9, 0.01);
-  // W + R = m Ia = -258 N: the weight aids; outward |m| 1.9 = 377 N.
-  EXPECT_NEAR(load.weight.value + load.friction.value, -258.0, 0.1);
-  EXPECT_NEAR(-load.weight.value + load.friction.value, 377.0, 0.1);
-  EXPECT_NEAR(load.weight.value, -317.5, 0.1);
-  EXPECT_NEAR(load.friction.value, 59.5, 0.1);  // positive: always opposes
-}
-
 TEST(TorqueLaw, findsThePowersBelowAndAboveBaseSpeed) {
   std::mt19937 random(4);
   std::normal_distribution<double> normal;
@@ -103,61 +89,6 @@ TEST(TorqueLaw, findsThePowersBelowAndAboveBaseSpeed) {
   const std::vector<SpindleCut> slow(cuts.begin(), cuts.begin() + 4);
   EXPECT_THAT(errorOf([&] { TorquePowerLaw(slow, 1570.0).torque(2000.0, 1.0); }),
               HasSubstr("no cut above base speed"));
-}
-
-TEST(AnfisLearning, hybridRuleLearnsWhatALineCannot) {
-  std::mt19937 random(5);
-  std::uniform_real_distribution<double> uniform;
-  std::vector<std::vector<double>> inputs, unseen;
-  std::vector<double> outputs, truth;
-  const auto function = [](double a, double b) { return 10.0 * std::sin(2.5 * a) + 20.0 * b * b; };
-  for (int i = 0; i < 400; ++i) {
-    const double a = uniform(random), b = uniform(random);
-    (i % 2 ? unseen : inputs).push_back({a, 500.0 * b});
-    (i % 2 ? truth : outputs).push_back(function(a, b));
-  }
-  Anfis::Parameters once;
-  once.epochs = 1;
-  const Anfis first(inputs, outputs, once);
-  const Anfis trained(inputs, outputs, Anfis::Parameters());
-  EXPECT_LT(trained.trainingRms(), first.trainingRms());
-  double squares = 0.0;
-  for (std::size_t i = 0; i < unseen.size(); ++i) squares += std::pow(trained(unseen[i]) - truth[i], 2);
-  EXPECT_LT(std::sqrt(squares / 200.0), 0.25);  // of a range of 30
-  EXPECT_THAT(errorOf([&] { trained({1.0}); }), HasSubstr("2 inputs are due"));
-}
-
-TEST(Variances, splitAndFTestAreThoseOfTheFormulas) {
-  const VarianceSplit s = splitVariance({10, 12, 14}, {11, 15, 19});
-  EXPECT_DOUBLE_EQ(s.process_variance, 4.0);
-  EXPECT_DOUBLE_EQ(s.current_variance, 16.0);
-  EXPECT_DOUBLE_EQ(s.sensor_variance, 12.0);
-  EXPECT_NEAR(s.f_means, 9.0 / (10.0 * 2.0 / 3.0), 1e-12);
-  // Two-sided t = 1.1619 with 4 degrees of freedom: 1 - sin(u) (1 + cos(u)^2 / 2), tan(u) = t / 2.
-  EXPECT_NEAR(s.p_means, 0.30988, 2e-5);
-  EXPECT_NEAR(s.p_variances, 0.2, 1e-9);  // F(2, 2): 1 / (1 + F)
-}
-
-TEST(TurningScene, errorsAndVariancesAreThoseThatWerePutIn) {
-  const TurningVariances v;
-  const TurningResult r = studyTurning(3, v, 200);
-  EXPECT_NEAR(r.z.slope.value, 215.9, 0.03 * 215.9);
-  EXPECT_NEAR(r.x.slope.value, -198.45,
-              0.25 * 198.45);  // 15 cuts; noise of the current flattens a regression
-  EXPECT_GT(r.fit_y, 0.98);
-  // The sensor's noise is the floor of the prediction, the paper's errors are the ceiling.
-  EXPECT_GT(r.regression.rmse[1], 0.9 * std::sqrt(v.sensor[1]));
-  EXPECT_LT(r.regression.rmse[0], 29.0);
-  EXPECT_LT(r.regression.rmse[1], 36.0);
-  EXPECT_LT(r.regression.rmse[2], 27.0);
-  EXPECT_LT(r.anfis.rmse[1], 34.0);
-  EXPECT_LT(r.anfis.rmse[2], 21.0);
-  // 200 replications know a variance to 10 %; the difference of two to about 20 %.
-  EXPECT_NEAR(r.fy.process_variance, v.process[1], 0.3 * v.process[1]);
-  EXPECT_NEAR(r.fz.process_variance, v.process[2], 0.3 * v.process[2]);
-  EXPECT_NEAR(r.fy.sensor_variance, v.sensor[1], 0.6 * v.sensor[1]);
-  EXPECT_NEAR(r.fz.sensor_variance, v.sensor[2], 0.6 * v.sensor[2]);
-  EXPECT_LT(r.fy.p_variances, 1e-6);
 }
 
 }  // namespace

@@ -42,15 +42,6 @@ struct Line {
 /// where the weight aids the motion more than friction hinders it. @throws Error with fewer than three cuts.
 Line fitLine(const std::vector<double>& x, const std::vector<double>& y);
 
-/// What a drive's line says of its slide, from air cuts in both directions (section 9, ii): in the direction
-/// of the calibration m I = W + R, against it |m| I' = |W| + R.
-struct SlideLoad {
-  Estimate weight;    ///< [N] W, opposing the calibrated motion; negative: aids it
-  Estimate friction;  ///< [N] R
-};
-SlideLoad slideLoad(const Line& calibration, double air_current, double air_current_reverse,
-                    double current_std);
-
 /// One spindle cut: rise of the phase range over air cutting, and what torque the force made.
 struct SpindleCut {
   double speed_rpm = 0.0;
@@ -89,17 +80,5 @@ class TorquePowerLaw {
   std::array<std::optional<Side>, 2> sides_;  // below and above base speed
   double scatter_ = 0.0, r_squared_ = 0.0;
 };
-
-/// Section 12: replications of one cut, seen by the dynamometer (the process alone) and by the current.
-struct VarianceSplit {
-  double process_mean = 0.0, current_mean = 0.0;          ///< [N]
-  double process_variance = 0.0, current_variance = 0.0;  ///< [N2]
-  double sensor_variance = 0.0;  ///< [N2] of the current's way of measuring: the difference, not below 0
-  double f_means = 0.0;          ///< [1] F of the difference of the means (1 and 2 n - 2 degrees of freedom)
-  double p_means = 1.0;          ///< [1] chance of such an F without a difference
-  double p_variances = 1.0;      ///< [1] chance of such a ratio of variances without a difference, one-sided
-};
-/// @throws Error with fewer than three replications on either side.
-VarianceSplit splitVariance(const std::vector<double>& dynamometer, const std::vector<double>& current);
 
 }  // namespace smartmill::loadmeter

@@ -197,7 +197,7 @@ int main(int argc, char** argv) {
     }
     return crash(file, writers, seconds, every) ? 0 : 1;
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "database_study: %s\n", error.what());
+    std::fprintf(stderr, "loadmeter_database: %s\n", error.what());
     return 1;
   }
 }

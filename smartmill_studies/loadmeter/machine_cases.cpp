@@ -1,4 +1,4 @@
-#include "study/machine_cases.h"
+#include "loadmeter/machine_cases.h"
 
 #include <algorithm>
 #include <cmath>

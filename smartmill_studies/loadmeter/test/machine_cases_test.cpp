@@ -4,10 +4,10 @@
 
 #include <gtest/gtest.h>
 
+#include "loadmeter/machine_cases.h"
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/units.h"
 #include "smartmill_loadmeter/identification/runout_torque.h"
-#include "study/machine_cases.h"
 
 namespace smartmill::loadmeter {
 namespace {
@@ -62,7 +62,7 @@ TEST(RunoutTorque, isTheTorqueOfTheSlicesInClosedForm) {
   }
 }
 
-// The full study of 200 cases is the program loadmeter_study.
+// The full study of 200 cases is the program loadmeter_cases.
 TEST(Cases, ktcIsWithinThreeAndSixPercentAndHonest) {
   const Faults faults;
   std::vector<double> errors;

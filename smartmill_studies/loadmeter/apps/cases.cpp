@@ -9,9 +9,9 @@
 
 #include <CLI/CLI.hpp>
 
+#include "loadmeter/machine_cases.h"
+#include "loadmeter/turning_scene.h"
 #include "smartmill_core/signal/statistics.h"
-#include "study/machine_cases.h"
-#include "study/turning_scene.h"
 
 namespace {
 
@@ -116,7 +116,7 @@ int main(int argc, char** argv) {
     machines(first, count);
     turning(first);
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "loadmeter_study: %s\n", error.what());
+    std::fprintf(stderr, "loadmeter_cases: %s\n", error.what());
     return 1;
   }
   return 0;

@@ -48,6 +48,27 @@ class TurningCentre {
   TurningVariances variances_;
 };
 
+/// What a drive's line says of its slide, from air cuts in both directions (section 9, ii): in the direction
+/// of the calibration m I = W + R, against it |m| I' = |W| + R.
+struct SlideLoad {
+  Estimate weight;    ///< [N] W, opposing the calibrated motion; negative: aids it
+  Estimate friction;  ///< [N] R
+};
+SlideLoad slideLoad(const Line& calibration, double air_current, double air_current_reverse,
+                    double current_std);
+
+/// Section 12: replications of one cut, seen by the dynamometer (the process alone) and by the current.
+struct VarianceSplit {
+  double process_mean = 0.0, current_mean = 0.0;          ///< [N]
+  double process_variance = 0.0, current_variance = 0.0;  ///< [N2]
+  double sensor_variance = 0.0;  ///< [N2] of the current's way of measuring: the difference, not below 0
+  double f_means = 0.0;          ///< [1] F of the difference of the means (1 and 2 n - 2 degrees of freedom)
+  double p_means = 1.0;          ///< [1] chance of such an F without a difference
+  double p_variances = 1.0;      ///< [1] chance of such a ratio of variances without a difference, one-sided
+};
+/// @throws Error with fewer than three replications on either side.
+VarianceSplit splitVariance(const std::vector<double>& dynamometer, const std::vector<double>& current);
+
 /// RMSE [N] and coefficient of determination of Fx, Fy, Fz over the cuts in which the axis moves.
 struct Agreement {
   std::array<double, 3> rmse{}, r_squared{};

@@ -1,4 +1,4 @@
-#include "smartmill_loadmeter/motor/anfis.h"
+#include "loadmeter/anfis.h"
 
 #include <algorithm>
 #include <cmath>
