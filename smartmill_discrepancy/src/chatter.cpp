@@ -5,6 +5,7 @@
 #include <string>
 
 #include "smartmill_core/signal/fourier.h"
+#include "smartmill_core/signal/interpolate.h"
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/units.h"
 
@@ -15,12 +16,10 @@ constexpr double LEAST_SHARE = 0.25;
 constexpr double LEAST_FREQUENCY = 80.0;  // [Hz] below it drift, hum and slow trends live
 constexpr std::size_t LEAST_SAMPLES = 128;
 
-// Cubic interpolation between samples.
+// Between samples.
 double at(const std::vector<double>& x, double place) {
   const auto i = static_cast<std::size_t>(place);
-  const double s = place - static_cast<double>(i);
-  const double a = x[i - 1], b = x[i], c = x[i + 1], d = x[i + 2];
-  return b + 0.5 * s * (c - a + s * (2.0 * a - 5.0 * b + 4.0 * c - d + s * (3.0 * (b - c) + d - a)));
+  return catmullRom(x[i - 1], x[i], x[i + 1], x[i + 2], place - static_cast<double>(i));
 }
 
 }  // namespace

@@ -15,7 +15,6 @@
 namespace smartmill::discrepancy {
 namespace {
 
-const std::array<std::string, 3> FORCES{{"fx", "fy", "fz"}};
 constexpr double FAR = 5.0;      // gap beyond which a label is doubted
 constexpr double SWAPPED = 0.1;  // share of the squares that a swap leaves
 constexpr double RELABELLED =

@@ -7,6 +7,7 @@
 #include <filesystem>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/signal/interpolate.h"
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/units.h"
 #include "smartmill_discrepancy/chatter.h"
@@ -16,7 +17,7 @@ namespace smartmill::discrepancy {
 namespace {
 
 constexpr double LEAST_RUNNING = 0.1;      // [s] before a stretch, within which the twin settles
-constexpr double EDGE_SETTLING = 0.6;     // [s] that vibrations near the stability limit take to die out
+constexpr double EDGE_SETTLING = 0.6;      // [s] that vibrations near the stability limit take to die out
 constexpr std::size_t LEAST_READINGS = 5;  // of the load meter
 
 // RMS difference from one revolution to the next [N], the larger of fx and fy.
@@ -29,11 +30,8 @@ double unsettled(const Record& record, const CampaignTest& test) {
     const std::vector<double>& x = record.column(channel);
     double squares = 0.0, count = 0.0;
     for (std::size_t i = whole + 1; i < x.size(); ++i) {
-      // Cubic between the samples around one revolution ago.
-      const double p = x[i - whole - 1], q = x[i - whole], r = x[i - whole + 1], s = x[i - whole + 2];
       const double before =
-          q +
-          0.5 * share * (r - p + share * (2.0 * p - 5.0 * q + 4.0 * r - s + share * (3.0 * (q - r) + s - p)));
+          catmullRom(x[i - whole - 1], x[i - whole], x[i - whole + 1], x[i - whole + 2], share);
       squares += (x[i] - before) * (x[i] - before);
       count += 1.0;
     }

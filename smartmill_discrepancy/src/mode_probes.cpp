@@ -11,7 +11,6 @@
 namespace smartmill::discrepancy {
 namespace {
 
-const std::array<std::string, 3> FORCES{{"fx", "fy", "fz"}};
 const std::array<std::string, 2> TIP{{"tool_x", "tool_y"}};
 
 constexpr std::size_t POINTS = 360;  // a turn

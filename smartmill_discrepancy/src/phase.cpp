@@ -13,16 +13,16 @@ namespace smartmill::discrepancy {
 namespace {
 
 using units::TWO_PI;
-const std::array<std::string, 3> FORCES{{"fx", "fy", "fz"}};
 
-std::complex<double> lineAt(const std::vector<double>& values, std::size_t from, double step) {
+std::complex<double> lineAt(const std::vector<double>& values, std::size_t from, std::size_t to,
+                            double step) {
   std::complex<double> sum = 0.0, turn = std::polar(1.0, -step),
                        at = std::polar(1.0, -step * static_cast<double>(from));
-  for (std::size_t i = from; i < values.size(); ++i) {
+  for (std::size_t i = from; i < to; ++i) {
     sum += values[i] * at;
     at *= turn;
   }
-  return sum / static_cast<double>(values.size() - from);
+  return sum / static_cast<double>(to - from);
 }
 
 void setAngle(TestData& t, double phase) {
@@ -35,18 +35,24 @@ void setAngle(TestData& t, double phase) {
   }
 }
 
-/// Lines of a record and of a model at the orders of the spindle, forces over their noise.
+// First sample in cut, of an air cut the first.
+std::size_t beginOf(const TestData& t) {
+  return t.first_cut < t.record.size() ? t.first_cut : 0;
+}
+
+/// Lines of a record and of a model at orders of the spindle, forces over their noise.
 struct Lines {
-  std::vector<std::complex<double>> measured, simulated;  // [order - 1] a channel, one after the other
-  int orders = 0;
+  std::vector<std::complex<double>> measured, simulated;  // lowest order first, one channel after the other
+  int orders = 0;                                         // a channel
+  int spacing = 1;                                        // the lowest order, and from one to the next
+
+  int orderOf(std::size_t line) const { return (static_cast<int>(line) % orders + 1) * spacing; }
 
   /// How well they agree when the model is turned by a phase [rad]: half of the squares it takes away.
   double match(double phase) const {
     double sum = 0.0;
-    for (std::size_t i = 0; i < measured.size(); ++i) {
-      const int order = static_cast<int>(i) % orders + 1;
-      sum += std::real(std::conj(simulated[i] * std::polar(1.0, order * phase)) * measured[i]);
-    }
+    for (std::size_t i = 0; i < measured.size(); ++i)
+      sum += std::real(std::conj(simulated[i] * std::polar(1.0, orderOf(i) * phase)) * measured[i]);
     return sum;
   }
 
@@ -66,22 +72,19 @@ struct Lines {
   }
 };
 
-Lines linesOf(const Dataset& data, const TestData& t, const Record& model, std::size_t from, std::size_t to) {
-  constexpr int MOST_ORDERS = 60;
-  const double step = t.test.spindle_speed / t.test.sample_rate;
+// Every order of the spindle (spacing 1) or those of the tooth passing, as many as the sampling holds.
+Lines linesOf(const Dataset& data, const TestData& t, const Record& model, std::size_t from, std::size_t to,
+              int spacing, int most) {
+  const double step = spacing * t.test.spindle_speed / t.test.sample_rate;
   Lines lines;
-  lines.orders = std::min(MOST_ORDERS, static_cast<int>(0.9 * units::PI / step));
+  lines.spacing = spacing;
+  lines.orders = std::min(most, static_cast<int>(0.9 * units::PI / step));
   for (const std::string& channel : FORCES) {
     if (!t.record.has(channel) || data.noise.count(channel) == 0) continue;
-    const auto part = [&](const std::vector<double>& v) {
-      return std::vector<double>(v.begin(), v.begin() + static_cast<std::ptrdiff_t>(to));
-    };
-    const std::vector<double> measured = part(t.record.column(channel)),
-                              simulated = part(model.column(channel));
     const double noise = data.noise.at(channel);
     for (int k = 1; k <= lines.orders; ++k) {
-      lines.measured.push_back(lineAt(measured, from, k * step) / noise);
-      lines.simulated.push_back(lineAt(simulated, from, k * step) / noise);
+      lines.measured.push_back(lineAt(t.record.column(channel), from, to, k * step) / noise);
+      lines.simulated.push_back(lineAt(model.column(channel), from, to, k * step) / noise);
     }
   }
   return lines;
@@ -97,7 +100,8 @@ double refinedSpeed(const TestData& test, int teeth, double share) {
       if (!test.record.has(channel)) continue;
       for (int k = 1; k <= 3; ++k) {
         if (k * teeth * speed > 0.9 * units::PI) break;
-        sum += std::norm(lineAt(test.record.column(channel), test.first_cut, k * teeth * speed));
+        sum += std::norm(
+            lineAt(test.record.column(channel), test.first_cut, test.record.size(), k * teeth * speed));
       }
     }
     return sum;
@@ -119,7 +123,7 @@ double refinedSpeed(const TestData& test, int teeth, double share) {
 
 std::vector<std::string> estimatePhases(Dataset& data) {
   constexpr double SPEED_SHARE = 0.01;
-  constexpr int PHASES = 240;
+  constexpr int PHASES = 240, TOOTH_LINES = 4;
   std::vector<std::string> notes;
   std::vector<TestData*> turned;
   for (TestData& t : data.tests) {
@@ -137,21 +141,10 @@ std::vector<std::string> estimatePhases(Dataset& data) {
     // One tooth period of phases; of the lines of the tooth passing only the phase turns.
     setAngle(t, 0.0);
     const Record model = sim::simulateTest(data.nominal, t.test, t.record, options);
-    const double step = t.test.spindle_speed / t.test.sample_rate;
+    const Lines lines = linesOf(data, t, model, t.first_cut, t.record.size(), teeth, TOOTH_LINES);
     double best = 0.0, largest = -1e300;
     for (int p = 0; p < PHASES; ++p) {
-      const double phase = TWO_PI / teeth * p / PHASES;
-      double match = 0.0;
-      for (const std::string& channel : FORCES) {
-        if (!t.record.has(channel)) continue;
-        const double noise = data.noise.at(channel);
-        for (int k = 1; k <= 4 && k * teeth * step < 0.9 * units::PI; ++k) {
-          const auto measured = lineAt(t.record.column(channel), t.first_cut, k * teeth * step);
-          const auto expected = lineAt(model.column(channel), t.first_cut, k * teeth * step) *
-                                std::polar(1.0, k * teeth * phase);
-          match += std::real(std::conj(expected) * measured) / (noise * noise);
-        }
-      }
+      const double phase = TWO_PI / teeth * p / PHASES, match = lines.match(phase);
       if (match > largest) {
         largest = match;
         best = phase;
@@ -171,10 +164,10 @@ std::vector<std::string> estimatePhases(Dataset& data) {
   const auto once = [&](const TestData& t) {
     std::array<std::complex<double>, 3> line{};
     const double phase = t.record.column("spindle_angle").front();
-    const std::size_t from = t.first_cut < t.record.size() ? t.first_cut : 0;
     for (std::size_t a = 0; a < 3; ++a) {
       if (t.record.has(FORCES[a]))
-        line[a] = lineAt(t.record.column(FORCES[a]), from, t.test.spindle_speed / t.test.sample_rate) *
+        line[a] = lineAt(t.record.column(FORCES[a]), beginOf(t), t.record.size(),
+                         t.test.spindle_speed / t.test.sample_rate) *
                   std::polar(1.0, -phase);
     }
     return line;
@@ -190,7 +183,7 @@ std::vector<std::string> estimatePhases(Dataset& data) {
   for (TestData* t : turned) {
     const auto line = once(*t);
     // The force of the cut has left the tooth open, an air cut any angle.
-    const int teeth = t->test.kind == TestKind::cut ? data.nominal.tool->teeth : 360;
+    const int teeth = t->test.kind == TestKind::cut && data.nominal.tool ? data.nominal.tool->teeth : 360;
     int best = 0;
     double largest = -1e300;
     for (int k = 0; k < teeth; ++k) {
@@ -210,7 +203,7 @@ std::vector<std::string> estimatePhases(Dataset& data) {
 double turnPhases(Dataset& data, const MachineModel& model) {
   constexpr double LEAST_GAIN = 25.0;   // of squares over noise: less tells no phase
   constexpr double LEAST_SHOWN = 0.05;  // squares of the lines beside those of the tooth passing
-  constexpr int ALL_ROUND = 1440, NEAR = 40;
+  constexpr int ALL_ROUND = 1440, NEAR = 40, MOST_ORDERS = 60;
   double largest = 0.0;
   for (TestData& t : data.tests) {
     if (!t.phase_estimated) continue;
@@ -218,13 +211,16 @@ double turnPhases(Dataset& data, const MachineModel& model) {
     options.noise = false;
     options.substeps = 2;
     const Record simulated = sim::simulateTest(model, t.test, t.record, options);
-    const std::size_t from = t.first_cut < t.record.size() ? t.first_cut : 0, end = t.record.size();
-    const Lines all = linesOf(data, t, simulated, from, end);
+    const std::size_t from = beginOf(t), end = t.record.size();
+    const auto linesBetween = [&](std::size_t first, std::size_t last) {
+      return linesOf(data, t, simulated, first, last, 1, MOST_ORDERS);
+    };
+    const Lines all = linesBetween(from, end);
     // A model that shows little of what tells the teeth apart must not choose another tooth.
     const int teeth = t.test.kind == TestKind::cut && data.nominal.tool ? data.nominal.tool->teeth : 1;
     double shown = 0.0, seen = 0.0;
     for (std::size_t i = 0; i < all.simulated.size(); ++i) {
-      if ((static_cast<int>(i) % all.orders + 1) % teeth == 0 && teeth > 1) continue;
+      if (teeth > 1 && all.orderOf(i) % teeth == 0) continue;
       shown += std::norm(all.simulated[i]);
       seen += std::norm(all.measured[i]);
     }
@@ -240,8 +236,8 @@ double turnPhases(Dataset& data, const MachineModel& model) {
     if (t.test.kind == TestKind::cut && span * t.test.spindle_speed > 4.0 * TWO_PI) {
       const std::size_t middle = from + (end - from) / 2;
       const double range = 0.25 * TWO_PI / all.orders;
-      early = linesOf(data, t, simulated, from, middle).best(turn, range, NEAR);
-      late = linesOf(data, t, simulated, middle, end).best(turn, range, NEAR);
+      early = linesBetween(from, middle).best(turn, range, NEAR);
+      late = linesBetween(middle, end).best(turn, range, NEAR);
     }
     turn = 0.5 * (early + late);
     const double rate = (late - early) / (0.5 * span);  // [rad/s]

@@ -5,6 +5,7 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/signal/fourier.h"
+#include "smartmill_core/signal/interpolate.h"
 #include "smartmill_core/signal/steady_path.h"
 #include "smartmill_core/signal/window.h"
 #include "smartmill_core/units.h"
@@ -17,12 +18,6 @@ constexpr double RESTART = 1.0;  // [s] backward jump that tells of a bag starte
 void bound(bool good, const char* key, double value, const char* range) {
   if (!good)
     throw Error(std::string(key) + ": " + std::to_string(value) + " is out of range (" + range + ")");
-}
-
-// Catmull-Rom through four samples around a place between the second and the third.
-double between(double a, double b, double c, double d, double share) {
-  return b +
-         0.5 * share * (c - a + share * (2.0 * a - 5.0 * b + 4.0 * c - d + share * (3.0 * (b - c) + d - a)));
 }
 
 }  // namespace
@@ -202,8 +197,9 @@ void ChatterDetector::judge(double from, double to) {
       const double place = (times[i] - samples_.front().time) * rate;
       const auto at = static_cast<std::size_t>(
           std::clamp(std::floor(place), 1.0, static_cast<double>(samples_.size() - 3)));
-      force[i] = between(samples_[at - 1].force[axis], samples_[at].force[axis], samples_[at + 1].force[axis],
-                         samples_[at + 2].force[axis], place - static_cast<double>(at));
+      force[i] =
+          catmullRom(samples_[at - 1].force[axis], samples_[at].force[axis], samples_[at + 1].force[axis],
+                     samples_[at + 2].force[axis], place - static_cast<double>(at));
     }
     double mean = 0.0;
     std::vector<double> repeated(bins, 0.0);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <map>
 #include <string>
@@ -11,6 +12,9 @@
 #include "smartmill_discrepancy/chatter.h"
 
 namespace smartmill::discrepancy {
+
+/// Force channels in the order of the axes x, y, z.
+inline const std::array<std::string, 3> FORCES{{"fx", "fy", "fz"}};
 
 /// One test with its record as measured, ready to be compared with the twin.
 struct TestData {

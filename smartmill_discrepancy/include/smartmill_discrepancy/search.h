@@ -23,8 +23,8 @@ struct SearchOptions {
   double twin_accuracy = 2e-4;  ///< [1] of the signal, by which two faithful simulations differ
   double least_share = 0.05;    ///< [1] of the squares above the noise that an effect must take
   std::function<void(const std::string&)> progress;
-  /// Turns records without spindle angle to where a model fits best and returns by how much [rad]; empty where
-  /// every record has its angle.
+  /// Turns records without spindle angle to where a model fits best and returns by how much [rad]; empty
+  /// where every record has its angle.
   std::function<double(const MachineModel&)> turn_phases;
 };
 

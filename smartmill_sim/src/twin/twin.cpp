@@ -12,6 +12,7 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/effect_catalogue.h"
+#include "smartmill_core/signal/interpolate.h"
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/signal/window.h"
 #include "smartmill_core/units.h"
@@ -58,16 +59,14 @@ bool gives(const std::string& column, const CampaignTest& test) {
   return false;
 }
 
-// Catmull-Rom through the samples: smooth, exact at the samples.
+// Smooth, exact at the samples, the last ones held beyond the ends.
 double interpolated(const std::vector<double>& samples, std::size_t i, double share) {
   const auto at = [&](std::ptrdiff_t k) {
     return samples[static_cast<std::size_t>(
         std::clamp<std::ptrdiff_t>(k, 0, static_cast<std::ptrdiff_t>(samples.size()) - 1))];
   };
   const auto k = static_cast<std::ptrdiff_t>(i);
-  const double a = at(k - 1), b = at(k), c = at(k + 1), d = at(k + 2);
-  return b +
-         0.5 * share * (c - a + share * (2.0 * a - 5.0 * b + 4.0 * c - d + share * (3.0 * (b - c) + d - a)));
+  return catmullRom(at(k - 1), at(k), at(k + 1), at(k + 2), share);
 }
 
 // The force of a tap: zero outside the contact (Dunwoody section 4.3.1), where the record shows only noise,

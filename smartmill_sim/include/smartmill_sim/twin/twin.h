@@ -38,8 +38,8 @@ double recordedPhase(const CampaignTest& test, const Record& recorded);
 ///
 /// Before engage_time the tool is out of cut; from there full engagement with the surface that steady cutting
 /// leaves. The sensor begins at rest, the load meter at its air-cut value. With running_before the record
-/// begins in the steady state: the time before it is simulated, with the depth of cut growing, until the tool has
-/// settled.
+/// begins in the steady state: the time before it is simulated, with the depth of cut growing, until the tool
+/// has settled.
 /// @param recorded gives columns, times, phase and hammer force
 /// @throws Error naming what the model lacks or what this twin cannot run.
 Record simulateTest(const MachineModel& model, const CampaignTest& test, const Record& recorded,

@@ -16,17 +16,17 @@ enum class TestKind { cut, air, tap };
 struct CampaignTest {
   std::string name;
   TestKind kind = TestKind::cut;
-  std::string file;         ///< relative to the campaign's folder
-  std::string file_format;  ///< empty: smartmill CSV; dynoware
+  std::string file;                             ///< relative to the campaign's folder
+  std::string file_format;                      ///< empty: smartmill CSV; dynoware
   std::map<std::string, std::string> channels;  ///< dynoware: fx, fy, fz -> name in the file
-  double sample_rate = 0.0;                 ///< [Hz]
-  double spindle_speed = 0.0;               ///< [rad/s]
-  std::optional<Engagement> engagement;     ///< of a cut
-  std::optional<double> engage_time;        ///< [s] absent: in cut throughout
-  std::optional<double> running_before;     ///< [s] of a cut or air: it ran like this before the record began
-  std::optional<double> start_time;         ///< [s]
-  std::optional<double> cut_time_before;    ///< [s]
-  std::string direction;                    ///< of a tap: x, y or z
+  double sample_rate = 0.0;                     ///< [Hz]
+  double spindle_speed = 0.0;                   ///< [rad/s]
+  std::optional<Engagement> engagement;         ///< of a cut
+  std::optional<double> engage_time;            ///< [s] absent: in cut throughout
+  std::optional<double> running_before;   ///< [s] of a cut or air: it ran like this before the record began
+  std::optional<double> start_time;       ///< [s]
+  std::optional<double> cut_time_before;  ///< [s]
+  std::string direction;                  ///< of a tap: x, y or z
 };
 
 /// smartmill-campaign/1: a folder with campaign.yaml and one CSV a test.

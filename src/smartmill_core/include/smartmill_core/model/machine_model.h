@@ -18,25 +18,26 @@ struct ToolTip {
   ModalModel x, y;
 };
 
-/// Force sensor: measured over applied force, static gain 1 (direct = 1 - sum of gains); an axis left out is ideal.
+/// Force sensor: measured over applied force, static gain 1 (direct = 1 - sum of gains); an axis left out is
+/// ideal.
 struct ForceSensor {
   ForceSensor() {
     for (ModalModel& a : axis) a.direct = 1.0;
   }
   std::array<ModalModel, 3> axis;
-  std::optional<Axes3> noise_rms;    ///< [N]
-  bool measures_workpiece = false;   ///< the reaction on the workpiece; turned where samples enter
-  bool mean_samples = false;         ///< a sample is the mean over its interval, not an instant
+  std::optional<Axes3> noise_rms;   ///< [N]
+  bool measures_workpiece = false;  ///< the reaction on the workpiece; turned where samples enter
+  bool mean_samples = false;        ///< a sample is the mean over its interval, not an instant
 };
 
 /// Spindle friction, load meter and limits.
 struct Spindle {
-  double viscous = 0.0;               ///< [N m s/rad]
-  double coulomb = 0.0;               ///< [N m], any sign
-  double load_meter_gain = 0.0;       ///< [V/W]
-  double load_meter_bandwidth = 0.0;  ///< [Hz] first order
-  double load_meter_resolution = 0.0; ///< [V]
-  double friction_zero_below = 0.0;   ///< [rad/s]
+  double viscous = 0.0;                ///< [N m s/rad]
+  double coulomb = 0.0;                ///< [N m], any sign
+  double load_meter_gain = 0.0;        ///< [V/W]
+  double load_meter_bandwidth = 0.0;   ///< [Hz] first order
+  double load_meter_resolution = 0.0;  ///< [V]
+  double friction_zero_below = 0.0;    ///< [rad/s]
   // What the controller and the chart need beyond the contract's keys (all optional in the file).
   std::optional<double> load_meter_full_scale;  ///< [V] shown as 100 %
   std::optional<double> max_speed;              ///< [rad/s]
@@ -48,24 +49,26 @@ struct Spindle {
 /// Linear axes of the machine.
 struct MachineAxes {
   std::array<std::array<double, 2>, 3> travel{};  ///< [m] min, max of x, y, z
-  double rapid = 0.0;         ///< [m/s]
-  double acceleration = 0.0;  ///< [m/s2]
-  Axes3 home{{0, 0, 0}};      ///< [m]
+  double rapid = 0.0;                             ///< [m/s]
+  double acceleration = 0.0;                      ///< [m/s2]
+  Axes3 home{{0, 0, 0}};                          ///< [m]
 };
 
 /// Hammer station: solenoid hammer above a capacitive displacement sensor, on the table (Dunwoody fig. 4.1).
 struct HammerStation {
-  double offset = 0.0;             ///< [m] hammer's height above the displacement sensor
-  double peak_force = 0.0;         ///< [N]
-  double contact_time = 0.0;       ///< [s] of the half-sine hit
-  double force_noise_rms = 0.0;    ///< [N]
-  double gap_at_zero_volt = 0.0;   ///< [m] sensor: V = gain_volt (gap_at_zero_volt / gap - 1), clipped to +-range_volt
+  double offset = 0.0;           ///< [m] hammer's height above the displacement sensor
+  double peak_force = 0.0;       ///< [N]
+  double contact_time = 0.0;     ///< [s] of the half-sine hit
+  double force_noise_rms = 0.0;  ///< [N]
+  double gap_at_zero_volt =
+      0.0;  ///< [m] sensor: V = gain_volt (gap_at_zero_volt / gap - 1), clipped to +-range_volt
   double gain_volt = 0.0;          ///< [V]
   double range_volt = 0.0;         ///< [V]
   double voltage_noise_rms = 0.0;  ///< [V]
   double flute_depth = 0.0;        ///< [m] how far the tool's surface falls back between two flutes
-  /// Tool centre (tip) in machine coordinates at which the sensor of that direction faces the tool at about twice
-  /// gap_at_zero_volt when a flute points at it. The tool nears the sensor in the direction's positive sense.
+  /// Tool centre (tip) in machine coordinates at which the sensor of that direction faces the tool at about
+  /// twice gap_at_zero_volt when a flute points at it. The tool nears the sensor in the direction's positive
+  /// sense.
   std::map<std::string, Axes3> position;  ///< "x", "y" [m]
 };
 
@@ -80,7 +83,7 @@ struct Workpiece {
 struct EffectEntry {
   std::string name;
   std::map<std::string, double> numbers;
-  std::map<std::string, double> std_devs;  ///< of keys with _std beside them
+  std::map<std::string, double> std_devs;    ///< of keys with _std beside them
   std::map<std::string, std::string> words;  ///< channel, axis
   std::vector<double> pitch_deg;
   ToolTip flexibility;
@@ -91,12 +94,12 @@ struct Uncertainty {
   double cutting = 3.0, frequency = 0.5, damping = 10.0, stiffness = 5.0, spindle = 3.0;
 };
 
-/// smartmill-model/1: what is believed of one machine, tool and material (formats.md). SI; optional sections are empty when
-/// the file lacks them.
+/// smartmill-model/1: what is believed of one machine, tool and material (formats.md). SI; optional sections
+/// are empty when the file lacks them.
 struct MachineModel {
   std::string file;  ///< for messages
   std::optional<ToolGeometry> tool;
-  std::optional<double> stickout;  ///< [m]
+  std::optional<double> stickout;                  ///< [m]
   std::optional<CuttingCoefficients> cutting;      ///< NaN: the file lacks that key; needCutting() refuses it
   std::optional<CuttingCoefficients> cutting_std;  ///< NaN: no _std key beside it; empty: none at all
   ToolTip tool_tip;
@@ -117,7 +120,8 @@ struct MachineModel {
   const Workpiece& needWorkpiece(const std::string& why) const;
 };
 
-/// @throws Error of one line that names the file, the key and the value: unknown key, missing key, wrong type, NaN, out of range.
+/// @throws Error of one line that names the file, the key and the value: unknown key, missing key, wrong
+/// type, NaN, out of range.
 MachineModel readMachineModel(const std::string& file);
 
 /// A key of the section `cutting` and the coefficient it holds, in the order of the file.
@@ -131,7 +135,8 @@ const std::array<CuttingKey, 6>& cuttingKeys();
 /// The section `cutting:` with its standard deviations; values that are NaN are left out.
 std::string cuttingSection(const CuttingCoefficients& value, const CuttingCoefficients& std_dev);
 
-/// Writes the model with the same keys, ten significant digits. @throws Error when the file cannot be written.
+/// Writes the model with the same keys, ten significant digits. @throws Error when the file cannot be
+/// written.
 void writeMachineModel(const MachineModel& model, const std::string& file);
 
 }  // namespace smartmill

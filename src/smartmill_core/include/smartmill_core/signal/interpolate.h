@@ -1,0 +1,12 @@
+#pragma once
+
+namespace smartmill {
+
+/// Catmull-Rom through four even samples at a place between the second and the third.
+/// @param share [1] of the way from b to c, 0 to 1
+inline double catmullRom(double a, double b, double c, double d, double share) {
+  return b +
+         0.5 * share * (c - a + share * (2.0 * a - 5.0 * b + 4.0 * c - d + share * (3.0 * (b - c) + d - a)));
+}
+
+}  // namespace smartmill
