@@ -3,12 +3,12 @@
 
 include(GNUInstallDirs)
 
-# smartmill_compile_options(TARGET): C++17 and the project's warnings.
+# smartmill_compile_options(TARGET): C++17, the project's warnings, headers in include/ and (private ones) in src/.
 function(smartmill_compile_options target)
   target_compile_features(${target} PUBLIC cxx_std_17)
   set_target_properties(${target} PROPERTIES CXX_EXTENSIONS OFF)
   target_compile_options(${target} PRIVATE -Wall -Wextra -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual)
-  target_include_directories(${target} PRIVATE ${CMAKE_CURRENT_SOURCE_DIR}/include)
+  target_include_directories(${target} PRIVATE ${CMAKE_CURRENT_SOURCE_DIR}/include ${CMAKE_CURRENT_SOURCE_DIR}/src)
   target_include_directories(${target} SYSTEM PRIVATE ${catkin_INCLUDE_DIRS})
   if(catkin_EXPORTED_TARGETS)
     add_dependencies(${target} ${catkin_EXPORTED_TARGETS})

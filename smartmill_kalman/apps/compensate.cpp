@@ -1,0 +1,263 @@
+// rosrun smartmill_kalman compensate BAG|CAMPAIGN -o OUT: force at the tool of every cut.
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+#include <optional>
+#include <set>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "node/bag_compensation.h"
+#include "smartmill_core/error.h"
+#include "smartmill_core/model/machine_model.h"
+#include "smartmill_core/signal/statistics.h"
+#include "smartmill_core/units.h"
+#include "smartmill_kalman/compensation/campaign_compensation.h"
+#include "smartmill_kalman/sensor/blind_mode.h"
+
+namespace {
+
+using namespace smartmill;
+
+constexpr std::array<const char*, 3> AXES{{"x", "y", "z"}};
+
+struct Request {
+  std::string source, out, model, parameters, method = "kalman", matrix_out;
+  bool identify = false, coupled = false, blind = false;
+  double blind_low = 600.0, blind_high = 1500.0;  // [Hz]
+  std::optional<double> bandwidth, noise, settling;
+  double lag = 0.05;  // [s]
+  kalman::SensorFitParameters fit;
+};
+
+void print(const char* axis, const ModalModel& sensor) {
+  std::printf("sensor %s: direct %.4f", axis, sensor.direct);
+  for (const Mode& mode : sensor.modes) {
+    std::printf("; %.2f Hz, damping %.4f, gain %.4f", mode.frequency, mode.damping_ratio, mode.gain);
+  }
+  std::printf("\n");
+}
+
+void printRange(const std::string& name, const std::array<std::vector<double>, 3>& measured,
+                const std::array<std::vector<double>, 3>& compensated) {
+  const auto range = [](const std::vector<double>& v) { return percentile(v, 0.9) - percentile(v, 0.1); };
+  std::printf("%s: range 10..90 %% measured x %.1f y %.1f N, compensated x %.1f y %.1f N\n", name.c_str(),
+              range(measured[0]), range(measured[1]), range(compensated[0]), range(compensated[1]));
+}
+
+void write(const std::string& folder, const std::string& name, const std::vector<double>& time,
+           const std::array<std::vector<double>, 3>& force) {
+  Record record;
+  record.time = time;
+  for (std::size_t axis = 0; axis < 3; ++axis) record.add(std::string("f") + AXES[axis]) = force[axis];
+  writeCsv(record, (std::filesystem::path(folder) / (name + ".csv")).string());
+}
+
+/// What is said about the samples' times.
+const char* latency(const Request& request) {
+  if (request.method == "fixed-lag") return "the lag taken out";
+  return request.method == "inverse" ? "its latency of 256 samples taken out" : "no latency";
+}
+
+/// What a cut says about the sensor without a tap.
+void printBlind(const std::string& name, const Record& record, const CampaignTest& test,
+                const Request& request) {
+  for (const char* channel : {"fx", "fy", "fz"}) {
+    const kalman::BlindMode found = kalman::findBlindMode(
+        record.column(channel), test.sample_rate, test.spindle_speed, request.blind_low, request.blind_high);
+    if (found.likelihood < 10.0) {
+      std::printf("%s %s: no mode shows between the lines of the spindle\n", name.c_str(), channel);
+    } else {
+      std::printf("%s %s: a mode shows at %.1f +- %.1f Hz, damping %.4f +- %.4f\n", name.c_str(), channel,
+                  found.mode.frequency, found.mode.frequency_std, found.mode.damping_ratio,
+                  found.mode.damping_ratio_std);
+    }
+  }
+}
+
+std::array<std::vector<double>, 3> forces(const Record& record) {
+  return {record.column("fx"), record.column("fy"), record.column("fz")};
+}
+
+kalman::NodeParameters parametersOf(const Request& request) {
+  kalman::NodeParameters parameters;
+  if (!request.parameters.empty()) {
+    ParameterReader reader = ParameterReader::fromFile(request.parameters);
+    parameters = kalman::readParameters(reader);
+  }
+  kalman::HarmonicFilterParameters& filter = parameters.compensation.filter;
+  if (request.bandwidth) filter.bandwidth = *request.bandwidth;
+  if (request.noise) filter.noise_rms = *request.noise;
+  if (request.method == "fixed-lag") parameters.compensation.lag = request.lag;
+  if (request.settling) filter.settling_revolutions = *request.settling;
+  return parameters;
+}
+
+void fromCampaign(const Request& request) {
+  if (request.coupled && request.method != "kalman") throw Error("--coupled goes with --method kalman");
+  const Campaign campaign = readCampaign(request.source);
+  const kalman::NodeParameters parameters = parametersOf(request);
+  std::array<ModalModel, 3> sensor;
+  std::optional<kalman::SensorMatrix> matrix;
+  bool workpiece = false;
+  if (request.coupled) {
+    matrix = kalman::identifySensorMatrix(campaign, request.fit);
+    for (std::size_t axis = 0; axis < 3; ++axis) sensor[axis] = matrix->h[axis][axis];
+    double worst = 1.0;
+    for (double f = 0.0; f <= request.fit.high; f += 5.0) worst = std::max(worst, matrix->condition(f));
+    std::printf(
+        "static cross-talk [%%]: xy %.2f xz %.2f yx %.2f yz %.2f zx %.2f zy %.2f; condition at most %.1f\n",
+        100.0 * matrix->h[0][1].staticGain(), 100.0 * matrix->h[0][2].staticGain(),
+        100.0 * matrix->h[1][0].staticGain(), 100.0 * matrix->h[1][2].staticGain(),
+        100.0 * matrix->h[2][0].staticGain(), 100.0 * matrix->h[2][1].staticGain(), worst);
+    if (!request.matrix_out.empty()) kalman::writeSensorMatrix(*matrix, request.matrix_out);
+    workpiece = kalman::measuresWorkpiece(campaign, request.model);
+  } else if (request.identify) {
+    workpiece = kalman::measuresWorkpiece(campaign, request.model);
+    sensor = kalman::identifySensor(campaign, request.fit);
+  } else {
+    const MachineModel model = readMachineModel(request.model.empty() ? campaign.modelPath() : request.model);
+    sensor = model.force_sensor.axis;
+    workpiece = model.force_sensor.measures_workpiece;
+  }
+  for (std::size_t axis = 0; axis < 3; ++axis) print(AXES[axis], sensor[axis]);
+  std::size_t cuts = 0;
+  for (const CampaignTest& test : campaign.tests) {
+    if (test.kind != TestKind::cut) continue;
+    std::fprintf(stderr, "compensating %s\n", test.name.c_str());
+    Record record = readRecord(campaign, test);
+    if (workpiece) kalman::turnForces(record);
+    if (request.blind) printBlind(test.name, record, test, request);
+    const auto force = matrix ? kalman::compensate(record, *matrix, test.spindle_speed, test.sample_rate,
+                                                   parameters.compensation.filter)
+                              : kalman::compensate(record, sensor, false, test.spindle_speed,
+                                                   test.sample_rate, parameters.compensation.filter,
+                                                   kalman::methodOf(request.method), request.lag);
+    write(request.out, test.name, record.time, force);
+    printRange(test.name, forces(record), force);
+    ++cuts;
+  }
+  if (cuts == 0) throw Error(campaign.folder + ": the campaign has no cuts");
+  if (request.blind) {
+    std::printf(
+        "a mode shown by a cut may be the tool's, the workpiece's or the sensor's, and with which share it "
+        "stands "
+        "in the force it does not tell: it is not used; a tap tells\n");
+  }
+  std::printf("%zu cuts written to %s (%s)\n", cuts, request.out.c_str(), latency(request));
+}
+
+/// A test's name as the name of a file; a name that came before gets a number.
+std::string fileName(std::string name, std::set<std::string>& used) {
+  if (name.empty()) name = "cut";
+  for (char& c : name) {
+    if (!std::isalnum(static_cast<unsigned char>(c)) && c != '-' && c != '.' && c != '_') c = '_';
+  }
+  std::string unique = name;
+  for (int n = 2; !used.insert(unique).second; ++n) unique = name + "_" + std::to_string(n);
+  return unique;
+}
+
+void fromBag(const Request& request) {
+  if (request.identify || request.coupled || request.blind) {
+    throw Error(
+        "--identify, --coupled and --blind are for campaigns: the taps in a bag count from their goals on, "
+        "as in the "
+        "node");
+  }
+  const kalman::NodeParameters parameters = parametersOf(request);
+  const std::string model_file = request.model.empty() ? parameters.model : request.model;
+  if (model_file.empty()) throw Error(request.source + ": a bag needs the machine's model (--model)");
+  const MachineModel model = readMachineModel(model_file);
+  const bool terminal = isatty(STDERR_FILENO);
+  std::set<std::string> used;
+  const auto began = std::chrono::steady_clock::now();
+  const kalman::BagSummary summary = kalman::compensateBag(
+      request.source, model.force_sensor, parameters, kalman::methodOf(request.method),
+      [&](kalman::BagCut&& cut) {
+        const std::string name = fileName(cut.name, used);
+        write(request.out, name, cut.offset, cut.compensated);
+        printRange(name, cut.measured, cut.compensated);
+        std::printf("%s: time 0 is %.9f s, the first %.3f s settle\n", name.c_str(), cut.stamp, cut.settling);
+      },
+      [&](double share) {
+        if (terminal) std::fprintf(stderr, "\rreading %3.0f %%%s", 100.0 * share, share >= 1.0 ? "\n" : "");
+      });
+  for (const kalman::SensorResult& result : summary.identified) {
+    std::printf("taps in %s: %s\n", result.modes.direction.c_str(), result.message.c_str());
+    if (result.code == FrfCode::ok) print(result.modes.direction.c_str(), result.modes.model);
+  }
+  if (summary.cuts == 0) throw Error(request.source + ": no cut (cut/condition of kind CUT with samples)");
+  if (!summary.rotation_known) {
+    std::fprintf(stderr, "compensate: %s holds no transform of the sensor: forces are in its own frame\n",
+                 request.source.c_str());
+  }
+  if (summary.gaps + summary.not_finite + summary.late > 0) {
+    std::fprintf(stderr, "compensate: %zu gaps, %zu samples not numbers, %zu inputs out of order\n",
+                 summary.gaps, summary.not_finite, summary.late);
+  }
+  const double wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+  std::printf("%zu cuts written to %s (no latency); %.1f s of data in %.2f s, %.0f x real time\n",
+              summary.cuts, request.out.c_str(), summary.duration, wall, summary.duration / wall);
+}
+
+void run(const Request& request) {
+  if (!std::filesystem::exists(request.source)) throw Error(request.source + ": cannot be read");
+  std::filesystem::create_directories(request.out);
+  if (std::filesystem::path(request.source).extension() == ".bag") {
+    fromBag(request);
+  } else {
+    fromCampaign(request);
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Request request;
+  CLI::App app{"Recovers the force at the tool from the records of a force sensor: one CSV a cut."};
+  app.add_option("SOURCE", request.source, "campaign folder, or a bag")->required();
+  app.add_option("-o,--out", request.out, "folder for one CSV a cut")->required();
+  app.add_option("--model", request.model, "model file with the force sensor (default: the campaign's)");
+  app.add_option("--params", request.parameters, "parameter file of the node (launch/config/kalman.yaml)");
+  app.add_flag("--identify", request.identify, "campaign: take the sensor's modes from its own taps");
+  app.add_flag("--blind", request.blind,
+               "campaign: say what the cuts show of the sensor's modes without a tap");
+  app.add_option("--blind-low-hz", request.blind_low, "band of --blind")->capture_default_str();
+  app.add_option("--blind-high-hz", request.blind_high, "band of --blind")->capture_default_str();
+  app.add_flag(
+      "--coupled", request.coupled,
+      "campaign: sensor with its cross-talk from the campaign's own taps along x, y and z; method kalman");
+  app.add_option("--matrix-out", request.matrix_out,
+                 "with --coupled: file of the matrix, for the node's parameter sensor_matrix");
+  app.add_option("--method", request.method,
+                 "kalman (causal, as the node), smoother, fixed-lag (as the node with `lag`) or inverse")
+      ->check(CLI::IsMember({"kalman", "smoother", "fixed-lag", "inverse"}))
+      ->capture_default_str();
+  app.add_option("--lag-s", request.lag, "lag of fixed-lag")
+      ->check(CLI::Range(0.0, 10.0))
+      ->capture_default_str();
+  app.add_option("--bandwidth-hz", request.bandwidth, "harmonics up to this frequency");
+  app.add_option("--noise-rms-n", request.noise, "noise of one sample");
+  app.add_option("--settling-revolutions", request.settling, "time constant of the amplitudes");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? 0 : 2;
+  }
+  try {
+    run(request);
+  } catch (const std::exception& e) {
+    std::cerr << "compensate: " << e.what() << "\n";
+    return 1;
+  }
+  return 0;
+}

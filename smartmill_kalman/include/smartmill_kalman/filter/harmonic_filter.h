@@ -1,0 +1,180 @@
+#pragma once
+
+#include <array>
+#include <complex>
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+#include "smartmill_core/modal/modal_model.h"
+#include "smartmill_kalman/filter/innovation_watch.h"
+
+namespace smartmill::kalman {
+
+/// How a filter is laid out; see launch/config/kalman.yaml.
+struct HarmonicFilterParameters {
+  double bandwidth = 5000.0;          ///< [Hz] harmonics of the spindle frequency up to here; > 0
+  int max_harmonics = 100;            ///< 0..200, also kept below 0.45 of the sample rate; 0: a random walk
+  double noise_rms = 1.0;             ///< [N] of one sample; > 0
+  double settling_revolutions = 0.2;  ///< [1] time constant of each harmonic's amplitude after a change; > 0
+  /// [1] time constant once nothing changes any more, in revolutions; at most settling_revolutions: always
+  /// quick
+  double memory_revolutions = 2.0;
+  /// Memory of a level of `levels` [revolutions]: quick, geometric mean, slow.
+  double memory(std::size_t level) const;
+  /// @throws Error naming key and value.
+  void validate() const;
+};
+
+/// Gains of one filter, in the coordinates of Dunwoody eq. 5.37: mode states (two a mode, StateSpace form),
+/// then the constant, then (F, G) of each harmonic.
+struct HarmonicGain {
+  std::vector<double> filter;  ///< [state/N] P c' / (c P c' + r)
+  std::vector<double>
+      smoothing;          ///< [state N] P d', d the force of a state, P the stationary prediction covariance
+  double variance = 0.0;  ///< [N2] of the innovation
+};
+
+/// Stationary gain from the discrete Riccati equation. Exact discretisation (Van Loan for the noise). Process
+/// noise q = (r dt) / tau^2 for every amplitude puts each harmonic's pole near -|H| / tau, H the sensor's
+/// answer to it. A harmonic that the sensor hardly passes is slow already: tau is min(1, 2 |H|) settling
+/// there, not below quickest, so that a long memory does not make it slower still. The gain does not depend
+/// on r.
+/// @param spindle_speed [rad/s] @param sample_rate [Hz] @param settling, quickest [s]
+HarmonicGain designHarmonicGain(const ModalModel& sensor, double spindle_speed, double sample_rate,
+                                int harmonics, double noise_rms, double settling, double quickest);
+
+/// The same with a time constant [s] for each harmonic, 0 .. N.
+HarmonicGain designHarmonicGain(const ModalModel& sensor, double spindle_speed, double sample_rate,
+                                double noise_rms, const std::vector<double>& settling);
+
+/// Gains from quick to slow: settling_revolutions, memory_revolutions and their geometric mean.
+std::vector<HarmonicGain> designGains(const ModalModel& sensor, double spindle_speed, double sample_rate,
+                                      const HarmonicFilterParameters& parameters);
+
+/// Kalman filter of Dunwoody chapter 5 for one axis at one spindle speed: sensor modes (eq. 5.18..5.23,
+/// static gain 1) driven by a force that is a constant and N harmonics of the spindle frequency with slowly
+/// wandering amplitudes (eq. 5.28..5.35).
+///
+/// Runs in the coordinates in which nothing couples: each harmonic with the sensor's answer to it in the
+/// steady state (exact, H(n w)), and what each mode still rings beside it. M + N + 1 rotations and a gain:
+/// the cost is linear in the number of states; nothing is allocated.
+///
+/// After a change (start, tool entry) it follows within settling_revolutions; while the innovations say that
+/// nothing changes, the memory grows to memory_revolutions and the noise falls; an innovation out of line
+/// takes it back at once. Only the gain changes, the state goes on.
+class HarmonicFilter {
+ public:
+  static constexpr std::size_t LEVELS = 3;
+
+  /// @param sensor measured over applied force [1] @param spindle_speed [rad/s] > 0 @param sample_rate [Hz]
+  HarmonicFilter(const ModalModel& sensor, double spindle_speed, double sample_rate,
+                 const HarmonicFilterParameters& parameters);
+  /// With gains of this speed or one nearby; they tell the number of harmonics.
+  HarmonicFilter(std::vector<HarmonicGain> gains, const ModalModel& sensor, double spindle_speed,
+                 double sample_rate);
+
+  /// Takes one measured sample [N]. @return applied force [N] at this sample, from all samples up to it.
+  double step(double measured) {
+    innovation_ = measured - expected_;
+    const double force = advance(gains_[level()].data(), innovation_, force_gain_[level()]);
+    watch_.add(innovation_);
+    return force;
+  }
+
+  /// Keeps the state going without a measurement. @return predicted force [N].
+  double coast() {
+    innovation_ = 0.0;
+    return advance(gains_[level()].data(), 0.0, 0.0);
+  }
+
+  /// At rest, no force.
+  void reset();
+
+  /// Other sensor model or spindle speed, same number of harmonics: the force and the modes' displacements go
+  /// on, the gains stay.
+  void retune(const ModalModel& sensor, double spindle_speed);
+
+  /// The sensor is another than was believed, same number of modes: what is expected to be measured goes on,
+  /// the force jumps to what explains it. @param gains of the other sensor; empty: the gains stay
+  void replaceSensor(const ModalModel& sensor, std::vector<HarmonicGain> gains);
+
+  /// Harmonics of the measured force at the next sample [N]: output = Re sum Y_n, n = 0..N.
+  std::vector<std::complex<double>> measuredHarmonics() const;
+
+  /// Harmonic n of the applied force at the next sample [N], 0 the constant: force = Re sum.
+  std::complex<double> forceHarmonic(std::size_t n) const {
+    const std::size_t i = modes_ + n;
+    return {blocks_[i / 4].re[i % 4], blocks_[i / 4].im[i % 4]};
+  }
+
+  /// Slope of the sample expected next over the spindle's angle [N/rad], of the harmonics in their steady
+  /// state. @param highest harmonic that counts
+  double slope(double highest = 1e9) const;
+
+  /// Takes the force of another filter over (harmonics beyond its own: zero), so that a new layout starts
+  /// without a jump. The sensor's modes must be as many.
+  void adopt(const HarmonicFilter& other);
+
+  /// Fixed-interval smoother with the slowest gain (modified Bryson-Frazier: nothing is stored but
+  /// innovations), of all samples together. @return applied force [N] at each sample. Starts from this
+  /// filter's state and leaves it at the end.
+  std::vector<double> smooth(const std::vector<double>& measured);
+
+  double innovation() const { return innovation_; }                  ///< [N] of the last step
+  double innovationStd() const { return innovation_std_[level()]; }  ///< [N] expected by the design
+  double spindleSpeed() const { return spindle_speed_; }             ///< [rad/s]
+  int harmonics() const { return harmonics_; }
+  std::size_t states() const { return 2 * modes_ + 1 + 2 * static_cast<std::size_t>(harmonics_); }
+  std::size_t level() const { return watch_.level(); }  ///< 0 quick .. LEVELS - 1 slow
+  bool settled() const { return watch_.settled(); }     ///< at its longest memory
+  /// Times that an innovation was out of line: the memory began anew.
+  std::size_t restarts() const { return watch_.restarts(); }
+  void setLevel(std::size_t level) { watch_.setLevel(level); }
+  /// State in the coordinates of HarmonicGain.
+  std::vector<double> state() const;
+  void setState(const std::vector<double>& state);
+
+  // A pair is a rotation (a, b) of (re, im) with the share (c1, c2) in the measured and (g) in the applied
+  // force. Four pairs run side by side.
+  typedef double Four __attribute__((vector_size(32), aligned(8)));
+  struct Block {
+    Four re, im, a, b, c1, c2, g;
+  };
+  struct GainBlock {
+    Four re, im;
+  };
+  /// What a smoother goes back with; one for as long as sensor, speed and gains stay.
+  struct Layout {
+    std::vector<Block> blocks;                             ///< re, im of no meaning
+    std::vector<std::vector<GainBlock>> gains, smoothing;  ///< a level each
+    std::vector<double> variance, force_gain;              ///< [N2], [1] a level each
+  };
+  std::shared_ptr<const Layout> layout() const;
+  /// One sample back: lambda of a sample from that of the one after it. @param level, innovation of the
+  /// sample's step @param seen false: it was bridged @return correction of its predicted force [N]
+  static double goBack(const Layout& layout, std::size_t level, double innovation, bool seen,
+                       std::vector<GainBlock>& lambda);
+
+ private:
+  double advance(const GainBlock* gain, double innovation, double force_gain);
+  void layOut(const ModalModel& sensor, double spindle_speed);
+  std::vector<double> toPairs(const std::vector<double>& state) const;
+  void setGains();
+  double expectation() const;
+
+  ModalModel sensor_;
+  double spindle_speed_, sample_rate_;
+  std::size_t modes_;
+  int harmonics_;
+  std::vector<HarmonicGain> design_;
+  std::vector<std::array<double, 4>> modal_;  // transition of each mode's two states, row-major
+  std::vector<Block> blocks_;
+  std::vector<std::vector<GainBlock>> gains_;
+  std::vector<double> force_gain_, innovation_std_;
+  double expected_ = 0.0, innovation_ = 0.0;
+  InnovationWatch watch_;
+  mutable std::shared_ptr<const Layout> shared_layout_;  // empty: to be made
+};
+
+}  // namespace smartmill::kalman

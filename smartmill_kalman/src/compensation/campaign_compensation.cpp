@@ -1,0 +1,187 @@
+#include "smartmill_kalman/compensation/campaign_compensation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/model/machine_model.h"
+#include "smartmill_core/signal/frequency_response.h"
+#include "smartmill_core/signal/statistics.h"
+#include "smartmill_core/signal/window.h"
+
+namespace smartmill::kalman {
+namespace {
+
+const std::array<const char*, 3> FORCES{{"fx", "fy", "fz"}};
+const std::array<const char*, 3> DIRECTIONS{{"x", "y", "z"}};
+
+}  // namespace
+
+void SensorFitParameters::validate() const {
+  if (!(low >= 0.0) || !(high > low)) {
+    throw Error("sensor fit: the band " + std::to_string(low) + " .. " + std::to_string(high) +
+                " Hz is empty");
+  }
+  if (max_modes < 1 || max_modes > 20) {
+    throw Error("max_modes: " + std::to_string(max_modes) + ", 1 .. 20 is due");
+  }
+}
+
+FrequencyResponse averaged(const std::vector<std::vector<double>>& hammer,
+                           const std::vector<std::vector<double>>& response, double sample_rate) {
+  if (hammer.empty() || hammer.size() != response.size()) throw Error("sensor identification: no hits");
+  FrfEstimator estimator(sample_rate, hammer.front().size());
+  for (std::size_t i = 0; i < hammer.size(); ++i) {
+    const std::vector<double> window = impactWindow(hammer[i]);
+    std::vector<double> force = hammer[i];
+    double share = 0.0, window_power = 0.0, rest = 0.0, rest_response = 0.0;
+    std::size_t before = 0;
+    for (std::size_t k = 0; k < force.size(); ++k) {
+      force[k] *= window[k];
+      window_power += window[k] * window[k];
+    }
+    // What stands before the hit is noise.
+    while (before < window.size() && window[before] == 0.0) {
+      rest += hammer[i][before] * hammer[i][before];
+      rest_response += response[i][before] * response[i][before];
+      ++before;
+    }
+    share = window_power / static_cast<double>(window.size());
+    if (before > 10) {
+      estimator.setNoise(std::sqrt(rest / before), std::sqrt(rest_response / before), share);
+    }
+    estimator.add(force, response[i]);
+  }
+  return estimator.h1("1");
+}
+
+namespace {
+
+/// A blow against the sensor's axis, or a sensor that shows the reaction: its slow response is negative.
+bool staysOpposite(const FrequencyResponse& frf, double low) {
+  double sum = 0.0;
+  for (const auto& value : frf.band(low, 3.0 * low + 50.0).value) sum += value.real();
+  return sum < 0.0;
+}
+
+struct Taps {
+  std::vector<std::vector<double>> hammer;
+  std::array<std::vector<std::vector<double>>, 3> response;  // of fx, fy, fz
+  double rate = 0.0;                                         // [Hz]
+};
+
+Taps tapsAlong(const Campaign& campaign, std::size_t axis) {
+  Taps taps;
+  for (const CampaignTest& test : campaign.tests) {
+    if (test.kind != TestKind::tap || test.direction != DIRECTIONS[axis]) continue;
+    const Record record = readRecord(campaign, test);
+    if (taps.rate != 0.0 && (taps.rate != test.sample_rate || record.size() != taps.hammer.front().size())) {
+      throw Error(record.file + ": taps of one direction need one rate and one length");
+    }
+    taps.rate = test.sample_rate;
+    taps.hammer.push_back(record.column("hammer"));
+    for (std::size_t i = 0; i < 3; ++i) taps.response[i].push_back(record.column(FORCES[i]));
+  }
+  return taps;
+}
+
+}  // namespace
+
+ModalFit identifySensor(const std::vector<std::vector<double>>& hammer,
+                        const std::vector<std::vector<double>>& response, double sample_rate,
+                        const SensorFitParameters& parameters) {
+  parameters.validate();
+  ModalFitOptions options;
+  options.low = parameters.low;
+  options.high = std::min(parameters.high, 0.45 * sample_rate);
+  options.max_modes = parameters.max_modes;
+  options.unit_static_gain = true;
+  FrequencyResponse measured = averaged(hammer, response, sample_rate);
+  if (staysOpposite(measured, parameters.low)) {
+    for (auto& value : measured.value) value = -value;
+  }
+  return fitModes(measured, options);
+}
+
+std::array<ModalModel, 3> identifySensor(const Campaign& campaign, const SensorFitParameters& parameters) {
+  std::array<ModalModel, 3> sensor;
+  bool any = false;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    sensor[axis].direct = 1.0;
+    const Taps taps = tapsAlong(campaign, axis);
+    if (taps.hammer.empty()) continue;
+    any = true;
+    sensor[axis] = identifySensor(taps.hammer, taps.response[axis], taps.rate, parameters).model;
+  }
+  if (!any) throw Error(campaign.folder + ": the campaign has no taps to identify the force sensor from");
+  return sensor;
+}
+
+bool measuresWorkpiece(const Campaign& campaign, const std::string& model_file) {
+  const std::string file = model_file.empty() ? campaign.modelPath() : model_file;
+  if (model_file.empty() && (file.empty() || !std::filesystem::is_regular_file(file))) return false;
+  return readMachineModel(file).force_sensor.measures_workpiece;
+}
+
+void turnForces(Record& record) {
+  for (std::size_t i = 0; i < record.names.size(); ++i) {
+    if (std::find(FORCES.begin(), FORCES.end(), record.names[i]) == FORCES.end()) continue;
+    for (double& sample : record.columns[i]) sample = -sample;
+  }
+}
+
+std::array<std::vector<double>, 3> compensate(const Record& record, const std::array<ModalModel, 3>& sensor,
+                                              bool measures_workpiece, double spindle_speed,
+                                              double sample_rate, const HarmonicFilterParameters& parameters,
+                                              Method method, double lag) {
+  std::array<std::vector<double>, 3> force;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    std::vector<double> measured = record.column(FORCES[axis]);
+    if (measures_workpiece) {
+      for (double& sample : measured) sample = -sample;
+    }
+    force[axis] =
+        compensateRecord(method, measured, sensor[axis], spindle_speed, sample_rate, parameters, lag);
+  }
+  return force;
+}
+
+SensorMatrix identifySensorMatrix(const Campaign& campaign, const SensorFitParameters& parameters) {
+  SensorMatrix sensor;
+  std::array<Taps, 3> taps;
+  for (std::size_t j = 0; j < 3; ++j) {
+    taps[j] = tapsAlong(campaign, j);
+    if (taps[j].hammer.empty())
+      throw Error(campaign.folder + ": cross-talk needs taps along " + DIRECTIONS[j] + " too");
+    sensor.h[j][j] = identifySensor(taps[j].hammer, taps[j].response[j], taps[j].rate, parameters).model;
+  }
+  for (std::size_t j = 0; j < 3; ++j) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      if (i == j) continue;
+      FrequencyResponse across = averaged(taps[j].hammer, taps[j].response[i], taps[j].rate);
+      if (staysOpposite(averaged(taps[j].hammer, taps[j].response[j], taps[j].rate), parameters.low)) {
+        for (auto& value : across.value) value = -value;
+      }
+      sensor.h[i][j] = fitCrossTalk(across, sensor.h[j][j], sensor.h[i][i], parameters.low,
+                                    std::min(parameters.high, 0.45 * taps[j].rate));
+    }
+  }
+  return sensor;
+}
+
+std::array<std::vector<double>, 3> compensate(const Record& record, const SensorMatrix& sensor,
+                                              double spindle_speed, double sample_rate,
+                                              const HarmonicFilterParameters& parameters) {
+  CoupledFilter filter(sensor, spindle_speed, sample_rate, parameters);
+  std::array<std::vector<double>, 3> force;
+  const std::array<const std::vector<double>*, 3> measured{
+      {&record.column("fx"), &record.column("fy"), &record.column("fz")}};
+  for (std::size_t i = 0; i < record.size(); ++i) {
+    const auto found = filter.step({(*measured[0])[i], (*measured[1])[i], (*measured[2])[i]});
+    for (std::size_t axis = 0; axis < 3; ++axis) force[axis].push_back(found[axis]);
+  }
+  return force;
+}
+
+}  // namespace smartmill::kalman

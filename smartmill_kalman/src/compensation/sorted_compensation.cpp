@@ -1,0 +1,219 @@
+#include "smartmill_kalman/compensation/sorted_compensation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "smartmill_core/error.h"
+
+namespace smartmill::kalman {
+namespace {
+
+// A stamp this far behind the newest one means that a recording was started again.
+constexpr double RESTART = 1.0;  // [s]
+constexpr double NEVER = -std::numeric_limits<double>::infinity();
+
+int axisOf(const std::string& direction) {
+  return direction == "x" ? 0 : direction == "y" ? 1 : direction == "z" ? 2 : -1;
+}
+
+}  // namespace
+
+SortedCompensation::SortedCompensation(const CompensationParameters& parameters, const TapParameters& taps,
+                                       const ForceSensor& sensor, double hold_back, Outputs outputs)
+    : believed_(sensor),
+      outputs_(std::move(outputs)),
+      compensation_(parameters, sensor.measures_workpiece,
+                    [this](const ForceBlock& m, const ForceBlock& c) { forward(m, c); }),
+      measurement_(taps),
+      sorter_(hold_back),
+      conditions_(sorter_.addEvents("cut/condition")),
+      goals_(sorter_.addEvents("kalman/measure_frf")),
+      hammers_(sorter_.addEvents("daq/hammer")),
+      // A machine without a tachometer has no angles to wait for.
+      angles_(parameters.track_speed ? sorter_.addEvents("spindle/angle")
+                                     : sorter_.addRegular("spindle/angle")),
+      blocks_(sorter_.addRegular("daq/dynamometer")),
+      newest_(NEVER),
+      newest_block_(NEVER),
+      newest_hammer_(NEVER),
+      newest_angle_(NEVER) {
+  useModelFile();
+}
+
+void SortedCompensation::useModelFile() {
+  identified_.fill(NEVER);
+  if (matrix_) {
+    compensation_.setMatrix(*matrix_);
+    for (std::size_t axis = 0; axis < 3; ++axis) believed_.axis[axis] = matrix_->h[axis][axis];
+  }
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (believed_.noise_rms) {
+      compensation_.setSensor(axis, believed_.axis[axis], (*believed_.noise_rms)[axis]);
+    } else {
+      compensation_.setSensor(axis, believed_.axis[axis]);
+    }
+  }
+}
+
+void SortedCompensation::watch(double stamp, double& newest_here) {
+  // Against its own stream: under load one topic may come seconds after another.
+  if (stamp < newest_here - RESTART) {
+    sorter_.reset();
+    compensation_.reset();
+    measurement_.reset();
+    if (spindle_) spindle_->reset();
+    invalid_.clear();
+    useModelFile();
+    newest_ = newest_block_ = newest_hammer_ = newest_angle_ = NEVER;
+    if (restarted_) restarted_();
+  }
+  newest_here = std::max(newest_here, stamp);
+  newest_ = std::max(newest_, stamp);
+}
+
+void SortedCompensation::push(const SampleBlock& block) {
+  watch(block.stamp, newest_block_);
+  sorter_.push(blocks_, block.stamp, [this, block] {
+    if (SpindleForceSensor::isSixChannels(block)) {
+      const SampleBlock forces = toForces(block);
+      compensation_.handle(forces);
+      measurement_.handleSensor(forces);
+    } else {
+      compensation_.handle(block);
+      measurement_.handleSensor(block);
+    }
+    drain();
+  });
+}
+
+SampleBlock SortedCompensation::toForces(const SampleBlock& block) {
+  if (!spindle_) throw Error("six channels of a spindle's force sensor, but no calibration (spindle_sensor)");
+  for (std::size_t axis = 0; axis < 3; ++axis) spindle_->setSensor(axis, compensation_.sensor(axis));
+  SampleBlock forces = spindle_->handle(block);
+  const std::vector<bool>& invalid = spindle_->invalid();
+  for (std::size_t i = 0; spindle_->anyInvalid() && i < invalid.size(); ++i) {
+    const std::uint64_t index = block.first_index + i;
+    if (!invalid[i]) continue;
+    if (!invalid_.empty() && invalid_.back().second == index) {
+      ++invalid_.back().second;
+    } else {
+      invalid_.emplace_back(index, index + 1);
+    }
+  }
+  return forces;
+}
+
+// The filters bridge what was not measured; where the sensor could not measure nothing is claimed.
+void SortedCompensation::forward(const ForceBlock& measured, const ForceBlock& compensated) {
+  if (!outputs_.force) return;
+  if (!spindle_) {
+    outputs_.force(measured, compensated);
+    return;
+  }
+  ForceBlock shown = measured, marked = compensated;
+  const std::uint64_t begin = marked.first_index, end = begin + marked.force[0].size();
+  while (!invalid_.empty() && invalid_.front().second <= std::min(begin, shown.first_index))
+    invalid_.pop_front();
+  for (const auto& [from, to] : invalid_) {
+    for (std::uint64_t i = std::max(from, begin); i < std::min(to, end); ++i) {
+      for (auto& force : marked.force) force[i - begin] = NOT_A_NUMBER;
+    }
+  }
+  spindle_->lowPass(shown);
+  outputs_.force(shown, marked);
+}
+
+void SortedCompensation::pushHammer(const SampleBlock& block) {
+  watch(block.stamp, newest_hammer_);
+  sorter_.setRegular(hammers_, true);
+  sorter_.push(hammers_, block.stamp, [this, block] {
+    measurement_.handleHammer(block);
+    drain();
+  });
+}
+
+void SortedCompensation::push(const SpindleAngle& angle) {
+  watch(angle.stamp, newest_angle_);
+  sorter_.push(angles_, angle.stamp, [this, angle] {
+    if (spindle_) spindle_->handle(angle);
+    compensation_.handle(angle);
+  });
+}
+
+void SortedCompensation::push(const CuttingCondition& condition) {
+  // A latched condition is older than the data around it: no restart.
+  sorter_.push(conditions_, condition.stamp, [this, condition] {
+    if (spindle_) spindle_->handle(condition);
+    compensation_.handle(condition);
+  });
+}
+
+void SortedCompensation::push(const MeasureFrfGoal& goal, std::function<bool(bool)> begin) {
+  sorter_.push(goals_, goal.stamp, [this, goal, begin = std::move(begin)] {
+    const bool free = !measurement_.active();
+    const bool wanted = !begin || begin(free);  // before the goal's own results
+    if (free && wanted) measurement_.handle(goal);
+    drain();
+  });
+}
+
+void SortedCompensation::event(std::function<void(SensorMeasurement&)> what) {
+  const auto deliver = [this, what = std::move(what)] {
+    what(measurement_);
+    drain();
+  };
+  if (std::isfinite(newest_)) {
+    sorter_.push(goals_, newest_, deliver);
+  } else {
+    deliver();
+  }
+}
+
+void SortedCompensation::push(const MeasuredModes& modes) {
+  const int found = axisOf(modes.direction);
+  if (modes.point != POINT_FORCE_SENSOR || found < 0) return;
+  sorter_.push(goals_, modes.stamp, [this, modes, axis = static_cast<std::size_t>(found)] {
+    if (modes.stamp <= identified_[axis]) return;
+    identified_[axis] = modes.stamp;
+    compensation_.setSensor(axis, modes.model);
+  });
+}
+
+double SortedCompensation::modesAge() const {
+  double age = 0.0;
+  for (const double stamp : identified_) {
+    if (std::isfinite(stamp)) age = std::max(age, newest_ - stamp);
+  }
+  return age;
+}
+
+void SortedCompensation::hammerLost(const std::string& text) {
+  if (measurement_.active()) {
+    measurement_.lost(text);
+    drain();
+  }
+  sorter_.setRegular(hammers_, false);
+}
+
+void SortedCompensation::drain() {
+  if (const auto command = measurement_.takeCommand(); command && outputs_.strike) outputs_.strike(*command);
+  if (const auto feedback = measurement_.takeFeedback(); feedback && outputs_.feedback)
+    outputs_.feedback(*feedback);
+  if (const auto result = measurement_.takeResult()) {
+    if (result->code == FrfCode::ok) {
+      const auto axis = static_cast<std::size_t>(axisOf(result->modes.direction));
+      identified_[axis] = result->modes.stamp;
+      // A record without any noise says nothing about the sensor's.
+      if (result->noise_rms > 0.0) {
+        compensation_.setSensor(axis, result->modes.model, result->noise_rms);
+      } else {
+        compensation_.setSensor(axis, result->modes.model);
+      }
+    }
+    if (outputs_.result) outputs_.result(*result);
+  }
+}
+
+}  // namespace smartmill::kalman

@@ -1,0 +1,36 @@
+#include "smartmill_kalman/filter/riccati.h"
+
+#include <cmath>
+#include <string>
+
+#include <Eigen/LU>
+
+#include "smartmill_core/error.h"
+
+namespace smartmill::kalman {
+
+Eigen::MatrixXd stationaryCovariance(const Eigen::MatrixXd& phi, const Eigen::MatrixXd& q,
+                                     const Eigen::RowVectorXd& c, double r) {
+  constexpr int MAX_DOUBLINGS = 60;
+  constexpr double TOLERANCE = 1e-12;
+  const Eigen::Index n = phi.rows();
+  Eigen::MatrixXd a = phi.transpose();
+  Eigen::MatrixXd g = c.transpose() * c / r;
+  Eigen::MatrixXd h = q;
+  for (int i = 0; i < MAX_DOUBLINGS; ++i) {
+    const Eigen::PartialPivLU<Eigen::MatrixXd> w(Eigen::MatrixXd::Identity(n, n) + g * h);
+    const Eigen::MatrixXd w_a = w.solve(a);
+    const Eigen::MatrixXd w_g = w.solve(g);
+    const Eigen::MatrixXd rise = a.transpose() * h * w_a;
+    const Eigen::MatrixXd more = a * w_g * a.transpose();
+    h += 0.5 * (rise + rise.transpose());
+    g += 0.5 * (more + more.transpose());
+    a = (a * w_a).eval();
+    if (!h.allFinite()) break;
+    if (rise.norm() <= TOLERANCE * h.norm()) return h;
+  }
+  throw Error("Kalman filter: the Riccati equation of " + std::to_string(n) +
+              " states has no stationary solution");
+}
+
+}  // namespace smartmill::kalman

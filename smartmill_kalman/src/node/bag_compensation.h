@@ -1,0 +1,40 @@
+#pragma once
+
+#include <array>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "node/parameters_ros.h"
+#include "smartmill_kalman/compensation/record_compensation.h"
+
+namespace smartmill::kalman {
+
+/// Force on the tool in one cut of a bag, machine frame.
+struct BagCut {
+  std::string name;                                          ///< of the cutting condition
+  double stamp = 0.0;                                        ///< [s] of the cutting condition
+  double sample_rate = 0.0;                                  ///< [Hz]
+  double speed = 0.0;                                        ///< [rad/s] of the spindle, last
+  double settling = 0.0;                                     ///< [s] marked as settling or passed through
+  std::vector<double> offset;                                ///< [s] of each sample since stamp
+  std::array<std::vector<double>, 3> measured, compensated;  ///< [N]
+};
+
+/// What a bag held beside its cuts.
+struct BagSummary {
+  std::size_t cuts = 0, gaps = 0, not_finite = 0, late = 0;
+  bool rotation_known = false;           ///< false: no transform in the bag, forces are in the sensor's frame
+  double duration = 0.0;                 ///< [s]
+  std::vector<SensorResult> identified;  ///< tap tests that the bag holds
+};
+
+/// Puts a bag's sensors, conditions and goals through SortedCompensation, as the node does, without a master.
+/// Methods other than kalman run over each cut's samples with the sensor and the speed that the node had in
+/// it.
+/// @param done called at the end of each cut, in order @throws Error.
+BagSummary compensateBag(const std::string& path, const ForceSensor& sensor, const NodeParameters& parameters,
+                         Method method, const std::function<void(BagCut&&)>& done,
+                         const std::function<void(double)>& progress = {});
+
+}  // namespace smartmill::kalman

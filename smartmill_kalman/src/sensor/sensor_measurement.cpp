@@ -1,0 +1,286 @@
+#include "smartmill_kalman/sensor/sensor_measurement.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <utility>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/modal/impact_analysis.h"
+#include "smartmill_core/modal/modal_fit.h"
+#include "smartmill_core/signal/statistics.h"
+
+namespace smartmill::kalman {
+namespace {
+
+/// Stamps are rounded to nanoseconds; equal times must compare equal however a stream is cut into blocks.
+constexpr double SAME_TIME = 1e-6;  // [s]
+/// Equal readings in a row at the extreme of a noisy signal that mean clipping.
+constexpr std::size_t CLIPPED_RUN = 4;
+/// Lines at the lower end that tell the static gain at least.
+constexpr std::size_t LEAST_STATIC_LINES = 4;
+/// Share of the time before the trigger that is free of the foot of the hit.
+constexpr double QUIET_SHARE = 0.75;
+
+std::string format(const char* pattern, double a, double b = 0.0) {
+  char line[200];
+  std::snprintf(line, sizeof line, pattern, a, b);
+  return line;
+}
+
+void need(bool good, const char* key, double value, const char* due) {
+  if (!good || !std::isfinite(value)) {
+    throw Error(std::string(key) + ": " + format("%g", value) + ", " + due + " is due");
+  }
+}
+
+}  // namespace
+
+void TapParameters::validate() const {
+  need(trigger_force > 0.0, "trigger_force", trigger_force, "above 0 N");
+  need(weak_force >= trigger_force, "weak_force", weak_force, "at least trigger_force");
+  need(second_hit_share > 0.0 && second_hit_share < 1.0, "second_hit_share", second_hit_share, "0..1");
+  need(pre_trigger > 0.0, "pre_trigger", pre_trigger, "above 0 s");
+  need(record_length > 2.0 * pre_trigger, "record_length", record_length, "above 2 x pre_trigger");
+  need(rest_time >= 0.0, "rest_time", rest_time, "at least 0 s");
+  need(strike_timeout > 0.0, "strike_timeout", strike_timeout, "above 0 s");
+  need(max_bad_hits >= 0, "max_bad_hits", max_bad_hits, "at least 0");
+  need(response_range >= 0.0, "response_range", response_range, "at least 0 N");
+  need(static_tolerance > 0.0, "static_tolerance", static_tolerance, "above 0");
+  need(systematic >= 0.0 && systematic < 1.0, "systematic", systematic, "0..1");
+  need(frf_high > 0.0, "frf_high", frf_high, "above 0 Hz");
+  need(fit_low >= 0.0, "fit_low", fit_low, "at least 0 Hz");
+  need(fit_high > fit_low, "fit_high", fit_high, "above fit_low");
+  need(max_modes >= 1 && max_modes <= 20, "max_modes", max_modes, "1..20");
+}
+
+SensorMeasurement::SensorMeasurement(const TapParameters& parameters)
+    : parameters_((parameters.validate(), parameters)),
+      collector_({parameters.trigger_force, parameters.pre_trigger, parameters.record_length}) {
+}
+
+void SensorMeasurement::reset() {
+  active_ = waiting_for_hit_ = false;
+  collector_.reset();
+  hammer_.clear();
+  sensor_.clear();
+  hits_.clear();
+  command_.reset();
+  feedback_.reset();
+  done_.reset();
+}
+
+std::optional<StrikeCommand> SensorMeasurement::takeCommand() {
+  return std::exchange(command_, std::nullopt);
+}
+std::optional<TapFeedback> SensorMeasurement::takeFeedback() {
+  return std::exchange(feedback_, std::nullopt);
+}
+std::optional<SensorResult> SensorMeasurement::takeResult() {
+  return std::exchange(done_, std::nullopt);
+}
+
+void SensorMeasurement::say(const std::string& stage) {
+  feedback_ = TapFeedback{stage, 0.95 * static_cast<double>(hits_.size()) / goal_.hits,
+                          static_cast<int>(hits_.size())};
+}
+
+bool SensorMeasurement::handle(const MeasureFrfGoal& goal) {
+  if (active_) return false;
+  reset();
+  goal_ = goal;
+  bad_hits_ = 0;
+  result_ = SensorResult();
+  active_ = true;
+  if (goal.point != POINT_FORCE_SENSOR) {
+    finish(FrfCode::bad_goal, "point '" + goal.point + "': this node measures " + POINT_FORCE_SENSOR);
+  } else if (goal.direction != "x" && goal.direction != "y" && goal.direction != "z") {
+    finish(FrfCode::bad_goal, "direction '" + goal.direction + "': x, y or z is due");
+  } else if (goal.hits < 1 || goal.hits > 1000) {
+    finish(FrfCode::bad_goal, "hits " + std::to_string(goal.hits) + ": 1..1000 are due");
+  } else if (goal.modes < 0 || goal.modes > 20) {
+    finish(FrfCode::bad_goal, "modes " + std::to_string(goal.modes) + ": 0..20 are due");
+  } else {
+    // The samples before the first blow fill the record's quiet part.
+    rest_until_ = goal.stamp + std::max(parameters_.rest_time, 2.0 * parameters_.pre_trigger);
+    say("waiting for the samples");
+  }
+  return true;
+}
+
+void SensorMeasurement::take(const SampleBlock& block, const std::string& channel,
+                             std::deque<Sample>& queue) {
+  const std::size_t c = block.channel(channel);
+  if (block.units.at(c) != "N") throw Error("channel " + channel + " is in " + block.units[c] + ", N is due");
+  for (std::size_t i = 0; i < block.size(); ++i) {
+    queue.push_back({block.timeOf(i), block.first_index + i, block.sample_rate, block.at(i, c)});
+  }
+  join();
+  for (const auto* waiting : {&hammer_, &sensor_}) {
+    if (waiting->empty() || waiting->back().time - waiting->front().time <= parameters_.strike_timeout)
+      continue;
+    return finish(FrfCode::bad_data, std::string("no samples of ") +
+                                         (waiting == &hammer_ ? "the force sensor" : "the hammer") +
+                                         " with the other's running index");
+  }
+}
+
+void SensorMeasurement::handleHammer(const SampleBlock& block) {
+  if (active_) take(block, "hammer", hammer_);
+}
+
+void SensorMeasurement::handleSensor(const SampleBlock& block) {
+  if (active_) take(block, "f" + goal_.direction, sensor_);
+}
+
+// A sample that one stream lost leaves a gap in the index, which the collector sees.
+void SensorMeasurement::join() {
+  while (!hammer_.empty() && !sensor_.empty()) {
+    const Sample h = hammer_.front(), s = sensor_.front();
+    if (h.index <= s.index) hammer_.pop_front();
+    if (s.index <= h.index) sensor_.pop_front();
+    if (h.index != s.index) continue;
+    if (h.rate != s.rate) return finish(FrfCode::bad_data, "hammer and force sensor differ in sample rate");
+    sample(h.time, h.index, h.rate, h.value, s.value);
+    if (!active_) return;
+  }
+}
+
+void SensorMeasurement::sample(double time, std::uint64_t index, double rate, double force, double response) {
+  if (time < goal_.stamp - SAME_TIME) return;
+  auto record = collector_.add(time, index, rate, force, response);
+  if (record) return recorded(time, std::move(*record));
+  if (!waiting_for_hit_) {
+    if (time >= rest_until_ - SAME_TIME) strike(time);
+  } else if (time > deadline_ && !collector_.recording()) {
+    collector_.disarm();
+    badHit(time, format("no hit within %.1f s", parameters_.strike_timeout), false);
+  }
+}
+
+void SensorMeasurement::strike(double now) {
+  waiting_for_hit_ = true;
+  deadline_ = now + parameters_.strike_timeout;
+  collector_.arm();
+  command_ = StrikeCommand{now, goal_.direction};
+  say("waiting for hit " + std::to_string(hits_.size() + 1) + " of " + std::to_string(goal_.hits));
+}
+
+void SensorMeasurement::hitByHand() {
+  if (active_) say("hit the workpiece by hand in " + goal_.direction);
+}
+
+void SensorMeasurement::recorded(double now, HitCollector::Record record) {
+  HitFault fault{record.fault, true};
+  if (fault.text.empty()) {
+    fault = hitFault(record.hit,
+                     {parameters_.weak_force, parameters_.second_hit_share, parameters_.response_range});
+  }
+  if (fault.text.empty() && longestRunAtExtreme(record.hit.response) >= CLIPPED_RUN) {
+    fault = {"the sensor is clipped: equal readings at its extreme", true};
+  }
+  if (!fault.text.empty()) return badHit(now, fault.text, fault.bad_data);
+  hits_.push_back(std::move(record.hit));
+  if (static_cast<int>(hits_.size()) >= goal_.hits) return evaluate();
+  say("hit " + std::to_string(hits_.size()) + " of " + std::to_string(goal_.hits));
+  waiting_for_hit_ = false;
+  rest_until_ = now + parameters_.rest_time;
+}
+
+void SensorMeasurement::badHit(double now, const std::string& why, bool bad_data) {
+  if (++bad_hits_ > parameters_.max_bad_hits) {
+    return finish(bad_data ? FrfCode::bad_data : FrfCode::no_hit,
+                  std::to_string(bad_hits_) + " useless hits, the last: " + why);
+  }
+  say("hit thrown away: " + why);
+  waiting_for_hit_ = false;
+  rest_until_ = now + parameters_.rest_time;
+}
+
+// Mean of the real part over the lines below the fit's band, where the sensor has no dynamics yet.
+void SensorMeasurement::staticGain(const FrequencyResponse& frf) {
+  double weights = 0.0, sum = 0.0;
+  for (std::size_t k = 0;
+       k < frf.size() && (k < LEAST_STATIC_LINES || frf.frequency[k] <= parameters_.fit_low); ++k) {
+    const double weight = std::isfinite(frf.std_dev[k]) ? 2.0 / std::norm(frf.std_dev[k]) : 0.0;
+    weights += weight;
+    sum += weight * frf.value[k].real();
+  }
+  result_.static_gain = sum / weights;
+  result_.static_gain_std = 1.0 / std::sqrt(weights);
+}
+
+void SensorMeasurement::evaluate() {
+  result_.frf.stamp = result_.modes.stamp = hits_.back().stamp;
+  result_.frf.tool = result_.modes.tool = goal_.tool;
+  result_.frf.point = result_.modes.point = goal_.point;
+  result_.frf.direction = result_.modes.direction = goal_.direction;
+  result_.modes.unit = "1";
+  try {
+    for (const Hit& hit : hits_) {
+      const auto quiet = static_cast<std::ptrdiff_t>(QUIET_SHARE * static_cast<double>(hit.pre_trigger));
+      result_.noise_rms +=
+          std::pow(standardDeviation({hit.response.begin(), hit.response.begin() + quiet}), 2) /
+          static_cast<double>(hits_.size());
+    }
+    result_.noise_rms = std::sqrt(result_.noise_rms);
+    ImpactOptions options;
+    options.unit = "1";
+    ImpactAnalysis analysis(options);
+    for (const Hit& hit : hits_) analysis.add(hit);
+    // The line at zero is the drift of the sensor.
+    FrequencyResponse frf = analysis.frf().band(1e-3, parameters_.frf_high);
+    staticGain(frf);
+    const double off = std::abs(std::abs(result_.static_gain) - 1.0);
+    if (!(off <= parameters_.static_tolerance + 4.0 * result_.static_gain_std)) {
+      return finish(
+          FrfCode::bad_data,
+          format("static gain %.3f +- %.3f, 1 is due: check the hammer's and the sensor's sensitivity",
+                 result_.static_gain, result_.static_gain_std));
+    }
+    for (std::size_t k = 0; k < frf.size(); ++k) {
+      if (result_.static_gain < 0.0) frf.value[k] = -frf.value[k];
+      frf.std_dev[k] = std::hypot(frf.std_dev[k], parameters_.systematic * std::abs(frf.value[k]));
+    }
+    result_.frf.frf = frf;
+    ModalFitOptions fit_options;
+    fit_options.low = parameters_.fit_low;
+    fit_options.high = std::min(parameters_.fit_high, frf.frequency.back());
+    fit_options.modes = goal_.modes;
+    fit_options.max_modes = parameters_.max_modes;
+    fit_options.unit_static_gain = true;
+    const ModalFit fit = fitModes(frf, fit_options);
+    result_.modes.model = fit.model;
+    result_.modes.relative_error = fit.relative_error;
+    finish(FrfCode::ok, std::to_string(hits_.size()) + " hits, " + std::to_string(fit.model.modes.size()) +
+                            " modes, static gain measured " +
+                            format("%.3f +- %.3f", result_.static_gain, result_.static_gain_std));
+  } catch (const Error& error) {
+    finish(FrfCode::fit_failed, error.what());
+  }
+}
+
+void SensorMeasurement::cancel() {
+  if (active_) finish(FrfCode::cancelled, "cancelled");
+}
+
+void SensorMeasurement::commandFailed(const std::string& text) {
+  if (active_) finish(FrfCode::no_hit, text);
+}
+
+void SensorMeasurement::lost(const std::string& text) {
+  if (active_) finish(FrfCode::bad_data, text);
+}
+
+void SensorMeasurement::finish(FrfCode code, const std::string& message) {
+  active_ = waiting_for_hit_ = false;
+  collector_.disarm();
+  hammer_.clear();
+  sensor_.clear();
+  result_.code = code;
+  result_.message = message;
+  done_ = std::move(result_);
+  result_ = SensorResult();
+}
+
+}  // namespace smartmill::kalman

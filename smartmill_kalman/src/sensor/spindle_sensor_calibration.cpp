@@ -1,0 +1,419 @@
+#include "smartmill_kalman/sensor/spindle_sensor_calibration.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <map>
+#include <set>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <Eigen/QR>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/modal/modal_fit.h"
+#include "smartmill_core/model/strict_yaml.h"
+#include "smartmill_core/units.h"
+#include "smartmill_kalman/sensor/numeric_table.h"
+
+namespace smartmill::kalman {
+namespace {
+
+constexpr const char* AXES = "xyz";
+constexpr const char* FORMAT = "smartmill-spindle-sensor/1";
+
+ModalModel ideal() {
+  ModalModel model;
+  model.direct = 1.0;
+  return model;
+}
+
+void require(bool good, const std::string& key, double value, const char* due) {
+  if (!good) throw Error("spindle sensor: " + key + ": " + std::to_string(value) + ", " + due + " is due");
+}
+
+/// Least squares with standard deviations from the residuals; empty columns must not be given.
+struct LeastSquares {
+  Eigen::VectorXd x, std_dev;
+  double residual = 0.0;  // RMS
+};
+
+LeastSquares solve(const Eigen::MatrixXd& a, const Eigen::VectorXd& b, const std::string& what) {
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(a);
+  if (qr.rank() < a.cols()) throw Error(what + ": the readings do not tell all constants apart");
+  LeastSquares found;
+  found.x = qr.solve(b);
+  const Eigen::Index free = a.rows() - a.cols();
+  const double squares = (b - a * found.x).squaredNorm();
+  found.residual = std::sqrt(squares / static_cast<double>(std::max<Eigen::Index>(1, a.rows())));
+  const double variance = squares / static_cast<double>(std::max<Eigen::Index>(1, free));
+  const Eigen::MatrixXd covariance =
+      Eigen::LDLT<Eigen::MatrixXd>(a.transpose() * a).solve(Eigen::MatrixXd::Identity(a.cols(), a.cols()));
+  found.std_dev = (variance * covariance.diagonal()).cwiseMax(0.0).cwiseSqrt();
+  return found;
+}
+
+LengthConstants constantsOf(const StaticReadings& readings, double length) {
+  std::map<int, Eigen::Index> tests;
+  std::vector<std::size_t> rows;
+  for (std::size_t i = 0; i < readings.size(); ++i) {
+    if (readings.length[i] != length) continue;
+    tests.emplace(readings.test[i], static_cast<Eigen::Index>(tests.size()));
+    rows.push_back(i);
+  }
+  const auto n = static_cast<Eigen::Index>(rows.size());
+  const auto columns = 3 + 2 * static_cast<Eigen::Index>(tests.size());
+  const std::string what = readings.file + ": length " + std::to_string(length / units::MM) + " mm";
+  if (n <= columns) throw Error(what + ": too few readings");
+  Eigen::MatrixXd a = Eigen::MatrixXd::Zero(n, columns), b(n, 3);
+  for (Eigen::Index r = 0; r < n; ++r) {
+    const std::size_t i = rows[static_cast<std::size_t>(r)];
+    const Eigen::Index test = 3 + 2 * tests.at(readings.test[i]);
+    for (Eigen::Index j = 0; j < 3; ++j) a(r, j) = readings.load[i][static_cast<std::size_t>(j)];
+    a(r, test) = 1.0;
+    a(r, test + 1) = readings.time[i];
+    const auto means = pairMeans(readings.sensors[i]);
+    for (Eigen::Index k = 0; k < 3; ++k) b(r, k) = means[static_cast<std::size_t>(k)];
+  }
+  for (Eigen::Index j = 0; j < 3; ++j) {
+    if (a.col(j).isZero()) throw Error(what + ": no load along " + AXES[j]);
+  }
+  LengthConstants found;
+  found.length = length;
+  double squares = 0.0;
+  for (Eigen::Index k = 0; k < 3; ++k) {
+    const LeastSquares line = solve(a, b.col(k), what);
+    for (Eigen::Index j = 0; j < 3; ++j) {
+      found.share[k][j] = line.x(j);
+      found.std_dev[k][j] = line.std_dev(j);
+    }
+    for (Eigen::Index t = 4; t < columns; t += 2) found.drift = std::max(found.drift, std::abs(line.x(t)));
+    squares += line.residual * line.residual;
+  }
+  found.residual = std::sqrt(squares / 3.0);
+  return found;
+}
+
+/// Line over length of 1 / share.
+LengthLine lineOf(const std::vector<LengthConstants>& lengths, int row, int column) {
+  Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
+  Eigen::Vector2d right = Eigen::Vector2d::Zero();
+  double middle = 0.0, weights = 0.0;
+  std::vector<std::array<double, 3>> points;  // length, constant, weight
+  for (const LengthConstants& l : lengths) {
+    const double c = 1.0 / l.share[row][column];
+    const double std_dev = std::max(l.std_dev[row][column] * c * c, 1e-12 * std::abs(c));
+    points.push_back({l.length, c, 1.0 / (std_dev * std_dev)});
+    middle += points.back()[0] * points.back()[2];
+    weights += points.back()[2];
+  }
+  middle /= weights;
+  LengthLine line;
+  if (points.size() == 1) {
+    line.offset = points[0][1];
+    line.slope_std = 0.0;
+    line.offset_std = 1.0 / std::sqrt(points[0][2]);
+    return line;
+  }
+  for (const auto& [length, c, weight] : points) {
+    const Eigen::Vector2d row_of(length - middle, 1.0);
+    normal += weight * row_of * row_of.transpose();
+    right += weight * c * row_of;
+  }
+  const Eigen::Matrix2d covariance = Eigen::LDLT<Eigen::Matrix2d>(normal).solve(Eigen::Matrix2d::Identity());
+  const Eigen::Vector2d x = covariance * right;
+  line.slope = x(0);
+  line.offset = x(1) - x(0) * middle;
+  line.slope_std = std::sqrt(covariance(0, 0));
+  line.offset_std = std::sqrt(covariance(1, 1) + middle * middle * covariance(0, 0));
+  return line;
+}
+
+/// Cross-talk that is there at every length.
+std::optional<LengthLine> crossOf(const std::vector<LengthConstants>& lengths, int row, int column) {
+  for (const LengthConstants& l : lengths) {
+    if (!(std::abs(l.share[row][column]) > 2.0 * l.std_dev[row][column])) return {};
+  }
+  return lineOf(lengths, row, column);
+}
+
+LengthLine readLine(const StrictYaml& yaml) {
+  LengthLine line;
+  line.slope = yaml.number("slope_per_mm") / units::MM;
+  line.offset = yaml.number("offset");
+  if (const auto s = yaml.optionalNumber("slope_per_mm_std", Range::notNegative()))
+    line.slope_std = *s / units::MM;
+  if (const auto s = yaml.optionalNumber("offset_std", Range::notNegative())) line.offset_std = *s;
+  yaml.finish();
+  return line;
+}
+
+std::string text(const std::string& key, const LengthLine& line) {
+  std::string out =
+      key + ": {slope_per_mm: " + yamlNumber(line.slope * units::MM) + ", offset: " + yamlNumber(line.offset);
+  if (std::isfinite(line.slope_std)) out += ", slope_per_mm_std: " + yamlNumber(line.slope_std * units::MM);
+  if (std::isfinite(line.offset_std)) out += ", offset_std: " + yamlNumber(line.offset_std);
+  return out + "}\n";
+}
+
+ModalModel readCourse(const StrictYaml& yaml) {
+  ModalModel model = ideal();
+  for (const StrictYaml& entry : yaml.maps("modes")) {
+    Mode mode;
+    mode.frequency = entry.number("frequency_hz", Range::positive());
+    mode.damping_ratio = entry.number("damping_ratio", {0.0, 1.0, true, true});
+    mode.gain = entry.number("gain");
+    entry.finish();
+    model.direct -= mode.gain;
+    model.modes.push_back(mode);
+  }
+  yaml.finish();
+  return model;
+}
+
+std::string text(const std::string& key, const ModalModel& model) {
+  if (model.modes.empty()) return "";
+  std::string out = key + ":\n  modes:\n";
+  for (const Mode& mode : model.modes) {
+    out += "  - {frequency_hz: " + yamlNumber(mode.frequency) +
+           ", damping_ratio: " + yamlNumber(mode.damping_ratio) + ", gain: " + yamlNumber(mode.gain) + "}\n";
+  }
+  return out;
+}
+
+}  // namespace
+
+SpindleSensorCalibration::SpindleSensorCalibration()
+    : dynamic_yx(ideal()), dynamic_yz(ideal()), dynamic_xz(ideal()) {
+}
+
+SpindleSensorCalibration SpindleSensorCalibration::table3() {
+  SpindleSensorCalibration table;
+  const auto line = [](double slope_per_mm, double offset) {
+    LengthLine l;
+    l.slope = slope_per_mm / units::MM;
+    l.offset = offset;
+    return l;
+  };
+  table.x = line(-0.059, 26.203);
+  table.y = line(-0.063, 26.718);
+  table.z = line(0.0, 62.46);
+  table.yx = line(-0.121, 44.545);
+  table.yz = line(-0.398, 186.16);
+  table.xz = line(1.840, -597.73);
+  table.preload = {6050.0, 6040.0, 6050.0, 6045.0, 6035.0, 6034.0};
+  table.range_limit = 36e3;
+  return table;
+}
+
+void SpindleSensorCalibration::validate() const {
+  const auto check = [](const std::string& key, const LengthLine& line) {
+    require(std::isfinite(line.slope), key + ".slope", line.slope, "a number");
+    require(std::isfinite(line.offset), key + ".offset", line.offset, "a number");
+  };
+  check("x", x);
+  check("y", y);
+  check("z", z);
+  if (yx) check("yx", *yx);
+  if (yz) check("yz", *yz);
+  if (xz) check("xz", *xz);
+  for (const double p : preload) require(p > 0.0 && std::isfinite(p), "preload_n", p, "above 0 N");
+  require(least_compression >= 0.0, "least_compression_n", least_compression, "at least 0 N");
+  require(range_limit > 0.0, "range_limit_n", range_limit, "above 0 N");
+  require(low_pass >= 0.0 && std::isfinite(low_pass), "low_pass_hz", low_pass, "at least 0 Hz");
+  require(drift_std > 0.0 && std::isfinite(drift_std), "drift_std_n_per_s", drift_std, "above 0 N/s");
+}
+
+std::array<double, 3> pairMeans(const std::array<double, 6>& s) {
+  return {0.5 * (s[0] - s[1]), -0.5 * (s[2] - s[3]), 0.5 * (s[4] + s[5])};
+}
+
+std::array<double, 3> staticForce(const SpindleSensorCalibration& c, double length,
+                                  const std::array<double, 3>& means) {
+  const double y = means[1] * c.y.at(length);
+  const double x = (means[0] - (c.yx ? y / c.yx->at(length) : 0.0)) * c.x.at(length);
+  const double z =
+      (means[2] - (c.yz ? y / c.yz->at(length) : 0.0) - (c.xz ? x / c.xz->at(length) : 0.0)) * c.z.at(length);
+  return {x, y, z};
+}
+
+double lateralLimit(const SpindleSensorCalibration& c, double length, std::size_t axis) {
+  const double constant = std::abs(axis == 0 ? c.x.at(length) : c.y.at(length));
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t k = 2 * axis; k < 2 * axis + 2; ++k) {
+    least = std::min({least, c.preload[k] - c.least_compression, c.range_limit - c.preload[k]});
+  }
+  return least * constant;
+}
+
+SpindleSensorCalibration readSpindleSensor(const std::string& file) {
+  const StrictYaml yaml = StrictYaml::fromFile(file);
+  yaml.oneOf("format", {FORMAT});
+  SpindleSensorCalibration c;
+  c.x = readLine(yaml.map("x"));
+  c.y = readLine(yaml.map("y"));
+  c.z = readLine(yaml.map("z"));
+  const auto cross = [&](const char* key, std::optional<LengthLine>& line, ModalModel& course) {
+    if (const auto map = yaml.optionalMap(key)) line = readLine(*map);
+    const std::string dynamic = std::string("dynamic_") + key;
+    if (const auto map = yaml.optionalMap(dynamic)) {
+      if (!line) yaml.fail(dynamic, "there is no static cross-talk " + std::string(key));
+      course = readCourse(*map);
+    }
+  };
+  cross("yx", c.yx, c.dynamic_yx);
+  cross("yz", c.yz, c.dynamic_yz);
+  cross("xz", c.xz, c.dynamic_xz);
+  const auto preload = yaml.numbers("preload_n", 6, Range::positive());
+  std::copy(preload.begin(), preload.end(), c.preload.begin());
+  c.least_compression = yaml.optionalNumber("least_compression_n", Range::notNegative()).value_or(0.0);
+  c.range_limit = yaml.optionalNumber("range_limit_n", Range::positive()).value_or(c.range_limit);
+  c.low_pass = yaml.optionalNumber("low_pass_hz", Range::notNegative()).value_or(0.0);
+  c.drift_std = yaml.optionalNumber("drift_std_n_per_s", Range::positive()).value_or(c.drift_std);
+  if (const auto map = yaml.optionalMap("unbalance")) {
+    const auto re = map->numbers("cos_kg_m", 3), im = map->numbers("sin_kg_m", 3);
+    const auto std_dev = map->numbers("std_kg_m", 3, Range::notNegative());
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      c.unbalance[axis] = {re[axis], -im[axis]};
+      c.unbalance_std[axis] = std_dev[axis];
+    }
+    map->finish();
+  }
+  yaml.finish();
+  try {
+    c.validate();
+  } catch (const Error& e) {
+    throw Error(file + ": " + e.what());
+  }
+  return c;
+}
+
+void writeSpindleSensor(const SpindleSensorCalibration& c, const std::string& file) {
+  const auto list = [](const char* key, auto begin, auto end, auto value) {
+    std::string out = std::string(key) + ": [";
+    for (auto it = begin; it != end; ++it) out += (it == begin ? "" : ", ") + yamlNumber(value(*it));
+    return out + "]";
+  };
+  const auto same = [](double v) { return v; };
+  std::string out = std::string("format: ") + FORMAT + "\n# constants over the length of tool and holder\n";
+  out += text("x", c.x) + text("y", c.y) + text("z", c.z);
+  if (c.yx) out += text("yx", *c.yx) + text("dynamic_yx", c.dynamic_yx);
+  if (c.yz) out += text("yz", *c.yz) + text("dynamic_yz", c.dynamic_yz);
+  if (c.xz) out += text("xz", *c.xz) + text("dynamic_xz", c.dynamic_xz);
+  out += "# of x1 x2 y1 y2 z1 z2\n" + list("preload_n", c.preload.begin(), c.preload.end(), same) + "\n";
+  out += "least_compression_n: " + yamlNumber(c.least_compression) + "\n";
+  if (std::isfinite(c.range_limit)) out += "range_limit_n: " + yamlNumber(c.range_limit) + "\n";
+  out += "low_pass_hz: " + yamlNumber(c.low_pass) + "\n";
+  out += "drift_std_n_per_s: " + yamlNumber(c.drift_std) + "\n";
+  if (*std::max_element(c.unbalance_std.begin(), c.unbalance_std.end()) > 0.0) {
+    const auto& u = c.unbalance;
+    out +=
+        "# F = (cos_kg_m cos(angle) + sin_kg_m sin(angle)) w^2, angle and speed w of the "
+        "spindle\nunbalance:\n";
+    out += "  " + list("cos_kg_m", u.begin(), u.end(), [](auto v) { return v.real(); }) + "\n";
+    out += "  " + list("sin_kg_m", u.begin(), u.end(), [](auto v) { return -v.imag(); }) + "\n";
+    out += "  " + list("std_kg_m", c.unbalance_std.begin(), c.unbalance_std.end(), same) + "\n";
+  }
+  std::ofstream stream(file);
+  stream << out;
+  stream.close();
+  if (!stream) throw Error(file + ": cannot be written");
+}
+
+StaticReadings readStaticReadings(const std::string& file) {
+  const auto columns =
+      readNumericTable(file, {"test", "time[s]", "length[mm]", "load_x[N]", "load_y[N]", "load_z[N]", "x1[N]",
+                              "x2[N]", "y1[N]", "y2[N]", "z1[N]", "z2[N]"});
+  StaticReadings readings;
+  readings.file = file;
+  for (std::size_t i = 0; i < columns[0].size(); ++i) {
+    readings.test.push_back(static_cast<int>(std::lround(columns[0][i])));
+    readings.time.push_back(columns[1][i]);
+    readings.length.push_back(columns[2][i] * units::MM);
+    readings.load.push_back({columns[3][i], columns[4][i], columns[5][i]});
+    readings.sensors.push_back(
+        {columns[6][i], columns[7][i], columns[8][i], columns[9][i], columns[10][i], columns[11][i]});
+  }
+  return readings;
+}
+
+StaticCalibration calibrateStatic(const StaticReadings& readings, const SpindleSensorCalibration& base) {
+  const std::set<double> lengths(readings.length.begin(), readings.length.end());
+  StaticCalibration result;
+  result.calibration = base;
+  for (const double length : lengths) result.lengths.push_back(constantsOf(readings, length));
+  for (const LengthConstants& l : result.lengths) {
+    for (int axis = 0; axis < 3; ++axis) {
+      if (!(std::abs(l.share[axis][axis]) > 2.0 * l.std_dev[axis][axis])) {
+        throw Error(readings.file + ": length " + std::to_string(l.length / units::MM) + " mm: the pair " +
+                    AXES[axis] + " does not answer its load");
+      }
+    }
+  }
+  result.calibration.x = lineOf(result.lengths, 0, 0);
+  result.calibration.y = lineOf(result.lengths, 1, 1);
+  result.calibration.z = lineOf(result.lengths, 2, 2);
+  result.calibration.yx = crossOf(result.lengths, 0, 1);
+  result.calibration.yz = crossOf(result.lengths, 2, 1);
+  result.calibration.xz = crossOf(result.lengths, 2, 0);
+  return result;
+}
+
+std::array<double, 3> verifyStatic(const StaticReadings& readings,
+                                   const SpindleSensorCalibration& calibration) {
+  std::array<double, 3> worst{}, largest{};
+  const std::set<int> tests(readings.test.begin(), readings.test.end());
+  for (const int test : tests) {
+    std::vector<std::size_t> rows, unloaded;
+    for (std::size_t i = 0; i < readings.size(); ++i) {
+      if (readings.test[i] != test) continue;
+      rows.push_back(i);
+      const auto& l = readings.load[i];
+      if (l[0] == 0.0 && l[1] == 0.0 && l[2] == 0.0) unloaded.push_back(i);
+    }
+    const std::string what = readings.file + ": test " + std::to_string(test);
+    if (unloaded.size() < 2) throw Error(what + ": two readings without load are due, they tell the drift");
+    const auto n = static_cast<Eigen::Index>(unloaded.size());
+    Eigen::MatrixXd a(n, 2), b(n, 3);
+    for (Eigen::Index r = 0; r < n; ++r) {
+      const std::size_t i = unloaded[static_cast<std::size_t>(r)];
+      a.row(r) << 1.0, readings.time[i];
+      const auto f = staticForce(calibration, readings.length[i], pairMeans(readings.sensors[i]));
+      b.row(r) << f[0], f[1], f[2];
+    }
+    const Eigen::MatrixXd zero = a.colPivHouseholderQr().solve(b);
+    for (const std::size_t i : rows) {
+      const auto f = staticForce(calibration, readings.length[i], pairMeans(readings.sensors[i]));
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const auto k = static_cast<Eigen::Index>(axis);
+        const double told = f[axis] - zero(0, k) - zero(1, k) * readings.time[i];
+        worst[axis] = std::max(worst[axis], std::abs(told - readings.load[i][axis]));
+        largest[axis] = std::max(largest[axis], std::abs(readings.load[i][axis]));
+      }
+    }
+  }
+  const double any = *std::max_element(largest.begin(), largest.end());
+  if (!(any > 0.0)) throw Error(readings.file + ": no reading has a load");
+  for (std::size_t axis = 0; axis < 3; ++axis) worst[axis] /= largest[axis] > 0.0 ? largest[axis] : any;
+  return worst;
+}
+
+ModalModel fitDynamicCrossTalk(const std::vector<std::vector<double>>& shown,
+                               const std::vector<std::vector<double>>& cross, double constant,
+                               double sample_rate, double low, double high, int max_modes) {
+  if (shown.empty() || shown.size() != cross.size()) throw Error("dynamic cross-talk: no taps");
+  FrfEstimator estimator(sample_rate, shown.front().size());
+  for (std::size_t i = 0; i < shown.size(); ++i) {
+    std::vector<double> response = cross[i];
+    for (double& v : response) v *= constant;
+    estimator.add(shown[i], response);
+  }
+  ModalFitOptions options;
+  options.low = low;
+  options.high = high;
+  options.max_modes = max_modes;
+  options.unit_static_gain = true;
+  return fitModes(estimator.h1("1"), options).model;
+}
+
+}  // namespace smartmill::kalman

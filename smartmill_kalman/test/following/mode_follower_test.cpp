@@ -1,0 +1,159 @@
+#include "smartmill_kalman/following/mode_follower.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/signal/fourier.h"
+#include "smartmill_core/units.h"
+#include "smartmill_kalman_testing/reference_case.h"
+
+namespace smartmill::kalman {
+namespace {
+
+const ToolGeometry TOOL{4, 16e-3, units::radFromDeg(30.0), {}};
+const Engagement SLOT{0.0, units::PI, 2e-3, 6e-5};
+
+// Harmonics in closed form: the force of a tool with runout times the sensor's response.
+ModeFollower::Harmonics harmonics(const ModalModel& sensor, double speed, int count) {
+  std::vector<double> radius;
+  for (int k = 0; k < 4; ++k) radius.push_back(8e-6 * std::cos(TOOL.toothAngle(k) - 0.5));
+  const auto force = revolutionForce(TOOL, {800e6, 250e6, 0.0, 20e3, 20e3, 0.0}, SLOT, radius, 8192);
+  ModeFollower::Harmonics result;
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    const auto line = fourier(force[axis]);
+    for (int n = 0; n <= count; ++n) {
+      result[axis].push_back(line[static_cast<std::size_t>(n)] * ((n > 0 ? 2.0 : 1.0) / 8192.0) *
+                             sensor.response(n * speed / units::TWO_PI));
+    }
+  }
+  return result;
+}
+
+TEST(ModeFollower, FindsModesThatHaveMoved) {
+  const double speed = units::radPerSecFromRpm(9000.0);
+  const ModalModel believed = ReferenceCase::exactSensor();
+  ModalModel is = believed;
+  is.modes[0].frequency *= 1.02;
+  is.modes[1].frequency *= 0.99;
+  is.modes[2].damping_ratio *= 1.2;
+  ModeFollower follower(TOOL, SLOT, 33, {});
+  const auto move = follower.look(harmonics(is, speed, 33), 0.05, {believed, believed}, speed);
+  ASSERT_TRUE(move.has_value());
+  EXPECT_LT(move->after, 0.01 * move->before);
+  for (const ModalModel& axis : move->sensor) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      // Priors of 2 % and 10 % pull a little where the harmonics say little.
+      EXPECT_NEAR(axis.modes[k].frequency, is.modes[k].frequency, 0.002 * is.modes[k].frequency) << k;
+      EXPECT_NEAR(axis.modes[k].damping_ratio, is.modes[k].damping_ratio, 0.15 * is.modes[k].damping_ratio)
+          << k;
+    }
+  }
+}
+
+TEST(ModeFollower, LeavesWhatFitsAlone) {
+  const double speed = units::radPerSecFromRpm(9000.0);
+  const ModalModel believed = ReferenceCase::exactSensor();
+  ModeFollower follower(TOOL, SLOT, 33, {});
+  for (int look = 0; look < 3; ++look)
+    EXPECT_FALSE(
+        follower.look(harmonics(believed, speed, 33), 0.05, {believed, believed}, speed).has_value());
+}
+
+TEST(ModeFollower, GoesBackToTheTaps) {
+  const double speed = units::radPerSecFromRpm(9000.0);
+  const ModalModel believed = ReferenceCase::exactSensor();
+  ModalModel strayed = believed;
+  strayed.modes[0].frequency *= 1.03;
+  ModeFollower follower(TOOL, SLOT, 33, {});
+  ASSERT_FALSE(follower.look(harmonics(believed, speed, 33), 0.05, {believed, believed}, speed).has_value());
+  const auto move = follower.look(harmonics(believed, speed, 33), 0.05, {strayed, strayed}, speed);
+  ASSERT_TRUE(move.has_value());
+  EXPECT_NEAR(move->sensor[0].modes[0].frequency, 1450.0, 1.5);
+}
+
+TEST(ModeFollower, RefusesImpossibleParameters) {
+  FollowParameters parameters;
+  parameters.misfit = 0.0;
+  EXPECT_THROW(ModeFollower(TOOL, SLOT, 33, parameters), Error);
+  EXPECT_THROW(ModeFollower(TOOL, SLOT, 0, {}), Error);
+}
+
+/// Issue: frozen at most a fifth of the raw error for 1 % of frequency error and half for 3 %; following back
+/// under 3 % within 100 revolutions, and never worse than frozen.
+class Following : public testing::Test {
+ protected:
+  struct Outcome {
+    double raw = 0.0, frozen = 0.0, following = 0.0;
+    std::size_t moves = 0;
+  };
+  Outcome run(const ModalModel& is) {
+    ReferenceCase reference;
+    reference.spindle_speed = units::radPerSecFromRpm(21750.0);
+    reference.duration = 0.42;
+    const ModalModel believed = reference.sensor;
+    reference.sensor = is;
+    const ReferenceRecord record = simulate(reference);
+    CompensationParameters parameters;
+    const auto frozen = runCompensation(reference, record, believed, parameters);
+    parameters.follow = true;
+    Outcome outcome;
+    const auto following = runCompensation(reference, record, believed, parameters, &outcome.moves);
+    // From 100 revolutions after engagement on.
+    const auto from = static_cast<std::size_t>((0.02 + 100.0 * 60.0 / 21750.0) * reference.sample_rate);
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      const auto error = [&](const std::vector<double>& force) {
+        return bandError(force, record.truth[axis], reference.sample_rate, from, following[axis].size(),
+                         5000.0);
+      };
+      outcome.raw = std::max(outcome.raw, error(record.measured[axis]));
+      outcome.frozen = std::max(outcome.frozen, error(frozen[axis]));
+      outcome.following = std::max(outcome.following, error(following[axis]));
+    }
+    return outcome;
+  }
+  static ModalModel scaled(double frequency, double damping) {
+    ModalModel model = ReferenceCase::exactSensor();
+    for (Mode& mode : model.modes) {
+      mode.frequency *= frequency;
+      mode.damping_ratio *= damping;
+    }
+    return model;
+  }
+};
+
+TEST_F(Following, ExactModelStays) {
+  const Outcome outcome = run(scaled(1.0, 1.0));
+  EXPECT_EQ(outcome.moves, 0u);
+  EXPECT_EQ(outcome.following, outcome.frozen);
+}
+
+TEST_F(Following, OnePercent) {
+  const Outcome outcome = run(scaled(1.01, 1.0));
+  EXPECT_LT(outcome.frozen, 0.2 * outcome.raw);
+  EXPECT_LT(outcome.following, 0.03);
+}
+
+TEST_F(Following, ThreePercent) {
+  const Outcome outcome = run(scaled(1.03, 1.0));
+  EXPECT_LT(outcome.frozen, 0.5 * outcome.raw);
+  EXPECT_LT(outcome.following, 0.03);
+}
+
+TEST_F(Following, Damping) {
+  const Outcome outcome = run(scaled(1.0, 1.3));
+  EXPECT_LT(outcome.following, 0.03);
+}
+
+TEST_F(Following, AModeNobodyKnowsIsNotMadeWorse) {
+  ModalModel is = ReferenceCase::exactSensor();
+  is.modes.push_back({3000.0, 0.03, 0.03});
+  is.modes[0].gain -= 0.03;
+  const Outcome outcome = run(is);
+  EXPECT_LE(outcome.following, 1.001 * outcome.frozen);
+}
+
+}  // namespace
+}  // namespace smartmill::kalman

@@ -1,0 +1,92 @@
+#include "smartmill_kalman/sensor/blind_mode.h"
+
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <random>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "smartmill_core/campaign/campaign.h"
+#include "smartmill_core/campaign/record.h"
+#include "smartmill_core/error.h"
+#include "smartmill_core/modal/modal_filter.h"
+#include "smartmill_core/units.h"
+
+namespace smartmill::kalman {
+namespace {
+
+constexpr double RATE = 10000.0;                 // [Hz]
+constexpr double SPEED = units::TWO_PI * 100.0;  // [rad/s]
+
+std::vector<double> cut(const ModalModel& sensor, std::uint32_t seed, double rough) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal;
+  ModalFilter filter(sensor, RATE, Hold::zero_order);
+  std::vector<double> samples;
+  for (int i = 0; i < 12000; ++i) {
+    const double angle = SPEED * i / RATE;
+    const double force = 80.0 + 60.0 * std::cos(2.0 * angle) + 30.0 * std::cos(angle + 1.0) +
+                         10.0 * std::cos(10.0 * angle) + rough * normal(random);
+    const double measured = filter.step(force) + 0.5 * normal(random);
+    if (i >= 2000) samples.push_back(measured);
+  }
+  return samples;
+}
+
+// One second of a cut, whose tenth harmonic lies at 1000 Hz beside the mode.
+TEST(BlindMode, FindsTheModeWithAnHonestDeviation) {
+  ModalModel sensor;
+  sensor.modes = {{970.0, 0.02, 1.0}};
+  int covered = 0, all = 0;
+  for (std::uint32_t seed = 0; seed < 20; ++seed) {
+    const BlindMode found = findBlindMode(cut(sensor, seed, 3.0), RATE, SPEED, 600.0, 1500.0);
+    EXPECT_NEAR(found.mode.frequency, 970.0, 0.01 * 970.0);
+    EXPECT_GT(found.likelihood, 10.0);
+    EXPECT_TRUE(std::isnan(found.mode.gain));
+    covered += std::abs(found.mode.frequency - 970.0) < 1.96 * found.mode.frequency_std;
+    covered += std::abs(found.mode.damping_ratio - 0.02) < 1.96 * found.mode.damping_ratio_std;
+    all += 2;
+  }
+  std::printf("covered %d of %d\n", covered, all);
+  EXPECT_GE(covered, 34);  // of 40; 38 due
+}
+
+TEST(BlindMode, SaysThatThereIsNone) {
+  ModalModel ideal;
+  ideal.direct = 1.0;
+  EXPECT_LT(findBlindMode(cut(ideal, 1, 3.0), RATE, SPEED, 600.0, 1500.0).likelihood, 10.0);
+  EXPECT_THROW(findBlindMode(cut(ideal, 1, 3.0), RATE, SPEED, 990.0, 1010.0), Error);
+}
+
+// Measured slots (sensor rings near 958 .. 985 Hz, as its README tells).
+TEST(BlindMode, MeasuredSlotsAt6000) {
+  const char* shared = std::getenv("SMARTMILL_SHARED");
+  const std::string folder = std::string(shared ? shared : SHARED_DEFAULT) + "/measured/slot_6000";
+  if (!std::filesystem::exists(folder)) {
+    std::printf("%s absent, not checked\n", folder.c_str());
+    return;
+  }
+  const Campaign campaign = readCampaign(folder);
+  for (const CampaignTest& test : campaign.tests) {
+    const Record record = readRecord(campaign, test);
+    for (const char* channel : {"fx", "fy"}) {
+      const BlindMode found =
+          findBlindMode(record.column(channel), test.sample_rate, test.spindle_speed, 700.0, 1300.0);
+      if (std::string(channel) == "fx") {
+        // README: a band near 958 .. 985 Hz.
+        EXPECT_GT(found.likelihood, 10.0);
+        EXPECT_NEAR(found.mode.frequency, 971.5, 13.5 + 2.0 * found.mode.frequency_std) << test.name;
+      }
+      std::printf("%s %s: %.1f +- %.1f Hz, damping %.4f +- %.4f, %.1f above the floor, likelihood %.0f\n",
+                  test.name.c_str(), channel, found.mode.frequency, found.mode.frequency_std,
+                  found.mode.damping_ratio, found.mode.damping_ratio_std, found.above, found.likelihood);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace smartmill::kalman

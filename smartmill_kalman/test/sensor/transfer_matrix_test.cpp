@@ -1,0 +1,178 @@
+#include "smartmill_kalman/sensor/transfer_matrix.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+#include <Eigen/LU>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/units.h"
+#include "smartmill_kalman_testing/plate_sensor.h"
+#include "smartmill_kalman_testing/reference_case.h"
+
+namespace smartmill::kalman {
+namespace {
+
+constexpr double RATE = 51200.0;  // [Hz]
+
+TEST(PlateSensor, IsTrueAtRestAndRingsAtItsFrequencies) {
+  const PlateSensor plate;
+  EXPECT_LT((plate.response(0.0) - Eigen::MatrixXcd::Identity(6, 6)).norm(), 1e-9);
+  // With its centre of mass in the feet's plane nothing turns: one mass on a spring, 1 / (2 zeta) at
+  // resonance.
+  PlateSensor flat;
+  flat.centre = {0.0, 0.0, 0.0};
+  const auto h = flat.response(3000.0);
+  EXPECT_NEAR(std::abs(h(0, 0)), std::sqrt(1.0 + 4.0 * 4e-4) / 0.04, 1e-6);
+  EXPECT_NEAR(std::abs(h(0, 4)), 0.0, 1e-9);
+  EXPECT_GT(std::abs(plate.response(2800.0)(0, 4)), 1.0);  // forces turn the real one [1/m]
+}
+
+TEST(TransferMatrix, FindsThePlatesSixBySix) {
+  const PlateSensor plate;
+  std::mt19937 random(4);
+  const TransferMatrix found =
+      identifyTransferMatrix(tapPlate(plate, RATE, 6, 3, random), RATE).band(100.0, 8000.0);
+  EXPECT_EQ(found.channels, 6u);
+  EXPECT_EQ(found.hits, 42);
+  for (std::size_t l = 0; l < found.frequency.size(); l += 25) {
+    const Eigen::MatrixXcd truth = plate.response(found.frequency[l]);
+    // Both forms, to 6 of their standard deviations (36 numbers at 32 lines) and the hammer's own noise.
+    const Eigen::MatrixXd forward = (found.forward[l] - truth).cwiseAbs();
+    const Eigen::MatrixXd inverse = (found.inverse[l] - truth.inverse()).cwiseAbs();
+    EXPECT_LT(
+        (forward.array() / (found.forward_std[l].array() + 0.004 * truth.cwiseAbs().array())).maxCoeff(), 6.0)
+        << found.frequency[l];
+    EXPECT_LT((inverse.array() / (found.inverse_std[l].array() + 0.004 * truth.inverse().cwiseAbs().array()))
+                  .maxCoeff(),
+              6.0)
+        << found.frequency[l];
+  }
+  // "In the low frequency range (< 1 kHz) there is no need for compensation": diagonal near 1.
+  EXPECT_NEAR(std::abs(found.forward[20](0, 0)), 1.0, 0.05);
+  EXPECT_LT(found.condition[20], 1.5);
+}
+
+// 100 tap tests: real and imaginary parts within 1.96 of their standard deviations.
+TEST(TransferMatrix, StandardDeviationsAreHonest) {
+  constexpr double SLOW = 25600.0;
+  PlateSensor plate;
+  plate.force_noise = plate.moment_noise = 0.0;
+  std::mt19937 random(3);
+  std::normal_distribution<double> noise(0.0, 0.5);
+  std::vector<MatrixTap> quiet;
+  for (int k = 0; k < 9; ++k) {  // one point, three blows along each axis
+    MatrixTap tap;
+    tap.direction[k % 3] = 1.0;
+    std::array<std::vector<double>, 3> force;
+    for (auto& f : force) f.assign(1280, 0.0);
+    for (int i = 0; i < 5; ++i) force[k % 3][128 + i] = 300.0 * std::pow(std::sin(units::PI * i / 5.0), 2);
+    tap.hammer = force[k % 3];
+    tap.channels = plate.measure(force, tap.point, SLOW, 3, random);
+    quiet.push_back(std::move(tap));
+  }
+  const std::vector<double> places{400.0, 1600.0, 3200.0, 4000.0};  // [Hz]
+  std::vector<int> covered(places.size()), inverse_covered(places.size());
+  int all = 0;
+  for (int run = 0; run < 100; ++run) {
+    std::vector<MatrixTap> taps = quiet;
+    for (MatrixTap& tap : taps) {
+      for (auto& channel : tap.channels) {
+        for (double& v : channel) v += noise(random);
+      }
+    }
+    const TransferMatrix found = identifyTransferMatrix(taps, SLOW);
+    for (std::size_t p = 0; p < places.size(); ++p) {
+      const auto l = static_cast<std::size_t>(std::lround(places[p] / found.frequency[1]));
+      const Eigen::MatrixXcd truth = plate.response(found.frequency[l]).topLeftCorner(3, 3);
+      const Eigen::MatrixXcd forward = found.forward[l] - truth, inverse = found.inverse[l] - truth.inverse();
+      for (int i = 0; i < 3; ++i) {
+        for (int j = 0; j < 3; ++j) {
+          const double s = 1.96 * found.forward_std[l](i, j) / std::sqrt(2.0);
+          const double si = 1.96 * found.inverse_std[l](i, j) / std::sqrt(2.0);
+          covered[p] += (std::abs(forward(i, j).real()) < s) + (std::abs(forward(i, j).imag()) < s);
+          inverse_covered[p] += (std::abs(inverse(i, j).real()) < si) + (std::abs(inverse(i, j).imag()) < si);
+        }
+      }
+    }
+    all += 18;
+  }
+  for (std::size_t p = 0; p < places.size(); ++p) {
+    EXPECT_GE(covered[p], 0.90 * all) << places[p];
+    EXPECT_LE(covered[p], 0.99 * all) << places[p];
+    EXPECT_GE(inverse_covered[p], 0.90 * all) << places[p];
+    EXPECT_LE(inverse_covered[p], 0.99 * all) << places[p];
+  }
+}
+
+// Section 2.1: three channels hold only near the taps; section 2.2: six hold everywhere.
+TEST(TransferMatrix, SixChannelsRestoreABouncingHammerWhereNobodyTapped) {
+  const PlateSensor plate;
+  std::mt19937 random(6);
+  const std::array<double, 3> point{{0.026, -0.020, 0.03}}, direction{{0.30, 0.20, -0.9327}};
+  const std::vector<double> contact = bouncingContact(RATE, 0.12, 0.01);
+  // It bounces, then stands with the 40 N of its push.
+  int bounces = 0;
+  for (std::size_t i = 1; i < contact.size(); ++i) bounces += contact[i] > 0.0 && contact[i - 1] == 0.0;
+  EXPECT_GE(bounces, 3);
+  EXPECT_NEAR(contact.back(), 40.0, 0.5);
+  std::array<std::vector<double>, 3> applied;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    for (const double f : contact) applied[axis].push_back(f * direction[axis]);
+  }
+  const auto six = identifyTransferMatrix(tapPlate(plate, RATE, 6, 3, random), RATE);
+  const auto three = identifyTransferMatrix(tapPlate(plate, RATE, 3, 3, random), RATE);
+  const auto measured = plate.measure(applied, point, RATE, 6, random);
+  const auto restored = invertRecord(six, measured, RATE, 8000.0);
+  const auto by_three = invertRecord(three, {measured[0], measured[1], measured[2]}, RATE, 8000.0);
+  // Over the bounces, 5 to 45 ms: RMS of the difference over that of the truth.
+  const auto error = [&](const std::vector<double>& f, std::size_t axis) {
+    double sum = 0.0, whole = 0.0;
+    for (std::size_t i = 256; i < 2304; ++i) {
+      sum += std::pow(f[i] - applied[axis][i], 2);
+      whole += std::pow(applied[axis][i], 2);
+    }
+    return std::sqrt(sum / whole);
+  };
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    EXPECT_GT(error(measured[axis], axis), 0.3) << axis;
+    EXPECT_LT(error(restored[axis], axis), 0.05) << axis;
+    EXPECT_LT(error(restored[axis], axis), 0.5 * error(by_three[axis], axis)) << axis;
+  }
+  // Where it presses, from force and moment at rest.
+  std::array<double, 3> force{}, moment{};
+  for (std::size_t i = 5000; i < 5600; ++i) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      force[c] += restored[c][i] / 600.0;
+      moment[c] += restored[c + 3][i] / 600.0;
+    }
+  }
+  const auto place = pointOfApplication(force, moment, point[2]);
+  EXPECT_NEAR(place[0], point[0], 2e-4);
+  EXPECT_NEAR(place[1], point[1], 2e-4);
+}
+
+TEST(TransferMatrix, RefusesTapsThatDoNotTellEverything) {
+  const PlateSensor plate;
+  std::mt19937 random(1);
+  std::vector<MatrixTap> taps = tapPlate(plate, 25600.0, 6, 1, random);
+  std::vector<MatrixTap> top(taps.begin(), taps.begin() + 6);  // all from above
+  EXPECT_THROW(identifyTransferMatrix(top, 25600.0), Error);
+  taps[3].channels[2][7] = std::nan("");
+  EXPECT_THROW(identifyTransferMatrix(taps, 25600.0), Error);
+  EXPECT_THROW(identifyTransferMatrix({}, 25600.0), Error);
+}
+
+TEST(PointOfApplication, SolvesTheLever) {
+  // r = (10, -20, 30) mm, F = (5, -7, -40) N: M = r x F.
+  const std::array<double, 3> f{{5.0, -7.0, -40.0}};
+  const std::array<double, 3> m{
+      {-0.02 * -40.0 - 0.03 * -7.0, 0.03 * 5.0 - 0.01 * -40.0, 0.01 * -7.0 + 0.02 * 5.0}};
+  const auto p = pointOfApplication(f, m, 0.03);
+  EXPECT_NEAR(p[0], 0.01, 1e-12);
+  EXPECT_NEAR(p[1], -0.02, 1e-12);
+  EXPECT_TRUE(std::isnan(pointOfApplication({1.0, 0.0, 0.0}, m, 0.03)[0]));
+}
+
+}  // namespace
+}  // namespace smartmill::kalman

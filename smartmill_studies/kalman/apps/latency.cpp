@@ -1,0 +1,160 @@
+// rosrun smartmill_studies kalman_latency: block in to block out, three axes at 50 kHz in 10 ms blocks, all
+// cores loaded.
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <iostream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <Eigen/Core>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/units.h"
+#include "smartmill_kalman/compensation/sorted_compensation.h"
+#include "smartmill_kalman_testing/reference_case.h"
+
+namespace {
+
+using namespace smartmill;
+using Clock = std::chrono::steady_clock;
+
+constexpr double RATE = 50000.0;                 // [Hz]
+constexpr std::size_t BLOCK = 500;               // 10 ms
+constexpr double SPEED = units::TWO_PI * 150.0;  // 9000 rpm: 33 harmonics up to 5 kHz
+constexpr int STATES = 6 + 1 + 2 * 33;
+
+struct Took {
+  std::vector<double> work, due;  // [us] of the call; from when the block was due to when it was out
+};
+
+void print(const char* name, Took took) {
+  const auto at = [](std::vector<double>& v, double share) {
+    std::sort(v.begin(), v.end());
+    return v[std::min(v.size() - 1, static_cast<std::size_t>(share * static_cast<double>(v.size())))];
+  };
+  std::printf(
+      "%-34s  in to out: median %8.1f  99 %% %8.1f  max %8.1f us   from due: median %8.1f  99 %% %8.1f us\n",
+      name, at(took.work, 0.5), at(took.work, 0.99), at(took.work, 1.0), at(took.due, 0.5),
+      at(took.due, 0.99));
+}
+
+SampleBlock blockOf(std::uint64_t number) {
+  SampleBlock block;
+  block.stamp = 0.01 * static_cast<double>(number);
+  block.sample_rate = RATE;
+  block.first_index = number * BLOCK;
+  block.channels = {"fx", "fy", "fz"};
+  block.units = {"N", "N", "N"};
+  for (std::size_t i = 0; i < BLOCK; ++i) {
+    const double phase = SPEED * static_cast<double>(block.first_index + i) / RATE;
+    const double force = 100.0 + 50.0 * std::cos(4.0 * phase) + 20.0 * std::sin(8.0 * phase);
+    block.samples.insert(block.samples.end(), {force, -0.5 * force, 0.2 * force});
+  }
+  return block;
+}
+
+/// Blocks become due every 10 ms, as a device delivers them.
+template <typename Handle>
+Took run(int blocks, Handle handle) {
+  Took took;
+  handle(blockOf(0));  // lays out
+  const auto start = Clock::now() + std::chrono::milliseconds(10);
+  for (int b = 1; b <= blocks; ++b) {
+    const SampleBlock block = blockOf(static_cast<std::uint64_t>(b));
+    const auto due = start + b * std::chrono::milliseconds(10);
+    std::this_thread::sleep_until(due);
+    const auto begin = Clock::now();
+    handle(block);
+    const auto end = Clock::now();
+    took.work.push_back(1e6 * std::chrono::duration<double>(end - begin).count());
+    took.due.push_back(1e6 * std::chrono::duration<double>(end - due).count());
+  }
+  return took;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  double seconds = 10.0;
+  int loads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  CLI::App app{
+      "Latency of three axes at 50 kHz in 10 ms blocks with every core busy; baseline: the same filters as "
+      "dense "
+      "fixed-size products."};
+  app.add_option("--seconds", seconds, "of each run")->capture_default_str()->check(CLI::Range(0.1, 1000.0));
+  app.add_option("--loads", loads, "busy threads beside it")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 256));
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? 0 : 2;
+  }
+  try {
+    std::atomic<bool> stop{false};
+    std::vector<std::thread> busy;
+    for (int i = 0; i < loads; ++i) {
+      busy.emplace_back([&stop] {
+        double x = 1.0;
+        while (!stop.load(std::memory_order_relaxed)) {
+          for (int k = 0; k < 1000; ++k) x = std::sqrt(x + 1.0);
+        }
+        if (x < 0.0) std::printf("%f", x);
+      });
+    }
+    const int blocks = static_cast<int>(100.0 * seconds);
+    std::size_t out = 0;
+    double sum = 0.0;
+    kalman::CompensationParameters parameters;
+    ForceSensor sensor;
+    for (ModalModel& axis : sensor.axis) axis = kalman::ReferenceCase::exactSensor();
+    const auto receive = [&](const ForceBlock&, const ForceBlock& c) {
+      ++out;
+      sum += c.force[0].back();
+    };
+    kalman::ForceCompensation estimator(parameters, false, receive);
+    for (std::size_t axis = 0; axis < 3; ++axis) estimator.setSensor(axis, sensor.axis[axis]);
+    const Took own = run(blocks, [&](const SampleBlock& block) {
+      estimator.handle(SpindleAngle{block.stamp, SPEED * block.stamp, SPEED});
+      estimator.handle(block);
+    });
+    if (out != static_cast<std::size_t>(blocks) + 1) throw Error("blocks were lost");
+
+    using Matrix = Eigen::Matrix<double, STATES, STATES>;
+    using Vector = Eigen::Matrix<double, STATES, 1>;
+    struct Dense {
+      Matrix transition = 0.02 * Matrix::Random();  // the numbers do not matter for the cost
+      Vector gain = 0.1 * Vector::Random(), output = Vector::Random(), force = Vector::Random(),
+             x = Vector::Zero();
+    };
+    std::vector<Dense> dense(3);
+    const Took baseline = run(blocks, [&](const SampleBlock& block) {
+      for (std::size_t i = 0; i < block.size(); ++i) {
+        for (std::size_t axis = 0; axis < 3; ++axis) {
+          Dense& d = dense[axis];
+          const Vector filtered = d.x + d.gain * (block.at(i, axis) - d.output.dot(d.x));
+          sum += d.force.dot(filtered);
+          d.x.noalias() = d.transition * filtered;
+        }
+      }
+    });
+    stop = true;
+    for (std::thread& thread : busy) thread.join();
+    std::printf(
+        "%d blocks of 10 ms, 3 axes at 50 kHz, 3 modes and 33 harmonics, %d busy threads on %u cores "
+        "(%.0f)\n",
+        blocks, loads, std::thread::hardware_concurrency(), std::isfinite(sum) ? 0.0 : 1.0);
+    print("ForceCompensation", own);
+    print("dense fixed-size Eigen (baseline)", baseline);
+  } catch (const std::exception& e) {
+    std::cerr << "latency: " << e.what() << "\n";
+    return 1;
+  }
+  return 0;
+}

@@ -1,0 +1,457 @@
+// rosrun smartmill_studies kalman_reference: errors of the compensation in the project's reference cut,
+// beside their targets.
+
+#include <cmath>
+#include <cstdio>
+#include <ctime>
+#include <functional>
+#include <iostream>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "kalman/delay_filter.h"
+#include "kalman/tuning.h"
+#include "smartmill_core/units.h"
+#include "smartmill_kalman/compensation/campaign_compensation.h"
+#include "smartmill_kalman/compensation/record_compensation.h"
+#include "smartmill_kalman_testing/reference_case.h"
+
+namespace {
+
+using namespace smartmill;          // NOLINT
+using namespace smartmill::kalman;  // NOLINT
+
+struct Errors {
+  double to_3k = 0.0, to_5k = 0.0, entry_3k = 0.0, entry_5k = 0.0;  // [1]
+};
+
+using Estimator = std::function<std::vector<double>(const std::vector<double>&)>;
+
+Errors errorsOf(const ReferenceCase& reference, const ReferenceRecord& record, const Estimator& estimator) {
+  Errors worst;
+  const double rate = reference.sample_rate, revolution = units::TWO_PI / reference.spindle_speed;
+  const auto sample = [rate](double time) { return static_cast<std::size_t>(std::lround(time * rate)); };
+  const std::size_t from = sample(reference.engage_time + 0.1), to = record.time.size();
+  const std::size_t third = sample(reference.engage_time + 2.0 * revolution);
+  const std::size_t eighth = sample(reference.engage_time + 8.0 * revolution);
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    const std::vector<double> force = estimator(record.measured[axis]);
+    const auto error = [&](double band, std::size_t a, std::size_t b) {
+      return bandError(force, record.truth[axis], rate, a, b, band);
+    };
+    worst.to_3k = std::max(worst.to_3k, error(3000.0, from, to));
+    worst.to_5k = std::max(worst.to_5k, error(5000.0, from, to));
+    worst.entry_3k = std::max(worst.entry_3k, error(3000.0, third, eighth));
+    worst.entry_5k = std::max(worst.entry_5k, error(5000.0, third, eighth));
+  }
+  return worst;
+}
+
+void row(double rpm, const char* name, const Errors& e, const char* target) {
+  std::printf("%6.0f  %-30s %8.2f %8.2f %10.2f %8.2f   %s\n", rpm, name, 100.0 * e.to_3k, 100.0 * e.to_5k,
+              100.0 * e.entry_3k, 100.0 * e.entry_5k, target);
+}
+
+/// The plain augmented Kalman filter: the force is a random walk; its best intensity over a grid, by the
+/// truth.
+Errors randomWalk(const ReferenceCase& reference, const ReferenceRecord& record, bool smooth) {
+  Errors best;
+  best.to_5k = 1e9;
+  HarmonicFilterParameters parameters;
+  parameters.max_harmonics = 0;
+  for (double tau = 1e-6; tau < 1e-3; tau *= 2.0) {  // [s]
+    parameters.settling_revolutions = parameters.memory_revolutions =
+        tau * reference.spindle_speed / units::TWO_PI;
+    HarmonicFilter filter(reference.sensor, reference.spindle_speed, reference.sample_rate, parameters);
+    const Errors errors = errorsOf(reference, record, [&](const std::vector<double>& measured) {
+      filter.reset();
+      if (smooth) return filter.smooth(measured);
+      std::vector<double> force;
+      for (const double sample : measured) force.push_back(filter.step(sample));
+      return force;
+    });
+    if (errors.to_5k < best.to_5k) best = errors;
+  }
+  return best;
+}
+
+void run(const std::vector<double>& speeds, double duration) {
+  std::printf("reference cut: error of the force [%%], worst of x and y; targets to 3 / 5 kHz\n");
+  std::printf("   rpm  method                          to 3 kHz to 5 kHz   rev 3-8 (3k)   (5k)   target\n");
+  for (const double rpm : speeds) {
+    ReferenceCase reference;
+    reference.spindle_speed = units::radPerSecFromRpm(rpm);
+    reference.duration = duration;
+    std::fprintf(stderr, "%.0f rpm\n", rpm);
+    const ReferenceRecord record = simulate(reference);
+    HarmonicFilterParameters parameters;
+    parameters.max_harmonics = 200;
+    const auto with = [&](Method method, const ModalModel& sensor) {
+      return errorsOf(reference, record, [&](const std::vector<double>& measured) {
+        return compensateRecord(method, measured, sensor, reference.spindle_speed, reference.sample_rate,
+                                parameters);
+      });
+    };
+    row(rpm, "measured", errorsOf(reference, record, [](const std::vector<double>& m) { return m; }), "");
+    row(rpm, "kalman", with(Method::kalman, reference.sensor), "0.6 / 1.2, rev 3-8: 1");
+    row(rpm, "smoother", with(Method::smoother, reference.sensor), "0.5 / 1.0");
+    row(rpm, "inverse", with(Method::inverse, reference.sensor), "1.2 / 2.2");
+    const ReferenceTaps taps = simulateTaps(reference, 9);
+    const ModalFit fit =
+        identifySensor(taps.hammer, taps.response, reference.sample_rate, {100.0, 5000.0, 4});
+    row(rpm, "kalman, nine taps", with(Method::kalman, fit.model), "1.5");
+    row(rpm, "random walk, best q, causal", randomWalk(reference, record, false), "baseline");
+    row(rpm, "random walk, best q, smoothed", randomWalk(reference, record, true), "baseline");
+  }
+}
+
+/// Fourier series and F(t) = F(t - T) side by side: error, states, time of a sample and of the layout.
+void runForceModels(const std::vector<double>& speeds, double duration) {
+  const auto seconds = [](std::clock_t since) {
+    return static_cast<double>(std::clock() - since) / CLOCKS_PER_SEC;
+  };
+  std::printf("force models: error of the force [%%], worst of x and y, causal\n");
+  std::printf(
+      "   rpm  T [samples]  force model         to 3 kHz to 5 kHz   rev 3-8 (3k)   (5k)  states  ns a sample"
+      "  layout [s]\n");
+  for (const double rpm : speeds) {
+    ReferenceCase reference;
+    reference.spindle_speed = units::radPerSecFromRpm(rpm);
+    reference.duration = duration;
+    const ReferenceRecord record = simulate(reference);
+    const auto show = [&](const char* name, auto make) {
+      const std::clock_t began = std::clock();
+      auto filter = make();
+      const double layout = seconds(began);
+      double cost = 0.0;
+      const Errors e = errorsOf(reference, record, [&](const std::vector<double>& measured) {
+        filter.reset();
+        std::vector<double> force;
+        force.reserve(measured.size());
+        const std::clock_t start = std::clock();
+        for (const double sample : measured) force.push_back(filter.step(sample));
+        cost = 1e9 * seconds(start) / static_cast<double>(measured.size());
+        return force;
+      });
+      std::printf("%6.0f  %11.3f  %-18s %9.2f %8.2f %10.2f %10.2f %7zu %10.0f %12.3f\n", rpm,
+                  60.0 / rpm * reference.sample_rate, name, 100.0 * e.to_3k, 100.0 * e.to_5k,
+                  100.0 * e.entry_3k, 100.0 * e.entry_5k, filter.states(), cost, layout);
+    };
+    HarmonicFilterParameters parameters;
+    parameters.max_harmonics = 200;
+    show("Fourier series", [&] {
+      return HarmonicFilter(reference.sensor, reference.spindle_speed, reference.sample_rate, parameters);
+    });
+    show("F(t) = F(t - T)", [&] {
+      return DelayFilter(reference.sensor, reference.spindle_speed, reference.sample_rate, parameters);
+    });
+  }
+}
+
+/// Without a tachometer: the speed as a state, beside the tachometer and beside the commanded speed taken for
+/// true. Errors to 3 kHz over the last 0.3 s; speed error at the end.
+void runSpeeds(const std::vector<double>& speeds, double duration) {
+  std::printf("no tachometer: error of the force to 3 / 5 kHz [%%] over the last 0.3 s, worst of x and y\n");
+  std::printf(
+      "   rpm  commanded speed is off   speed falls    tachometer       speed a state   commanded taken for "
+      "true\n");
+  for (const double rpm : speeds) {
+    for (const auto& [off, drop] : {std::pair(0.0, 0.0), std::pair(0.01, 0.0), std::pair(-0.01, 0.0),
+                                    std::pair(0.0, 0.01), std::pair(0.01, 0.01)}) {
+      ReferenceCase reference;
+      reference.spindle_speed = units::radPerSecFromRpm(rpm);
+      reference.duration = duration;
+      reference.nominal_off = off;
+      reference.speed_drop = drop;
+      const ReferenceRecord record = simulate(reference);
+      const auto error = [&](const ReferenceCase& told, bool track) {
+        CompensationParameters parameters;
+        parameters.filter.max_harmonics = 200;
+        parameters.track_speed = track;
+        const auto force = runCompensation(told, record, reference.sensor, parameters);
+        const std::size_t to = force[0].size();
+        const auto from = to - static_cast<std::size_t>(0.3 * reference.sample_rate);
+        std::array<double, 2> worst{};
+        for (std::size_t axis = 0; axis < 2; ++axis) {
+          for (std::size_t band = 0; band < 2; ++band) {
+            worst[band] = std::max(
+                worst[band], 100.0 * bandError(force[axis], record.truth[axis], reference.sample_rate, from,
+                                               to, band == 0 ? 3000.0 : 5000.0));
+          }
+        }
+        return worst;
+      };
+      ReferenceCase blind = reference;
+      blind.spindle_speed *= 1.0 + off;
+      blind.speed_drop = 0.0;
+      const auto tachometer = error(reference, false), tracked = error(reference, true),
+                 commanded = error(blind, false);
+      std::printf("%6.0f %18.1f %% %13.1f %% %9.2f %7.2f %10.2f %7.2f %12.1f %7.1f\n", rpm, 100.0 * off,
+                  100.0 * drop, tachometer[0], tachometer[1], tracked[0], tracked[1], commanded[0],
+                  commanded[1]);
+    }
+  }
+}
+
+/// What a known latency buys: error over lag, from causal to the whole record.
+void runLags(const std::vector<double>& speeds, double duration) {
+  std::printf(
+      "fixed lag: error of the force to 3 / 5 kHz [%%] from 0.1 s after engagement, worst of x and y\n");
+  std::printf("   rpm      lag [ms]  to 3 kHz to 5 kHz\n");
+  for (const double rpm : speeds) {
+    ReferenceCase reference;
+    reference.spindle_speed = units::radPerSecFromRpm(rpm);
+    reference.duration = duration;
+    const ReferenceRecord record = simulate(reference);
+    const auto from = static_cast<std::size_t>((reference.engage_time + 0.1) * reference.sample_rate);
+    for (const double lag : {0.0, 0.002, 0.005, 0.01, 0.02, 0.04, 0.08, 0.16}) {
+      CompensationParameters parameters;
+      parameters.filter.max_harmonics = 200;
+      parameters.lag = lag;
+      const auto force = runCompensation(reference, record, reference.sensor, parameters);
+      double to_3k = 0.0, to_5k = 0.0;
+      for (std::size_t axis = 0; axis < 2; ++axis) {
+        const auto error = [&](double band) {
+          return 100.0 * bandError(force[axis], record.truth[axis], reference.sample_rate, from,
+                                   force[axis].size(), band);
+        };
+        to_3k = std::max(to_3k, error(3000.0));
+        to_5k = std::max(to_5k, error(5000.0));
+      }
+      std::printf("%6.0f  %12.0f %9.3f %8.3f\n", rpm, 1000.0 * lag, to_3k, to_5k);
+    }
+  }
+}
+
+/// Sensor that is not what it is believed to be.
+struct Wrong {
+  const char* name;
+  std::function<ModalModel(ModalModel)> change;  // of the sensor that measures
+  bool drifts;                                   // during the cut, from 0.3 to 0.8 s
+};
+
+const std::vector<Wrong>& wrongs() {
+  static const auto scale = [](double frequency, double damping) {
+    return [frequency, damping](ModalModel sensor) {
+      for (Mode& mode : sensor.modes) {
+        mode.frequency *= frequency;
+        mode.damping_ratio *= damping;
+      }
+      return sensor;
+    };
+  };
+  static const std::vector<Wrong> all{{"exact", scale(1.0, 1.0), false},
+                                      {"frequencies +1 %", scale(1.01, 1.0), false},
+                                      {"frequencies -1 %", scale(0.99, 1.0), false},
+                                      {"frequencies +3 %", scale(1.03, 1.0), false},
+                                      {"damping +30 %", scale(1.0, 1.3), false},
+                                      {"one more mode, 3000 Hz, gain 0.03",
+                                       [](ModalModel sensor) {
+                                         sensor.modes.push_back({3000.0, 0.03, 0.03});
+                                         sensor.modes[0].gain -= 0.03;
+                                         return sensor;
+                                       },
+                                       false},
+                                      {"first mode +1 % in the cut",
+                                       [](ModalModel sensor) {
+                                         sensor.modes[0].frequency *= 1.01;
+                                         return sensor;
+                                       },
+                                       true},
+                                      // Half the moving mass is the workpiece's.
+                                      {"workpiece 20 % lighter in the cut",
+                                       [](ModalModel sensor) {
+                                         for (Mode& mode : sensor.modes) mode.frequency /= std::sqrt(0.9);
+                                         return sensor;
+                                       },
+                                       true}};
+  return all;
+}
+
+void runErrors(const std::vector<double>& speeds, double duration) {
+  std::printf("model errors: error of the force up to 5 kHz [%%] over the last 0.3 s, worst of x and y\n");
+  std::printf("   rpm  the sensor is                        measured   frozen  following  moves\n");
+  for (const double rpm : speeds) {
+    for (const Wrong& wrong : wrongs()) {
+      ReferenceCase reference;
+      reference.spindle_speed = units::radPerSecFromRpm(rpm);
+      reference.duration = duration;
+      const ModalModel believed = reference.sensor;
+      reference.later = wrong.change(reference.sensor);
+      if (wrong.drifts) {
+        reference.drift_from = 0.3;
+        reference.drift_to = 0.8;
+      } else {
+        reference.sensor = reference.later;
+      }
+      const ReferenceRecord record = simulate(reference);
+      CompensationParameters parameters;
+      parameters.filter.max_harmonics = 200;
+      const auto frozen = runCompensation(reference, record, believed, parameters);
+      parameters.follow = true;
+      std::size_t moves = 0;
+      const auto following = runCompensation(reference, record, believed, parameters, &moves);
+      const auto error = [&](const std::array<std::vector<double>, 2>& force) {
+        const std::size_t to = following[0].size();
+        const auto from = to - static_cast<std::size_t>(0.3 * reference.sample_rate);
+        double worst = 0.0;
+        for (std::size_t axis = 0; axis < 2; ++axis) {
+          worst = std::max(
+              worst, bandError(force[axis], record.truth[axis], reference.sample_rate, from, to, 5000.0));
+        }
+        return 100.0 * worst;
+      };
+      std::printf("%6.0f  %-36s %8.2f %8.2f %10.2f %6zu\n", rpm, wrong.name, error(record.measured),
+                  error(frozen), error(following), moves);
+    }
+  }
+}
+
+/// Burzoni's tables 8..15 and his maps: what a q from the taps alone loses against the best q of the cut,
+/// told by the truth of the cut; and the harmonic form, as laid out and with a memory a band from the
+/// likelihood.
+void runTuning(double duration, const std::string& picture) {
+  constexpr double BAND = 5000.0, AMPLITUDES = 3000.0;
+  constexpr int FLUTES = 4, HARMONICS = 60;
+  const std::vector<double> edges{1000.0, 3000.0};  // [Hz]
+  ReferenceCase reference;
+  reference.duration = duration;
+  const double rate = reference.sample_rate;
+  const ReferenceTaps taps = simulateTaps(reference, 9);
+  const ModalModel sensor = identifySensor(taps.hammer, taps.response, rate, {100.0, 5000.0, 4}).model;
+  const FrequencyResponse frf = averaged(taps.hammer, taps.response, rate);
+  const double r_taps = noiseBefore(taps, rate, 0.009);
+  std::vector<double> speeds;
+  for (double rpm = 1000.0; rpm <= 20000.0; rpm += 200.0) speeds.push_back(units::radPerSecFromRpm(rpm));
+  const TuningMap map = tapMap(taps, sensor, rate, r_taps, speeds, BAND);
+  std::printf(
+      "sensor from nine taps; R from before the blows %.3f N2; RMSE of the harmonics' amplitudes [N], "
+      "amplitude error of the tooth harmonics to 3 kHz [%%], worst of x and y\n",
+      r_taps);
+  std::printf(
+      "        |        random walk (Burzoni)                     |   harmonics, as laid out  |  "
+      "memory a band from the likelihood\n");
+  std::printf(
+      "    rpm | R of air   q of taps  RMSE   ampl.  best q  RMSE |      RMSE   ampl.         |  "
+      "RMSE   ampl.   revolutions\n");
+  std::vector<std::pair<double, int>> cuts;
+  for (const double rpm : {1000.0, 3700.0, 6500.0, 9300.0, 12000.0, 14800.0, 17600.0}) {
+    reference.spindle_speed = units::radPerSecFromRpm(rpm);
+    const ReferenceRecord record = simulate(reference);
+    // Air cutting: the tool is not in the cut before engage_time.
+    double r_air = 0.0;
+    const auto air = static_cast<std::size_t>(0.9 * reference.engage_time * rate);
+    for (std::size_t i = 0; i < air; ++i)
+      r_air += std::pow(record.measured[0][i], 2) / static_cast<double>(air);
+    const auto from = static_cast<std::size_t>(0.4 * duration * rate);
+    const auto scored = [&](const std::function<std::vector<double>(const std::vector<double>&)>& estimate) {
+      CutScore worst;
+      for (std::size_t axis = 0; axis < 2; ++axis) {
+        const CutScore score = scoreCut(estimate(record.measured[axis]), record.truth[axis], rate,
+                                        reference.spindle_speed, FLUTES, from, BAND, AMPLITUDES);
+        worst.rmse = std::max(worst.rmse, score.rmse);
+        worst.amplitude = std::max(worst.amplitude, score.amplitude);
+      }
+      return worst;
+    };
+    const auto walk = [&](int exponent) {
+      return scored([&](const std::vector<double>& measured) {
+        return randomWalkForce(measured, sensor, rate, std::pow(2.0, exponent), r_air);
+      });
+    };
+    const int told = map.best(reference.spindle_speed);
+    const CutScore own = walk(told);
+    CutScore best;
+    best.rmse = 1e9;
+    int best_exponent = 0;
+    for (int exponent = LEAST_EXPONENT; exponent <= MOST_EXPONENT; ++exponent) {
+      const CutScore score = walk(exponent);
+      if (score.rmse >= best.rmse) continue;
+      best = score;
+      best_exponent = exponent;
+    }
+    cuts.emplace_back(reference.spindle_speed, best_exponent);
+    HarmonicFilterParameters parameters;
+    parameters.max_harmonics = HARMONICS;
+    HarmonicFilter filter(sensor, reference.spindle_speed, rate, parameters);
+    const CutScore laid_out = scored([&](const std::vector<double>& measured) {
+      filter.reset();
+      std::vector<double> force;
+      for (const double sample : measured) force.push_back(filter.step(sample));
+      return force;
+    });
+    const BandTuning tuned = tuneBands(record.measured[0], sensor, reference.spindle_speed, rate,
+                                       std::sqrt(r_air), edges, frf, HARMONICS);
+    const CutScore bands = scored([&](const std::vector<double>& measured) {
+      return bandForce(measured, sensor, reference.spindle_speed, rate, std::sqrt(r_air), edges, tuned.memory,
+                       HARMONICS);
+    });
+    std::printf("%7.0f | %8.3f %8s%-2d %6.3f %6.2f %5s%-2d %6.3f | %9.3f %7.2f         | %6.3f %6.2f  ", rpm,
+                r_air, "2^", told, own.rmse, 100.0 * own.amplitude, "2^", best_exponent, best.rmse,
+                laid_out.rmse, 100.0 * laid_out.amplitude, bands.rmse, 100.0 * bands.amplitude);
+    for (const double memory : tuned.memory) std::printf(" %g", memory);
+    std::printf("\n");
+  }
+  if (picture.empty()) return;
+  std::vector<std::pair<std::string, TuningMap>> maps{{"sensor as measured", map}};
+  for (const double k : {-3.0, -2.0, 2.0, 3.0}) {
+    char name[64];
+    std::snprintf(name, sizeof name, "%+.0f standard deviations", k);
+    maps.emplace_back(name, tapMap(plantAt(taps, frf, rate, k), sensor, rate, r_taps, speeds, BAND));
+    std::printf("plant at %s: best q at 9300 rpm 2^%d, at 17600 rpm 2^%d\n", name,
+                maps.back().second.best(units::radPerSecFromRpm(9300.0)),
+                maps.back().second.best(units::radPerSecFromRpm(17600.0)));
+  }
+  drawMaps(maps, cuts, picture);
+  std::printf("maps drawn to %s\n", picture.c_str());
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  std::setvbuf(stdout, nullptr, _IOLBF, 0);
+  std::vector<double> speeds{3000.0, 9000.0, 15000.0, 21750.0};
+  double duration = 1.0;
+  std::string picture;
+  bool errors = false, tuning = false, force_models = false, track = false, lags = false;
+  CLI::App app{"Errors of the force compensation in the reference cut, beside their targets."};
+  app.add_option("--speed-rpm", speeds, "spindle speeds")->check(CLI::Range(500.0, 60000.0));
+  app.add_option("--duration-s", duration, "length of a record")->check(CLI::Range(0.3, 100.0));
+  app.add_flag("--model-errors", errors,
+               "a sensor that is not what it is believed to be: frozen and following");
+  app.add_flag("--force-models", force_models, "Fourier series beside F(t) = F(t - T): error and cost");
+  app.add_flag("--track-speed", track, "no tachometer: the speed as a state beside the tachometer");
+  app.add_flag("--lags", lags, "error of the fixed-lag smoother over its lag");
+  app.add_flag("--tuning", tuning, "seven speeds: laid out from the taps against the best q of the cut");
+  app.add_option("--picture", picture, "with --tuning: PNG of the maps q over speed, with confidence plants");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? 0 : 2;
+  }
+  try {
+    if (force_models) {
+      runForceModels(speeds, duration);
+      return 0;
+    }
+    if (track) {
+      runSpeeds(speeds, duration);
+      return 0;
+    }
+    if (lags) {
+      runLags(speeds, duration);
+      return 0;
+    }
+    if (tuning) {
+      runTuning(duration, picture);
+      return 0;
+    }
+    errors ? runErrors(speeds, std::max(duration, 1.6)) : run(speeds, duration);
+  } catch (const std::exception& e) {
+    std::cerr << "reference: " << e.what() << "\n";
+    return 1;
+  }
+  return 0;
+}

@@ -1,0 +1,215 @@
+#include "kalman/delay_filter.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include <Eigen/Core>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/modal/state_space.h"
+#include "smartmill_core/units.h"
+
+namespace smartmill::kalman {
+namespace {
+
+/// The quick memory over settling_revolutions: a line of samples has more to learn than a band of harmonics.
+constexpr double QUICK = 1.5;
+/// Length of the array in which the line moves, in lines.
+constexpr std::size_t ROOM = 8;
+/// Steps of the gain's recursion, in revolutions, and the rise of P over a revolution at which it ends.
+constexpr double MOST_REVOLUTIONS = 3000.0, CONVERGED = 1e-7;
+
+/// Coefficients of u^i, lowest first, of the polynomial that is 1 at node j and 0 at the others.
+std::vector<double> lagrangePolynomial(const std::vector<double>& nodes, std::size_t j) {
+  std::vector<double> p{1.0};
+  for (std::size_t k = 0; k < nodes.size(); ++k) {
+    if (k == j) continue;
+    std::vector<double> next(p.size() + 1, 0.0);
+    const double scale = 1.0 / (nodes[j] - nodes[k]);
+    for (std::size_t i = 0; i < p.size(); ++i) {
+      next[i + 1] += scale * p[i];
+      next[i] -= scale * nodes[k] * p[i];
+    }
+    p = std::move(next);
+  }
+  return p;
+}
+
+}  // namespace
+
+DelayModel::DelayModel(const ModalModel& sensor, double period, double sample_rate)
+    : modes(sensor.modes.size()), direct(sensor.direct) {
+  const double samples = period * sample_rate;
+  if (!(samples >= 18.0) || samples > 1e6) {
+    throw Error("delay form: a period of " + std::to_string(samples) + " samples, 18 .. 1e6 is due");
+  }
+  const StateSpace continuous = stateSpace(sensor);
+  const auto m = static_cast<Eigen::Index>(2 * modes);
+  // x' = A x + B p(u), p a polynomial in u = t / dt: the chain z_i' = z_(i+1) makes the powers of u.
+  constexpr auto HOLD_INDEX = static_cast<Eigen::Index>(HOLD);
+  Eigen::MatrixXd a = Eigen::MatrixXd::Zero(m + HOLD_INDEX, m + HOLD_INDEX);
+  if (m > 0) {
+    a.topLeftCorner(m, m) = continuous.a / sample_rate;
+    a.block(0, m, m, 1) = continuous.b / sample_rate;
+  }
+  for (Eigen::Index i = 0; i + 1 < HOLD_INDEX; ++i) a(m + i, m + i + 1) = 1.0;
+  const Eigen::MatrixXd phi = matrixExponential(a);
+  for (std::size_t k = 0; k < modes; ++k) {
+    const auto i = static_cast<Eigen::Index>(2 * k);
+    transition.insert(transition.end(), {phi(i, i), phi(i, i + 1), phi(i + 1, i), phi(i + 1, i + 1)});
+    output.insert(output.end(), {continuous.c(0, i), continuous.c(0, i + 1)});
+  }
+  std::vector<double> nodes;
+  for (std::size_t j = 0; j < HOLD; ++j) nodes.push_back(static_cast<double>(j) - static_cast<double>(NOW));
+  drive.assign(2 * modes * HOLD, 0.0);
+  for (std::size_t j = 0; j < HOLD; ++j) {
+    const std::vector<double> p = lagrangePolynomial(nodes, j);
+    for (std::size_t state = 0; state < 2 * modes; ++state) {
+      double factorial = 1.0;
+      for (std::size_t i = 0; i < HOLD; ++i) {
+        // z_i(0) = i! p_i
+        if (i > 0) factorial *= static_cast<double>(i);
+        drive[state * HOLD + j] +=
+            phi(static_cast<Eigen::Index>(state), m + static_cast<Eigen::Index>(i)) * factorial * p[i];
+      }
+    }
+  }
+  // The line's next element is line[line]; one period before it is line[line - T].
+  line = static_cast<std::size_t>(std::ceil(samples)) + TAPS / 2;
+  const double position = static_cast<double>(line) - samples;
+  at = static_cast<std::size_t>(std::floor(position)) - (TAPS / 2 - 1);
+  std::vector<double> points;
+  for (std::size_t j = 0; j < TAPS; ++j) points.push_back(static_cast<double>(at + j));
+  for (std::size_t j = 0; j < TAPS; ++j) {
+    double share = 1.0;
+    for (std::size_t k = 0; k < TAPS; ++k) {
+      if (k != j) share *= (position - points[k]) / (points[j] - points[k]);
+    }
+    interpolate.push_back(share);
+  }
+}
+
+void DelayModel::step(std::vector<double>& x) const {
+  double* forces = x.data() + 2 * modes;
+  for (std::size_t k = 0; k < modes; ++k) {
+    const double x1 = x[2 * k], x2 = x[2 * k + 1];
+    double next1 = transition[4 * k] * x1 + transition[4 * k + 1] * x2;
+    double next2 = transition[4 * k + 2] * x1 + transition[4 * k + 3] * x2;
+    for (std::size_t j = 0; j < HOLD; ++j) {
+      next1 += drive[2 * k * HOLD + j] * forces[j];
+      next2 += drive[(2 * k + 1) * HOLD + j] * forces[j];
+    }
+    x[2 * k] = next1;
+    x[2 * k + 1] = next2;
+  }
+  double next = 0.0;
+  for (std::size_t j = 0; j < TAPS; ++j) next += interpolate[j] * forces[at + j];
+  std::copy(forces + 1, forces + line, forces);
+  forces[line - 1] = next;
+}
+
+double DelayModel::measured(const std::vector<double>& x) const {
+  double sum = direct * x[2 * modes + NOW];
+  for (std::size_t i = 0; i < 2 * modes; ++i) sum += output[i] * x[i];
+  return sum;
+}
+
+std::vector<double> delayGain(const DelayModel& model, double q, double r) {
+  if (!(q > 0.0) || !(r > 0.0)) throw Error("delay form: variances above 0 are due");
+  // Morf, Sidhu and Kailath: P(k + 1) - P(k) = m l l', n = P c'.
+  std::vector<double> l(model.states(), 0.0), n = l, through(model.states());
+  l.back() = 1.0;
+  double m = q, variance = r;
+  const auto most = static_cast<std::size_t>(MOST_REVOLUTIONS * static_cast<double>(model.line));
+  double rise = 0.0;  // of the innovation's variance over a revolution
+  for (std::size_t step = 1; step <= most; ++step) {
+    const double seen = model.measured(l), before = variance;
+    // l(k + 1) = (phi - phi n c / variance) l
+    for (std::size_t i = 0; i < l.size(); ++i) through[i] = l[i] - n[i] * (seen / before);
+    for (std::size_t i = 0; i < l.size(); ++i) n[i] += m * seen * l[i];
+    variance += m * seen * seen;
+    m *= before / variance;
+    model.step(through);
+    l.swap(through);
+    rise += m * seen * seen;
+    if (step % model.line == 0) {
+      double left = 0.0;
+      for (const double x : l) left += x * x;
+      if (rise < CONVERGED * variance && m * left < CONVERGED * q * static_cast<double>(model.line)) {
+        for (double& gain : n) gain /= variance;
+        n.push_back(variance);
+        return n;
+      }
+      rise = 0.0;
+    }
+  }
+  throw Error("delay form: the gain does not settle");
+}
+
+DelayFilter::DelayFilter(const ModalModel& sensor, double spindle_speed, double sample_rate,
+                         const HarmonicFilterParameters& parameters)
+    : model_(sensor, units::TWO_PI / spindle_speed, sample_rate),
+      watch_(1, units::TWO_PI / spindle_speed * sample_rate) {
+  parameters.validate();
+  const double r = parameters.noise_rms * parameters.noise_rms;
+  const double quick = QUICK * parameters.settling_revolutions;
+  const double slow = std::max(quick, parameters.memory_revolutions);
+  for (const double memory : {quick, std::sqrt(quick * slow), slow}) {
+    gain_.push_back(delayGain(model_, r / (memory * memory), r));
+    innovation_std_.push_back(std::sqrt(gain_.back().back()));
+    gain_.back().pop_back();
+  }
+  watch_.setLevels(gain_.size());
+  modes_.resize(2 * model_.modes);
+  next_.resize(2 * model_.modes);
+  line_.resize(ROOM * model_.line);
+  reset();
+}
+
+void DelayFilter::reset() {
+  std::fill(modes_.begin(), modes_.end(), 0.0);
+  std::fill(line_.begin(), line_.end(), 0.0);
+  head_ = 0;
+  innovation_ = 0.0;
+  watch_.reset();
+}
+
+double DelayFilter::step(double measured) {
+  constexpr std::size_t HOLD = DelayModel::HOLD, TAPS = DelayModel::TAPS, NOW = DelayModel::NOW;
+  if (head_ + model_.line >= line_.size()) {
+    std::copy(line_.end() - static_cast<std::ptrdiff_t>(model_.line), line_.end(), line_.begin());
+    head_ = 0;
+  }
+  double* forces = line_.data() + head_;
+  double expected = model_.direct * forces[NOW];
+  for (std::size_t i = 0; i < modes_.size(); ++i) expected += model_.output[i] * modes_[i];
+  innovation_ = measured - expected;
+  const double nu = innovation_;
+  const double* gain = gain_[watch_.level()].data();
+  for (std::size_t i = 0; i < modes_.size(); ++i) modes_[i] += gain[i] * nu;
+  gain += modes_.size();
+  for (std::size_t i = 0; i < model_.line; ++i) forces[i] += gain[i] * nu;
+  const double force = forces[NOW];
+  for (std::size_t k = 0; k < model_.modes; ++k) {
+    const double* phi = model_.transition.data() + 4 * k;
+    const double* first = model_.drive.data() + 2 * k * HOLD;
+    double next1 = phi[0] * modes_[2 * k] + phi[1] * modes_[2 * k + 1];
+    double next2 = phi[2] * modes_[2 * k] + phi[3] * modes_[2 * k + 1];
+    for (std::size_t j = 0; j < HOLD; ++j) {
+      next1 += first[j] * forces[j];
+      next2 += first[HOLD + j] * forces[j];
+    }
+    next_[2 * k] = next1;
+    next_[2 * k + 1] = next2;
+  }
+  modes_.swap(next_);
+  double next = 0.0;
+  for (std::size_t j = 0; j < TAPS; ++j) next += model_.interpolate[j] * forces[model_.at + j];
+  forces[model_.line] = next;
+  ++head_;
+  watch_.add(nu);
+  return force;
+}
+
+}  // namespace smartmill::kalman
