@@ -1,0 +1,140 @@
+// rosrun smartmill_stability chart BAG --model MODEL -o chart.csv: what stability_node makes of a recording,
+// without a master.
+
+#include <unistd.h>
+
+#include <cmath>
+#include <cstdio>
+#include <exception>
+#include <fstream>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "node/bag_charts.h"
+#include "smartmill_core/error.h"
+#include "smartmill_core/units.h"
+#include "smartmill_stability/chart/picture.h"
+
+namespace {
+
+using namespace smartmill;             // NOLINT
+using namespace smartmill::stability;  // NOLINT
+
+struct Options {
+  std::string bag, model, parameters, output, states;
+};
+
+std::ofstream open(const std::string& file) {
+  std::ofstream stream(file);
+  if (!stream) throw Error(file + ": cannot be written");
+  stream.precision(17);  // the node's figures to the last digit
+  return stream;
+}
+
+void finish(std::ofstream& stream, const std::string& file) {
+  stream.close();
+  if (!stream) throw Error(file + ": cannot be written");
+}
+
+/// Empty where there is none.
+std::ostream& cell(std::ostream& stream, double value) {
+  stream << ',';
+  return std::isfinite(value) ? stream << value : stream;
+}
+
+void write(const Chart& chart, const std::string& file) {
+  std::ofstream csv = open(file);
+  csv << "rpm,limit_mm,chatter_hz,torque_limit_mm,power_limit_mm\n";
+  for (std::size_t i = 0; i < chart.limit.depth.size(); ++i) {
+    csv << units::rpmFromRadPerSec(chart.limit.spindle_speed[i]);
+    cell(csv, chart.limit.depth[i] / units::MM);
+    cell(csv, chart.limit.chatter_frequency[i]);
+    cell(csv, chart.torque_depth_limit[i] / units::MM);
+    cell(csv, chart.power_depth_limit[i] / units::MM) << '\n';
+  }
+  finish(csv, file);
+  drawBeside(file,
+             "set xlabel 'Spindle speed [rpm]'\nset ylabel 'Axial depth [mm]'\nset yrange [0:]\n"
+             "plot %FILE skip 1 using 1:2 with lines lw 2 title 'stability limit', "
+             "%FILE skip 1 using 1:4 with lines title 'torque limit', "
+             "%FILE skip 1 using 1:5 with lines title 'power limit'");
+}
+
+void write(const std::vector<ChatterState>& states, const std::string& file) {
+  std::ofstream csv = open(file);
+  csv << "time_s,condition,valid,chatter,frequency_hz,energy_ratio,severity_n\n";
+  for (const ChatterState& s : states) {
+    csv << s.stamp << ',' << s.condition << ',' << s.valid << ',' << s.chatter;
+    cell(csv, s.frequency);
+    cell(csv, s.energy_ratio);
+    cell(csv, s.severity) << '\n';
+  }
+  finish(csv, file);
+}
+
+void print(const char* title, const std::vector<ChartPoint>& points) {
+  std::printf("%s\n", title);
+  for (const ChartPoint& p : points) {
+    std::printf("  %8.1f rpm %8.4f mm (limit %8.4f mm, %7.1f Hz) %7.2f Nm %7.3f kW %8.2f cm3/min\n",
+                units::rpmFromRadPerSec(p.spindle_speed), p.axial_depth / units::MM,
+                p.depth_limit / units::MM, p.chatter_frequency, p.torque, p.power / 1e3,
+                p.material_removal_rate * 60e6);
+  }
+}
+
+void run(const Options& o) {
+  NodeParameters parameters;
+  parameters.model = o.model;
+  if (!o.parameters.empty()) {
+    ParameterReader reader = ParameterReader::fromFile(o.parameters);
+    parameters = readParameters(reader, o.model);
+  }
+  if (parameters.model.empty()) throw Error(o.bag + ": a bag needs the machine's model (--model)");
+  const bool terminal = isatty(STDERR_FILENO);
+  const auto progress = [terminal](double share) {
+    if (terminal) std::fprintf(stderr, "\rreading %3.0f %%%s", 100.0 * share, share >= 1.0 ? "\n" : "");
+  };
+  const BagCharts found = chartsFromBag(o.bag, readMachineModel(parameters.model), parameters, progress);
+  if (!o.states.empty()) write(found.states, o.states);
+  int valid = 0, chatter = 0;
+  for (const ChatterState& s : found.states) {
+    valid += s.valid;
+    chatter += s.chatter;
+  }
+  std::printf("chatter in %d of %d steady windows\n", chatter, valid);
+  if (!found.chart) {
+    if (!o.output.empty()) throw Error(o.bag + ": no chart, missing: " + found.missing);
+    std::printf("no chart, missing: %s\n", found.missing.c_str());
+    return;
+  }
+  std::printf("tool %s, material %s, stable at every speed below %.4f mm\n", found.chart->tool.c_str(),
+              found.chart->material.c_str(), found.chart->absolute_depth_limit / units::MM);
+  print("recommended:", found.chart->recommended);
+  print("unstable, for a check:", found.chart->unstable);
+  if (!o.output.empty()) write(*found.chart, o.output);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("The stability chart and the chatter verdicts that stability_node makes of a recorded bag.");
+  Options o;
+  app.add_option("BAG", o.bag, "recording with tool/frf, material/coefficients, cuts")->required();
+  app.add_option("--model", o.model, "machine model file: tool and spindle limits (default: the parameter)");
+  app.add_option("--params", o.parameters, "parameter file of the node (launch/config/stability.yaml)");
+  app.add_option("-o,--out", o.output, "CSV of the chart; a picture of the same name with .png beside it");
+  app.add_option("--states", o.states, "CSV of the chatter verdicts");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  try {
+    run(o);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "chart: %s\n", error.what());
+    return 1;
+  }
+  return 0;
+}

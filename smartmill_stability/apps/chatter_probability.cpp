@@ -1,0 +1,106 @@
+// rosrun smartmill_stability chatter_probability MODEL --entry-deg A --exit-deg B --speeds LO:HI:N
+// --depths-mm LO:HI:N -o grid.csv
+
+#include <unistd.h>
+
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <iostream>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "smartmill_core/error.h"
+#include "smartmill_stability/chart/picture.h"
+#include "smartmill_stability/chart/uncertainty.h"
+#include "smartmill_stability/solvers/model_system.h"
+
+namespace {
+
+using namespace smartmill;  // NOLINT
+
+struct Request {
+  std::string model, speeds, depths, out;
+  double entry_deg = 0.0, exit_deg = 180.0, risk = 0.05, speed_margin = 0.02;
+  int draws = 60, points = 5;
+  unsigned seed = 1;
+};
+
+void run(const Request& request) {
+  if (!(request.risk >= 0.0) || !(request.risk < 1.0)) throw Error("--risk: 0 <= value < 1 is due");
+  const MachineModel model = readMachineModel(request.model);
+  const stability::RegenerativeSystem system =
+      stability::systemOf(model, request.entry_deg, request.exit_deg);
+  std::vector<double> speeds = stability::rangeOf("--speeds", request.speeds);
+  for (double& speed : speeds) speed = units::radPerSecFromRpm(speed);
+  std::vector<double> depths = stability::rangeOf("--depths-mm", request.depths);
+  for (double& depth : depths) depth *= units::MM;
+  const bool terminal = isatty(STDERR_FILENO);
+  const auto chart = stability::probabilityChart(stability::UncertainSystem::of(model, system), speeds,
+                                                 depths, request.draws, request.seed, [&](double share) {
+                                                   if (terminal)
+                                                     std::fprintf(stderr, "\r%3.0f %% of the draws%s",
+                                                                  100.0 * share, share >= 1.0 ? "\n" : "");
+                                                 });
+  std::ofstream csv(request.out);
+  csv.precision(8);
+  csv << "rpm,depth_mm,probability,nominal_limit_mm\n";
+  for (std::size_t s = 0; s < speeds.size(); ++s) {
+    if (s > 0) csv << '\n';  // gnuplot's rows
+    for (std::size_t d = 0; d < depths.size(); ++d) {
+      csv << units::rpmFromRadPerSec(speeds[s]) << ',' << depths[d] / units::MM << ','
+          << chart.probability[s][d] << ',';
+      if (std::isfinite(chart.nominal[s])) csv << chart.nominal[s] / units::MM;
+      csv << '\n';
+    }
+  }
+  csv.close();
+  if (!csv) throw Error(request.out + ": cannot be written");
+  stability::drawBeside(
+      request.out,
+      "set xlabel 'Spindle speed [rpm]'\nset ylabel 'Axial depth [mm]'\nset cblabel 'Probability "
+      "of chatter'\nset cbrange [0:1]\nset palette defined (0 'white', 0.05 'light-green', 0.5 "
+      "'orange', 1 'dark-red')\nset view map\nset autoscale fix\n"
+      "plot %FILE skip 1 using 1:2:3 with image notitle, %FILE skip 1 using 1:4 with lines lw 2 "
+      "lc 'black' title 'limit of the nominal system'");
+  std::printf(
+      "robust points (probability of chatter at most %.0f %% within %.1f %% of the speed, %d draws):\n",
+      100.0 * request.risk, 100.0 * request.speed_margin, request.draws);
+  for (const auto& p : stability::robustPoints(chart, request.risk, request.speed_margin, request.points))
+    std::printf("  %8.1f rpm %8.4f mm  %4.1f %%\n", units::rpmFromRadPerSec(p.speed), p.depth / units::MM,
+                100.0 * p.probability);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Request request;
+  CLI::App app{
+      "Probability of chatter over speed and depth, from the standard deviations of a machine model."};
+  app.add_option("model", request.model, "machine model file with tool, cutting and tool_tip")->required();
+  app.add_option("--entry-deg", request.entry_deg, "immersion angle at which a tooth enters [deg]")
+      ->required();
+  app.add_option("--exit-deg", request.exit_deg, "immersion angle at which a tooth leaves [deg]")->required();
+  app.add_option("--speeds", request.speeds, "LO:HI:N [rpm]")->required();
+  app.add_option("--depths-mm", request.depths, "LO:HI:N [mm]")->required();
+  app.add_option("--draws", request.draws, "machines drawn (60)");
+  app.add_option("--seed", request.seed, "of the draws (1)");
+  app.add_option("--risk", request.risk, "probability of chatter that robust points may have (0.05)");
+  app.add_option("--speed-margin", request.speed_margin, "share of the speed to both sides (0.02)");
+  app.add_option("--points", request.points, "robust points printed (5)");
+  app.add_option("-o,--out", request.out, "CSV file; a picture of the same name with .png stands beside it")
+      ->required();
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? 0 : 2;
+  }
+  try {
+    run(request);
+  } catch (const std::exception& e) {
+    std::cerr << "chatter_probability: " << e.what() << "\n";
+    return 1;
+  }
+  return 0;
+}

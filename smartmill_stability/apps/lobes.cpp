@@ -1,0 +1,195 @@
+// rosrun smartmill_stability lobes MODEL --entry-deg A --exit-deg B --method M --speeds LO:HI:N
+// --max-depth-mm D -o chart.csv
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <iostream>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/model/machine_model.h"
+#include "smartmill_core/units.h"
+#include "smartmill_stability/chart/picture.h"
+#include "smartmill_stability/solvers/boundary.h"
+#include "smartmill_stability/solvers/model_system.h"
+#include "smartmill_stability/solvers/solver.h"
+
+namespace {
+
+using namespace smartmill;
+
+struct Request {
+  std::string model, method = "collocation", speeds, out, boundary, serration;
+  double entry_deg = 0.0, exit_deg = 180.0, max_depth_mm = 0.0, feed_mm = 0.0;
+  bool errors = false;
+};
+
+std::string axes(double max_depth_mm) {
+  return "set xlabel 'Spindle speed [rpm]'\nset ylabel 'Axial depth [mm]'\nset yrange [0:" +
+         std::to_string(max_depth_mm) + "]\n";
+}
+
+/// [s] a limit may take before progress is shown.
+constexpr double QUIET = 1.0;
+
+std::vector<stability::Limit> limitsOf(const stability::StabilitySolver& solver,
+                                       const std::vector<double>& speeds, double max_depth) {
+  // In pieces that overlap by one speed, so that neighbours are compared across them.
+  constexpr std::size_t PIECE = 25;
+  const auto begin = std::chrono::steady_clock::now();
+  std::vector<stability::Limit> limits;
+  bool shown = false;
+  for (std::size_t i = 0; i < speeds.size(); i += PIECE) {
+    const std::size_t from = i > 0 ? i - 1 : 0, to = std::min(i + PIECE + 1, speeds.size());
+    const std::vector<double> part(speeds.begin() + static_cast<std::ptrdiff_t>(from),
+                                   speeds.begin() + static_cast<std::ptrdiff_t>(to));
+    const std::vector<stability::Limit> found = solver.limits(part, max_depth);
+    for (std::size_t k = i; k < std::min(i + PIECE, speeds.size()); ++k) limits.push_back(found[k - from]);
+    const std::chrono::duration<double> passed = std::chrono::steady_clock::now() - begin;
+    if (passed.count() > QUIET || shown) {
+      std::fprintf(stderr, "\r%3zu %% of the speeds", 100 * limits.size() / speeds.size());
+      shown = true;
+    }
+  }
+  if (shown) std::fprintf(stderr, "\n");
+  return limits;
+}
+
+void traceAll(const Request& request, const stability::FloquetSolver& solver,
+              const std::vector<double>& speeds) {
+  if (speeds.size() < 2) throw Error("--boundary: a range of speeds is due");
+  stability::TraceOptions options;
+  options.speed_low = speeds.front();
+  options.speed_high = speeds.back();
+  options.max_depth = request.max_depth_mm * units::MM;
+  options.levels = 3;  // tips of pockets down to 1/480 of the range of speeds
+  const auto curves = stability::traceBoundary(solver, options);
+  std::ofstream csv(request.boundary);
+  csv.precision(8);
+  csv << "curve,rpm,depth_mm,chatter_hz,kind\n";
+  for (std::size_t c = 0; c < curves.size(); ++c) {
+    // A blank line parts the curves for gnuplot.
+    if (c > 0) csv << "\n";
+    for (const stability::BoundaryPoint& p : curves[c].points)
+      csv << c << ',' << units::rpmFromRadPerSec(p.speed) << ',' << p.depth / units::MM << ',' << p.frequency
+          << ',' << nameOf(p.kind) << '\n';
+  }
+  csv.close();
+  if (!csv) throw Error(request.boundary + ": cannot be written");
+  stability::drawBeside(request.boundary,
+                        axes(request.max_depth_mm) +
+                            "plot %FILE skip 1 using 2:3 with lines lw 2 title 'boundary', "
+                            "%FILE skip 1 using 2:(strcol(5) eq 'flip' ? $3 : NaN) with points "
+                            "pt 7 ps 0.4 title 'flip'");
+  std::size_t islands = 0;
+  for (const auto& curve : curves) islands += curve.closed;
+  std::printf("%zu boundary curves, %zu of them islands\n", curves.size(), islands);
+}
+
+/// Contact of the teeth as it is, where a feed is given.
+void addChips(const Request& request, stability::RegenerativeSystem& system) {
+  if (request.feed_mm == 0.0 && request.serration.empty()) return;
+  if (!(request.feed_mm > 0.0)) throw Error("--feed-mm: above 0 is due (with a serration as well)");
+  stability::ChipGeometry chip;
+  chip.feed = request.feed_mm * units::MM;
+  if (!request.serration.empty()) {
+    double amplitude = 0.0, wavelength = 0.0;
+    char rest = 0;
+    if (std::sscanf(request.serration.c_str(), "%lf:%lf%c", &amplitude, &wavelength, &rest) != 2 ||
+        !(amplitude > 0.0) || !(wavelength > 0.0))
+      throw Error("--serration-mm " + request.serration + ": AMPLITUDE:WAVELENGTH is due, both above 0");
+    chip.serration_amplitude = amplitude * units::MM;
+    chip.serration_wavelength = wavelength * units::MM;
+  }
+  system.chip = chip;
+}
+
+void run(const Request& request) {
+  const stability::Method method = stability::methodOf(request.method);
+  if (!(request.max_depth_mm > 0.0)) throw Error("--max-depth-mm: above 0 is due");
+  std::vector<double> speeds = stability::rangeOf("--speeds", request.speeds);  // [rpm]
+  for (double& speed : speeds) speed = units::radPerSecFromRpm(speed);
+  stability::RegenerativeSystem system =
+      stability::systemOf(readMachineModel(request.model), request.entry_deg, request.exit_deg);
+  addChips(request, system);
+  stability::SolverOptions options;
+  options.estimate_error = request.errors;
+  const auto solver = stability::makeSolver(method, system, options);
+  const double max_depth = request.max_depth_mm * units::MM;
+  const std::vector<stability::Limit> limits = limitsOf(*solver, speeds, max_depth);
+
+  std::ofstream csv(request.out);
+  csv.precision(8);
+  csv << "rpm,limit_mm,chatter_hz,kind\n";
+  double least = max_depth, error = 0.0;
+  for (std::size_t i = 0; i < speeds.size(); ++i) {
+    csv << units::rpmFromRadPerSec(speeds[i]) << ',';
+    const stability::Limit& limit = limits[i];
+    if (std::isfinite(limit.depth)) {
+      csv << limit.depth / units::MM << ',' << limit.frequency << ',' << nameOf(limit.kind) << '\n';
+      least = std::min(least, limit.depth);
+      if (std::isfinite(limit.error)) error = std::max(error, limit.error / limit.depth);
+    } else {
+      csv << ",,\n";
+    }
+  }
+  csv.close();
+  if (!csv) throw Error(request.out + ": cannot be written");
+  stability::drawBeside(
+      request.out, axes(request.max_depth_mm) +
+                       "plot %FILE skip 1 using 1:2 with lines lw 2 title 'first loss of stability (" +
+                       std::string(nameOf(method)) +
+                       ")', %FILE skip 1 using 1:(strcol(4) eq 'flip' ? $2 : NaN) with points pt 7 ps 0.4 "
+                       "title 'flip'");
+  std::printf("stable at every one of these speeds below %.4f mm (%s)\n", least / units::MM, nameOf(method));
+  if (request.errors) std::printf("largest estimated error of a limit %.2g %%\n", 100.0 * error);
+  if (!request.boundary.empty())
+    traceAll(request, *stability::makeFloquetSolver(method, system, options), speeds);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Request request;
+  CLI::App app{
+      "Stability lobes of a machine model: the first loss of stability when the depth grows, over spindle "
+      "speed."};
+  app.add_option("model", request.model, "machine model file with tool, cutting and tool_tip")->required();
+  app.add_option("--entry-deg", request.entry_deg, "immersion angle at which a tooth enters [deg]")
+      ->required();
+  app.add_option("--exit-deg", request.exit_deg, "immersion angle at which a tooth leaves [deg]")->required();
+  app.add_option("--method", request.method,
+                 "solver: collocation (default), semi_discretization, multi_frequency, zero_order");
+  app.add_option("--speeds", request.speeds, "LO:HI:N [rpm]")->required();
+  app.add_option("--max-depth-mm", request.max_depth_mm, "depths up to here [mm]")->required();
+  app.add_option("-o,--out", request.out, "CSV file; a picture of the same name with .png stands beside it")
+      ->required();
+  app.add_option("--boundary", request.boundary,
+                 "CSV of the whole boundary with its islands, besides the first loss; a picture beside it");
+  app.add_option(
+      "--feed-mm", request.feed_mm,
+      "per tooth [mm]: contact of the teeth about the forced vibration counts (uneven pitch, serration); "
+      "without it every tooth cuts all along its arc");
+  app.add_option(
+      "--serration-mm", request.serration,
+      "AMPLITUDE:WAVELENGTH [mm] of a serrated edge, evenly shifted from tooth to tooth; needs --feed-mm");
+  app.add_flag("--errors", request.errors, "estimate the error of each limit by a refined solution");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? 0 : 2;
+  }
+  try {
+    run(request);
+  } catch (const std::exception& e) {
+    std::cerr << "lobes: " << e.what() << "\n";
+    return 1;
+  }
+  return 0;
+}

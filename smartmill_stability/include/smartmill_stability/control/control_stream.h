@@ -1,0 +1,54 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "smartmill_core/signal/streams.h"
+#include "smartmill_stability/control/turning_control.h"
+
+namespace smartmill::stability {
+
+struct ControlStreamParameters {
+  std::string deflection_channel = "deflection";  ///< of the machine [m], or its acceleration [m/s2]
+  std::string tool_channel = "tool";              ///< displacement that the actuator made [m]
+  double integrator_corner = 2.0;                 ///< [Hz] > 0, of an acceleration's integration
+  double speed_tolerance = 1e-3;    ///< [1] > 0, change of the spindle speed from which all is learnt anew
+  ControllerParameters controller;  ///< rate and period come from the streams
+  /// @throws Error naming key and value.
+  void validate() const;
+};
+
+/// The machine as learnt from one segment.
+struct LearntMachine {
+  double stamp = 0.0;  ///< [s] last sample of the segment
+  SecondOrder machine;
+  SecondOrder controller;  ///< in force from here on; gain 0: none
+  bool informed = false;   ///< the segment said something
+};
+
+/// Adaptive chatter control on the displacement streams of a lathe, for node and replay: blocks in, blocks of
+/// commands out. A gap in the samples, a jump back in time, a new sample rate or a new spindle speed starts
+/// it anew.
+class ControlStream {
+ public:
+  using Learnt = std::function<void(const LearntMachine&)>;
+  /// @throws Error on bad parameters.
+  ControlStream(const ControlStreamParameters& parameters, Learnt learnt);
+
+  void handle(const SpindleAngle& angle);
+  /// @return commands for the samples of the block, one channel "command" [m]; empty before the spindle's
+  /// speed is known. @throws Error on a missing channel or a unit that is neither m nor m/s2.
+  std::optional<SampleBlock> handle(const SampleBlock& block);
+
+ private:
+  ControlStreamParameters parameters_;
+  Learnt learnt_;
+  std::optional<AdaptiveChatterController> controller_;
+  std::optional<AccelerationIntegrator> integrator_;
+  double speed_ = 0.0, rate_ = 0.0, last_stamp_ = 0.0;
+  std::uint64_t next_index_ = 0;
+};
+
+}  // namespace smartmill::stability

@@ -1,0 +1,411 @@
+#include "smartmill_stability/chart/chart.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <memory>
+
+#include "smartmill_core/cutting/mechanistic.h"
+#include "smartmill_core/error.h"
+#include "smartmill_core/units.h"
+#include "smartmill_stability/solvers/solver.h"
+
+namespace smartmill::stability {
+namespace {
+
+constexpr double NO_LIMIT = std::numeric_limits<double>::infinity();
+/// Points nearer than this share of their speed belong to one pocket or valley.
+constexpr double SAME_POCKET = 0.03;
+/// A point for a check must lie at least so far above the limit, else its outcome would say nothing.
+constexpr double CLEARLY_UNSTABLE = 1.5;
+
+void bound(bool good, const char* key, double value, const char* range) {
+  if (!good || !std::isfinite(value)) {
+    throw Error(std::string(key) + ": " + std::to_string(value) + " is out of range (" + range + ")");
+  }
+}
+
+/// Worst value over the speeds within the margin on both sides, up to the next speed of the grid.
+double around(const StabilityLimit& limit, std::size_t k, double margin,
+              const std::function<bool(double, double)>& worse) {
+  double worst = limit.depth[k];
+  const double speed = limit.spindle_speed[k];
+  for (std::size_t j = k; j > 0 && limit.spindle_speed[j] >= speed * (1.0 - margin); --j) {
+    if (worse(limit.depth[j - 1], worst)) worst = limit.depth[j - 1];
+  }
+  for (std::size_t j = k; j + 1 < limit.depth.size() && limit.spindle_speed[j] <= speed * (1.0 + margin);
+       ++j) {
+    if (worse(limit.depth[j + 1], worst)) worst = limit.depth[j + 1];
+  }
+  return worst;
+}
+
+/// The first points in the given order, one a pocket.
+std::vector<ChartPoint> pick(std::vector<ChartPoint> points, int count,
+                             const std::function<bool(const ChartPoint&, const ChartPoint&)>& better) {
+  std::stable_sort(points.begin(), points.end(), better);
+  std::vector<ChartPoint> chosen;
+  for (const ChartPoint& point : points) {
+    if (static_cast<int>(chosen.size()) >= count) break;
+    const bool near = std::any_of(chosen.begin(), chosen.end(), [&](const ChartPoint& other) {
+      return std::abs(point.spindle_speed / other.spindle_speed - 1.0) < SAME_POCKET;
+    });
+    if (!near) chosen.push_back(point);
+  }
+  return chosen;
+}
+
+}  // namespace
+
+void ChartParameters::validate() const {
+  bound(entry >= 0.0 && entry < units::TWO_PI, "entry_angle", entry, "0 <= value < 2 pi rad");
+  bound(exit > entry && exit <= units::TWO_PI, "exit_angle", exit, "entry_angle < value <= 2 pi rad");
+  bound(feed_per_tooth > 0.0, "feed_per_tooth", feed_per_tooth, "> 0 m");
+  bound(kr >= 0.0, "kr", kr, ">= 0");
+  bound(speed_low > 0.0, "speed_low", speed_low, "> 0 rad/s");
+  bound(speed_high == 0.0 || speed_high > speed_low, "speed_high", speed_high, "above speed_low, or 0");
+  bound(speeds >= 2 && speeds <= 100000, "speeds", speeds, "2..100000");
+  bound(frequency_low >= 0.0, "frequency_low", frequency_low, ">= 0 Hz");
+  bound(frequency_high > frequency_low, "frequency_high", frequency_high, "above frequency_low");
+  bound(modes_error > 0.0, "modes_error", modes_error, "> 0");
+  if (method != "auto" && method != "collocation" && method != "zero_order")
+    throw Error("method: '" + method + "' is unknown (auto, collocation or zero_order)");
+  bound(line_error > 0.0, "line_error", line_error, "> 0");
+  bound(max_depth > 0.0, "max_depth", max_depth, "> 0 m");
+  bound(depth_margin >= 0.0 && depth_margin < 1.0, "depth_margin", depth_margin, "0 <= value < 1");
+  bound(speed_margin >= 0.0 && speed_margin < 0.2, "speed_margin", speed_margin, "0 <= value < 0.2");
+  bound(load_share > 0.0 && load_share <= 1.0, "load_share", load_share, "0 < value <= 1");
+  bound(recommended >= 0 && recommended <= 100, "recommended", recommended, "0..100");
+  bound(unstable_factor >= CLEARLY_UNSTABLE && unstable_factor <= 5.0, "unstable_factor", unstable_factor,
+        "1.5..5");
+  bound(unstable >= 0 && unstable <= 100, "unstable", unstable, "0..100");
+}
+
+namespace {
+
+/// Without the lines at which the hammer excited too little: there noise would pass for a resonance. What the
+/// neighbours say is put in their place by the interpolation.
+FrequencyResponse certainLines(const FrequencyResponse& frf, double error) {
+  if (frf.std_dev.size() != frf.size()) return frf;
+  double peak = 0.0;
+  for (std::size_t i = 0; i < frf.size(); ++i) {
+    if (frf.std_dev[i] < std::abs(frf.value[i])) peak = std::max(peak, std::abs(frf.value[i]));
+  }
+  FrequencyResponse kept;
+  kept.unit = frf.unit;
+  kept.averages = frf.averages;
+  for (std::size_t i = 0; i < frf.size(); ++i) {
+    if (frf.std_dev[i] > error * peak) continue;
+    kept.frequency.push_back(frf.frequency[i]);
+    kept.value.push_back(frf.value[i]);
+  }
+  return kept;
+}
+
+/// Limits at rising speeds, solved where a straight line between the neighbours would be off by more than a
+/// fraction of a percent, and interpolated elsewhere.
+StabilityLimit refinedLimits(const StabilitySolver& solver, const std::vector<double>& speeds,
+                             double max_depth) {
+  constexpr std::size_t STRIDE = 16;
+  constexpr double STRAIGHT = 3e-3;
+  StabilityLimit limit;
+  limit.spindle_speed = speeds;
+  limit.depth.assign(speeds.size(), NO_LIMIT);
+  limit.chatter_frequency.assign(speeds.size(), std::numeric_limits<double>::quiet_NaN());
+  const auto solve = [&](std::size_t i) {
+    const Limit found = solver.limit(speeds[i], max_depth);
+    limit.depth[i] = found.depth;
+    limit.chatter_frequency[i] = found.frequency;
+  };
+  const auto between = [&](std::size_t a, std::size_t b, std::size_t i, const std::vector<double>& values) {
+    const double share = (speeds[i] - speeds[a]) / (speeds[b] - speeds[a]);
+    return values[a] + share * (values[b] - values[a]);
+  };
+  const std::function<void(std::size_t, std::size_t)> fill = [&](std::size_t a, std::size_t b) {
+    if (b - a < 2) return;
+    const std::size_t middle = (a + b) / 2;
+    solve(middle);
+    const double expected = between(a, b, middle, limit.depth);
+    const double frequency = between(a, b, middle, limit.chatter_frequency);
+    const bool all_stable =
+        std::isinf(limit.depth[a]) && std::isinf(limit.depth[b]) && std::isinf(limit.depth[middle]);
+    const bool straight = std::abs(limit.depth[middle] - expected) <= STRAIGHT * expected &&
+                          std::abs(limit.chatter_frequency[middle] - frequency) <= STRAIGHT * frequency;
+    if (!all_stable && !(straight && std::isfinite(expected))) {
+      fill(a, middle);
+      fill(middle, b);
+      return;
+    }
+    if (all_stable) return;
+    for (const auto& [from, to] : {std::pair{a, middle}, {middle, b}}) {
+      for (std::size_t i = from + 1; i < to; ++i) {
+        limit.depth[i] = between(from, to, i, limit.depth);
+        limit.chatter_frequency[i] = between(from, to, i, limit.chatter_frequency);
+      }
+    }
+  };
+  solve(0);
+  for (std::size_t a = 0; a + 1 < speeds.size();) {
+    const std::size_t b = std::min(a + STRIDE, speeds.size() - 1);
+    solve(b);
+    fill(a, b);
+    a = b;
+  }
+  return limit;
+}
+
+}  // namespace
+
+struct ChartMaker::Basis {
+  RegenerativeProcess process;
+  ToolTipResponse response;                 // zero-order
+  std::unique_ptr<StabilitySolver> solver;  // collocation
+  double max_depth = 0.0;                   // [m] looked at by collocation
+
+  StabilityLimit limits(const std::vector<double>& speeds) const {
+    return solver ? refinedLimits(*solver, speeds, max_depth) : zeroOrderLimit(process, response, speeds);
+  }
+};
+
+ChartMaker::ChartMaker(const ChartParameters& parameters, const MachineModel& model)
+    : parameters_(parameters), tool_geometry_(model.needTool("predict stability")) {
+  if (model.spindle) spindle_ = *model.spindle;
+  if (parameters_.speed_high == 0.0 && spindle_.max_speed) parameters_.speed_high = *spindle_.max_speed;
+  parameters_.validate();
+  if (parameters_.speed_high == 0.0) {
+    throw Error("speed_high: 0 takes the spindle's highest speed, which " + model.file + " does not state");
+  }
+}
+
+void ChartMaker::use(const std::string& tool, double stamp) {
+  if (tool != tool_) {
+    frfs_.clear();
+    modes_.clear();
+    tool_ = tool;
+  }
+  stamp_ = std::max(stamp_, stamp);
+}
+
+void ChartMaker::handle(const MeasuredFrf& frf) {
+  if (frf.point != POINT_TOOL_TIP) return;
+  use(frf.tool, frf.stamp);
+  frfs_[frf.direction] = frf;
+}
+
+void ChartMaker::handle(const MeasuredModes& modes) {
+  if (modes.point != POINT_TOOL_TIP) return;
+  use(modes.tool, modes.stamp);
+  modes_[modes.direction] = modes;
+}
+
+void ChartMaker::handle(const CoefficientSet& coefficients) {
+  stamp_ = std::max(stamp_, coefficients.stamp);
+  coefficients_ = coefficients;
+}
+
+std::string ChartMaker::missing() const {
+  std::string list;
+  const auto need = [&](bool there, const std::string& what) {
+    if (!there) list += (list.empty() ? "" : ", ") + what;
+  };
+  for (const std::string direction : {"x", "y"}) {
+    if (needsModes()) {
+      need(modes_.count(direction) > 0, "modes in " + direction);
+    } else if (!byCollocation()) {
+      need(frfs_.count(direction) > 0, "FRF in " + direction);
+    }
+  }
+  need(coefficients_ && coefficients_->value.ktc > 0.0, "tangential coefficient");
+  return list;
+}
+
+bool ChartMaker::needsModes() const {
+  return parameters_.method == "collocation" || (parameters_.method == "zero_order" && parameters_.use_modes);
+}
+
+bool ChartMaker::byCollocation() const {
+  if (parameters_.method != "auto") return parameters_.method == "collocation";
+  const auto good = [this](const char* direction) {
+    const auto found = modes_.find(direction);
+    return found != modes_.end() && !found->second.model.modes.empty() &&
+           found->second.relative_error <= parameters_.modes_error;
+  };
+  return good("x") && good("y");
+}
+
+std::optional<RegenerativeSystem> ChartMaker::system(const Engagement& engagement) const {
+  if (!modes_.count("x") || !modes_.count("y") || !coefficients_ || !(coefficients_->value.ktc > 0.0))
+    return {};
+  const CuttingCoefficients& cutting = coefficients_->value;
+  const bool given = engagement.exit > engagement.entry;
+  RegenerativeSystem system;
+  system.modes = systemModes(modes_.at("x").model, modes_.at("y").model);
+  system.teeth = tool_geometry_.teeth;
+  system.pitch = tool_geometry_.pitch;
+  system.helix = tool_geometry_.helix;
+  system.diameter = tool_geometry_.diameter;
+  system.entry = given ? engagement.entry : parameters_.entry;
+  system.exit = given ? engagement.exit : parameters_.exit;
+  system.kt = cutting.ktc;
+  system.kr = std::isfinite(cutting.krc) ? cutting.krc : parameters_.kr * cutting.ktc;
+  return system;
+}
+
+std::size_t ChartMaker::modesInX() const {
+  return modes_.count("x") ? systemModes(modes_.at("x").model, 0).size() : 0;
+}
+
+ChartMaker::Basis ChartMaker::basis() const {
+  const std::string lacking = missing();
+  if (!lacking.empty()) throw Error("no chart yet, missing: " + lacking);
+  Basis basis;
+  const CuttingCoefficients& cutting = coefficients_->value;
+  basis.process.teeth = tool_geometry_.teeth;
+  basis.process.entry = parameters_.entry;
+  basis.process.exit = parameters_.exit;
+  basis.process.kt = cutting.ktc;
+  basis.process.kr = std::isfinite(cutting.krc) ? cutting.krc / cutting.ktc : parameters_.kr;
+  if (byCollocation()) {
+    const RegenerativeSystem system = *this->system({});
+    SolverOptions options;
+    options.tolerance = 1e-4;
+    options.nodes = 10;  // 1e-6 of the depth, enough for a chart
+    basis.solver = makeSolver(Method::collocation, system, options);
+    // So deep that a limit beyond cannot hold a recommended cut down.
+    basis.max_depth = parameters_.max_depth / (1.0 - parameters_.depth_margin);
+  } else if (parameters_.use_modes) {
+    constexpr std::size_t LINES = 20000;
+    basis.response = responseOf(modes_.at("x").model, modes_.at("y").model,
+                                std::max(1.0, parameters_.frequency_low), parameters_.frequency_high, LINES);
+  } else {
+    const auto lines = [&](const char* direction) {
+      return certainLines(frfs_.at(direction).frf.band(parameters_.frequency_low, parameters_.frequency_high),
+                          parameters_.line_error);
+    };
+    basis.response = responseOf(lines("x"), lines("y"));
+  }
+  return basis;
+}
+
+double ChartMaker::torquePerDepth() const {
+  Engagement engagement{parameters_.entry, parameters_.exit, 1e-3, parameters_.feed_per_tooth};
+  const auto row = meanForceMatrix(tool_geometry_, engagement)[3];
+  const double edge = std::isfinite(coefficients_->value.kte) ? coefficients_->value.kte : 0.0;
+  return (row[0] * coefficients_->value.ktc + row[3] * edge) / engagement.axial_depth;
+}
+
+double ChartMaker::friction(double speed) const {
+  const bool found =
+      std::isfinite(coefficients_->friction_viscous) && std::isfinite(coefficients_->friction_coulomb);
+  const double torque = found ? coefficients_->friction_viscous * speed + coefficients_->friction_coulomb
+                              : spindle_.viscous * speed + spindle_.coulomb;
+  return std::max(0.0, torque);
+}
+
+std::array<double, 2> ChartMaker::loadLimits(double speed) const {
+  const double per_depth = torquePerDepth(), lost = friction(speed);
+  const double torque =
+      spindle_.rated_torque ? std::max(0.0, *spindle_.rated_torque - lost) / per_depth : NO_LIMIT;
+  const double power =
+      spindle_.rated_power ? std::max(0.0, *spindle_.rated_power / speed - lost) / per_depth : NO_LIMIT;
+  return {{torque, power}};
+}
+
+ChartPoint ChartMaker::point(double speed, double depth, double limit, double frequency) const {
+  ChartPoint result{speed, depth, limit, frequency};
+  result.torque = torquePerDepth() * depth;
+  result.power = result.torque * speed;
+  // A tooth removes the integral of c sin(phi) R over its engagement.
+  const double area = parameters_.feed_per_tooth * tool_geometry_.radius() *
+                      (std::cos(parameters_.entry) - std::cos(parameters_.exit));
+  result.material_removal_rate = area * depth * tool_geometry_.teeth * speed / units::TWO_PI;
+  return result;
+}
+
+Chart ChartMaker::chart() const {
+  const Basis given = basis();
+  Chart chart;
+  chart.stamp = stamp_;
+  chart.tool = tool_;
+  chart.material = coefficients_->material;
+  const int n = parameters_.speeds;
+  // A little beyond both ends, so that the margin of speed holds there too.
+  const int beyond = parameters_.speed_margin > 0.0 ? 20 : 0;
+  StabilityLimit wide;
+  for (int i = -beyond; i < n + beyond; ++i) {
+    const double low = parameters_.speed_low, high = parameters_.speed_high,
+                 part = parameters_.speed_margin / 20.0;
+    wide.spindle_speed.push_back(i < 0    ? low * (1.0 + part * i)
+                                 : i >= n ? high * (1.0 + part * (i - n + 1))
+                                          : low + (high - low) * i / (n - 1));
+  }
+  wide = given.limits(wide.spindle_speed);
+  const auto inner = [&](const std::vector<double>& all) {
+    return std::vector<double>(all.begin() + beyond, all.end() - beyond);
+  };
+  chart.limit = {inner(wide.spindle_speed), inner(wide.depth), inner(wide.chatter_frequency)};
+  const std::vector<double>& speeds = chart.limit.spindle_speed;
+  const auto shift = static_cast<std::size_t>(beyond);
+  chart.method = given.solver ? nameOf(Method::collocation) : nameOf(Method::zero_order);
+  chart.absolute_depth_limit = given.solver
+                                   ? *std::min_element(chart.limit.depth.begin(), chart.limit.depth.end())
+                                   : absoluteDepthLimit(given.process, given.response);
+
+  std::vector<ChartPoint> cuts, valleys;
+  std::vector<double> carried;  // [m] by the spindle, with its reserve
+  for (std::size_t k = 0; k < speeds.size(); ++k) {
+    const auto [torque, power] = loadLimits(speeds[k]);
+    chart.torque_depth_limit.push_back(torque);
+    chart.power_depth_limit.push_back(power);
+    carried.push_back(
+        std::min({parameters_.load_share * torque, parameters_.load_share * power, parameters_.max_depth}));
+    const double stable = around(wide, k + shift, parameters_.speed_margin, std::less<>());
+    cuts.push_back(point(speeds[k], std::min((1.0 - parameters_.depth_margin) * stable, carried[k]),
+                         chart.limit.depth[k], chart.limit.chatter_frequency[k]));
+  }
+  std::vector<ChartPoint> peaks;
+  for (std::size_t k = 0; k < cuts.size(); ++k) {
+    const double rate = cuts[k].material_removal_rate;
+    const bool over_left = k == 0 || rate > cuts[k - 1].material_removal_rate;
+    const bool over_right = k + 1 == cuts.size() || rate >= cuts[k + 1].material_removal_rate;
+    if (rate > 0.0 && over_left && over_right) peaks.push_back(cuts[k]);
+  }
+  chart.recommended = pick(peaks, parameters_.recommended, [](const ChartPoint& a, const ChartPoint& b) {
+    return a.material_removal_rate > b.material_removal_rate;
+  });
+  for (std::size_t k = 1; k + 1 < speeds.size(); ++k) {
+    const std::vector<double>& depth = chart.limit.depth;
+    if (!(depth[k] < depth[k - 1] && depth[k] <= depth[k + 1])) continue;
+    const double highest = around(wide, k + shift, parameters_.speed_margin, std::greater<>());
+    const double proposed = std::min(parameters_.unstable_factor * highest, carried[k]);
+    if (!std::isfinite(proposed) || proposed < CLEARLY_UNSTABLE * highest) continue;
+    valleys.push_back(point(speeds[k], proposed, depth[k], chart.limit.chatter_frequency[k]));
+  }
+  // A check beside the recommended cut tells most: nearly the same speed, another outcome.
+  const double reference =
+      chart.recommended.empty() ? speeds.back() : chart.recommended.front().spindle_speed;
+  chart.unstable = pick(valleys, parameters_.unstable, [&](const ChartPoint& a, const ChartPoint& b) {
+    return std::abs(std::log(a.spindle_speed / reference)) < std::abs(std::log(b.spindle_speed / reference));
+  });
+  return chart;
+}
+
+Prediction ChartMaker::predict(double spindle_speed, double axial_depth) const {
+  if (!(spindle_speed > 0.0) || !std::isfinite(spindle_speed)) {
+    throw Error("spindle_speed: " + std::to_string(spindle_speed) + " rad/s is not positive");
+  }
+  if (!(axial_depth > 0.0) || !std::isfinite(axial_depth)) {
+    throw Error("axial_depth: " + std::to_string(axial_depth) + " m is not positive");
+  }
+  const Basis given = basis();
+  const StabilityLimit limit = given.limits({spindle_speed});
+  const auto [torque, power] = loadLimits(spindle_speed);
+  Prediction prediction;
+  prediction.point = point(spindle_speed, axial_depth, limit.depth[0], limit.chatter_frequency[0]);
+  prediction.stable = axial_depth < limit.depth[0];
+  prediction.within_spindle_limits =
+      axial_depth <= std::min(torque, power) && (!spindle_.max_speed || spindle_speed <= *spindle_.max_speed);
+  return prediction;
+}
+
+}  // namespace smartmill::stability

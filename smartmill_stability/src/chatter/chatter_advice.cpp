@@ -1,0 +1,207 @@
+#include "smartmill_stability/chatter/chatter_advice.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "smartmill_core/error.h"
+
+namespace smartmill::stability {
+namespace {
+
+struct Probe {
+  double gap =
+      0.0;  // [Hz] signed distance of the predicted frequency from the observed, modulo the tooth passing
+  bool chatters = false;
+};
+
+Probe probe(const RegenerativeSystem& system, double speed, double depth, double observed) {
+  const auto at = makeFloquetSolver(Method::collocation, system)->at(speed);
+  const CharacteristicMultiplier m = at->multiplier(depth);
+  const double passing = 1.0 / m.period, predicted = at->chatterFrequency(depth);
+  // A multiplier and its conjugate: frequencies at +f and -f, each plus whole multiples.
+  const double same = std::remainder(predicted - observed, passing);
+  const double mirrored = -std::remainder(-predicted - observed, passing);
+  return {std::abs(same) <= std::abs(mirrored) ? same : mirrored, m.radius() > 1.0};
+}
+
+RegenerativeSystem scaled(const RegenerativeSystem& system, std::size_t mode, double factor) {
+  RegenerativeSystem changed = system;
+  SystemMode& m = changed.modes[mode];
+  // The compliance stays: both vectors go with the frequency.
+  m.frequency *= factor;
+  for (std::size_t a = 0; a < 2; ++a) {
+    m.input[a] *= factor;
+    m.output[a] *= factor;
+  }
+  return changed;
+}
+
+}  // namespace
+
+std::vector<ChatterEpisode> episodes(const std::vector<ChatterState>& states) {
+  std::vector<ChatterEpisode> found;
+  std::vector<double> frequencies;
+  bool running = false;
+  const auto close = [&] {
+    if (!running) return;
+    std::nth_element(frequencies.begin(),
+                     frequencies.begin() + static_cast<std::ptrdiff_t>(frequencies.size() / 2),
+                     frequencies.end());
+    found.back().frequency = frequencies[frequencies.size() / 2];
+    running = false;
+  };
+  for (const ChatterState& s : states) {
+    if (!s.valid || !s.chatter || (running && s.condition != found.back().condition)) close();
+    if (!s.valid || !s.chatter) continue;
+    if (!running) {
+      found.push_back({s.condition, s.onset, s.stamp, s.stamp, 0.0, 0.0});
+      frequencies.clear();
+      running = true;
+    }
+    frequencies.push_back(s.frequency);
+    found.back().end = s.stamp;
+    found.back().severity = std::max(found.back().severity, s.severity);
+  }
+  close();
+  return found;
+}
+
+std::vector<double> speedsFromChatter(double frequency, int teeth, double low, double high) {
+  if (!(frequency > 0.0) || teeth < 1) throw Error("chatter speeds: a frequency and teeth are due");
+  if (!(low > 0.0) || !(high >= low)) throw Error("chatter speeds: 0 < low <= high is due");
+  std::vector<double> speeds;
+  for (int k = 1;; ++k) {
+    const double speed = units::TWO_PI * frequency / (k * teeth);
+    if (speed < low) return speeds;
+    if (speed <= high) speeds.push_back(speed);
+  }
+}
+
+std::optional<ModeCorrection> correctFromChatter(const RegenerativeSystem& believed, double speed,
+                                                 double depth, double observed, double most) {
+  if (!(observed > 0.0)) throw Error("chatter correction: a frequency above 0 Hz is due");
+  if (!(most > 0.0) || most >= 0.5) throw Error("chatter correction: largest change 0..0.5 is due");
+  std::optional<ModeCorrection> best;
+  const auto consider = [&](std::size_t mode, double factor, bool chatters) {
+    const bool better = !best || (chatters && !best->chatters) ||
+                        (chatters == best->chatters && std::abs(factor - 1.0) < std::abs(best->factor - 1.0));
+    if (!better) return;
+    best = ModeCorrection{mode, factor, believed.modes[mode].frequency * factor, chatters,
+                          scaled(believed, mode, factor)};
+  };
+  const double passing = speed * believed.teeth / units::TWO_PI;
+  for (std::size_t mode = 0; mode < believed.modes.size(); ++mode) {
+    // Roots of the gap over the factor; a step where another motion takes over, or a wrap, is no root.
+    constexpr int STEPS = 40;
+    double before_factor = 1.0 - most;
+    Probe before = probe(scaled(believed, mode, before_factor), speed, depth, observed);
+    for (int i = 1; i <= STEPS; ++i) {
+      const double factor = 1.0 - most + 2.0 * most * i / STEPS;
+      const Probe here = probe(scaled(believed, mode, factor), speed, depth, observed);
+      if ((before.gap > 0.0) != (here.gap > 0.0) && std::abs(here.gap - before.gap) < 0.25 * passing) {
+        double a = before_factor, b = factor;
+        Probe pa = before, pb = here;
+        for (int k = 0; k < 25 && b - a > 1e-7; ++k) {
+          const double middle = 0.5 * (a + b);
+          const Probe pm = probe(scaled(believed, mode, middle), speed, depth, observed);
+          ((pm.gap > 0.0) == (pa.gap > 0.0) ? a : b) = middle;
+          ((pm.gap > 0.0) == (pa.gap > 0.0) ? pa : pb) = pm;
+        }
+        if (std::abs(pb.gap - pa.gap) < 1e-3 * passing) consider(mode, 0.5 * (a + b), pb.chatters);
+      }
+      before = here;
+      before_factor = factor;
+    }
+  }
+  return best;
+}
+
+ChatterAdvisor::ChatterAdvisor(double low, double high, int teeth, Believed believed, Output output)
+    : low_(low), high_(high), teeth_(teeth), believed_(std::move(believed)), output_(std::move(output)) {
+  if (!(low > 0.0) || !(high >= low)) throw Error("chatter advice: 0 < low <= high speed is due");
+  if (teeth < 1) throw Error("chatter advice: teeth are due");
+}
+
+void ChatterAdvisor::handle(const CuttingCondition& condition) {
+  constexpr std::size_t KEPT = 8;
+  conditions_.push_back(condition);
+  if (conditions_.size() > KEPT) conditions_.pop_front();
+}
+
+void ChatterAdvisor::handle(const ChatterState& state) {
+  const bool same = !running_.empty() && running_.front().condition == state.condition;
+  if (!state.valid || !state.chatter || !same) {
+    running_.clear();
+    advised_ = false;
+  }
+  if (!state.valid || !state.chatter) return;
+  running_.push_back(state);
+  if (advised_ || running_.size() < 2) return;
+  constexpr double AGREE = 0.01;
+  const double before = running_[running_.size() - 2].frequency;
+  if (std::abs(state.frequency - before) > AGREE * before) return;
+  advised_ = true;
+  advise(state);
+}
+
+void ChatterAdvisor::advise(const ChatterState& state) {
+  ChatterAdvice advice;
+  advice.stamp = state.stamp;
+  advice.episode = episodes(running_).front();
+  const double frequency = 0.5 * (state.frequency + running_[running_.size() - 2].frequency);
+  advice.episode.frequency = frequency;
+  CuttingCondition condition;
+  for (const CuttingCondition& c : conditions_)
+    if (c.name == state.condition) condition = c;
+  advice.depth = condition.engagement.axial_depth;
+  const int teeth = condition.tool.teeth > 0 ? condition.tool.teeth : teeth_;
+  std::optional<RegenerativeSystem> system = believed_(condition);
+  const double speed = condition.spindle_speed;
+  // Deep enough to tell a pocket from the rest.
+  const double most = 5.0 * advice.depth;
+  if (system && speed > 0.0 && advice.depth > 0.0) {
+    const auto limitOf = [&](const RegenerativeSystem& s) {
+      return makeSolver(Method::collocation, s)->limit(speed, most).depth;
+    };
+    advice.believed_limit = limitOf(*system);
+    advice.correction = correctFromChatter(*system, speed, advice.depth, frequency);
+    if (advice.correction) {
+      advice.believed_frequency = system->modes[advice.correction->mode].frequency;
+      system = advice.correction->system;
+      advice.corrected_limit = limitOf(*system);
+    }
+  }
+  std::vector<double> proposed = speedsFromChatter(frequency, teeth, low_, high_);
+  constexpr std::size_t MOST_SPEEDS = 12;
+  if (proposed.size() > MOST_SPEEDS) proposed.resize(MOST_SPEEDS);
+  const bool known = system && most > 0.0;
+  if (known) {
+    // A flip's frequency is no mode's: the pockets lie where the teeth pass in step with a mode.
+    for (const SystemMode& mode : system->modes)
+      for (const double s : speedsFromChatter(mode.frequency, teeth, low_, high_))
+        if (proposed.size() < 4 * MOST_SPEEDS) proposed.push_back(s);
+  }
+  for (const double s : proposed) {
+    constexpr double ALIKE = 0.01;
+    if (std::any_of(advice.speeds.begin(), advice.speeds.end(), [&](const ChatterAdvice::Speed& other) {
+          return std::abs(other.speed / s - 1.0) < ALIKE;
+        }))
+      continue;
+    ChatterAdvice::Speed one;
+    one.speed = s;
+    one.limit = one.frequency = std::numeric_limits<double>::quiet_NaN();
+    if (known) {
+      const Limit limit = makeSolver(Method::collocation, *system)->limit(s, most);
+      one.limit = limit.depth;
+      one.frequency = limit.frequency;
+    }
+    advice.speeds.push_back(one);
+  }
+  if (known)
+    std::stable_sort(advice.speeds.begin(), advice.speeds.end(), [](const auto& a, const auto& b) {
+      return a.limit != b.limit ? a.limit > b.limit : a.speed > b.speed;
+    });
+  output_(advice);
+}
+
+}  // namespace smartmill::stability

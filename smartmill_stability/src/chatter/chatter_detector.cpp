@@ -1,0 +1,320 @@
+#include "smartmill_stability/chatter/chatter_detector.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/signal/fourier.h"
+#include "smartmill_core/signal/interpolate.h"
+#include "smartmill_core/signal/steady_path.h"
+#include "smartmill_core/signal/window.h"
+#include "smartmill_core/units.h"
+
+namespace smartmill::stability {
+namespace {
+
+constexpr double RESTART = 1.0;  // [s] backward jump that tells of a bag started again
+
+void bound(bool good, const char* key, double value, const char* range) {
+  if (!good)
+    throw Error(std::string(key) + ": " + std::to_string(value) + " is out of range (" + range + ")");
+}
+
+}  // namespace
+
+void ChatterParameters::validate() const {
+  bound(revolutions >= 4 && revolutions <= 200, "revolutions", revolutions, "4..200");
+  bound(hop_revolutions >= 1 && hop_revolutions <= revolutions, "hop_revolutions", hop_revolutions,
+        "1..revolutions");
+  bound(energy_ratio > 0.0 && energy_ratio < 1.0, "energy_ratio", energy_ratio, "0 < value < 1");
+  bound(least_severity >= 0.0 && std::isfinite(least_severity), "least_severity", least_severity, ">= 0 N");
+  bound(alternation_ratio > 0.0 && alternation_ratio <= 1.0, "alternation_ratio", alternation_ratio,
+        "0 < value <= 1");
+  bound(path_tolerance > 0.0 && path_tolerance <= 1.0, "path_tolerance", path_tolerance, "0 < value <= 1 m");
+  bound(settle_revolutions >= 0.0 && settle_revolutions <= 1000.0, "settle_revolutions", settle_revolutions,
+        "0..1000");
+  bound(maximum_gap > 0.0 && maximum_gap <= 60.0, "maximum_gap", maximum_gap, "0 < value <= 60 s");
+}
+
+ChatterDetector::ChatterDetector(const ChatterParameters& parameters, Output output)
+    : parameters_(parameters), output_(std::move(output)) {
+  parameters_.validate();
+}
+
+void ChatterDetector::reset() {
+  condition_.reset();
+  samples_.clear();
+  angles_.clear();
+  dropWindow();
+  last_state_ = 0.0;
+  next_index_ = 0;
+  said_invalid_ = false;
+}
+
+void ChatterDetector::dropWindow() {
+  steady_since_.reset();
+  steady_until_.reset();
+  window_start_.reset();
+}
+
+void ChatterDetector::notSteady(double stamp) {
+  dropWindow();
+  if (said_invalid_) return;
+  said_invalid_ = true;
+  ChatterState state;
+  state.stamp = stamp;
+  state.condition = condition_ ? condition_->name : "";
+  output_(state);
+}
+
+void ChatterDetector::handle(const CuttingCondition& condition) {
+  condition_ = condition;
+  said_invalid_ = false;
+  // Turns are counted from here on: the digits of a verdict must not depend on how long the node has run.
+  if (!angles_.empty()) angles_.assign(1, {angles_.back().time, angles_.back().shown, angles_.back().shown});
+  notSteady(condition.stamp);
+}
+
+void ChatterDetector::handle(const CncState& state) {
+  const bool gap = state.stamp - last_state_ > parameters_.maximum_gap;
+  last_state_ = state.stamp;
+  const bool steady = condition_ && condition_->kind == CuttingCondition::Kind::cut && state.connected &&
+                      state.feed > 0.0 && onSteadyPath(*condition_, state, parameters_.path_tolerance);
+  if (!steady || gap) notSteady(state.stamp);
+  if (!steady) return;
+  if (!steady_since_) steady_since_ = state.stamp;
+  steady_until_ = state.stamp;
+  evaluate();
+}
+
+void ChatterDetector::handle(const SpindleAngle& angle) {
+  if (!std::isfinite(angle.angle) || !std::isfinite(angle.speed)) return;
+  if (!angles_.empty() && angle.stamp - angles_.back().time > parameters_.maximum_gap) {
+    angles_.clear();
+    dropWindow();
+  }
+  if (angles_.empty()) {
+    angles_.push_back({angle.stamp, angle.angle, angle.angle});
+    return;
+  }
+  const Angle last = angles_.back();
+  if (!(angle.stamp > last.time)) return;
+  // The speed tells how many full turns lie between two readings.
+  const double expected = last.turned + angle.speed * (angle.stamp - last.time);
+  const double turns = std::round((expected - angle.angle) / units::TWO_PI);
+  angles_.push_back({angle.stamp, std::max(last.turned, angle.angle + units::TWO_PI * turns), angle.angle});
+  evaluate();
+}
+
+void ChatterDetector::handle(const ForceBlock& block) {
+  if (block.status == ForceBlock::Status::settling ||
+      (!samples_.empty() && block.first_index != next_index_)) {
+    samples_.clear();
+    window_start_.reset();
+  }
+  next_index_ = block.first_index + block.force[0].size();
+  if (block.status == ForceBlock::Status::settling) return;
+  for (std::size_t i = 0; i < block.force[0].size(); ++i) {
+    const std::array<double, 3> force{{block.force[0][i], block.force[1][i], block.force[2][i]}};
+    if (!std::isfinite(force[0] + force[1] + force[2])) {
+      samples_.clear();
+      window_start_.reset();
+      continue;
+    }
+    samples_.push_back({block.stamp + static_cast<double>(i) / block.sample_rate, force});
+  }
+  evaluate();
+}
+
+double ChatterDetector::angleAt(double time) const {
+  const auto after = std::lower_bound(angles_.begin() + 1, angles_.end() - 1, time,
+                                      [](const Angle& a, double t) { return a.time < t; });
+  const Angle& b = *after;
+  const Angle& a = *(after - 1);
+  return a.turned + (time - a.time) / (b.time - a.time) * (b.turned - a.turned);
+}
+
+double ChatterDetector::timeAt(double turned) const {
+  const auto after = std::lower_bound(angles_.begin() + 1, angles_.end() - 1, turned,
+                                      [](const Angle& a, double t) { return a.turned < t; });
+  const Angle& b = *after;
+  const Angle& a = *(after - 1);
+  return b.turned > a.turned ? a.time + (turned - a.turned) / (b.turned - a.turned) * (b.time - a.time)
+                             : a.time;
+}
+
+void ChatterDetector::evaluate() {
+  if (!steady_since_) {
+    // Nothing to judge: keep what the next controller state may still declare steady.
+    const double kept = 2.0 * parameters_.maximum_gap;
+    while (!samples_.empty() && samples_.front().time < samples_.back().time - kept) samples_.pop_front();
+    while (angles_.size() > 2 && angles_[1].time < angles_.back().time - kept) angles_.pop_front();
+    return;
+  }
+  if (samples_.size() < 4 || angles_.size() < 2) return;
+  const double first = std::max({*steady_since_, samples_[1].time, angles_.front().time});
+  const double last = std::min({*steady_until_, samples_[samples_.size() - 3].time, angles_.back().time});
+  if (!(last > first)) return;
+  if (!window_start_) window_start_ = angleAt(first) + units::TWO_PI * parameters_.settle_revolutions;
+  const double end = angleAt(last);
+  while (*window_start_ + units::TWO_PI * parameters_.revolutions <= end) {
+    judge(*window_start_, *window_start_ + units::TWO_PI * parameters_.revolutions);
+    *window_start_ += units::TWO_PI * parameters_.hop_revolutions;
+  }
+  const double needed = std::min(timeAt(*window_start_), last) - 0.01;
+  while (samples_.size() > 4 && samples_[2].time < needed) samples_.pop_front();
+  while (angles_.size() > 2 && angles_[1].time < needed) angles_.pop_front();
+}
+
+void ChatterDetector::judge(double from, double to) {
+  const double start = timeAt(from), stop = timeAt(to);
+  const double period = (stop - start) / parameters_.revolutions;
+  const double rate =
+      static_cast<double>(samples_.size() - 1) / (samples_.back().time - samples_.front().time);
+  if (!(period * rate >= 8.0)) return;  // fewer samples a turn carry no harmonics
+  const auto bins = static_cast<std::size_t>(std::ceil(period * rate));
+  const auto turns = static_cast<std::size_t>(parameters_.revolutions);
+  const std::size_t n = bins * turns;
+  ChatterState state;
+  state.stamp = stop;
+  state.condition = condition_->name;
+  state.valid = true;
+  double all = 0.0, outside = 0.0, alternating = 0.0;
+  // Orders of the spindle at which a flip of an even number of teeth lies: odd multiples of half the teeth.
+  const int teeth = condition_->tool.teeth;
+  const std::size_t half = teeth > 0 && teeth % 2 == 0 ? static_cast<std::size_t>(teeth) / 2 : 0;
+  std::vector<double> of_order(bins / 2 + 1, 0.0);
+  std::vector<double> power(n / 2 + 1, 0.0);
+  const std::vector<double> taper = hannWindow(n);
+  std::vector<double> outside_of_turn(turns, 0.0);
+  std::vector<double> times(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    times[i] = timeAt(from + units::TWO_PI * static_cast<double>(i) / static_cast<double>(bins));
+  }
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    std::vector<double> force(n);
+    for (std::size_t i = 0; i < n; ++i) {
+      const double place = (times[i] - samples_.front().time) * rate;
+      const auto at = static_cast<std::size_t>(
+          std::clamp(std::floor(place), 1.0, static_cast<double>(samples_.size() - 3)));
+      force[i] =
+          catmullRom(samples_[at - 1].force[axis], samples_[at].force[axis], samples_[at + 1].force[axis],
+                     samples_[at + 2].force[axis], place - static_cast<double>(at));
+    }
+    double mean = 0.0;
+    std::vector<double> repeated(bins, 0.0);
+    for (std::size_t i = 0; i < n; ++i) {
+      mean += force[i] / static_cast<double>(n);
+      repeated[i % bins] += force[i] / static_cast<double>(turns);
+    }
+    // The mean over the turns takes one part in `turns` of whatever does not repeat with it.
+    const double share = static_cast<double>(turns) / static_cast<double>(turns - 1);
+    for (std::size_t i = 0; i < n; ++i) {
+      all += (force[i] - mean) * (force[i] - mean) / static_cast<double>(n);
+      force[i] -= repeated[i % bins];
+      outside += share * force[i] * force[i] / static_cast<double>(n);
+      outside_of_turn[i / bins] += share * force[i] * force[i] / static_cast<double>(bins);
+      force[i] *= taper[i];
+    }
+    if (half > 0) {
+      const auto orders = fourier(repeated);
+      for (std::size_t k = half; 2 * k < bins; k += 2 * half) {
+        of_order[k] += 2.0 * std::norm(orders[k]) / std::pow(static_cast<double>(bins), 2);
+        alternating += 2.0 * std::norm(orders[k]) / std::pow(static_cast<double>(bins), 2);
+      }
+    }
+    const auto spectrum = fourier(force);
+    for (std::size_t k = 0; k < power.size(); ++k) power[k] += std::norm(spectrum[k]);
+  }
+  state.alternation = all > 0.0 ? std::min(1.0, alternating / all) : 0.0;
+  const bool flip = state.alternation > parameters_.alternation_ratio && alternating > outside;
+  const double chatter_energy = flip ? outside + alternating : outside;
+  state.energy_ratio = all > 0.0 ? std::min(1.0, chatter_energy / all) : 0.0;
+  state.severity = std::sqrt(chatter_energy);
+  const auto peak =
+      static_cast<std::size_t>(std::max_element(power.begin() + 1, power.end() - 1) - power.begin());
+  // Vertex of the parabola through the logarithms: exact to a few percent of a line under a Hann window.
+  const double a = std::log(power[peak - 1] + 1e-300), b = std::log(power[peak] + 1e-300),
+               c = std::log(power[peak + 1] + 1e-300);
+  const double curve = a - 2.0 * b + c;
+  const double shift = curve < 0.0 ? std::clamp(0.5 * (a - c) / curve, -0.5, 0.5) : 0.0;
+  state.frequency = (static_cast<double>(peak) + shift) / (stop - start);
+  if (flip)
+    state.frequency =
+        static_cast<double>(std::max_element(of_order.begin(), of_order.end()) - of_order.begin()) / period;
+  // What dies out within the window is a transient (an entry), not chatter.
+  constexpr double DIES = 0.7;
+  double early = 0.0, late = 0.0;
+  for (std::size_t k = 0; k < turns; ++k) (2 * k < turns ? early : late) += outside_of_turn[k];
+  const bool dies = !flip && late < DIES * early;
+  state.chatter =
+      !dies && state.energy_ratio > parameters_.energy_ratio && state.severity > parameters_.least_severity;
+  if (state.chatter) {
+    // A flip repeats: it was there from the window's beginning, as far as this window tells.
+    std::size_t turn = flip ? 0 : turns - 1;
+    while (turn > 0 && outside_of_turn[turn - 1] > parameters_.energy_ratio * all) --turn;
+    state.onset = times[turn * bins];
+  }
+  said_invalid_ = false;
+  output_(state);
+}
+
+ForceBlock signalBlock(const SampleBlock& block) {
+  if (block.channels.empty()) throw Error("chatter detection: a sample block without channels");
+  ForceBlock signal;
+  signal.stamp = block.stamp;
+  signal.sample_rate = block.sample_rate;
+  signal.first_index = block.first_index;
+  signal.status = ForceBlock::Status::compensated;
+  for (std::size_t c = 0; c < 3; ++c) {
+    signal.force[c].assign(block.size(), 0.0);
+    if (c >= block.channels.size()) continue;
+    for (std::size_t i = 0; i < block.size(); ++i) signal.force[c][i] = block.at(i, c);
+  }
+  return signal;
+}
+
+SortedDetection::SortedDetection(const ChatterParameters& parameters, double hold_back,
+                                 ChatterDetector::Output output)
+    : detector_(parameters, std::move(output)),
+      sorter_(hold_back),
+      conditions_(sorter_.addEvents("cut/condition")),
+      states_(sorter_.addRegular("cnc/state")),
+      angles_(sorter_.addRegular("spindle/angle")),
+      blocks_(sorter_.addRegular("force/compensated")) {
+}
+
+void SortedDetection::watch(double stamp) {
+  if (stamp < newest_ - RESTART) {
+    sorter_.reset();
+    detector_.reset();
+    newest_ = stamp;
+    // The condition of the new run may have come before its first sample.
+    if (last_condition_ && last_condition_->stamp <= stamp + RESTART)
+      push(CuttingCondition(*last_condition_));
+  }
+  newest_ = std::max(newest_, stamp);
+}
+
+void SortedDetection::push(const CuttingCondition& condition) {
+  // A latched condition is older than the data around it: no restart.
+  last_condition_ = condition;
+  sorter_.push(conditions_, condition.stamp, [this, condition] { detector_.handle(condition); });
+}
+
+void SortedDetection::push(const CncState& state) {
+  watch(state.stamp);
+  sorter_.push(states_, state.stamp, [this, state] { detector_.handle(state); });
+}
+
+void SortedDetection::push(const SpindleAngle& angle) {
+  watch(angle.stamp);
+  sorter_.push(angles_, angle.stamp, [this, angle] { detector_.handle(angle); });
+}
+
+void SortedDetection::push(const ForceBlock& block) {
+  watch(block.stamp);
+  sorter_.push(blocks_, block.stamp, [this, block] { detector_.handle(block); });
+}
+
+}  // namespace smartmill::stability

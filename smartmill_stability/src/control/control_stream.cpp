@@ -1,0 +1,70 @@
+#include "smartmill_stability/control/control_stream.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/units.h"
+
+namespace smartmill::stability {
+
+void ControlStreamParameters::validate() const {
+  if (!(integrator_corner > 0.0))
+    throw Error("integrator_corner: " + std::to_string(integrator_corner) + " is out of range (> 0 Hz)");
+  if (!(speed_tolerance > 0.0))
+    throw Error("speed_tolerance: " + std::to_string(speed_tolerance) + " is out of range (> 0)");
+  controller.validate();
+}
+
+ControlStream::ControlStream(const ControlStreamParameters& parameters, Learnt learnt)
+    : parameters_(parameters), learnt_(std::move(learnt)) {
+  parameters_.validate();
+}
+
+void ControlStream::handle(const SpindleAngle& angle) {
+  if (!(angle.speed > 0.0) || std::abs(angle.speed - speed_) <= parameters_.speed_tolerance * speed_) return;
+  speed_ = angle.speed;
+  controller_.reset();
+}
+
+std::optional<SampleBlock> ControlStream::handle(const SampleBlock& block) {
+  const std::size_t deflection = block.channel(parameters_.deflection_channel);
+  const std::size_t tool = block.channel(parameters_.tool_channel);
+  const std::string& unit = block.units.at(deflection);
+  if (unit != "m" && unit != "m/s2")
+    throw Error("channel " + parameters_.deflection_channel + " has the unit " + unit + ", m or m/s2 is due");
+  if (block.units.at(tool) != "m")
+    throw Error("channel " + parameters_.tool_channel + " has the unit " + block.units.at(tool) +
+                ", m is due");
+  if (!(speed_ > 0.0)) return std::nullopt;
+  if (!controller_ || block.first_index != next_index_ || block.stamp < last_stamp_ ||
+      block.sample_rate != rate_) {
+    ControllerParameters controller = parameters_.controller;
+    controller.rate = block.sample_rate;
+    controller.period = units::TWO_PI / speed_;
+    controller_.emplace(controller);
+    integrator_.reset();
+    if (unit == "m/s2") integrator_.emplace(parameters_.integrator_corner, block.sample_rate);
+    rate_ = block.sample_rate;
+  }
+  next_index_ = block.first_index + block.size();
+  last_stamp_ = block.stamp;
+  SampleBlock commands;
+  commands.stamp = block.stamp;
+  commands.sample_rate = block.sample_rate;
+  commands.first_index = block.first_index;
+  commands.channels = {"command"};
+  commands.units = {"m"};
+  for (std::size_t i = 0; i < block.size(); ++i) {
+    const double measured = block.at(i, deflection);
+    const std::size_t before = controller_->segments().size();
+    commands.samples.push_back(
+        controller_->step(integrator_ ? integrator_->step(measured) : measured, block.at(i, tool)));
+    if (controller_->segments().size() > before && learnt_)
+      learnt_({block.timeOf(i), controller_->beliefs().back(), controller_->active(),
+               controller_->segments().back().informed});
+  }
+  return commands;
+}
+
+}  // namespace smartmill::stability

@@ -1,0 +1,275 @@
+#include "smartmill_stability/control/turning_control.h"
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+
+#include "smartmill_core/error.h"
+#include "smartmill_stability/solvers/solver.h"
+
+namespace smartmill::stability {
+namespace {
+
+void require(bool good, const char* what, double value) {
+  if (!good || !std::isfinite(value))
+    throw Error(std::string("turning: ") + what + " " + std::to_string(value) + " is impossible");
+}
+
+ModalModel modalModel(const SecondOrder& model) {
+  return {{{model.frequency / units::TWO_PI, model.damping_ratio, model.gain}}, 0.0};
+}
+
+}  // namespace
+
+void TurningProcess::validate() const {
+  require(stiffness_ratio > 0.0, "stiffness ratio", stiffness_ratio);
+  require(damping_ratio > 0.0 && damping_ratio < 1.0, "damping ratio", damping_ratio);
+  require(natural_frequency > 0.0, "natural frequency [rad/s]", natural_frequency);
+  require(overlap >= 0.0 && overlap <= 1.0, "overlap", overlap);
+  require(period > 0.0, "period [s]", period);
+}
+
+double merrittLimit(double damping_ratio) {
+  return 2.0 * damping_ratio * (1.0 + damping_ratio);
+}
+
+double criticalFrequency(double natural_frequency, double damping_ratio) {
+  return natural_frequency * std::sqrt(1.0 + 2.0 * damping_ratio);
+}
+
+double growthRate(const TurningProcess& process) {
+  process.validate();
+  // One mode of unit stiffness along x; a depth of one metre cuts with the stiffness ratio.
+  RegenerativeSystem system;
+  system.cut = Cut::turning;
+  system.entry = 0.5 * units::PI;
+  system.kr = process.stiffness_ratio;
+  system.overlap = process.overlap;
+  system.modes = systemModes(
+      ModalModel{{{process.natural_frequency / units::TWO_PI, process.damping_ratio, 1.0}}, 0.0}, 0);
+  const auto solver = makeFloquetSolver(Method::collocation, system);
+  return std::log(solver->multiplier(units::TWO_PI / process.period, 1.0).radius()) / process.period;
+}
+
+std::complex<double> SecondOrder::response(double w) const {
+  return gain * frequency * frequency /
+         std::complex<double>(frequency * frequency - w * w, 2.0 * damping_ratio * frequency * w);
+}
+
+std::complex<double> secantUpdate(std::complex<double> g_1, std::complex<double> g_2,
+                                  std::complex<double> h_w, std::complex<double> h_1,
+                                  std::complex<double> h_2) {
+  return g_1 + (h_w - h_1) / (h_1 - h_2) * (g_1 - g_2);
+}
+
+double residualMargin(const SecondOrder& machine, const SecondOrder& controller) {
+  double least = 0.0;
+  const auto look = [&](double w) {
+    least = std::min(least, (machine.response(w) - controller.response(w)).real());
+  };
+  for (const SecondOrder* model : {&machine, &controller}) {
+    if (model->frequency <= 0.0) continue;
+    // Dense within many half-power bandwidths, coarse elsewhere.
+    constexpr int DENSE = 200, COARSE = 100;
+    for (int i = -DENSE; i <= DENSE; ++i)
+      look(std::abs(model->frequency *
+                    (1.0 + 20.0 * model->damping_ratio * std::pow(static_cast<double>(i) / DENSE, 3))));
+    for (int i = 0; i <= COARSE; ++i) look(3.0 * model->frequency * i / COARSE);
+  }
+  return least;
+}
+
+double worstMargin(const SecondOrder& machine, const SecondOrder& controller) {
+  double worst = residualMargin(machine, controller);
+  // Of the relative quantities, which have one size.
+  const Eigen::Vector3d mean(machine.gain, machine.frequency, machine.damping_ratio);
+  if (mean.minCoeff() <= 0.0) return worst;
+  const Eigen::Matrix3d relative =
+      mean.cwiseInverse().asDiagonal() * machine.covariance * mean.cwiseInverse().asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(relative);
+  for (int k = 0; k < 3; ++k) {
+    const Eigen::Vector3d off =
+        2.0 * std::sqrt(std::max(0.0, axes.eigenvalues()[k])) * axes.eigenvectors().col(k);
+    for (const double sign : {-1.0, 1.0}) {
+      SecondOrder other = machine;
+      other.gain *= std::max(0.05, 1.0 + sign * off[0]);
+      other.frequency *= std::max(0.05, 1.0 + sign * off[1]);
+      other.damping_ratio *= std::max(0.05, 1.0 + sign * off[2]);
+      worst = std::min(worst, residualMargin(other, controller));
+    }
+  }
+  return worst;
+}
+
+void ControllerParameters::validate() const {
+  const double ratio = rate / estimator.sample_rate;
+  require(estimator.sample_rate > 0.0, "estimator sample rate [Hz]", estimator.sample_rate);
+  require(ratio >= 1.0 && std::abs(ratio - std::round(ratio)) < 1e-9, "rate over the estimator's", ratio);
+  require(period > 2.0 / rate, "period [s]", period);
+  require(overlap >= 0.0 && overlap <= 1.0, "overlap", overlap);
+  require(drift >= 0.0, "drift", drift);
+  require(margin > -0.5 && margin < 0.0, "margin", margin);
+}
+
+AdaptiveChatterController::AdaptiveChatterController(const ControllerParameters& parameters)
+    : parameters_(parameters) {
+  parameters_.validate();
+}
+
+double AdaptiveChatterController::pastMotion() const {
+  // motion_[0] is the newest: this sample's.
+  const double back = parameters_.period * parameters_.rate;
+  const auto i = static_cast<std::size_t>(back);
+  if (i + 1 >= motion_.size()) return 0.0;  // nothing was cut before
+  const double share = back - static_cast<double>(i);
+  return motion_[i] + share * (motion_[i + 1] - motion_[i]);
+}
+
+double AdaptiveChatterController::step(double deflection, double tool) {
+  motion_.push_front(deflection - tool);
+  const auto longest = static_cast<std::size_t>(parameters_.period * parameters_.rate) + 3;
+  if (motion_.size() > longest) motion_.pop_back();
+  const double chip = parameters_.chip - motion_.front() + parameters_.overlap * pastMotion();
+  chips_.push_front(chip);
+  // Memory of a lightly damped machine, for the start of a new filter.
+  constexpr double MEMORY = 1.0;  // [s]
+  if (chips_.size() > static_cast<std::size_t>(MEMORY * parameters_.rate)) chips_.pop_back();
+
+  const int decimation = static_cast<int>(std::lround(parameters_.rate / parameters_.estimator.sample_rate));
+  if (phase_ == 0) {
+    segment_chip_.push_back(chip);
+    segment_deflection_.push_back(deflection);
+  }
+  phase_ = (phase_ + 1) % decimation;
+  if (filter_) filter_->step(chip);
+  if (phase_ == 0 && static_cast<int>(segment_chip_.size()) == parameters_.estimator.segment) {
+    learn();
+    segment_chip_.clear();
+    segment_deflection_.clear();
+  }
+  // The command lasts to the next sample: the machine's answer there, chip thickness going on as it went.
+  if (!filter_) return 0.0;
+  return filter_->peek(chips_.size() > 1 ? 2.0 * chips_[0] - chips_[1] : chip);
+}
+
+void AdaptiveChatterController::learn() {
+  const SegmentEstimate found = estimateSegment(segment_chip_, segment_deflection_, parameters_.estimator,
+                                                believed_.gain > 0.0 ? &believed_ : nullptr);
+  segments_.push_back(found);
+  if (found.informed) {
+    if (believed_.gain == 0.0) {
+      believed_ = found.model;
+    } else {
+      // Belief and news, each with its covariance; the machine may have drifted meanwhile.
+      Eigen::Vector3d old(believed_.gain, believed_.frequency, believed_.damping_ratio);
+      const Eigen::Vector3d fresh(found.model.gain, found.model.frequency, found.model.damping_ratio);
+      Eigen::Matrix3d covariance = believed_.covariance;
+      covariance.diagonal() +=
+          (parameters_.drift * Eigen::Vector3d(old[0], 0.1 * old[1], old[2])).cwiseAbs2();
+      const Eigen::Matrix3d weight = covariance * (covariance + found.model.covariance).inverse();
+      old += weight * (fresh - old);
+      believed_.gain = old[0];
+      believed_.frequency = old[1];
+      believed_.damping_ratio = std::clamp(old[2], 1e-4, 0.9);
+      believed_.covariance = (Eigen::Matrix3d::Identity() - weight) * covariance;
+    }
+  }
+  beliefs_.push_back(believed_);
+  if (believed_.gain <= 0.0 || !found.informed) return;
+  // Guard of stability (eq. 10): the old controller stays unless the new one bears the uncertainty better.
+  SecondOrder best = active_;
+  double margin = active_.gain > 0.0 ? worstMargin(believed_, active_) : -1e300;
+  SecondOrder candidate = believed_;
+  for (const double share : {1.0, 0.9, 0.8, 0.7}) {
+    candidate.gain = share * believed_.gain;
+    const double m = worstMargin(believed_, candidate);
+    if (m > margin) {
+      margin = m;
+      best = candidate;
+    }
+  }
+  if (margin >= parameters_.margin || margin > worstMargin(believed_, SecondOrder())) activate(best);
+}
+
+void AdaptiveChatterController::activate(const SecondOrder& model) {
+  active_ = model;
+  filter_ = std::make_unique<ModalFilter>(modalModel(model), parameters_.rate, Hold::first_order);
+  // Into the motion that the machine is in.
+  filter_->reset(parameters_.chip);
+  for (auto chip = chips_.rbegin(); chip != chips_.rend(); ++chip) filter_->step(*chip);
+}
+
+ControlLaw displacementErrorControl(double gain, double bandwidth, double rate) {
+  const double share = 1.0 - std::exp(-units::TWO_PI * bandwidth / rate);
+  return [gain, share, at = 0.0](double deflection, double tool) mutable {
+    at += share * (gain * (deflection - tool) - at);
+    return at;
+  };
+}
+
+ControlLaw forceFeedbackControl(const SecondOrder& model, const TurningProcess& process, double rate) {
+  const auto filter = std::make_shared<ModalFilter>(modalModel(model), rate, Hold::first_order);
+  const auto motion = std::make_shared<std::deque<double>>();
+  const double back = process.period * rate;
+  return [=, before = process.chip](double deflection, double tool) mutable {
+    motion->push_front(deflection - tool);
+    const auto i = static_cast<std::size_t>(back);
+    double past = 0.0;
+    if (i + 1 < motion->size()) {
+      past = (*motion)[i] + (back - static_cast<double>(i)) * ((*motion)[i + 1] - (*motion)[i]);
+      if (motion->size() > i + 3) motion->pop_back();
+    }
+    const double chip = process.chip - motion->front() + process.overlap * past;
+    filter->step(chip);
+    const double command = filter->peek(2.0 * chip - before);
+    before = chip;
+    return command;
+  };
+}
+
+AccelerationIntegrator::AccelerationIntegrator(double corner, double rate)
+    // 1 / (s^2 + sqrt(2) w s + w^2): 1 / s^2 above the corner.
+    : filter_(ModalModel{{{corner, 0.5 * std::sqrt(2.0), 1.0 / std::pow(units::TWO_PI * corner, 2)}}, 0.0},
+              rate, Hold::first_order) {
+}
+
+double AccelerationIntegrator::step(double acceleration) {
+  return filter_.step(acceleration);
+}
+
+TurningRun simulateTurning(const TurningProcess& process, double duration, double rate, double noise_rms,
+                           unsigned seed, const ControlLaw& law) {
+  process.validate();
+  require(duration > 0.0, "duration [s]", duration);
+  require(rate * process.period > 2.0, "rate x period", rate * process.period);
+  const SecondOrder machine{process.stiffness_ratio, process.natural_frequency, process.damping_ratio};
+  ModalFilter filter(modalModel(machine), rate, Hold::first_order);
+  const double direct =
+      filter.peek(1.0) - filter.peek(0.0);  // of this sample's chip on this sample's deflection
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> noise(0.0, 1.0);
+  TurningRun run;
+  const auto samples = static_cast<std::size_t>(duration * rate);
+  run.time.reserve(samples);
+  const double back = process.period * rate;
+  const auto whole = static_cast<std::size_t>(back);
+  const double share = back - static_cast<double>(whole);
+  double tool = 0.0;
+  for (std::size_t i = 0; i < samples; ++i) {
+    double past = 0.0;
+    if (i > whole) past = run.motion[i - whole] + share * (run.motion[i - whole - 1] - run.motion[i - whole]);
+    // deflection = free + direct chip and chip = a0 - (deflection - tool) + mu past, at once.
+    const double chip = (process.chip + tool - filter.peek(0.0) + process.overlap * past) / (1.0 + direct);
+    const double deflection = filter.step(chip);
+    run.time.push_back(static_cast<double>(i) / rate);
+    run.motion.push_back(deflection - tool);
+    run.deflection.push_back(deflection);
+    if (law) tool = law(deflection + noise_rms * noise(random), tool + noise_rms * noise(random));
+  }
+  return run;
+}
+
+}  // namespace smartmill::stability

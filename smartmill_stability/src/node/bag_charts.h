@@ -1,0 +1,24 @@
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "node/parameters_ros.h"
+
+namespace smartmill::stability {
+
+/// What the node would have published.
+struct BagCharts {
+  std::optional<Chart> chart;  ///< the last one
+  std::string missing;         ///< why there is none
+  std::vector<ChatterState> states;
+};
+
+/// Puts tool/frf, tool/modes, material/coefficients and the streams of the cuts in a bag through the classes
+/// of the node. @throws Error as BagReader; when the data contradict each other.
+BagCharts chartsFromBag(const std::string& path, const MachineModel& model, const NodeParameters& parameters,
+                        const std::function<void(double)>& progress = {});
+
+}  // namespace smartmill::stability

@@ -1,0 +1,232 @@
+#include "node/node.h"
+
+#include <smartmill_msgs/ChatterAdvice.h>
+#include <smartmill_msgs/ChatterState.h>
+#include <smartmill_msgs/StabilityChart.h>
+#include <boost/function.hpp>
+
+#include <type_traits>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/model/machine_model.h"
+#include "smartmill_ros/conversions.h"
+
+namespace smartmill::stability {
+namespace {
+
+constexpr int QUEUE = 2000;  // 20 s of blocks
+
+smartmill_msgs::StabilityPoint toMsg(const ChartPoint& point) {
+  smartmill_msgs::StabilityPoint message;
+  message.spindle_speed = point.spindle_speed;
+  message.axial_depth = point.axial_depth;
+  message.depth_limit = point.depth_limit;
+  message.chatter_frequency = point.chatter_frequency;
+  message.torque = point.torque;
+  message.power = point.power;
+  message.material_removal_rate = point.material_removal_rate;
+  return message;
+}
+
+smartmill_msgs::StabilityChart toMsg(const Chart& chart, const ChartParameters& parameters) {
+  smartmill_msgs::StabilityChart message;
+  message.header.stamp = fromSec(chart.stamp);
+  message.tool = chart.tool;
+  message.material = chart.material;
+  message.method = chart.method;
+  message.entry_angle = parameters.entry;
+  message.exit_angle = parameters.exit;
+  message.feed_per_tooth = parameters.feed_per_tooth;
+  message.spindle_speed = chart.limit.spindle_speed;
+  message.depth_limit = chart.limit.depth;
+  message.chatter_frequency = chart.limit.chatter_frequency;
+  message.torque_depth_limit = chart.torque_depth_limit;
+  message.power_depth_limit = chart.power_depth_limit;
+  message.absolute_depth_limit = chart.absolute_depth_limit;
+  for (const ChartPoint& point : chart.recommended) message.recommended.push_back(toMsg(point));
+  for (const ChartPoint& point : chart.unstable) message.unstable.push_back(toMsg(point));
+  return message;
+}
+
+}  // namespace
+
+StabilityNode::StabilityNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
+    : parameters_([&] {
+        ParameterReader reader = ParameterReader::fromServer(private_nh);
+        return readParameters(reader);
+      }()),
+      maker_(parameters_.chart, readMachineModel(parameters_.model)),
+      detection_(parameters_.chatter, parameters_.hold_back,
+                 [this](const ChatterState& state) {
+                   publish(state);
+                   try {
+                     advisor_.handle(state);
+                   } catch (const Error& error) {
+                     ROS_ERROR("chatter advice: %s", error.what());
+                   }
+                 }),
+      advisor_(
+          parameters_.chart.speed_low, maker_.highestSpeed(), maker_.teeth(),
+          [this](const CuttingCondition& condition) { return maker_.system(condition.engagement); },
+          [this](const ChatterAdvice& advice) { publish(advice); }),
+      last_input_(ros::WallTime::now()),
+      diagnostics_(ros::NodeHandle(), private_nh) {
+  chart_ = nh.advertise<smartmill_msgs::StabilityChart>("stability/chart", 1, true);
+  chatter_ = nh.advertise<smartmill_msgs::ChatterState>("chatter/state", 100);
+  advice_ = nh.advertise<smartmill_msgs::ChatterAdvice>("chatter/advice", 10, true);
+  predict_ = nh.advertiseService("stability/predict", &StabilityNode::predict, this);
+  subscribe<smartmill_msgs::Frf>(nh, "tool/frf", &StabilityNode::measured);
+  subscribe<smartmill_msgs::ModalModel>(nh, "tool/modes", &StabilityNode::measured);
+  subscribe<smartmill_msgs::CuttingCoefficients>(nh, "material/coefficients", &StabilityNode::measured);
+  subscribe<smartmill_msgs::CuttingCondition>(nh, "cut/condition", &StabilityNode::stream);
+  subscribe<smartmill_msgs::CncState>(nh, "cnc/state", &StabilityNode::stream);
+  subscribe<smartmill_msgs::SpindleAngle>(nh, "spindle/angle", &StabilityNode::stream);
+  if (parameters_.chatter_signal == "force") {
+    subscribe<smartmill_msgs::ForceBlock>(nh, "force/compensated", &StabilityNode::stream);
+  } else {
+    const std::string topic = "daq/" + parameters_.chatter_signal;
+    subscribe<smartmill_msgs::SampleBlock>(nh, topic.c_str(), &StabilityNode::stream);
+  }
+  diagnostics_.setHardwareID("none");
+  diagnostics_.add("stability chart", this, &StabilityNode::diagnoseChart);
+  diagnostics_.add("chatter detection", this, &StabilityNode::diagnoseChatter);
+  timer_ = nh.createWallTimer(ros::WallDuration(0.2), [this](const ros::WallTimerEvent&) { watch(); });
+}
+
+template <typename Message>
+void StabilityNode::subscribe(ros::NodeHandle& nh, const char* topic,
+                              void (StabilityNode::*use)(const Message&)) {
+  const boost::function<void(const Message&)> callback = [this, use](const Message& message) {
+    try {
+      (this->*use)(message);
+    } catch (const Error& error) {
+      ROS_ERROR_THROTTLE(5.0, "%s", error.what());
+    }
+  };
+  subscribers_.push_back(
+      nh.subscribe<Message>(topic, QUEUE, callback, ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay()));
+}
+
+template <typename Message>
+void StabilityNode::measured(const Message& message) {
+  maker_.handle(fromMsg(message));
+  chart_problem_.clear();
+  if (!maker_.missing().empty()) return;
+  try {
+    chart_.publish(toMsg(maker_.chart(), parameters_.chart));
+  } catch (const Error& error) {
+    chart_problem_ = error.what();
+    throw;
+  }
+}
+
+template <typename Message>
+void StabilityNode::stream(const Message& message) {
+  last_input_ = ros::WallTime::now();
+  flushed_ = false;
+  if constexpr (std::is_same_v<Message, smartmill_msgs::CuttingCondition>) advisor_.handle(fromMsg(message));
+  detection_.push(fromMsg(message));
+}
+
+void StabilityNode::publish(const ChatterState& state) {
+  last_state_ = state;
+  smartmill_msgs::ChatterState message;
+  message.header.stamp = fromSec(state.stamp);
+  message.condition = state.condition;
+  message.valid = state.valid;
+  message.chatter = state.chatter;
+  message.frequency = state.frequency;
+  message.energy_ratio = state.energy_ratio;
+  message.severity = state.severity;
+  chatter_.publish(message);
+}
+
+void StabilityNode::publish(const ChatterAdvice& advice) {
+  smartmill_msgs::ChatterAdvice message;
+  message.header.stamp = fromSec(advice.stamp);
+  message.condition = advice.episode.condition;
+  message.frequency = advice.episode.frequency;
+  message.severity = advice.episode.severity;
+  message.onset = advice.episode.onset;
+  for (const ChatterAdvice::Speed& s : advice.speeds) {
+    smartmill_msgs::StabilityPoint point;
+    point.spindle_speed = s.speed;
+    point.axial_depth = advice.depth;
+    point.depth_limit = s.limit;
+    point.chatter_frequency = s.frequency;
+    message.speeds.push_back(point);
+  }
+  message.corrected = advice.correction.has_value();
+  if (advice.correction) {
+    const std::size_t in_x = maker_.modesInX(), mode = advice.correction->mode;
+    message.direction = mode < in_x ? "x" : "y";
+    message.mode = static_cast<std::uint32_t>(mode < in_x ? mode : mode - in_x);
+    message.believed_frequency = advice.believed_frequency;
+    message.corrected_frequency = advice.correction->frequency;
+    message.believed_depth_limit = advice.believed_limit;
+    message.corrected_depth_limit = advice.corrected_limit;
+  }
+  advice_.publish(message);
+}
+
+bool StabilityNode::predict(smartmill_msgs::PredictStability::Request& request,
+                            smartmill_msgs::PredictStability::Response& response) {
+  using Response = smartmill_msgs::PredictStability::Response;
+  const std::string missing = maker_.missing();
+  if (!missing.empty()) {
+    response.code = Response::NO_CHART;
+    response.message = "no chart yet, missing: " + missing;
+    return true;
+  }
+  try {
+    const Prediction prediction = maker_.predict(request.spindle_speed, request.axial_depth);
+    response.code = Response::OK;
+    response.stable = prediction.stable;
+    response.within_spindle_limits = prediction.within_spindle_limits;
+    response.point = toMsg(prediction.point);
+    response.message = prediction.stable ? "stable" : "unstable";
+  } catch (const Error& error) {
+    response.code = Response::BAD_REQUEST;
+    response.message = error.what();
+  }
+  return true;
+}
+
+void StabilityNode::watch() {
+  // End of data: nothing more will come to release what waits.
+  if (!flushed_ && (ros::WallTime::now() - last_input_).toSec() > parameters_.input_timeout) {
+    detection_.flush();
+    flushed_ = true;
+  }
+  diagnostics_.update();
+}
+
+void StabilityNode::diagnoseChart(diagnostic_updater::DiagnosticStatusWrapper& status) {
+  const std::string missing = maker_.missing();
+  if (!missing.empty()) {
+    status.summary(diagnostic_msgs::DiagnosticStatus::OK, "waiting for " + missing);
+  } else if (!chart_problem_.empty()) {
+    status.summary(diagnostic_msgs::DiagnosticStatus::ERROR, chart_problem_);
+  } else {
+    status.summary(diagnostic_msgs::DiagnosticStatus::OK, "chart published");
+  }
+}
+
+void StabilityNode::diagnoseChatter(diagnostic_updater::DiagnosticStatusWrapper& status) {
+  const double silent = (ros::WallTime::now() - last_input_).toSec();
+  if (silent > parameters_.input_timeout) {
+    status.summary(diagnostic_msgs::DiagnosticStatus::STALE, "no input");
+  } else if (last_state_.chatter) {
+    status.summary(diagnostic_msgs::DiagnosticStatus::WARN, "chatter in " + last_state_.condition);
+  } else {
+    status.summary(diagnostic_msgs::DiagnosticStatus::OK,
+                   last_state_.valid ? "no chatter" : "not cutting steadily");
+  }
+  status.add("energy ratio [1]", last_state_.energy_ratio);
+  status.add("severity [N]", last_state_.severity);
+  status.add("frequency [Hz]", last_state_.frequency);
+  status.add("inputs out of order", detection_.late());
+  status.add("waiting for", detection_.waitingFor());
+}
+
+}  // namespace smartmill::stability

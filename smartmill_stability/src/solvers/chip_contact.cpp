@@ -1,0 +1,376 @@
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/LU>
+
+#include "smartmill_core/cutting/tool.h"
+#include "smartmill_core/error.h"
+#include "smartmill_stability/solvers/delayed_system.h"
+#include "solvers/floquet.h"
+
+// Contact of the teeth about the forced vibration. Along the axis the tool is cut into slices, a revolution
+// into cells. Where a tooth's chip against the tooth m places before it is the thinnest of all and positive,
+// it cuts, and what it meets was left m teeth ago. The forced vibration is linear once the contact is known
+// (harmonic balance over a revolution), and the contact follows from the vibration: Newton's method of a
+// function in linear pieces, which ends when the contact repeats.
+
+namespace smartmill::stability {
+namespace {
+
+using Complex = std::complex<double>;
+using Eigen::Index;
+using Eigen::MatrixXcd;
+using Eigen::VectorXcd;
+using units::PI;
+using units::TWO_PI;
+
+constexpr int CELLS = 384;          // of a revolution
+constexpr double SLICE_LAG = 0.03;  // [rad] lag of the edge over a slice
+constexpr int WAVE_SLICES = 20;     // a serration's wave
+constexpr int MOST_SLICES = 60;
+constexpr int MOST_ITERATIONS = 30;
+constexpr std::size_t MOST_BREAKS = 80;  // more: the slices themselves smooth the feedback
+
+double wrap(double angle) {
+  angle = std::fmod(angle, TWO_PI);
+  return angle < 0.0 ? angle + TWO_PI : angle;
+}
+
+/// A stretch of one tooth's slice in cut.
+struct Stretch {
+  double begin, end;  ///< [s] may reach beyond the period
+  std::size_t delay;
+};
+
+class Contact {
+ public:
+  Contact(const RegenerativeSystem& system, double speed, double depth)
+      : system_(system), chip_(*system.chip), speed_(speed), period_(TWO_PI / speed), teeth_(system.teeth) {
+    const ToolGeometry tool{system.teeth, system.diameter, system.helix, system.pitch};
+    const double lag = system.helix > 0.0 ? tool.lag() : 0.0;
+    double wanted = std::max(1.0, lag * depth / SLICE_LAG);
+    if (chip_.serration_amplitude > 0.0)
+      wanted = std::max(wanted, WAVE_SLICES * depth / chip_.serration_wavelength);
+    slices_ = std::min(MOST_SLICES, static_cast<int>(std::ceil(wanted)));
+    height_ = depth / slices_;
+    for (int s = 0; s < slices_; ++s) {
+      const double z = (s + 0.5) * height_;
+      for (int k = 0; k < teeth_; ++k) {
+        double offset = chip_.radius_offset.empty() ? 0.0 : chip_.radius_offset[static_cast<std::size_t>(k)];
+        if (chip_.serration_amplitude > 0.0)
+          offset += chip_.serration_amplitude *
+                    std::sin(TWO_PI * (z / chip_.serration_wavelength + static_cast<double>(k) / teeth_));
+        offset_.push_back(offset);
+        angle_.push_back(tool.toothAngle(k) - lag * z);
+      }
+    }
+    for (int k = 0; k < teeth_; ++k) {
+      double pitch = 0.0;
+      for (int m = 1; m <= teeth_; ++m) {
+        // Tooth k + 1 passed before tooth k.
+        pitch += system.pitchOf((k + m - 1) % teeth_);
+        const double delay = m == teeth_ ? period_ : pitch / speed;
+        std::size_t d = 0;
+        while (d < delays_.size() && std::abs(delays_[d] - delay) > 1e-9 * delay) ++d;
+        if (d == delays_.size()) delays_.push_back(delay);
+        delay_.push_back(d);
+        feed_.push_back(chip_.feed * teeth_ * pitch / TWO_PI);
+      }
+    }
+    bool alike = system.evenPitch();
+    for (const double o : offset_) alike = alike && o == offset_[0];
+    solve(chip_.forced_vibration && !alike && !system.modes.empty());
+  }
+
+  double period() const { return period_; }
+  const std::vector<double>& delays() const { return delays_; }
+  bool staircase() const { return breaks().size() > MOST_BREAKS; }
+
+  std::vector<double> breaks() const {
+    std::vector<double> times;
+    for (const auto& of_edge : stretch_) {
+      for (const Stretch& s : of_edge) {
+        times.push_back(std::fmod(s.begin, period_));
+        times.push_back(std::fmod(s.end, period_));
+      }
+    }
+    std::sort(times.begin(), times.end());
+    times.erase(
+        std::unique(times.begin(), times.end(), [&](double a, double b) { return b - a < 1e-9 * period_; }),
+        times.end());
+    return times;
+  }
+
+  void operator()(double t, double inside, Feedback& feedback) const {
+    feedback.now.setZero();
+    feedback.velocity.setZero();
+    feedback.delayed.assign(delays_.size(), Eigen::Matrix2d::Zero());
+    const double damp = system_.damping_radial > 0.0 || system_.damping_tangential > 0.0
+                            ? 1.0 / (0.5 * speed_ * system_.diameter)
+                            : 0.0;
+    double at = std::fmod(inside, period_);
+    if (at < 0.0) at += period_;
+    for (std::size_t e = 0; e < stretch_.size(); ++e) {
+      for (const Stretch& s : stretch_[e]) {
+        const double shifted = at < s.begin ? at + period_ : at;
+        if (shifted < s.begin || shifted >= s.end) continue;
+        const double angle = angle_[e] + speed_ * t;
+        const Eigen::Matrix2d stiffness = height_ * directional(system_.kt, system_.kr, angle);
+        feedback.now += stiffness;
+        feedback.delayed[s.delay] -= stiffness;
+        if (damp > 0.0)
+          feedback.velocity +=
+              height_ * damp * directional(system_.damping_tangential, system_.damping_radial, angle);
+        break;
+      }
+    }
+  }
+
+ private:
+  std::size_t edge(int s, int k) const { return static_cast<std::size_t>(s * teeth_ + k); }
+  std::size_t pass(int k, int m) const { return static_cast<std::size_t>(k * teeth_ + m - 1); }
+
+  /// Chip of a tooth against the one m places before it, at a cell; u: [axis][cell], before: the same a delay
+  /// ago.
+  double chipAgainst(int s, int k, int m, int cell) const {
+    const std::size_t e = edge(s, k), p = pass(k, m);
+    const double angle = angle_[e] + TWO_PI * (cell + 0.5) / CELLS;
+    const double sine = std::sin(angle), cosine = std::cos(angle);
+    double h = feed_[p] * sine + offset_[e] - offset_[edge(s, (k + m) % teeth_)];
+    if (!motion_.empty()) {
+      const auto i = static_cast<std::size_t>(cell);
+      const auto& before = delayed_motion_[delay_[p]];
+      h += (motion_[0][i] - before[0][i]) * sine + (motion_[1][i] - before[1][i]) * cosine;
+    }
+    return h;
+  }
+
+  /// Which earlier tooth (1 .. teeth) left what a tooth meets, and the chip.
+  std::pair<int, double> meets(int s, int k, int cell) const {
+    std::pair<int, double> best{1, chipAgainst(s, k, 1, cell)};
+    for (int m = 2; m <= teeth_; ++m) {
+      const double h = chipAgainst(s, k, m, cell);
+      if (h < best.second) best = {m, h};
+    }
+    return best;
+  }
+
+  /// Share of a cell of the slice's edge in the arc.
+  double inArc(std::size_t e, int cell) const {
+    const double width = TWO_PI / CELLS, middle = wrap(angle_[e] + width * (cell + 0.5));
+    double share = 0.0;
+    for (const double turn : {-TWO_PI, 0.0, TWO_PI}) {
+      const double from = std::max(middle + turn - 0.5 * width, system_.entry);
+      const double to = std::min(middle + turn + 0.5 * width, system_.exit);
+      share += std::max(0.0, to - from) / width;
+    }
+    return share;
+  }
+
+  using Pattern = std::vector<signed char>;  // [edge * CELLS + cell]: 0 no contact, else m
+
+  Pattern patternOf() const {
+    Pattern pattern(offset_.size() * CELLS, 0);
+    for (int s = 0; s < slices_; ++s) {
+      for (int k = 0; k < teeth_; ++k) {
+        const std::size_t e = edge(s, k);
+        for (int cell = 0; cell < CELLS; ++cell) {
+          if (inArc(e, cell) <= 0.0) continue;
+          const auto [m, h] = meets(s, k, cell);
+          if (h > 0.0) pattern[e * CELLS + static_cast<std::size_t>(cell)] = static_cast<signed char>(m);
+        }
+      }
+    }
+    return pattern;
+  }
+
+  void solve(bool with_motion) {
+    Pattern pattern = patternOf();
+    for (int i = 0; with_motion && i < MOST_ITERATIONS; ++i) {
+      move(pattern, i < MOST_ITERATIONS / 2 ? 1.0 : 0.5);
+      const Pattern next = patternOf();
+      std::size_t changed = 0;
+      for (std::size_t c = 0; c < next.size(); ++c) changed += next[c] != pattern[c];
+      pattern = next;
+      if (changed == 0) break;
+    }
+    stretches(pattern);
+  }
+
+  /// The forced vibration with a contact given; `share` of the way there.
+  void move(const Pattern& pattern, double share) {
+    double highest = 0.0;
+    for (const SystemMode& mode : system_.modes) highest = std::max(highest, mode.frequency);
+    const int most = std::min(90, static_cast<int>(std::ceil(2.0 * highest * period_)) + 8);
+    const Index n = 2 * most + 1;
+    const std::size_t kinds = 1 + delays_.size();
+    // Feedback [kind][cell] and constant force [cell].
+    std::vector<std::vector<Eigen::Matrix2d>> gain(
+        kinds, std::vector<Eigen::Matrix2d>(CELLS, Eigen::Matrix2d::Zero()));
+    std::vector<Eigen::Vector2d> force(CELLS, Eigen::Vector2d::Zero());
+    for (int s = 0; s < slices_; ++s) {
+      for (int k = 0; k < teeth_; ++k) {
+        const std::size_t e = edge(s, k);
+        for (int cell = 0; cell < CELLS; ++cell) {
+          const auto i = static_cast<std::size_t>(cell);
+          const int m = pattern[e * CELLS + i];
+          if (m == 0) continue;
+          const double angle = angle_[e] + TWO_PI * (cell + 0.5) / CELLS;
+          const double sine = std::sin(angle), cosine = std::cos(angle);
+          const Eigen::Matrix2d d = inArc(e, cell) * height_ * directional(system_.kt, system_.kr, angle);
+          const std::size_t p = pass(k, m);
+          gain[0][i] += d;
+          gain[1 + delay_[p]][i] -= d;
+          // directional() is force times normal: times the normal again it is the force of a chip of one.
+          const double h = feed_[p] * sine + offset_[e] - offset_[edge(s, (k + m) % teeth_)];
+          force[i] += d * Eigen::Vector2d(sine, cosine) * h;
+        }
+      }
+    }
+    std::vector<Complex> turn(CELLS);  // exp(-2 pi i j / CELLS)
+    for (int j = 0; j < CELLS; ++j) turn[static_cast<std::size_t>(j)] = std::polar(1.0, -TWO_PI * j / CELLS);
+    const auto at = [&](long j) { return turn[static_cast<std::size_t>(((j % CELLS) + CELLS) % CELLS)]; };
+    // Fourier coefficients -2 most .. 2 most of the gains.
+    std::vector<std::vector<Eigen::Matrix2cd>> c(
+        kinds,
+        std::vector<Eigen::Matrix2cd>(static_cast<std::size_t>(4 * most + 1), Eigen::Matrix2cd::Zero()));
+    for (std::size_t q = 0; q < kinds; ++q) {
+      for (int j = 0; j <= 2 * most; ++j) {
+        Eigen::Matrix2cd sum = Eigen::Matrix2cd::Zero();
+        for (int i = 0; i < CELLS; ++i)
+          sum += at(static_cast<long>(j) * i) * gain[q][static_cast<std::size_t>(i)];
+        // Cells' middles stand half a cell on.
+        sum *= std::polar(1.0 / CELLS, -PI * j / CELLS);
+        c[q][static_cast<std::size_t>(2 * most + j)] = sum;
+        c[q][static_cast<std::size_t>(2 * most - j)] = sum.conjugate();
+      }
+    }
+    MatrixXcd matrix = MatrixXcd::Identity(2 * n, 2 * n);
+    VectorXcd right(2 * n);
+    for (int r = -most; r <= most; ++r) {
+      const auto g = receptance(system_.modes, r / period_);
+      Eigen::Matrix2cd answer;
+      answer << g[0], g[1], g[2], g[3];
+      Eigen::Vector2cd f = Eigen::Vector2cd::Zero();
+      for (int i = 0; i < CELLS; ++i)
+        f += (at(static_cast<long>(r) * i) * std::polar(1.0 / CELLS, -PI * r / CELLS)) *
+             force[static_cast<std::size_t>(i)];
+      right.segment<2>(2 * (r + most)) = answer * f;
+      for (int l = -most; l <= most; ++l) {
+        const auto k = static_cast<std::size_t>(2 * most + r - l);
+        Eigen::Matrix2cd sum = c[0][k];
+        for (std::size_t d = 0; d < delays_.size(); ++d)
+          sum += std::polar(1.0, -TWO_PI * l * delays_[d] / period_) * c[1 + d][k];
+        matrix.block<2, 2>(2 * (r + most), 2 * (l + most)) -= answer * sum;
+      }
+    }
+    VectorXcd found = matrix.partialPivLu().solve(right);
+    if (!found.allFinite()) return;
+    if (spectrum_.size() == found.size() && share < 1.0) found = share * found + (1.0 - share) * spectrum_;
+    spectrum_ = found;
+    const auto seriesAt = [&](double delay, std::array<std::vector<double>, 2>& u) {
+      for (auto& axis : u) axis.assign(CELLS, 0.0);
+      for (int r = 0; r <= most; ++r) {
+        const Complex shift = std::polar(r == 0 ? 1.0 : 2.0, TWO_PI * r * (0.5 / CELLS - delay / period_));
+        const Complex x = shift * found[2 * (r + most)], y = shift * found[2 * (r + most) + 1];
+        for (int i = 0; i < CELLS; ++i) {
+          const Complex wave = std::conj(at(static_cast<long>(r) * i));
+          u[0][static_cast<std::size_t>(i)] += (x * wave).real();
+          u[1][static_cast<std::size_t>(i)] += (y * wave).real();
+        }
+      }
+    };
+    motion_.resize(2);
+    std::array<std::vector<double>, 2> u;
+    seriesAt(0.0, u);
+    motion_[0] = u[0];
+    motion_[1] = u[1];
+    delayed_motion_.resize(delays_.size());
+    for (std::size_t d = 0; d < delays_.size(); ++d) seriesAt(delays_[d], delayed_motion_[d]);
+  }
+
+  /// Cells joined to stretches; their ends where the chip goes through zero or another tooth's surface takes
+  /// over.
+  void stretches(const Pattern& pattern) {
+    const double width = period_ / CELLS;
+    stretch_.assign(offset_.size(), {});
+    for (int s = 0; s < slices_; ++s) {
+      for (int k = 0; k < teeth_; ++k) {
+        const std::size_t e = edge(s, k);
+        // The arc in time: entry and exit of this edge.
+        const double begin = wrap(system_.entry - angle_[e]) / speed_;
+        const double end = begin + (system_.exit - system_.entry) / speed_;
+        const auto of = [&](int cell) {
+          return static_cast<int>(
+              pattern[e * CELLS + static_cast<std::size_t>(((cell % CELLS) + CELLS) % CELLS)]);
+        };
+        const auto first = static_cast<int>(std::floor(begin / width));
+        const auto last = static_cast<int>(std::ceil(end / width)) - 1;
+        double from = begin;
+        int m = of(first);
+        for (int cell = first + 1; cell <= last + 1; ++cell) {
+          const int next = cell <= last ? of(cell) : -1;
+          if (next == m) continue;
+          double to = end;
+          if (cell <= last) to = std::clamp(change(s, k, cell - 1, m, next), from, end);
+          if (m > 0 && to > from + 1e-9 * period_) stretch_[e].push_back({from, to, delay_[pass(k, m)]});
+          from = to;
+          m = next;
+        }
+      }
+    }
+  }
+
+  /// [s] between the middles of a cell and the next, where contact a gives way to b.
+  double change(int s, int k, int cell, int a, int b) const {
+    const int here = ((cell % CELLS) + CELLS) % CELLS, there = (here + 1) % CELLS;
+    double before, after;
+    if (a == 0 || b == 0) {
+      const int m = a == 0 ? b : a;
+      before = chipAgainst(s, k, m, here);
+      after = chipAgainst(s, k, m, there);
+    } else {
+      before = chipAgainst(s, k, a, here) - chipAgainst(s, k, b, here);
+      after = chipAgainst(s, k, a, there) - chipAgainst(s, k, b, there);
+    }
+    const double share = before * after < 0.0 ? before / (before - after) : 0.5;
+    return (cell + 0.5 + share) * period_ / CELLS;
+  }
+
+  RegenerativeSystem system_;
+  ChipGeometry chip_;
+  double speed_, period_;
+  int teeth_, slices_ = 1;
+  double height_ = 0.0;                 // [m] of a slice
+  std::vector<double> offset_, angle_;  // of each edge: [m], [rad] at time 0
+  std::vector<double> delays_, feed_;   // [s]; [m] of each pass
+  std::vector<std::size_t> delay_;      // of each pass
+  VectorXcd spectrum_;
+  std::vector<std::vector<double>> motion_;  // [axis][cell] [m]
+  std::vector<std::array<std::vector<double>, 2>> delayed_motion_;
+  std::vector<std::vector<Stretch>> stretch_;  // of each edge
+};
+
+}  // namespace
+
+DelayedSystem contactSystem(const RegenerativeSystem& system, double speed, double depth) {
+  if (!system.chip) throw Error("stability: no chip geometry");
+  if (!(speed > 0.0) || !(depth > 0.0)) throw Error("stability: speed and depth above 0 are due");
+  const Contact contact(system, speed, depth);
+  DelayedSystem delayed;
+  delayed.modes = system.modes;
+  delayed.stiffness = depth * std::hypot(system.kt, system.kr);
+  delayed.period = contact.period();
+  delayed.delays = contact.delays();
+  delayed.rate = 2.0 * speed;
+  if (contact.staircase()) {
+    // So many small steps: taken as they come.
+    delayed.feedback = [contact](double t, double, Feedback& feedback) { contact(t, t, feedback); };
+  } else {
+    delayed.breaks = contact.breaks();
+    delayed.feedback = contact;
+  }
+  return delayed;
+}
+
+}  // namespace smartmill::stability

@@ -1,0 +1,468 @@
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include <gsl/gsl_integration.h>
+#include <Eigen/LU>
+
+#include "smartmill_core/error.h"
+#include "smartmill_stability/solvers/delayed_system.h"
+#include "solvers/arnoldi.h"
+#include "solvers/floquet.h"
+
+// Chebyshev collocation of the feedback force. On each element the force is the polynomial through its values
+// at the Chebyshev-Lobatto nodes; the modes answer to it exactly (closed convolution with exp(s t)), so only
+// the force has to be resolved and free flight between cuts costs and errs nothing. Elements end at the
+// breaks.
+
+namespace smartmill::stability {
+namespace {
+
+using Complex = std::complex<double>;
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+/// [rad] of vibration and feedback that one element may span: the default of 12 nodes leaves 1e-7 of the
+/// depth.
+constexpr double PHASE = 9.0;
+constexpr int DEFAULT_NODES = 12, REFINEMENT = 4;
+constexpr double EIGENVALUE_TOLERANCE = 1e-9;
+
+/// What depends on the number of nodes alone, on the unit interval.
+struct Reference {
+  explicit Reference(int count) : n(count), node(static_cast<std::size_t>(count)) {
+    for (int i = 0; i < n; ++i)
+      node[static_cast<std::size_t>(i)] = 0.5 * (1.0 - std::cos(units::PI * i / (n - 1)));
+    const auto points = static_cast<std::size_t>(n + 6);
+    gsl_integration_glfixed_table* table = gsl_integration_glfixed_table_alloc(points);
+    for (std::size_t q = 0; q < points; ++q) {
+      double x = 0.0, w = 0.0;
+      gsl_integration_glfixed_point(0.0, 1.0, q, &x, &w, table);
+      gauss.push_back(x);
+      weight.push_back(w);
+    }
+    gsl_integration_glfixed_table_free(table);
+    quadrature = VectorXd::Zero(n);
+    for (int i = 0; i < n; ++i) {
+      MatrixXd values(n, static_cast<Index>(points));
+      for (std::size_t q = 0; q < points; ++q)
+        values.col(static_cast<Index>(q)) = weights(node[static_cast<std::size_t>(i)] * gauss[q]);
+      lagrange.push_back(values);
+    }
+    for (std::size_t q = 0; q < points; ++q)
+      quadrature += weight[q] * lagrange.back().col(static_cast<Index>(q));
+  }
+
+  /// Lagrange polynomials at x in [0, 1], barycentric.
+  VectorXd weights(double x) const {
+    VectorXd w = VectorXd::Zero(n);
+    double sum = 0.0;
+    for (int i = 0; i < n; ++i) {
+      const double distance = x - node[static_cast<std::size_t>(i)];
+      if (std::abs(distance) < 1e-14) {
+        w.setZero();
+        w[i] = 1.0;
+        return w;
+      }
+      const double b = (i % 2 ? -1.0 : 1.0) * (i == 0 || i == n - 1 ? 0.5 : 1.0) / distance;
+      w[i] = b;
+      sum += b;
+    }
+    return w / sum;
+  }
+
+  int n;
+  std::vector<double> node, gauss, weight;
+  std::vector<MatrixXd> lagrange;  ///< per node i: the polynomials (rows) at node_i times each Gauss point
+  VectorXd quadrature;             ///< integral over [0, 1] from the nodes
+};
+
+/// Answer of the modes over an element of one length. State of a mode: q, q'/w.
+struct Shape {
+  double length = 0.0;
+  MatrixXd motion, velocity;              ///< (n D) x 2M: from the state at the beginning
+  MatrixXd force_motion, force_velocity;  ///< (n D) x (n D)
+  MatrixXd state, force_state;            ///< 2M x 2M, 2M x (n D): state at the end
+};
+
+Shape shapeOf(const std::vector<SystemMode>& modes, const Axes& axes, const Reference& reference,
+              double length, bool with_velocity) {
+  const Index n = reference.n, d = axes.count(), m2 = 2 * static_cast<Index>(modes.size());
+  Shape shape;
+  shape.length = length;
+  shape.motion = MatrixXd::Zero(n * d, m2);
+  shape.force_motion = MatrixXd::Zero(n * d, n * d);
+  shape.state = MatrixXd::Zero(m2, m2);
+  shape.force_state = MatrixXd::Zero(m2, n * d);
+  if (with_velocity) {
+    shape.velocity = shape.motion;
+    shape.force_velocity = shape.force_motion;
+  }
+  Eigen::MatrixXd re(n, n), im(n, n);
+  VectorXd wr(static_cast<Index>(reference.gauss.size())), wi(wr.size());
+  for (std::size_t k = 0; k < modes.size(); ++k) {
+    const SystemMode& mode = modes[k];
+    const Index c = 2 * static_cast<Index>(k);
+    const double w = units::TWO_PI * mode.frequency, a = mode.damping_ratio * w;
+    const double wd = w * std::sqrt(1.0 - mode.damping_ratio * mode.damping_ratio);
+    // integral of exp(s (t_i - t)) l_j(t) from 0 to t_i, s = -a + i wd.
+    for (Index i = 0; i < n; ++i) {
+      const double t = length * reference.node[static_cast<std::size_t>(i)];
+      for (Index q = 0; q < wr.size(); ++q) {
+        const double rest = t * (1.0 - reference.gauss[static_cast<std::size_t>(q)]);
+        const double e = std::exp(-a * rest) * t * reference.weight[static_cast<std::size_t>(q)];
+        wr[q] = e * std::cos(wd * rest);
+        wi[q] = e * std::sin(wd * rest);
+      }
+      re.row(i).noalias() = (reference.lagrange[static_cast<std::size_t>(i)] * wr).transpose();
+      im.row(i).noalias() = (reference.lagrange[static_cast<std::size_t>(i)] * wi).transpose();
+    }
+    const MatrixXd q_of_f = im / wd, v_of_f = re - (a / wd) * im;
+    for (Index i = 0; i < n; ++i) {
+      const double t = length * reference.node[static_cast<std::size_t>(i)];
+      const double e = std::exp(-a * t), co = std::cos(wd * t), si = std::sin(wd * t);
+      Eigen::Matrix2d flow;
+      flow << e * (co + a / wd * si), e * w / wd * si, -e * w / wd * si, e * (co - a / wd * si);
+      for (Index p = 0; p < d; ++p) {
+        const double out = mode.output[axes.index[static_cast<std::size_t>(p)]];
+        shape.motion.block<1, 2>(i * d + p, c) = out * flow.row(0);
+        if (with_velocity) shape.velocity.block<1, 2>(i * d + p, c) = out * w * flow.row(1);
+        for (Index r = 0; r < d; ++r) {
+          const double gain = out * mode.input[axes.index[static_cast<std::size_t>(r)]];
+          if (gain == 0.0) continue;
+          for (Index j = 0; j < n; ++j) {
+            shape.force_motion(i * d + p, j * d + r) += gain * q_of_f(i, j);
+            if (with_velocity) shape.force_velocity(i * d + p, j * d + r) += gain * v_of_f(i, j);
+          }
+        }
+      }
+      if (i + 1 == n) shape.state.block<2, 2>(c, c) = flow;
+    }
+    for (Index r = 0; r < d; ++r) {
+      const double in = mode.input[axes.index[static_cast<std::size_t>(r)]];
+      for (Index j = 0; j < n; ++j) {
+        shape.force_state(c, j * d + r) = in * q_of_f(n - 1, j);
+        shape.force_state(c + 1, j * d + r) = in * v_of_f(n - 1, j) / w;
+      }
+    }
+  }
+  return shape;
+}
+
+/// Shapes met at one speed; a cut without helix meets the same at every depth.
+class Shapes {
+ public:
+  Shapes(const std::vector<SystemMode>& of_modes, std::shared_ptr<const Reference> of_reference,
+         bool velocities)
+      : modes(of_modes), axes(of_modes), reference(std::move(of_reference)), with_velocity(velocities) {}
+
+  std::shared_ptr<const Shape> of(double length) {
+    for (const auto& shape : known_)
+      if (std::abs(shape->length - length) <= 1e-13 * length) return shape;
+    constexpr std::size_t MOST = 100;
+    if (known_.size() >= MOST) known_.clear();
+    known_.push_back(std::make_shared<Shape>(shapeOf(modes, axes, *reference, length, with_velocity)));
+    return known_.back();
+  }
+
+  std::vector<SystemMode> modes;
+  Axes axes;
+  std::shared_ptr<const Reference> reference;
+  bool with_velocity;
+  Index expected = 0;  ///< applications that the last eigenvalue took
+
+ private:
+  std::vector<std::shared_ptr<const Shape>> known_;
+};
+
+/// The map over one period of [state; motion at the nodes that later delays look back to].
+class PeriodMap {
+ public:
+  PeriodMap(const DelayedSystem& system, Shapes& shapes)
+      : d_(shapes.axes.count()),
+        n_(shapes.reference->n),
+        m2_(2 * static_cast<Index>(system.modes.size())),
+        reference_(*shapes.reference),
+        period_(system.period),
+        shapes_(shapes) {
+    mesh(system, shapes);
+    for (Element& element : elements_) fill(system, shapes, element);
+    size_ = m2_;
+    for (Element& element : elements_) {
+      if (!element.looked_back_to) continue;
+      element.slot = size_;
+      size_ += n_ * d_;
+    }
+    motion_.resize(elements_.size());
+  }
+
+  Index size() const { return size_; }
+
+  void apply(const VectorXd& in, VectorXd& out) { march(in, out, false); }
+
+  Dominant dominant(bool with_vector) {
+    return dominantEigenvalue([this](const VectorXd& in, VectorXd& out) { apply(in, out); }, size_,
+                              EIGENVALUE_TOLERANCE, with_vector, shapes_.expected);
+  }
+
+  /// [Hz] of the strongest Fourier component of the motion that starts with a mode of the map.
+  double strongest(const Dominant& mode, double highest) {
+    VectorXd out(size_);
+    std::vector<Eigen::VectorXcd> motion(elements_.size());
+    march(mode.vector.real(), out, true);
+    for (std::size_t e = 0; e < elements_.size(); ++e) motion[e] = motion_[e].cast<Complex>();
+    march(mode.vector.imag(), out, true);
+    for (std::size_t e = 0; e < elements_.size(); ++e)
+      motion[e] += Complex(0, 1) * motion_[e].cast<Complex>();
+    const double base = std::arg(mode.value) / period_, step = units::TWO_PI / period_;
+    const int most = std::min(400, static_cast<int>(highest / step) + 2);
+    double best = -1.0, frequency = 0.0;
+    for (int k = -most; k <= most; ++k) {
+      const double w = base + k * step;
+      Eigen::VectorXcd sum = Eigen::VectorXcd::Zero(d_);
+      for (std::size_t e = 0; e < elements_.size(); ++e) {
+        const Element& element = elements_[e];
+        for (Index i = 0; i < n_; ++i) {
+          const double t = element.begin + element.length * reference_.node[static_cast<std::size_t>(i)];
+          sum += element.length * reference_.quadrature[i] * std::polar(1.0, -w * t) *
+                 motion[e].segment(i * d_, d_);
+        }
+      }
+      if (sum.norm() > best) {
+        best = sum.norm();
+        frequency = std::abs(w) / units::TWO_PI;
+      }
+    }
+    return frequency;
+  }
+
+ private:
+  /// Where a node's delayed motion comes from.
+  struct Source {
+    std::size_t element = 0;
+    bool previous = true;  ///< period
+    VectorXd weights;      ///< empty: node by node
+  };
+
+  struct Element {
+    double begin = 0.0, length = 0.0;
+    std::shared_ptr<const Shape> shape;
+    bool cuts = false, looked_at = false, looked_back_to = false;
+    Index slot = 0;
+    MatrixXd from_state;                         // (n D) x 2M
+    Eigen::PartialPivLU<MatrixXd> lu;            // of I - feedback x answer
+    std::vector<std::vector<MatrixXd>> delayed;  // [delay][node] D x D, empty where zero
+    std::vector<std::vector<Source>> source;     // [delay][node]; one entry: the whole element
+  };
+
+  void mesh(const DelayedSystem& system, const Shapes&) {
+    std::vector<double> ends = system.breaks;
+    ends.push_back(0.0);
+    ends.push_back(period_);
+    std::sort(ends.begin(), ends.end());
+    double fastest = 0.0;
+    // What a heavily damped mode far above the others adds (a residual compliance) follows the force at once.
+    constexpr double FOLLOWS = 0.4;
+    for (const SystemMode& mode : system.modes) {
+      if (mode.damping_ratio >= FOLLOWS && system.modes.size() > 1) continue;
+      const double w = units::TWO_PI * mode.frequency;
+      const double added = system.stiffness * std::hypot(mode.input[0], mode.input[1]) *
+                           std::hypot(mode.output[0], mode.output[1]);
+      fastest = std::max(fastest, std::sqrt(w * w + added));
+    }
+    const double shortest_delay = *std::min_element(system.delays.begin(), system.delays.end());
+    double begin = 0.0;
+    for (const double end : ends) {
+      const double length = end - begin;
+      if (length < 1e-10 * period_) continue;
+      const double parts = std::ceil(
+          std::max((fastest + system.rate) * length / PHASE, length / shortest_delay * (1.0 - 1e-12)));
+      for (int p = 0; p < static_cast<int>(parts); ++p) {
+        Element element;
+        element.begin = begin + length * p / parts;
+        element.length = length / parts;
+        elements_.push_back(element);
+      }
+      begin = end;
+    }
+  }
+
+  Source find(double t, std::size_t self) {
+    Source source;
+    source.previous = t < -1e-12 * period_;
+    if (source.previous) t += period_;
+    std::size_t e = 0;
+    while (e + 1 < elements_.size() && elements_[e + 1].begin <= t) ++e;
+    // Rounding must not make an element look into itself.
+    if (!source.previous && e >= self && e > 0) e = self - 1;
+    source.element = e;
+    source.weights = reference_.weights(std::clamp((t - elements_[e].begin) / elements_[e].length, 0.0, 1.0));
+    elements_[e].looked_at = true;
+    if (source.previous) elements_[e].looked_back_to = true;
+    return source;
+  }
+
+  void fill(const DelayedSystem& system, Shapes& shapes, Element& element) {
+    element.shape = shapes.of(element.length);
+    const Shape& shape = *element.shape;
+    const auto self = static_cast<std::size_t>(&element - elements_.data());
+    const auto reduced = [&](const Eigen::Matrix2d& full) { return shapes.axes.reduced(full); };
+    const double inside = element.begin + 0.5 * element.length;
+    std::vector<Feedback> at(static_cast<std::size_t>(n_));
+    for (Index i = 0; i < n_; ++i) {
+      Feedback& f = at[static_cast<std::size_t>(i)];
+      system.feedback(element.begin + element.length * reference_.node[static_cast<std::size_t>(i)], inside,
+                      f);
+      element.cuts |=
+          !f.now.isZero(0.0) || !f.velocity.isZero(0.0) ||
+          std::any_of(f.delayed.begin(), f.delayed.end(), [](const auto& m) { return !m.isZero(0.0); });
+    }
+    if (!element.cuts) return;
+    MatrixXd matrix = MatrixXd::Identity(n_ * d_, n_ * d_);
+    element.from_state = MatrixXd::Zero(n_ * d_, m2_);
+    for (Index i = 0; i < n_; ++i) {
+      const Feedback& f = at[static_cast<std::size_t>(i)];
+      const MatrixXd now = reduced(f.now);
+      element.from_state.middleRows(i * d_, d_).noalias() = now * shape.motion.middleRows(i * d_, d_);
+      matrix.middleRows(i * d_, d_).noalias() -= now * shape.force_motion.middleRows(i * d_, d_);
+      if (!f.velocity.isZero(0.0)) {
+        const MatrixXd velocity = reduced(f.velocity);
+        element.from_state.middleRows(i * d_, d_).noalias() +=
+            velocity * shape.velocity.middleRows(i * d_, d_);
+        matrix.middleRows(i * d_, d_).noalias() -= velocity * shape.force_velocity.middleRows(i * d_, d_);
+      }
+    }
+    element.lu.compute(matrix);
+    element.delayed.resize(system.delays.size());
+    element.source.resize(system.delays.size());
+    for (std::size_t k = 0; k < system.delays.size(); ++k) {
+      bool any = false;
+      for (const Feedback& f : at) any |= !f.delayed[k].isZero(0.0);
+      if (!any) continue;
+      for (const Feedback& f : at) element.delayed[k].push_back(reduced(f.delayed[k]));
+      if (std::abs(system.delays[k] - period_) <= 1e-12 * period_) {
+        Source same;
+        same.element = self;
+        element.source[k].push_back(same);
+        element.looked_at = element.looked_back_to = true;
+        continue;
+      }
+      for (Index i = 0; i < n_; ++i) {
+        const double t = element.begin + element.length * reference_.node[static_cast<std::size_t>(i)];
+        element.source[k].push_back(find(t - system.delays[k], self));
+      }
+    }
+  }
+
+  void march(const VectorXd& in, VectorXd& out, bool everywhere) {
+    out.resize(size_);
+    state_ = in.head(m2_);
+    for (std::size_t e = 0; e < elements_.size(); ++e) {
+      const Element& element = elements_[e];
+      const Shape& shape = *element.shape;
+      const bool wanted = everywhere || element.looked_at;
+      if (wanted) motion_[e].noalias() = shape.motion * state_;
+      if (element.cuts) {
+        force_.noalias() = element.from_state * state_;
+        for (std::size_t k = 0; k < element.delayed.size(); ++k) {
+          if (element.delayed[k].empty()) continue;
+          for (Index i = 0; i < n_; ++i) {
+            const auto node = static_cast<std::size_t>(i);
+            const Source& source = element.source[k][element.source[k].size() == 1 ? 0 : node];
+            const double* values =
+                source.previous ? in.data() + elements_[source.element].slot : motion_[source.element].data();
+            if (source.weights.size() == 0) {
+              for (Index p = 0; p < d_; ++p) delayed_[p] = values[i * d_ + p];
+            } else {
+              delayed_[0] = delayed_[1] = 0.0;
+              for (Index l = 0; l < n_; ++l)
+                for (Index p = 0; p < d_; ++p) delayed_[p] += source.weights[l] * values[l * d_ + p];
+            }
+            const MatrixXd& gain = element.delayed[k][node];
+            for (Index p = 0; p < d_; ++p)
+              for (Index r = 0; r < d_; ++r) force_[i * d_ + p] += gain(p, r) * delayed_[r];
+          }
+        }
+        force_ = element.lu.solve(force_);
+        if (wanted) motion_[e].noalias() += shape.force_motion * force_;
+      }
+      next_.noalias() = shape.state * state_;
+      if (element.cuts) next_.noalias() += shape.force_state * force_;
+      state_.swap(next_);
+    }
+    out.head(m2_) = state_;
+    for (std::size_t e = 0; e < elements_.size(); ++e)
+      if (elements_[e].looked_back_to) out.segment(elements_[e].slot, n_ * d_) = motion_[e];
+  }
+
+  Index d_, n_, m2_, size_ = 0;
+  const Reference& reference_;
+  double period_;
+  Shapes& shapes_;
+  std::vector<Element> elements_;
+  std::vector<VectorXd> motion_;
+  VectorXd state_, next_, force_;
+  double delayed_[2] = {0.0, 0.0};
+};
+
+class Collocation : public FloquetSolver {
+ public:
+  Collocation(const RegenerativeSystem& system, const SolverOptions& options)
+      : FloquetSolver(system, options),
+        reference_(std::make_shared<Reference>(options.nodes > 0 ? options.nodes : DEFAULT_NODES)) {}
+
+  class Speed : public AtSpeed {
+   public:
+    Speed(const Collocation& solver, double speed)
+        : system_(solver.system_),
+          speed_(speed),
+          shapes_(system_.modes, solver.reference_,
+                  system_.damping_radial > 0.0 || system_.damping_tangential > 0.0) {}
+
+    CharacteristicMultiplier multiplier(double depth) override {
+      const DelayedSystem delayed = delayedSystem(system_, speed_, depth);
+      return {PeriodMap(delayed, shapes_).dominant(false).value, delayed.period};
+    }
+
+    double chatterFrequency(double depth) override {
+      const DelayedSystem delayed = delayedSystem(system_, speed_, depth);
+      PeriodMap map(delayed, shapes_);
+      return map.strongest(map.dominant(true), highestOf(system_));
+    }
+
+   private:
+    RegenerativeSystem system_;
+    double speed_;
+    Shapes shapes_;
+  };
+
+  std::unique_ptr<AtSpeed> at(double speed) const override { return std::make_unique<Speed>(*this, speed); }
+
+  std::unique_ptr<FloquetSolver> refined() const override {
+    SolverOptions finer = options_;
+    finer.nodes = reference_->n + REFINEMENT;
+    finer.estimate_error = false;
+    return std::make_unique<Collocation>(system_, finer);
+  }
+
+ private:
+  std::shared_ptr<const Reference> reference_;
+};
+
+}  // namespace
+
+std::unique_ptr<FloquetSolver> makeCollocation(const RegenerativeSystem& system,
+                                               const SolverOptions& options) {
+  if (options.nodes != 0 && (options.nodes < 4 || options.nodes > 40 + REFINEMENT))
+    throw Error("nodes: " + std::to_string(options.nodes) + " is out of range (4..40)");
+  return std::make_unique<Collocation>(system, options);
+}
+
+CharacteristicMultiplier collocationMultiplier(const DelayedSystem& system, int nodes) {
+  if (nodes < 4 || nodes > 40) throw Error("nodes: " + std::to_string(nodes) + " is out of range (4..40)");
+  Shapes shapes(system.modes, std::make_shared<Reference>(nodes), true);
+  return {PeriodMap(system, shapes).dominant(false).value, system.period};
+}
+
+}  // namespace smartmill::stability

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "smartmill_stability/solvers/solver.h"
+
+namespace smartmill::stability {
+
+std::unique_ptr<FloquetSolver> makeCollocation(const RegenerativeSystem& system,
+                                               const SolverOptions& options);
+std::unique_ptr<FloquetSolver> makeSemiDiscretization(const RegenerativeSystem& system,
+                                                      const SolverOptions& options);
+std::unique_ptr<StabilitySolver> makeMultiFrequency(const RegenerativeSystem& system,
+                                                    const SolverOptions& options);
+
+std::unique_ptr<StabilitySolver> makeZeroOrder(const RegenerativeSystem& system);
+
+/// Axes along which some mode is driven or moves; in the others the tool is rigid.
+struct Axes {
+  explicit Axes(const std::vector<SystemMode>& modes);
+  Eigen::Index count() const { return static_cast<Eigen::Index>(index.size()); }
+  Eigen::MatrixXd reduced(const Eigen::Matrix2d& full) const;
+  std::vector<std::size_t> index;
+};
+
+/// d n^T at an immersion angle [rad]: force on the tool per unit of depth and of chip thickness, times the
+/// chip's normal. @param tangential, radial [N/m2]
+Eigen::Matrix2d directional(double tangential, double radial, double angle);
+
+/// [rad/s] up to which chatter is looked for: 1.5 times the highest mode.
+double highestOf(const RegenerativeSystem& system);
+
+}  // namespace smartmill::stability

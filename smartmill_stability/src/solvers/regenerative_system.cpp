@@ -1,0 +1,268 @@
+#include <algorithm>
+#include <cmath>
+
+#include "smartmill_core/cutting/mechanistic.h"
+#include "smartmill_core/error.h"
+#include "smartmill_stability/solvers/delayed_system.h"
+#include "smartmill_stability/solvers/solver.h"
+#include "solvers/floquet.h"
+
+namespace smartmill::stability {
+namespace {
+
+using units::PI;
+using units::TWO_PI;
+
+void require(bool good, const char* what, double value) {
+  if (!good || !std::isfinite(value))
+    throw Error(std::string("stability: ") + what + " " + std::to_string(value) + " is impossible");
+}
+
+}  // namespace
+
+Eigen::Matrix2d directional(double tangential, double radial, double angle) {
+  const double s = std::sin(angle), c = std::cos(angle);
+  const Eigen::Vector2d force(-tangential * c - radial * s, tangential * s - radial * c);
+  return force * Eigen::RowVector2d(s, c);
+}
+
+namespace {
+
+/// Antiderivative of directional() over the angle.
+Eigen::Matrix2d directionalIntegral(double tangential, double radial, double angle) {
+  const double s2 = 0.25 * std::sin(2.0 * angle), sc = 0.5 * std::sin(angle) * std::sin(angle);
+  const double ss = 0.5 * angle - s2, cc = 0.5 * angle + s2;
+  Eigen::Matrix2d m;
+  m << -tangential * sc - radial * ss, -tangential * cc - radial * sc, tangential * ss - radial * sc,
+      tangential * sc - radial * cc;
+  return m;
+}
+
+double wrap(double angle) {
+  angle = std::fmod(angle, TWO_PI);
+  return angle < 0.0 ? angle + TWO_PI : angle;
+}
+
+/// Feedback of the teeth of a cut at one speed and depth.
+class Teeth {
+ public:
+  Teeth(const RegenerativeSystem& system, double speed, double depth) : system_(system), speed_(speed) {
+    ToolGeometry tool{system.teeth, system.diameter, system.helix, system.pitch};
+    swept_ = system.helix > 0.0 ? tool.lag() * depth : 0.0;
+    depth_ = depth;
+    const double v = 0.5 * speed * system.diameter;
+    damps_ = (system.damping_tangential > 0.0 || system.damping_radial > 0.0);
+    tangential_damping_ = damps_ ? system.damping_tangential / v : 0.0;
+    radial_damping_ = damps_ ? system.damping_radial / v : 0.0;
+    for (int k = 0; k < system.teeth; ++k) {
+      angle_.push_back(tool.toothAngle(k));
+      const double delay = system.evenPitch() ? TWO_PI / system.teeth / speed : system.pitchOf(k) / speed;
+      std::size_t d = 0;
+      while (d < delays_.size() && std::abs(delays_[d] - delay) > 1e-9 * delay) ++d;
+      if (d == delays_.size()) delays_.push_back(delay);
+      delay_.push_back(d);
+    }
+  }
+
+  const std::vector<double>& delays() const { return delays_; }
+
+  std::vector<double> breaks(double period) const {
+    std::vector<double> times;
+    for (const double angle : angle_) {
+      for (const double edge : {system_.entry, system_.exit, system_.entry + swept_, system_.exit + swept_}) {
+        const double t = wrap(edge - angle) / speed_;
+        // Of one principal period; with even pitch every tooth repeats the first.
+        if (t < period * (1.0 - 1e-12)) times.push_back(t);
+      }
+    }
+    // A surface with a bend is met again a delay later: for uneven pitch the period does not map it on
+    // itself.
+    if (!system_.evenPitch()) {
+      const std::vector<double> first = times;
+      for (const double t : first) {
+        for (const double delay : delays_) times.push_back(std::fmod(t + delay, period));
+      }
+    }
+    return times;
+  }
+
+  void operator()(double t, double inside, Feedback& feedback) const {
+    feedback.now.setZero();
+    feedback.velocity.setZero();
+    feedback.delayed.assign(delays_.size(), Eigen::Matrix2d::Zero());
+    for (std::size_t k = 0; k < angle_.size(); ++k) {
+      const double middle = wrap(angle_[k] + speed_ * inside);
+      const double angle = middle + speed_ * (t - inside);
+      if (swept_ < 1e-9) {
+        add(feedback, k, angle, middle);
+        // The angle of an exit beyond a full turn, and of an entry just below one.
+        if (system_.exit > TWO_PI) add(feedback, k, angle + TWO_PI, middle + TWO_PI);
+        continue;
+      }
+      // The edge's angles reach from angle - swept to angle.
+      for (double turn = 0.0; angle + turn - swept_ < system_.exit; turn += TWO_PI) {
+        const double high = std::min(angle + turn, system_.exit);
+        const double low = std::max(angle + turn - swept_, system_.entry);
+        if (high > low) addBetween(feedback, k, low, high);
+      }
+    }
+  }
+
+ private:
+  void put(Feedback& feedback, std::size_t k, const Eigen::Matrix2d& stiffness) const {
+    feedback.now += stiffness;
+    feedback.delayed[delay_[k]] -= system_.overlap * stiffness;
+  }
+
+  void add(Feedback& feedback, std::size_t k, double angle, double middle) const {
+    if (middle <= system_.entry || middle >= system_.exit) return;
+    put(feedback, k, depth_ * directional(system_.kt, system_.kr, angle));
+    if (damps_) feedback.velocity += depth_ * directional(tangential_damping_, radial_damping_, angle);
+  }
+
+  void addBetween(Feedback& feedback, std::size_t k, double low, double high) const {
+    const auto integral = [&](double tangential, double radial) -> Eigen::Matrix2d {
+      return (depth_ / swept_) *
+             (directionalIntegral(tangential, radial, high) - directionalIntegral(tangential, radial, low));
+    };
+    put(feedback, k, integral(system_.kt, system_.kr));
+    if (damps_) feedback.velocity += integral(tangential_damping_, radial_damping_);
+  }
+
+  RegenerativeSystem system_;
+  double speed_, depth_ = 0.0, swept_ = 0.0;
+  bool damps_ = false;
+  double tangential_damping_ = 0.0, radial_damping_ = 0.0;
+  std::vector<double> angle_, delays_;
+  std::vector<std::size_t> delay_;
+};
+
+}  // namespace
+
+void RegenerativeSystem::validate() const {
+  for (const SystemMode& mode : modes) {
+    require(mode.frequency > 0.0, "mode frequency [Hz]", mode.frequency);
+    require(mode.damping_ratio > 0.0 && mode.damping_ratio < 1.0, "mode damping ratio", mode.damping_ratio);
+    for (const double v : {mode.input[0], mode.input[1], mode.output[0], mode.output[1]})
+      require(true, "mode vector", v);
+  }
+  require(entry >= 0.0, "entry angle [rad]", entry);
+  require(kt >= 0.0, "tangential coefficient [N/m2]", kt);
+  require(kr >= 0.0 && kt + kr > 0.0, "radial coefficient [N/m2]", kr);
+  require(damping_tangential >= 0.0, "tangential process damping [N/m]", damping_tangential);
+  require(damping_radial >= 0.0, "radial process damping [N/m]", damping_radial);
+  require(overlap >= 0.0 && overlap <= 1.0, "overlap", overlap);
+  const bool needs_diameter = helix > 0.0 || damping_radial > 0.0 || damping_tangential > 0.0;
+  require(diameter > 0.0 || !needs_diameter, "diameter [m]", diameter);
+  if (chip) {
+    require(cut == Cut::milling, "chip geometry outside milling:", 0.0);
+    require(chip->feed > 0.0, "feed per tooth [m]", chip->feed);
+    require(chip->radius_offset.empty() || static_cast<int>(chip->radius_offset.size()) == teeth,
+            "number of radius offsets", static_cast<double>(chip->radius_offset.size()));
+    require(chip->serration_amplitude >= 0.0, "serration amplitude [m]", chip->serration_amplitude);
+    require(chip->serration_amplitude == 0.0 || chip->serration_wavelength > 0.0, "serration wavelength [m]",
+            chip->serration_wavelength);
+    require(exit <= TWO_PI + 1e-9, "exit angle beyond a turn with a chip geometry [rad]", exit);
+  }
+  if (cut == Cut::turning) {
+    require(teeth == 1, "number of teeth in turning", teeth);
+    require(helix == 0.0, "helix in turning [rad]", helix);
+    return;
+  }
+  require(teeth >= 1 && teeth <= 20, "number of teeth", teeth);
+  require(exit > entry && exit <= entry + TWO_PI + 1e-9, "exit angle [rad]", exit);
+  require(helix >= 0.0 && helix < 80.0 * PI / 180.0, "helix [rad]", helix);
+  if (!pitch.empty()) {
+    require(static_cast<int>(pitch.size()) == teeth, "number of pitches", static_cast<double>(pitch.size()));
+    double sum = 0.0;
+    for (const double p : pitch) {
+      require(p > 0.0, "pitch [rad]", p);
+      sum += p;
+    }
+    require(std::abs(sum - TWO_PI) < 1e-6, "sum of the pitches [rad]", sum);
+  }
+}
+
+bool RegenerativeSystem::evenPitch() const {
+  return std::all_of(pitch.begin(), pitch.end(),
+                     [&](double p) { return std::abs(p * teeth / TWO_PI - 1.0) < 1e-9; });
+}
+
+double RegenerativeSystem::pitchOf(int tooth) const {
+  return pitch.empty() ? TWO_PI / teeth : pitch[static_cast<std::size_t>(tooth)];
+}
+
+std::vector<SystemMode> systemModes(const ModalModel& model, int axis) {
+  std::vector<SystemMode> modes;
+  const auto add = [&](double frequency, double damping, double gain) {
+    if (gain == 0.0) return;
+    // gain w^2 / (w^2 - ...) = output input / (w^2 - ...): the sign of the gain goes to the output.
+    const double size = units::TWO_PI * frequency * std::sqrt(std::abs(gain));
+    SystemMode mode{frequency, damping, {{0.0, 0.0}}, {{0.0, 0.0}}};
+    mode.input[static_cast<std::size_t>(axis)] = size;
+    mode.output[static_cast<std::size_t>(axis)] = std::copysign(size, gain);
+    modes.push_back(mode);
+  };
+  double highest = 0.0;
+  for (const Mode& mode : model.modes) {
+    highest = std::max(highest, mode.frequency);
+    add(mode.frequency, mode.damping_ratio, mode.gain);
+  }
+  constexpr double ABOVE = 4.0, DAMPING = 0.5;
+  if (highest > 0.0) add(ABOVE * highest, DAMPING, model.direct);
+  return modes;
+}
+
+std::vector<SystemMode> systemModes(const ModalModel& x, const ModalModel& y) {
+  std::vector<SystemMode> modes = systemModes(x, 0);
+  const std::vector<SystemMode> other = systemModes(y, 1);
+  modes.insert(modes.end(), other.begin(), other.end());
+  return modes;
+}
+
+std::array<std::complex<double>, 4> receptance(const std::vector<SystemMode>& modes, double f) {
+  std::array<std::complex<double>, 4> g{};
+  const double w = TWO_PI * f;
+  for (const SystemMode& mode : modes) {
+    const double wn = TWO_PI * mode.frequency;
+    const std::complex<double> h =
+        1.0 / std::complex<double>(wn * wn - w * w, 2.0 * mode.damping_ratio * wn * w);
+    for (std::size_t i = 0; i < 2; ++i)
+      for (std::size_t j = 0; j < 2; ++j) g[2 * i + j] += mode.output[i] * mode.input[j] * h;
+  }
+  return g;
+}
+
+DelayedSystem delayedSystem(const RegenerativeSystem& system, double speed, double depth) {
+  require(speed > 0.0, "spindle speed [rad/s]", speed);
+  require(depth >= 0.0, "depth [m]", depth);
+  DelayedSystem delayed;
+  delayed.modes = system.modes;
+  delayed.stiffness = depth * std::hypot(system.kt, system.kr);
+  if (system.cut == Cut::turning) {
+    delayed.period = TWO_PI / speed;
+    delayed.delays = {delayed.period};
+    const Eigen::Matrix2d stiffness = depth * directional(system.kt, system.kr, system.entry);
+    Eigen::Matrix2d damping = Eigen::Matrix2d::Zero();
+    if (system.diameter > 0.0)
+      damping = depth / (0.5 * speed * system.diameter) *
+                directional(system.damping_tangential, system.damping_radial, system.entry);
+    const double overlap = system.overlap;
+    delayed.feedback = [stiffness, damping, overlap](double, double, Feedback& feedback) {
+      feedback.now = stiffness;
+      feedback.velocity = damping;
+      feedback.delayed.assign(1, -overlap * stiffness);
+    };
+    return delayed;
+  }
+  if (system.chip && depth > 0.0) return contactSystem(system, speed, depth);
+  const Teeth teeth(system, speed, depth);
+  delayed.period = TWO_PI / speed / (system.evenPitch() ? system.teeth : 1);
+  delayed.delays = teeth.delays();
+  delayed.breaks = teeth.breaks(delayed.period);
+  delayed.rate = 2.0 * speed;
+  delayed.feedback = teeth;
+  return delayed;
+}
+
+}  // namespace smartmill::stability

@@ -1,0 +1,222 @@
+#include "smartmill_stability/solvers/zero_order.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/units.h"
+
+namespace smartmill::stability {
+namespace {
+
+using Complex = std::complex<double>;
+using units::PI;
+using units::TWO_PI;
+
+void require(const char* what, bool good, double value) {
+  if (!good || !std::isfinite(value))
+    throw Error(std::string("stability: ") + what + " " + std::to_string(value) + " is impossible");
+}
+
+// Eigenvalues of the oriented FRF A0 Phi without its factor teeth / (2 pi), followed from line to line so
+// that branches stay branches.
+std::array<std::vector<Complex>, 2> eigenvalues(const RegenerativeProcess& process,
+                                                const ToolTipResponse& tool) {
+  const std::array<double, 4> a = directionalCoefficients(process);
+  std::array<std::vector<Complex>, 2> branches;
+  for (std::size_t i = 0; i < tool.frequency.size(); ++i) {
+    const Complex xy = tool.xy.empty() ? 0.0 : tool.xy[i], yx = tool.yx.empty() ? 0.0 : tool.yx[i];
+    const Complex trace = a[0] * tool.xx[i] + a[1] * yx + a[2] * xy + a[3] * tool.yy[i];
+    const Complex determinant = (a[0] * a[3] - a[1] * a[2]) * (tool.xx[i] * tool.yy[i] - xy * yx);
+    const Complex root = std::sqrt(trace * trace - 4.0 * determinant);
+    std::array<Complex, 2> value{{0.5 * (trace + root), 0.5 * (trace - root)}};
+    if (i > 0) {
+      const double keep = std::abs(value[0] - branches[0].back()) + std::abs(value[1] - branches[1].back());
+      const double change = std::abs(value[1] - branches[0].back()) + std::abs(value[0] - branches[1].back());
+      if (change < keep) std::swap(value[0], value[1]);
+    }
+    branches[0].push_back(value[0]);
+    branches[1].push_back(value[1]);
+  }
+  return branches;
+}
+
+// 1 = b g (1 - exp(-i w T)) with g = kt teeth / (4 pi) lambda: depth and phase of one line.
+struct LobePoint {
+  double depth;  // [m] > 0, +inf where no positive depth exists
+  double phase;  // [rad] w T modulo 2 pi, in (0, 2 pi)
+};
+
+LobePoint lobePoint(Complex g) {
+  // 1/(b g) = 1 - exp(-i theta) needs Re(1/(b g)) >= 0 on the circle of radius 1 around 1: b = |1/g|^2 / (2
+  // Re(1/g)).
+  const Complex inverse = 1.0 / g;
+  const double depth = std::norm(inverse) / (2.0 * inverse.real());
+  if (!(depth > 0.0) || !std::isfinite(depth)) return {std::numeric_limits<double>::infinity(), 0.0};
+  double phase = -std::arg(1.0 - inverse / depth);
+  if (phase <= 0.0) phase += TWO_PI;
+  return {depth, phase};
+}
+
+std::vector<LobePoint> lobe(const RegenerativeProcess& process, const std::vector<Complex>& branch) {
+  const double factor = process.kt * process.teeth / (4.0 * PI);
+  std::vector<LobePoint> points;
+  points.reserve(branch.size());
+  for (const Complex& lambda : branch) {
+    points.push_back(lambda == Complex(0.0) ? LobePoint{std::numeric_limits<double>::infinity(), 0.0}
+                                            : lobePoint(factor * lambda));
+  }
+  return points;
+}
+
+}  // namespace
+
+std::array<Complex, 4> ToolTipResponse::at(double f) const {
+  const double positive = std::abs(f);
+  const auto value = [&](const std::vector<Complex>& line) -> Complex {
+    if (line.empty()) return 0.0;
+    Complex v;
+    if (positive <= frequency.front()) {
+      v = line.front().real();
+    } else if (positive >= frequency.back()) {
+      const double ratio = frequency.back() / positive;
+      v = line.back().real() * ratio * ratio;
+    } else {
+      const auto above = std::upper_bound(frequency.begin(), frequency.end(), positive);
+      const auto i = static_cast<std::size_t>(above - frequency.begin());
+      const double share = (positive - frequency[i - 1]) / (frequency[i] - frequency[i - 1]);
+      v = line[i - 1] + share * (line[i] - line[i - 1]);
+    }
+    return f < 0.0 ? std::conj(v) : v;
+  };
+  return {value(xx), value(xy), value(yx), value(yy)};
+}
+
+void RegenerativeProcess::validate() const {
+  require("number of teeth", teeth >= 1 && teeth <= 20, teeth);
+  require("entry angle [rad]", entry >= 0.0, entry);
+  require("exit angle [rad]", exit > entry && exit <= TWO_PI + 1e-9, exit);
+  require("tangential coefficient [N/m2]", kt > 0.0, kt);
+  require("ratio kr", kr >= 0.0, kr);
+}
+
+std::array<double, 4> directionalCoefficients(const RegenerativeProcess& process) {
+  process.validate();
+  // Integrals over immersion of -cos - kr sin and sin - kr cos (force on the tool per Kt h) times sin and cos
+  // (h per x and y).
+  const double f = process.entry, t = process.exit;
+  const double ss = 0.5 * (t - f) - 0.25 * (std::sin(2 * t) - std::sin(2 * f));
+  const double cc = 0.5 * (t - f) + 0.25 * (std::sin(2 * t) - std::sin(2 * f));
+  const double sc = 0.5 * (std::sin(t) * std::sin(t) - std::sin(f) * std::sin(f));
+  const double kr = process.kr;
+  // Twice the integrals: the factor 1/2 of eq. 6.2 stays in front.
+  return {2.0 * (-sc - kr * ss), 2.0 * (-cc - kr * sc), 2.0 * (ss - kr * sc), 2.0 * (sc - kr * cc)};
+}
+
+ToolTipResponse responseOf(const ModalModel& x, const ModalModel& y, double low, double high,
+                           std::size_t lines) {
+  if (!(low >= 0.0) || !(high > low) || lines < 2) throw Error("stability: the frequency band is empty");
+  ToolTipResponse response;
+  for (std::size_t i = 0; i < lines; ++i) {
+    response.frequency.push_back(low +
+                                 (high - low) * static_cast<double>(i) / static_cast<double>(lines - 1));
+  }
+  // Around a mode the response turns within its half-power bandwidth.
+  constexpr int DENSE = 400;
+  for (const ModalModel* model : {&x, &y}) {
+    for (const Mode& mode : model->modes) {
+      const double width = mode.damping_ratio * mode.frequency;
+      for (int i = -DENSE; i <= DENSE; ++i) {
+        const double f = mode.frequency + width * 20.0 * std::pow(static_cast<double>(i) / DENSE, 3);
+        if (f > low && f < high) response.frequency.push_back(f);
+      }
+    }
+  }
+  std::sort(response.frequency.begin(), response.frequency.end());
+  response.frequency.erase(std::unique(response.frequency.begin(), response.frequency.end()),
+                           response.frequency.end());
+  for (const double f : response.frequency) {
+    response.xx.push_back(x.response(f));
+    response.yy.push_back(y.response(f));
+  }
+  return response;
+}
+
+ToolTipResponse responseOf(const FrequencyResponse& x, const FrequencyResponse& y) {
+  if (x.unit != "m/N" || y.unit != "m/N")
+    throw Error("stability: receptances [m/N] are due, got " + x.unit + " and " + y.unit);
+  if (x.size() < 2 || y.size() < 2) throw Error("stability: an FRF is empty");
+  ToolTipResponse response;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    if (x.frequency[i] < y.frequency.front() || x.frequency[i] > y.frequency.back() || x.frequency[i] <= 0.0)
+      continue;
+    response.frequency.push_back(x.frequency[i]);
+    response.xx.push_back(x.value[i]);
+    response.yy.push_back(y.at(x.frequency[i]));
+  }
+  if (response.frequency.size() < 2) throw Error("stability: the FRFs of x and y share no band");
+  return response;
+}
+
+StabilityLimit zeroOrderLimit(const RegenerativeProcess& process, const ToolTipResponse& tool,
+                              const std::vector<double>& speeds) {
+  StabilityLimit limit;
+  limit.spindle_speed = speeds;
+  limit.depth.assign(speeds.size(), std::numeric_limits<double>::infinity());
+  limit.chatter_frequency.assign(speeds.size(), std::numeric_limits<double>::quiet_NaN());
+  for (std::size_t k = 0; k < speeds.size(); ++k) {
+    if (!(speeds[k] > 0.0) || (k > 0 && speeds[k] <= speeds[k - 1])) {
+      throw Error("stability: spindle speeds must be positive and rising");
+    }
+  }
+  if (speeds.empty()) return limit;
+  for (const std::vector<Complex>& branch : eigenvalues(process, tool)) {
+    const std::vector<LobePoint> points = lobe(process, branch);
+    for (std::size_t i = 0; i + 1 < points.size(); ++i) {
+      LobePoint from = points[i], to = points[i + 1];
+      if (!std::isfinite(from.depth) || !std::isfinite(to.depth)) continue;
+      if (to.phase - from.phase > PI) to.phase -= TWO_PI;
+      if (from.phase - to.phase > PI) to.phase += TWO_PI;
+      const double w1 = TWO_PI * tool.frequency[i], w2 = TWO_PI * tool.frequency[i + 1];
+      // Lobe j: w T = phase + 2 pi j, spindle speed 2 pi / (teeth T). From the slowest to the fastest speed
+      // asked for.
+      const auto speedOf = [&](double w, double phase, int j) {
+        return TWO_PI * w / (process.teeth * (phase + TWO_PI * j));
+      };
+      const int last = static_cast<int>(std::max(w1, w2) / (process.teeth * speeds.front())) + 2;
+      for (int j = 0; j <= last; ++j) {
+        if (from.phase + TWO_PI * j <= 0.0 || to.phase + TWO_PI * j <= 0.0) continue;
+        const double n1 = speedOf(w1, from.phase, j), n2 = speedOf(w2, to.phase, j);
+        auto speed = std::lower_bound(speeds.begin(), speeds.end(), std::min(n1, n2));
+        for (; speed != speeds.end() && *speed <= std::max(n1, n2); ++speed) {
+          const double share = n1 == n2 ? 0.0 : (*speed - n1) / (n2 - n1);
+          const double depth = from.depth + share * (to.depth - from.depth);
+          const auto k = static_cast<std::size_t>(speed - speeds.begin());
+          if (depth < limit.depth[k]) {
+            limit.depth[k] = depth;
+            limit.chatter_frequency[k] = (w1 + share * (w2 - w1)) / TWO_PI;
+          }
+        }
+      }
+    }
+  }
+  return limit;
+}
+
+double absoluteDepthLimit(const RegenerativeProcess& process, const ToolTipResponse& tool) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const std::vector<Complex>& branch : eigenvalues(process, tool)) {
+    for (const LobePoint& point : lobe(process, branch)) least = std::min(least, point.depth);
+  }
+  return least;
+}
+
+double turningDepthLimit(const std::vector<Complex>& receptance, double cutting_stiffness) {
+  require("cutting stiffness [N/m2]", cutting_stiffness > 0.0, cutting_stiffness);
+  double least = 0.0;
+  for (const Complex& g : receptance) least = std::min(least, g.real());
+  return least < 0.0 ? -1.0 / (2.0 * cutting_stiffness * least) : std::numeric_limits<double>::infinity();
+}
+
+}  // namespace smartmill::stability

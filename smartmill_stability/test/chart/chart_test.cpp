@@ -1,0 +1,249 @@
+#include "smartmill_stability/chart/chart.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include <gtest/gtest.h>
+
+#include "smartmill_core/cutting/mechanistic.h"
+#include "smartmill_core/error.h"
+#include "smartmill_stability_testing/benchmark.h"
+
+namespace smartmill::stability {
+namespace {
+
+ChartMaker filled(ChartParameters parameters, double step = 1.0) {
+  parameters.kr = 1.0 / 3.0;
+  ChartMaker maker(parameters, machine());
+  maker.handle(frf("x", step));
+  maker.handle(frf("y", step));
+  maker.handle(coefficients());
+  return maker;
+}
+
+ChartParameters slot() {
+  ChartParameters parameters;
+  parameters.speed_low = units::radPerSecFromRpm(5000.0);
+  return parameters;
+}
+
+// Zero-order limits of the benchmark, an independent table (6000, 10000, 15000, 20000 rpm), printed to 0.1 ..
+// 0.2 %; it lies up to 0.5 % above the exact root. Lines of 1 Hz joined by straight lines cost less than 0.5
+// % more.
+TEST(ChartMaker, measuredFrfsGiveTheBenchmarksLimits) {
+  const ChartMaker maker = filled(slot());
+  const double table[][2] = {{6000, 0.0496}, {10000, 0.0737}, {15000, 0.1177}, {20000, 0.0626}};
+  for (const auto& row : table) {
+    const Prediction prediction = maker.predict(units::radPerSecFromRpm(row[0]), 0.05e-3);
+    EXPECT_NEAR(prediction.point.depth_limit * 1e3 / row[1], 1.0, 0.01) << row[0] << " rpm";
+    EXPECT_EQ(prediction.stable, row[1] > 0.05) << row[0] << " rpm";
+  }
+}
+
+// Where the hammer's spectrum has a zero the FRF is noise as large as a resonance; its standard deviation
+// says so.
+TEST(ChartMaker, linesThatTheHammerDidNotExciteMakeNoPocket) {
+  const Chart clean = filled(slot()).chart();
+  ChartParameters parameters = slot();
+  parameters.kr = 1.0 / 3.0;
+  ChartMaker maker(parameters, machine());
+  for (const char* direction : {"x", "y"}) {
+    MeasuredFrf noisy = frf(direction, 1.0);
+    double peak = 0.0;
+    for (const std::complex<double>& value : noisy.frf.value) peak = std::max(peak, std::abs(value));
+    noisy.frf.std_dev.assign(noisy.frf.size(), 1e-3 * peak);
+    for (std::size_t i = 0; i < noisy.frf.size(); ++i) {
+      const double f = noisy.frf.frequency[i];
+      if (f < 2950.0 || f > 3050.0) continue;
+      noisy.frf.value[i] = {-1.2 * peak, (i % 2 ? 0.5 : -0.5) * peak};
+      noisy.frf.std_dev[i] = 1.3 * peak;
+    }
+    maker.handle(noisy);
+  }
+  maker.handle(coefficients());
+  const Chart chart = maker.chart();
+  ASSERT_EQ(chart.limit.depth.size(), clean.limit.depth.size());
+  for (std::size_t k = 0; k < clean.limit.depth.size(); ++k) {
+    if (std::isinf(clean.limit.depth[k])) continue;
+    ASSERT_NEAR(chart.limit.depth[k] / clean.limit.depth[k], 1.0, 1e-2) << k;
+  }
+}
+
+TEST(ChartMaker, modesGiveTheSameChartAsTheirFrf) {
+  ChartParameters parameters = slot();
+  parameters.kr = 1.0 / 3.0;
+  parameters.method = "zero_order";
+  parameters.use_modes = true;
+  parameters.frequency_high = 4000.0;
+  ChartMaker maker(parameters, machine());
+  for (const char* direction : {"x", "y"}) {
+    maker.handle(MeasuredModes{10.0, "end_mill", POINT_TOOL_TIP, direction, "m/N", benchmark(), 0.0});
+  }
+  maker.handle(coefficients());
+  const Chart of_modes = maker.chart(), of_frf = filled(slot(), 0.25).chart();
+  for (std::size_t k = 0; k < of_modes.limit.depth.size(); ++k) {
+    ASSERT_NEAR(of_modes.limit.depth[k] / of_frf.limit.depth[k], 1.0, 2e-3) << k;
+  }
+  EXPECT_EQ(of_modes.tool, "end_mill");
+  EXPECT_EQ(of_modes.material, "aluminium");
+  EXPECT_EQ(of_modes.stamp, 20.0);
+}
+
+ChartMaker fromModes(ChartParameters parameters, double relative_error) {
+  parameters.kr = 1.0 / 3.0;
+  ChartMaker maker(parameters, machine());
+  for (const char* direction : {"x", "y"}) {
+    maker.handle(frf(direction, 1.0));
+    maker.handle(
+        MeasuredModes{10.0, "end_mill", POINT_TOOL_TIP, direction, "m/N", benchmark(), relative_error});
+  }
+  maker.handle(coefficients());
+  return maker;
+}
+
+// Where modes are known the chart comes from the default solver: the independent table of converged limits.
+TEST(ChartMaker, knownModesGiveTheConvergedLimits) {
+  ChartParameters parameters = slot();
+  parameters.speeds = 601;
+  const ChartMaker maker = fromModes(parameters, 0.01);
+  const double table[][2] = {{6000, 0.0483482}, {10000, 0.0714108}, {15000, 0.1144476}, {20000, 0.0632216}};
+  const Chart chart = maker.chart();
+  EXPECT_EQ(chart.method, "collocation");
+  for (const auto& row : table) {
+    const double speed = units::radPerSecFromRpm(row[0]);
+    EXPECT_NEAR(maker.predict(speed, 0.05e-3).point.depth_limit * 1e3 / row[1], 1.0, 3e-4)
+        << row[0] << " rpm";
+    // The chart interpolates between solved speeds.
+    const auto& speeds = chart.limit.spindle_speed;
+    auto k = static_cast<std::size_t>(std::lower_bound(speeds.begin(), speeds.end(), speed - 1e-9) -
+                                      speeds.begin());
+    ASSERT_NEAR(speeds[k], speed, 1e-6);
+    EXPECT_NEAR(chart.limit.depth[k] * 1e3 / row[1], 1.0, 5e-3) << row[0] << " rpm";
+  }
+  EXPECT_FALSE(chart.recommended.empty());
+  EXPECT_FALSE(chart.unstable.empty());
+}
+
+TEST(ChartMaker, modesThatFitBadlyLeaveTheChartToTheFrf) {
+  EXPECT_EQ(fromModes(slot(), 0.3).chart().method, "zero_order");
+  ChartParameters parameters = slot();
+  parameters.method = "zero_order";
+  EXPECT_EQ(fromModes(parameters, 0.01).chart().method, "zero_order");
+  parameters.method = "guess";
+  EXPECT_THROW(fromModes(parameters, 0.01), Error);
+}
+
+TEST(ChartMaker, spindleLimitsFollowTheMeanTorque) {
+  const Chart chart = filled(slot()).chart();
+  // A slot removes depth x diameter a feed: energy Ktc per volume, and the edge force along half a turn of
+  // each tooth.
+  const double energy_per_depth = 6e8 * 0.02 * 2 * 0.1e-3 + 1e4 * 2 * units::PI * 0.01;  // [J/m] a revolution
+  const double torque_per_depth = energy_per_depth / units::TWO_PI;
+  for (std::size_t k = 0; k < chart.limit.spindle_speed.size(); k += 100) {
+    const double speed = chart.limit.spindle_speed[k], friction = 0.1 + 1e-3 * speed;
+    EXPECT_NEAR(chart.torque_depth_limit[k] * torque_per_depth / (20.0 - friction), 1.0, 1e-12);
+    EXPECT_NEAR(chart.power_depth_limit[k] * torque_per_depth / (8000.0 / speed - friction), 1.0, 1e-12);
+  }
+  ASSERT_FALSE(chart.recommended.empty());
+  const ChartPoint& best = chart.recommended.front();
+  EXPECT_NEAR(best.torque / (torque_per_depth * best.axial_depth), 1.0, 1e-12);
+  EXPECT_NEAR(best.power / (best.torque * best.spindle_speed), 1.0, 1e-12);
+  EXPECT_NEAR(best.material_removal_rate /
+                  (best.axial_depth * 0.02 * 2 * 0.1e-3 * best.spindle_speed / units::TWO_PI),
+              1.0, 1e-12);
+}
+
+// The best pocket of one mode lies where the tooth passing frequency nears the natural frequency (from below
+// 922 Hz x 60 / 2 = 27660 rpm, here cut off), or a whole part of it: 13830 rpm, 9220 rpm.
+TEST(ChartMaker, recommendsStablePocketsAndProposesClearlyUnstableValleys) {
+  ChartParameters parameters = slot();
+  parameters.speed_high = units::radPerSecFromRpm(16000.0);
+  const ChartMaker maker = filled(parameters);
+  const Chart chart = maker.chart();
+  ASSERT_GE(chart.recommended.size(), 2u);
+  EXPECT_NEAR(units::rpmFromRadPerSec(chart.recommended[0].spindle_speed), 13830.0, 0.04 * 13830.0);
+  EXPECT_NEAR(units::rpmFromRadPerSec(chart.recommended[1].spindle_speed), 9220.0, 0.04 * 9220.0);
+  for (std::size_t i = 0; i < chart.recommended.size(); ++i) {
+    const ChartPoint& point = chart.recommended[i];
+    for (const double off : {0.991, 1.0, 1.009}) {
+      const Prediction there = maker.predict(point.spindle_speed * off, point.axial_depth);
+      EXPECT_TRUE(there.stable);
+      EXPECT_LE(point.axial_depth, 0.8 * there.point.depth_limit * (1 + 1e-3));
+    }
+    EXPECT_TRUE(maker.predict(point.spindle_speed, point.axial_depth).within_spindle_limits);
+    if (i > 0) {
+      EXPECT_GE(chart.recommended[i - 1].material_removal_rate, point.material_removal_rate);
+    }
+  }
+  ASSERT_FALSE(chart.unstable.empty());
+  for (const ChartPoint& point : chart.unstable) {
+    for (const double off : {0.991, 1.0, 1.009}) {
+      const Prediction there = maker.predict(point.spindle_speed * off, point.axial_depth);
+      EXPECT_FALSE(there.stable);
+      EXPECT_GE(point.axial_depth, 1.5 * there.point.depth_limit * (1 - 1e-3));
+    }
+    EXPECT_TRUE(maker.predict(point.spindle_speed, point.axial_depth).within_spindle_limits);
+    EXPECT_GT(point.chatter_frequency, 922.0);  // a slot's Hopf lobes lie above the natural frequency
+  }
+}
+
+TEST(ChartMaker, aWeakSpindleHoldsTheRecommendationDown) {
+  MachineModel weak = machine();
+  weak.spindle->rated_torque = 0.8;
+  ChartParameters parameters = slot();
+  parameters.kr = 1.0 / 3.0;
+  parameters.speed_high = 1500.0;
+  ChartMaker maker(parameters, weak);
+  maker.handle(frf("x", 1.0));
+  maker.handle(frf("y", 1.0));
+  maker.handle(coefficients());
+  const Chart chart = maker.chart();
+  for (const auto* points : {&chart.recommended, &chart.unstable}) {
+    for (const ChartPoint& point : *points) EXPECT_LE(point.torque, 0.8);
+  }
+}
+
+TEST(ChartMaker, saysWhatIsMissing) {
+  ChartMaker maker(slot(), machine());
+  EXPECT_EQ(maker.missing(), "FRF in x, FRF in y, tangential coefficient");
+  maker.handle(frf("x", 5.0));
+  maker.handle(coefficients());
+  EXPECT_EQ(maker.missing(), "FRF in y");
+  EXPECT_THROW(maker.chart(), Error);
+  MeasuredFrf sensor = frf("y", 5.0);
+  sensor.point = POINT_FORCE_SENSOR;
+  maker.handle(sensor);
+  EXPECT_EQ(maker.missing(), "FRF in y");
+  MeasuredFrf other = frf("y", 5.0);
+  other.tool = "face_mill";
+  maker.handle(other);
+  EXPECT_EQ(maker.missing(), "FRF in x");  // another tool: the first one's FRF is put away
+}
+
+TEST(ChartMaker, refusesBadParametersByKey) {
+  const auto message = [](const std::function<void(ChartParameters&)>& spoil) -> std::string {
+    ChartParameters parameters = slot();
+    spoil(parameters);
+    try {
+      ChartMaker maker(parameters, machine());
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(message([](ChartParameters&) {}), "");
+  EXPECT_NE(message([](ChartParameters& p) { p.exit = -1.0; }).find("exit_angle: -1.0"), std::string::npos);
+  EXPECT_NE(message([](ChartParameters& p) { p.depth_margin = 1.0; }).find("depth_margin"),
+            std::string::npos);
+  EXPECT_NE(message([](ChartParameters& p) { p.kr = std::nan(""); }).find("kr"), std::string::npos);
+  EXPECT_NE(message([](ChartParameters& p) { p.speed_low = 1e5; }).find("speed_high"), std::string::npos);
+  MachineModel without = machine();
+  without.tool.reset();
+  EXPECT_THROW(ChartMaker(slot(), without), Error);
+  EXPECT_THROW(filled(slot()).predict(0.0, 1e-3), Error);
+  EXPECT_THROW(filled(slot()).predict(100.0, std::nan("")), Error);
+}
+
+}  // namespace
+}  // namespace smartmill::stability

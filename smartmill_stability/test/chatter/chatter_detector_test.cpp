@@ -1,0 +1,215 @@
+#include "smartmill_stability/chatter/chatter_detector.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/units.h"
+#include "smartmill_stability_testing/cutting_scene.h"
+
+namespace smartmill::stability {
+namespace {
+
+using units::TWO_PI;
+
+/// A cut as the detector sees it.
+std::vector<ChatterState> run(const Scene& scene, const ChatterParameters& parameters = {}) {
+  std::vector<ChatterState> states;
+  ChatterDetector detector(parameters, [&](const ChatterState& state) { states.push_back(state); });
+  play(scene, [&](const auto& input) { detector.handle(input); });
+  return states;
+}
+
+TEST(ChatterDetector, forcedVibrationIsNoChatter) {
+  const std::vector<ChatterState> states = run({});
+  int valid = 0;
+  for (const ChatterState& state : states) {
+    EXPECT_FALSE(state.chatter) << state.stamp;
+    if (!state.valid) continue;
+    ++valid;
+    // What is left is the noise, 1 N in each of three axes; resampling takes at most 36 % of white noise's
+    // power.
+    EXPECT_LT(state.severity, 1.03 * std::sqrt(3.0)) << state.stamp;
+    EXPECT_GT(state.severity, 0.8 * std::sqrt(3.0)) << state.stamp;
+    EXPECT_EQ(state.condition, "cut_1");
+    EXPECT_GT(state.stamp, 0.5);
+    EXPECT_LT(state.stamp, 2.52);
+  }
+  // Two seconds of 75.3 turns each, a verdict every 8 turns, the first after 20.
+  EXPECT_NEAR(valid, (2.0 * 75.3 - 20.0) / 8.0, 2.0);
+}
+
+TEST(ChatterDetector, measuresChattersFrequencyAndForce) {
+  Scene scene;
+  scene.chatter = 120.0;
+  int valid = 0;
+  for (const ChatterState& state : run(scene)) {
+    if (!state.valid) continue;
+    ++valid;
+    EXPECT_TRUE(state.chatter);
+    EXPECT_NEAR(state.frequency, scene.frequency, 0.5) << state.stamp;
+    // Amplitude over root two, with noise; the turn-wise mean takes up to a few percent with it.
+    EXPECT_NEAR(state.severity, 120.0 / std::sqrt(2.0), 6.0) << state.stamp;
+    // All energy: forced in x and in y (times 0.7), and chatter.
+    const double forced = 1.49 * (150.0 * 150.0 + 60.0 * 60.0 + 40.0 * 40.0) / 2.0,
+                 chatter = 120.0 * 120.0 / 2.0;
+    EXPECT_NEAR(state.energy_ratio, chatter / (forced + chatter), 0.03) << state.stamp;
+  }
+  EXPECT_GT(valid, 10);
+}
+
+TEST(ChatterDetector, tellsWhenChatterBegins) {
+  Scene scene;
+  scene.chatter = 150.0;
+  scene.chatter_from = 1.5;
+  bool before = false;
+  double first = 0.0;
+  for (const ChatterState& state : run(scene)) {
+    if (state.chatter && first == 0.0) first = state.stamp;
+    before = before || (state.chatter && state.stamp < 1.5);
+  }
+  EXPECT_FALSE(before);
+  EXPECT_GT(first, 1.5);
+  EXPECT_LT(first, 1.5 + 24 / 75.3);  // a window and a hop later at the most
+}
+
+// Every other tooth out of the cut: it repeats each revolution, and only its size tells it from runout.
+TEST(ChatterDetector, findsTheFlipOfFourTeeth) {
+  Scene scene;
+  scene.teeth = 4;
+  scene.alternating = 150.0;
+  int valid = 0;
+  for (const ChatterState& state : run(scene)) {
+    if (!state.valid) continue;
+    ++valid;
+    EXPECT_TRUE(state.chatter);
+    EXPECT_NEAR(state.frequency, 2.0 * 75.3, 0.1);
+    const double forced = 1.49 * (150.0 * 150.0 + 60.0 * 60.0 + 40.0 * 40.0) / 2.0,
+                 flip = 150.0 * 150.0 / 2.0;
+    EXPECT_NEAR(state.alternation, flip / (forced + flip), 0.02);
+    EXPECT_NEAR(state.severity, 150.0 / std::sqrt(2.0), 5.0);
+  }
+  EXPECT_GT(valid, 10);
+  // A tenth of the force alternating, as runout does it, is none; nor can it be told where the teeth are not
+  // known.
+  scene.alternating = 20.0;
+  for (const ChatterState& state : run(scene)) EXPECT_FALSE(state.chatter);
+  scene.alternating = 150.0;
+  scene.teeth = 0;
+  for (const ChatterState& state : run(scene)) EXPECT_FALSE(state.chatter);
+}
+
+// The ringing of an entry is no chatter, though it is large in the first window.
+TEST(ChatterDetector, whatDiesOutIsNoChatter) {
+  Scene scene;
+  scene.transient = 400.0;
+  double largest = 0.0;
+  for (const ChatterState& state : run(scene)) {
+    EXPECT_FALSE(state.chatter) << state.stamp;
+    largest = std::max(largest, state.energy_ratio);
+  }
+  EXPECT_GT(largest, 0.1);  // the ratio alone would have called it chatter
+}
+
+TEST(SignalBlock, takesUpToThreeChannels) {
+  SampleBlock block;
+  block.stamp = 3.0;
+  block.sample_rate = 1000.0;
+  block.first_index = 7;
+  block.channels = {"ax", "ay"};
+  block.units = {"m/s2", "m/s2"};
+  block.samples = {1.0, 2.0, 3.0, 4.0};
+  const ForceBlock signal = signalBlock(block);
+  EXPECT_EQ(signal.stamp, 3.0);
+  EXPECT_EQ(signal.first_index, 7u);
+  EXPECT_EQ(signal.force[0], (std::vector<double>{1.0, 3.0}));
+  EXPECT_EQ(signal.force[1], (std::vector<double>{2.0, 4.0}));
+  EXPECT_EQ(signal.force[2], (std::vector<double>{0.0, 0.0}));
+  EXPECT_THROW(signalBlock(SampleBlock{}), Error);
+}
+
+TEST(ChatterDetector, saysNothingOutsideTheSteadyPart) {
+  const std::vector<ChatterState> states = run({});
+  ASSERT_FALSE(states.empty());
+  EXPECT_FALSE(states.front().valid);
+  EXPECT_TRUE(std::isnan(states.front().frequency));
+  EXPECT_FALSE(states.back().valid);
+  EXPECT_NEAR(states.back().stamp, 2.5, 0.03);
+}
+
+// The same inputs through a sorter, however late by stream, and again after a restart of the bag: the same
+// verdicts.
+TEST(SortedDetection, anyArrivalGivesTheSameVerdicts) {
+  const auto feed = [](SortedDetection& detection, double lag) {
+    CuttingCondition condition;
+    condition.stamp = 0.01;
+    condition.kind = CuttingCondition::Kind::cut;
+    condition.name = "cut";
+    condition.steady_from = {{0.0, 0.0, 0.0}};
+    condition.steady_to = {{1.0, 0.0, 0.0}};
+    detection.push(condition);
+    std::vector<ForceBlock> late;
+    for (int b = 0; b < 150; ++b) {
+      const double t = 0.01 * b;
+      CncState state;
+      state.stamp = t;
+      state.connected = true;
+      state.axes = {"X", "Y", "Z"};
+      state.position = {0.02 * t + 0.001, 0.0, 0.0};
+      state.feed = 0.02;
+      ForceBlock block;
+      block.stamp = t;
+      block.sample_rate = RATE;
+      block.first_index = static_cast<std::uint64_t>(b) * BLOCK;
+      for (int i = 0; i < BLOCK; ++i) {
+        const double at = t + i / RATE;
+        block.force[0].push_back(50.0 * std::cos(TWO_PI * 733.0 * at) + 80.0 * std::cos(SPEED * at));
+      }
+      block.force[1] = block.force[2] = block.force[0];
+      late.push_back(block);
+      detection.push(state);
+      detection.push(SpindleAngle{t, std::fmod(SPEED * t, TWO_PI), SPEED});
+      while (!late.empty() && late.front().stamp <= t - lag) {
+        detection.push(late.front());
+        late.erase(late.begin());
+      }
+    }
+    for (const ForceBlock& block : late) detection.push(block);
+    detection.flush();
+  };
+  std::vector<std::vector<ChatterState>> results;
+  std::vector<ChatterState> states;
+  SortedDetection detection({}, 0.05, [&](const ChatterState& state) {
+    if (state.valid) states.push_back(state);
+  });
+  for (const double lag : {0.0, 0.0, 0.3}) {
+    feed(detection, lag);  // from the second on the stamps jump back: a restart
+    results.push_back(states);
+    states.clear();
+  }
+  ASSERT_GT(results[0].size(), 4u);
+  for (const auto& result : results) {
+    ASSERT_EQ(result.size(), results[0].size());
+    for (std::size_t i = 0; i < result.size(); ++i) {
+      EXPECT_EQ(result[i].stamp, results[0][i].stamp);
+      EXPECT_EQ(result[i].severity, results[0][i].severity);
+      EXPECT_EQ(result[i].chatter, results[0][i].chatter);
+    }
+  }
+  EXPECT_TRUE(results[0].back().chatter);
+}
+
+TEST(ChatterDetector, refusesBadParameters) {
+  ChatterParameters parameters;
+  parameters.energy_ratio = 0.0;
+  EXPECT_THROW(ChatterDetector(parameters, [](const ChatterState&) {}), Error);
+  parameters = {};
+  parameters.hop_revolutions = 17;
+  EXPECT_THROW(ChatterDetector(parameters, [](const ChatterState&) {}), Error);
+}
+
+}  // namespace
+}  // namespace smartmill::stability

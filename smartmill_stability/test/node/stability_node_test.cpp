@@ -1,0 +1,147 @@
+#include <mutex>
+
+#include <gtest/gtest.h>
+#include <ros/ros.h>
+
+#include <smartmill_msgs/ChatterAdvice.h>
+#include <smartmill_msgs/ChatterState.h>
+#include <smartmill_msgs/PredictStability.h>
+#include <smartmill_msgs/StabilityChart.h>
+
+#include "smartmill_ros/conversions.h"
+#include "smartmill_stability_testing/benchmark.h"
+#include "smartmill_stability_testing/cutting_scene.h"
+
+namespace smartmill::stability {
+namespace {
+
+using smartmill_msgs::PredictStability;
+
+class StabilityNode : public ::testing::Test {
+ protected:
+  StabilityNode() : spinner_(1) { spinner_.start(); }
+
+  PredictStability::Response predict(double rpm, double depth) {
+    PredictStability call;
+    call.request.spindle_speed = units::radPerSecFromRpm(rpm);
+    call.request.axial_depth = depth;
+    auto client = nh_.serviceClient<PredictStability>("stability/predict");
+    EXPECT_TRUE(client.waitForExistence(ros::Duration(20.0)));
+    EXPECT_TRUE(client.call(call));
+    return call.response;
+  }
+
+  template <typename Message>
+  ros::Publisher publisher(const char* topic) {
+    ros::Publisher p = nh_.advertise<Message>(topic, 1000);
+    for (int i = 0; i < 400 && !p.getNumSubscribers(); ++i) ros::WallDuration(0.05).sleep();
+    EXPECT_GT(p.getNumSubscribers(), 0u) << topic;
+    return p;
+  }
+
+  ros::NodeHandle nh_;
+  ros::AsyncSpinner spinner_;
+};
+
+TEST_F(StabilityNode, publishesTheChartAndAnswers) {
+  EXPECT_EQ(predict(10000.0, 0.05e-3).code, PredictStability::Response::NO_CHART);
+  EXPECT_NE(predict(10000.0, 0.05e-3).message.find("FRF in x, FRF in y, tangential"), std::string::npos);
+
+  const auto frfs = publisher<smartmill_msgs::Frf>("tool/frf");
+  const auto sets = publisher<smartmill_msgs::CuttingCoefficients>("material/coefficients");
+  frfs.publish(toMsg(frf("x", 1.0)));
+  frfs.publish(toMsg(frf("y", 1.0)));
+  sets.publish(toMsg(coefficients()));
+
+  // Latched: who comes late gets it.
+  const auto chart =
+      ros::topic::waitForMessage<smartmill_msgs::StabilityChart>("stability/chart", nh_, ros::Duration(10.0));
+  ASSERT_TRUE(chart);
+  EXPECT_EQ(chart->tool, "end_mill");
+  EXPECT_EQ(chart->material, "aluminium");
+  EXPECT_EQ(chart->spindle_speed.size(), 300u);
+  EXPECT_EQ(chart->depth_limit.size(), 300u);
+  EXPECT_EQ(toSec(chart->header.stamp), 20.0);
+  EXPECT_FALSE(chart->recommended.empty());
+
+  // An independent table, zero-order, printed to 0.2 %; lines of 1 Hz joined by straight lines.
+  const auto below = predict(10000.0, 0.07e-3), above = predict(10000.0, 0.08e-3);
+  EXPECT_EQ(below.code, PredictStability::Response::OK);
+  EXPECT_NEAR(below.point.depth_limit, 0.0737e-3, 0.01 * 0.0737e-3);
+  EXPECT_TRUE(below.stable);
+  EXPECT_FALSE(above.stable);
+  EXPECT_EQ(predict(-1.0, 0.07e-3).code, PredictStability::Response::BAD_REQUEST);
+}
+
+TEST_F(StabilityNode, findsChatterInReplayedForce) {
+  std::mutex mutex;
+  std::vector<smartmill_msgs::ChatterState> states;
+  const ros::Subscriber subscriber = nh_.subscribe<smartmill_msgs::ChatterState>(
+      "chatter/state", 1000,
+      boost::function<void(const smartmill_msgs::ChatterState::ConstPtr&)>(
+          [&](const smartmill_msgs::ChatterState::ConstPtr& state) {
+            const std::lock_guard<std::mutex> lock(mutex);
+            states.push_back(*state);
+          }));
+  const auto conditions = publisher<smartmill_msgs::CuttingCondition>("cut/condition");
+  const auto cnc = publisher<smartmill_msgs::CncState>("cnc/state");
+  const auto angles = publisher<smartmill_msgs::SpindleAngle>("spindle/angle");
+  const auto forces = publisher<smartmill_msgs::ForceBlock>("force/compensated");
+  for (int i = 0; i < 200 && !subscriber.getNumPublishers(); ++i) ros::WallDuration(0.05).sleep();
+
+  struct Sink {
+    const ros::Publisher &conditions, &cnc, &angles, &forces;
+    void operator()(const CuttingCondition& c) const {
+      conditions.publish(toMsg(c));
+      ros::WallDuration(0.2).sleep();
+    }
+    void operator()(const CncState& s) const { cnc.publish(toMsg(s)); }
+    void operator()(const SpindleAngle& a) const { angles.publish(toMsg(a)); }
+    void operator()(const ForceBlock& b) const {
+      forces.publish(toMsg(b, "machine"));
+      ros::WallDuration(0.002).sleep();  // far faster than a machine, yet not faster than the queue
+    }
+  };
+  const Sink sink{conditions, cnc, angles, forces};
+  Scene scene;
+  play(scene, sink, 100.0);
+  scene.chatter = 150.0;
+  play(scene, sink, 200.0);
+  // The node notices that no more comes and evaluates the rest.
+  ros::WallDuration(2.0).sleep();
+
+  const std::lock_guard<std::mutex> lock(mutex);
+  int quiet = 0, chatter = 0;
+  for (const auto& state : states) {
+    const double stamp = toSec(state.header.stamp);
+    if (!state.valid) continue;
+    EXPECT_EQ(state.condition, "cut_1");
+    EXPECT_EQ(state.chatter, stamp > 200.0) << stamp;
+    if (stamp > 200.0) {
+      EXPECT_NEAR(state.frequency, scene.frequency, 0.5);
+    }
+    (stamp > 200.0 ? chatter : quiet) += 1;
+  }
+  EXPECT_GT(quiet, 10);
+  EXPECT_GT(chatter, 10);
+  // Two straight teeth of the model: the fastest speed below 2200 rad/s at which they pass in step with the
+  // chatter.
+  const auto advice =
+      ros::topic::waitForMessage<smartmill_msgs::ChatterAdvice>("chatter/advice", nh_, ros::Duration(5.0));
+  ASSERT_TRUE(advice);
+  EXPECT_EQ(advice->condition, "cut_1");
+  EXPECT_GT(toSec(advice->header.stamp), 200.0);
+  EXPECT_NEAR(advice->frequency, scene.frequency, 0.5);
+  ASSERT_FALSE(advice->speeds.empty());
+  EXPECT_NEAR(advice->speeds[0].spindle_speed, units::TWO_PI * scene.frequency / 4.0, 1.0);
+  EXPECT_FALSE(advice->corrected);  // no modes were measured
+}
+
+}  // namespace
+}  // namespace smartmill::stability
+
+int main(int argc, char** argv) {
+  testing::InitGoogleTest(&argc, argv);
+  ros::init(argc, argv, "stability_node_test");
+  return RUN_ALL_TESTS();
+}

@@ -1,0 +1,160 @@
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include "smartmill_core/modal/modal_filter.h"
+#include "smartmill_stability/solvers/solver.h"
+
+namespace smartmill::stability {
+
+/// An independent time-domain simulation of milling with the surface that earlier teeth left: chips cannot be
+/// negative and teeth leave the cut. Modes of one axis each; edges in slices, angles on a grid of whole
+/// steps.
+class TimeDomain {
+ public:
+  /// @param x, y receptances of the tool tip @param feed [m] per tooth @param may_leave false: chips may be
+  /// negative, as linear theory has it
+  TimeDomain(const RegenerativeSystem& system, const ModalModel& x, const ModalModel& y, double speed,
+             double depth, double feed, int steps_per_revolution = 720, bool may_leave = true,
+             int least_slices = 1)
+      : may_leave_(may_leave),
+        system_(system),
+        steps_(steps_per_revolution),
+        feed_(feed),
+        x_(x, speed / units::TWO_PI * steps_per_revolution, Hold::first_order),
+        y_(y, speed / units::TWO_PI * steps_per_revolution, Hold::first_order) {
+    const double per_step = units::TWO_PI / steps_;
+    const double lag = system.helix > 0.0 ? std::tan(system.helix) / (0.5 * system.diameter) : 0.0;
+    const int slices =
+        std::max(least_slices,
+                 lag > 0.0 ? std::max(4, static_cast<int>(std::ceil(lag * depth / (2.0 * per_step)))) : 1);
+    slice_depth_ = depth / slices;
+    for (int s = 0; s < slices; ++s)
+      lag_.push_back(static_cast<int>(std::lround(lag * depth * (s + 0.5) / slices / per_step)));
+    double angle = 0.0;
+    for (int k = 0; k < system.teeth; ++k) {
+      tooth_.push_back(static_cast<int>(std::lround(angle / per_step)));
+      angle += system.pitchOf(k);
+    }
+    surface_.assign(static_cast<std::size_t>(slices),
+                    std::vector<double>(static_cast<std::size_t>(steps_), 0.0));
+    // As if teeth without vibration had passed before.
+    for (auto& slice : surface_)
+      for (int i = 0; i < steps_; ++i)
+        slice[static_cast<std::size_t>(i)] = -feed_ * std::sin(units::TWO_PI * i / steps_);
+  }
+
+  /// Radial offset of each tooth [m], outwards.
+  void setRunout(std::vector<double> runout) { runout_ = std::move(runout); }
+
+  /// Radius of tooth k at a height: amplitude sin(2 pi (height / wavelength + k / teeth)) [m]. Needs slices
+  /// much thinner than the wave.
+  void setSerration(double amplitude, double wavelength) {
+    const std::size_t slices = surface_.size();
+    serration_.assign(slices, std::vector<double>(tooth_.size(), 0.0));
+    for (std::size_t s = 0; s < slices; ++s)
+      for (std::size_t k = 0; k < tooth_.size(); ++k)
+        serration_[s][k] =
+            amplitude *
+            std::sin(units::TWO_PI * ((static_cast<double>(s) + 0.5) * slice_depth_ / wavelength +
+                                      static_cast<double>(k) / static_cast<double>(tooth_.size())));
+  }
+
+  /// One step of the spindle. @return displacement x, y [m]; force() that made it.
+  std::array<double, 2> step() {
+    // Displacement with the force as it was, force with that displacement, then the true step.
+    const std::array<double, 2> guess{{x_.peek(force_[0]), y_.peek(force_[1])}};
+    force_ = cut(guess, false);
+    const std::array<double, 2> better{{x_.peek(force_[0]), y_.peek(force_[1])}};
+    force_ = cut(better, true);
+    ++count_;
+    return {{x_.step(force_[0]), y_.step(force_[1])}};
+  }
+
+  const std::array<double, 2>& force() const { return force_; }  ///< [N] on the tool
+
+ private:
+  static constexpr double RAMP = 30.0;  // [1] turns
+
+  std::array<double, 2> cut(const std::array<double, 2>& u, bool leave) {
+    std::array<double, 2> force{{0.0, 0.0}};
+    // A knock once the tool is in: what grows must begin somewhere.
+    const double turns = static_cast<double>(count_) / steps_ - RAMP;
+    if (turns >= 0.0 && turns < 0.02) {
+      const double knock =
+          0.05 * (system_.kt + system_.kr) * feed_ * slice_depth_ * static_cast<double>(lag_.size());
+      force = {{knock, knock}};
+    }
+    // Feed made so far, along x.
+    const double fed = feed_ * system_.teeth * static_cast<double>(count_) / steps_;
+    for (std::size_t s = 0; s < surface_.size(); ++s) {
+      for (std::size_t k = 0; k < tooth_.size(); ++k) {
+        const int offset = tooth_[k];
+        const long at = ((count_ + offset - lag_[s]) % steps_ + steps_) % steps_;
+        const double phi = units::TWO_PI * static_cast<double>(at) / steps_;
+        double& left = surface_[s][static_cast<std::size_t>(at)];
+        if (phi <= system_.entry || phi >= system_.exit) continue;
+        const double si = std::sin(phi), co = std::cos(phi);
+        const double reach = (u[0] + fed) * si + u[1] * co + (runout_.empty() ? 0.0 : runout_[k]) +
+                             (serration_.empty() ? 0.0 : serration_[s][k]);
+        const double chip = reach - left;
+        if (chip <= 0.0 && may_leave_) continue;
+        if (leave) left = reach;
+        // The tool sinks in over some turns: a sudden start could throw it into chatter that lives beside the
+        // stable cut.
+        const double depth = slice_depth_ * std::min(1.0, static_cast<double>(count_) / (RAMP * steps_));
+        const double ft = system_.kt * chip * depth, fr = system_.kr * chip * depth;
+        force[0] += -ft * co - fr * si;
+        force[1] += ft * si - fr * co;
+      }
+    }
+    return force;
+  }
+
+  bool may_leave_;
+  RegenerativeSystem system_;
+  int steps_;
+  double feed_, slice_depth_ = 0.0;
+  ModalFilter x_, y_;
+  std::vector<int> lag_, tooth_;
+  std::vector<double> runout_;
+  std::vector<std::vector<double>> serration_;  // [slice][tooth]
+  std::vector<std::vector<double>> surface_;
+  std::array<double, 2> force_{{0.0, 0.0}};
+  long count_ = 0;
+};
+
+/// Whether what does not repeat with a period (in steps) grows or stays over the second half of a run.
+inline bool chattersInTime(TimeDomain& run, int period, double feed, int revolutions = 180, int steps = 720) {
+  std::vector<std::array<double, 2>> before(static_cast<std::size_t>(period));
+  constexpr int WINDOW = 25;  // turns: longer than the beats of a quasi-periodic motion
+  double middle = 0.0, last = 0.0;
+  for (int r = 0; r < revolutions; ++r) {
+    double change = 0.0;
+    for (int i = 0; i < steps; ++i) {
+      const auto u = run.step();
+      auto& old = before[static_cast<std::size_t>(i % period)];
+      change += std::pow(u[0] - old[0], 2) + std::pow(u[1] - old[1], 2);
+      old = u;
+    }
+    if (r >= revolutions / 2 - WINDOW && r < revolutions / 2) middle += change;
+    if (r >= revolutions - WINDOW) last += change;
+  }
+  // Per sample: a millionth of the feed has died out, a twentieth will not die any more.
+  const double samples = static_cast<double>(WINDOW) * steps;
+  if (last < samples * std::pow(1e-6 * feed, 2)) return false;
+  return last > 0.7 * middle || last > samples * std::pow(0.05 * feed, 2);
+}
+
+/// The same by the principal period: a tooth's for even pitch, else a revolution.
+inline bool chattersInTime(const RegenerativeSystem& system, const ModalModel& x, const ModalModel& y,
+                           double speed, double depth, double feed, bool may_leave = true,
+                           int revolutions = 180, int steps = 720) {
+  TimeDomain run(system, x, y, speed, depth, feed, steps, may_leave);
+  return chattersInTime(run, system.evenPitch() ? steps / system.teeth : steps, feed, revolutions, steps);
+}
+
+}  // namespace smartmill::stability

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <array>
+#include <functional>
+#include <vector>
+
+#include "smartmill_core/model/machine_model.h"
+#include "smartmill_stability/chart/uncertainty.h"
+#include "stability/twin_cuts.h"
+
+namespace smartmill::stability {
+
+struct ReliabilityOptions {
+  double speed_low = 0.0, speed_high = 0.0;  ///< [rad/s] 0 < low < high
+  double max_depth = 0.0;                    ///< [m] > 0
+  int machines = 200;
+  int draws = 200;  ///< [1] behind each prediction
+  unsigned seed = 1;
+};
+
+/// One machine drawn from the belief, with a cut at a random speed near the believed limit.
+struct ReliabilityPoint {
+  double speed = 0.0, depth = 0.0;  ///< [rad/s], [m]
+  double predicted = 0.0;           ///< [1] probability of chatter by the belief
+  bool chatters = false;            ///< what the drawn machine does in the solver's sense
+  bool seen = false;                ///< and in the simulator's records
+};
+
+/// Predicted against observed share in one bin.
+struct ReliabilityBin {
+  int count = 0;
+  double predicted = 0.0;        ///< [1] mean
+  double observed = 0.0;         ///< [1] share
+  double low = 0.0, high = 1.0;  ///< [1] Wilson's 95 % interval of the observed share
+  bool holds() const { return count == 0 || (predicted >= low && predicted <= high); }
+};
+
+/// Machines drawn from the model's standard deviations, each cut once. @param twin nullptr: the solver is the
+/// observer
+std::vector<ReliabilityPoint> reliabilityStudy(const MachineModel& model, const RegenerativeSystem& system,
+                                               const ReliabilityOptions& options, const TwinCuts* twin,
+                                               const std::function<void(double)>& progress = {});
+
+/// Bins of equal width in the predicted probability. @param by_twin observed: seen, else chatters
+std::vector<ReliabilityBin> reliabilityBins(const std::vector<ReliabilityPoint>& points, int bins,
+                                            bool by_twin);
+
+/// Standard score of the number of chattering machines against the sum of the predictions: 0 +- 1 when
+/// honest.
+double reliabilityScore(const std::vector<ReliabilityPoint>& points, bool by_twin);
+
+/// Wilson's interval of a share k of n at 95 %.
+std::array<double, 2> wilson(int k, int n);
+
+}  // namespace smartmill::stability

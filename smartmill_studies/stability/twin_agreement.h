@@ -1,0 +1,49 @@
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "smartmill_core/model/machine_model.h"
+#include "smartmill_stability/solvers/solver.h"
+#include "stability/twin_cuts.h"
+
+namespace smartmill::stability {
+
+struct AgreementOptions {
+  double speed_low = 0.0, speed_high = 0.0;  ///< [rad/s] 0 < low < high
+  double max_depth = 0.0;                    ///< [m] > 0
+  double band = 0.05;                        ///< [1] of the depth around the boundary, no points there
+  double feed = 0.1e-3;                      ///< [m] per tooth
+  int points = 400;
+  unsigned seed = 1;
+  int revolutions = 180;  ///< [1] in cut
+
+  /// @throws Error naming the quantity.
+  void validate() const;
+};
+
+struct AgreementPoint {
+  double speed = 0.0;   ///< [rad/s]
+  double depth = 0.0;   ///< [m]
+  double radius = 0.0;  ///< [1] of the dominant multiplier
+  double limit = 0.0;   ///< [m] first loss of stability at this speed
+  Kind kind = Kind::none;
+  bool seen = false;  ///< the simulated record chatters
+  bool chatters() const { return radius > 1.0; }
+  bool agrees() const { return chatters() == seen; }
+};
+
+/// Once-per-period sampling of a record of a steady cut: whether what does not repeat with a period of so
+/// many samples stays or grows over the second half. @param scale [m] of what counts: a twentieth will not
+/// die any more, a thousandth has died.
+bool repeatsNoMore(const Record& record, int samples, int period, double scale);
+
+/// Random points outside the band, uniform in speed and in depth over the first limit (0.4 .. 1.6): stable or
+/// not by the default solver and by the simulator's records.
+/// @param system of the model (helix, pitch, arc); with a chip geometry its contact counts, and the first
+/// limits from which points are drawn stay those of the system without (they take longer)
+std::vector<AgreementPoint> agreementWithTwin(const MachineModel& model, const RegenerativeSystem& system,
+                                              const AgreementOptions& options, const TwinCuts& twin,
+                                              const std::function<void(double)>& progress = {});
+
+}  // namespace smartmill::stability
