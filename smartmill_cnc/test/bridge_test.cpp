@@ -27,7 +27,7 @@ class BridgeTest : public ::testing::Test {
  protected:
   BridgeTest() {
     startServer(0);
-    bridge_ = std::make_unique<Bridge>(parameters());
+    connectBridge(port_);
   }
 
   void startServer(std::uint16_t port) {
@@ -37,14 +37,15 @@ class BridgeTest : public ::testing::Test {
     port_ = server_->port();
   }
 
-  BridgeParameters parameters() const {
-    BridgeParameters p;
-    p.port = port_;
-    p.reply_timeout = 10.0;
-    p.limits.travel = {{{-0.2, 0.2}, {-0.2, 0.2}, {-0.2, 0.2}}};
-    p.limits.max_feed = 0.5;
-    p.limits.max_spindle_speed = units::radPerSecFromRpm(12000.0);
-    return p;
+  void connectBridge(std::uint16_t port) {
+    FocasParameters focas;
+    focas.port = port;
+    focas.reply_timeout = 10.0;
+    MotionParameters motion;
+    motion.limits.travel = {{{-0.2, 0.2}, {-0.2, 0.2}, {-0.2, 0.2}}};
+    motion.limits.max_feed = 0.5;
+    motion.limits.max_spindle_speed = units::radPerSecFromRpm(12000.0);
+    bridge_ = std::make_unique<Bridge>(makeFocasController(focas), 1.0, motion);
   }
 
   void cycle() {
@@ -503,9 +504,7 @@ class NarrowController {
 TEST_F(BridgeTest, SmallQuestionsForANarrowController) {
   for (const bool hang_up : {false, true}) {
     NarrowController narrow(port_, 5, hang_up);
-    BridgeParameters p = parameters();
-    p.port = narrow.port;
-    bridge_ = std::make_unique<Bridge>(p);
+    connectBridge(narrow.port);
     ASSERT_TRUE(cycleUntil([&] { return bridge_->state().connected; }, 1000));
     ASSERT_TRUE(bridge_->load());
     EXPECT_DOUBLE_EQ(bridge_->load()->spindle_load, 0.1234);
@@ -515,34 +514,36 @@ TEST_F(BridgeTest, SmallQuestionsForANarrowController) {
   }
   // So narrow that the load meters are refused altogether: the rest works.
   NarrowController narrow(port_, 3, false);
-  BridgeParameters p = parameters();
-  p.port = narrow.port;
-  bridge_ = std::make_unique<Bridge>(p);
+  connectBridge(narrow.port);
   ASSERT_TRUE(cycleUntil([&] { return bridge_->state().connected; }, 1000));
   EXPECT_FALSE(bridge_->load());
   EXPECT_EQ(bridge_->state().axes.size(), 3u);
 }
 
+MotionParameters goodMotion() {
+  MotionParameters motion;
+  motion.limits.travel = {{{-1, 1}, {-1, 1}, {-1, 1}}};
+  motion.limits.max_feed = 1.0;
+  motion.limits.max_spindle_speed = 1000.0;
+  return motion;
+}
+
 TEST(BridgeParameters, AreChecked) {
-  BridgeParameters p;
-  p.limits.travel = {{{-1, 1}, {-1, 1}, {-1, 1}}};
-  p.limits.max_feed = 1.0;
-  p.limits.max_spindle_speed = 1000.0;
-  EXPECT_NO_THROW(p.validate());
-  p.port = 70000;
-  EXPECT_THROW(p.validate(), Error);
-  p.port = 8193;
-  p.settle_time = NAN;
-  EXPECT_THROW(p.validate(), Error);
+  FocasParameters focas;
+  EXPECT_NO_THROW(focas.validate());
+  focas.port = 70000;
+  EXPECT_THROW(focas.validate(), Error);
+  MotionParameters motion = goodMotion();
+  EXPECT_NO_THROW(motion.validate());
+  motion.settle_time = NAN;
+  EXPECT_THROW(motion.validate(), Error);
+  EXPECT_THROW(Bridge(makeFocasController({}), 0.0, goodMotion()), Error);
 }
 
 TEST(BridgeConnect, ClosedPortIsOneLine) {
-  BridgeParameters p;
-  p.port = 1;
-  p.limits.travel = {{{-1, 1}, {-1, 1}, {-1, 1}}};
-  p.limits.max_feed = 1.0;
-  p.limits.max_spindle_speed = 1000.0;
-  Bridge bridge(p);
+  FocasParameters focas;
+  focas.port = 1;
+  Bridge bridge(makeFocasController(focas), 1.0, goodMotion());
   std::vector<Note> notes;
   for (int i = 0; i < 500; ++i) {
     bridge.fetch(i * 0.02);

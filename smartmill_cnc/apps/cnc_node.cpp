@@ -1,6 +1,6 @@
 #include <exception>
 
-#include "node.h"
+#include "node/node.h"
 
 int main(int argc, char** argv) {
   ros::init(argc, argv, "cnc");

@@ -1,4 +1,4 @@
-#include "parameters_ros.h"
+#include "node/parameters_ros.h"
 
 #include <string>
 #include <vector>
@@ -10,30 +10,31 @@ namespace smartmill::cnc {
 
 NodeParameters readParameters(ParameterReader& reader) {
   NodeParameters parameters;
-  BridgeParameters& bridge = parameters.bridge;
+  FocasParameters& controller = parameters.controller;
+  MotionParameters& motion = parameters.motion;
   std::string model_file;
   std::array<std::vector<double>, 3> travel;
-  reader.read("host", bridge.host);
-  reader.read("port", bridge.port);
+  reader.read("host", controller.host);
+  reader.read("port", controller.port);
   reader.read("rate", parameters.rate);
-  reader.read("reply_timeout", bridge.reply_timeout);
-  reader.read("reconnect_period", bridge.reconnect_period);
-  reader.read("spindle", bridge.spindle);
-  reader.read("marker_macro", bridge.marker_macro);
-  reader.read("orient_macro", bridge.orient_macro);
-  reader.read("settle_time", bridge.settle_time);
-  reader.read("condition_lead", bridge.condition_lead);
-  reader.read("standstill_speed", bridge.standstill_speed);
-  reader.read("stall_timeout", bridge.stall_timeout);
-  reader.read("stop_timeout", bridge.stop_timeout);
-  reader.read("open_timeout", bridge.open_timeout);
+  reader.read("reply_timeout", controller.reply_timeout);
+  reader.read("reconnect_period", parameters.reconnect_period);
+  reader.read("spindle", controller.spindle);
+  reader.read("marker_macro", controller.marker_macro);
+  reader.read("orient_macro", controller.orient_macro);
+  reader.read("settle_time", motion.settle_time);
+  reader.read("condition_lead", motion.condition_lead);
+  reader.read("standstill_speed", motion.standstill_speed);
+  reader.read("stall_timeout", motion.stall_timeout);
+  reader.read("stop_timeout", motion.stop_timeout);
+  reader.read("open_timeout", motion.open_timeout);
   reader.read("model", model_file);
   reader.read("travel_x", travel[0]);
   reader.read("travel_y", travel[1]);
   reader.read("travel_z", travel[2]);
-  reader.read("max_feed", bridge.limits.max_feed);
-  reader.read("max_spindle_speed", bridge.limits.max_spindle_speed);
-  reader.read("max_dwell", bridge.limits.max_dwell);
+  reader.read("max_feed", motion.limits.max_feed);
+  reader.read("max_spindle_speed", motion.limits.max_spindle_speed);
+  reader.read("max_dwell", motion.limits.max_dwell);
   reader.finish();
 
   if (!(parameters.rate >= 1.0 && parameters.rate <= 200.0)) {
@@ -47,12 +48,12 @@ NodeParameters readParameters(ParameterReader& reader) {
           travel[i] = {model.axes->travel[i][0], model.axes->travel[i][1]};
         }
       }
-      if (bridge.limits.max_feed == 0.0) {
-        bridge.limits.max_feed = model.axes->rapid;
+      if (motion.limits.max_feed == 0.0) {
+        motion.limits.max_feed = model.axes->rapid;
       }
     }
-    if (model.spindle && model.spindle->max_speed && bridge.limits.max_spindle_speed == 0.0) {
-      bridge.limits.max_spindle_speed = *model.spindle->max_speed;
+    if (model.spindle && model.spindle->max_speed && motion.limits.max_spindle_speed == 0.0) {
+      motion.limits.max_spindle_speed = *model.spindle->max_speed;
     }
   }
   const std::string or_model = " (or a model that has it)";
@@ -60,15 +61,16 @@ NodeParameters readParameters(ParameterReader& reader) {
     if (travel[i].size() != 2) {
       throw Error(std::string("travel_") + "xyz"[i] + ": lowest and highest position [m] are due" + or_model);
     }
-    bridge.limits.travel[i] = {travel[i][0], travel[i][1]};
+    motion.limits.travel[i] = {travel[i][0], travel[i][1]};
   }
-  if (bridge.limits.max_feed == 0.0) {
+  if (motion.limits.max_feed == 0.0) {
     throw Error("max_feed: a feed above 0 [m/s] is due" + or_model);
   }
-  if (bridge.limits.max_spindle_speed == 0.0) {
+  if (motion.limits.max_spindle_speed == 0.0) {
     throw Error("max_spindle_speed: a speed above 0 [rad/s] is due" + or_model);
   }
-  bridge.validate();
+  controller.validate();
+  motion.validate();
   return parameters;
 }
 

@@ -4,7 +4,7 @@
 #include <fstream>
 #include <string>
 
-#include "../src/parameters_ros.h"
+#include "node/parameters_ros.h"
 #include "smartmill_core/error.h"
 
 namespace smartmill::cnc {

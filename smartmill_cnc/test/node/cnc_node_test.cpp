@@ -19,7 +19,7 @@
 #include "smartmill_msgs/OrientSpindleAction.h"
 #include "smartmill_msgs/RunProgramAction.h"
 #include "smartmill_msgs/SetMacro.h"
-#include "test_machine.h"
+#include "../test_machine.h"
 
 namespace smartmill::cnc {
 namespace {

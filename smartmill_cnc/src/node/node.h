@@ -12,7 +12,7 @@
 #include <thread>
 #include <vector>
 
-#include "parameters_ros.h"
+#include "node/parameters_ros.h"
 #include "smartmill_cnc/bridge.h"
 #include "smartmill_msgs/ArmMotion.h"
 #include "smartmill_msgs/JogAction.h"

@@ -1,4 +1,4 @@
-#include "smartmill_cnc/nc_program.h"
+#include "smartmill_cnc/motion/nc_program.h"
 
 #include <gtest/gtest.h>
 

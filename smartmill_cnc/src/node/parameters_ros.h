@@ -6,7 +6,9 @@
 namespace smartmill::cnc {
 
 struct NodeParameters {
-  BridgeParameters bridge;
+  FocasParameters controller;
+  double reconnect_period = 1.0;  ///< [s] between two attempts to connect
+  MotionParameters motion;
   double rate = 50.0;  ///< [Hz] of cnc/state and cnc/load
 };
 

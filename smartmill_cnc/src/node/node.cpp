@@ -1,4 +1,4 @@
-#include "node.h"
+#include "node/node.h"
 
 #include <geometry_msgs/TransformStamped.h>
 
@@ -55,7 +55,7 @@ CncNode::CncNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
         ParameterReader reader = ParameterReader::fromServer(private_nh);
         return readParameters(reader);
       }()),
-      bridge_(parameters_.bridge),
+      bridge_(makeFocasController(parameters_.controller), parameters_.reconnect_period, parameters_.motion),
       diagnostics_(ros::NodeHandle(), private_nh) {
   state_publisher_ = nh.advertise<smartmill_msgs::CncState>("cnc/state", QUEUE);
   load_publisher_ = nh.advertise<smartmill_msgs::LoadSample>("cnc/load", QUEUE);
@@ -106,8 +106,8 @@ CncNode::CncNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
 
   arm_service_ = nh.advertiseService("cnc/arm_motion", &CncNode::armMotion, this);
   macro_service_ = nh.advertiseService("cnc/set_macro", &CncNode::setMacro, this);
-  diagnostics_.setHardwareID("controller " + parameters_.bridge.host + ":" +
-                             std::to_string(parameters_.bridge.port));
+  diagnostics_.setHardwareID("controller " + parameters_.controller.host + ":" +
+                             std::to_string(parameters_.controller.port));
   diagnostics_.add("controller", this, &CncNode::diagnose);
   // The updater publishes once a second, when it is asked to.
   diagnostics_timer_ = nh.createWallTimer(ros::WallDuration(0.2),

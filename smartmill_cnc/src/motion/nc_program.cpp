@@ -1,4 +1,4 @@
-#include "smartmill_cnc/nc_program.h"
+#include "smartmill_cnc/motion/nc_program.h"
 
 #include <algorithm>
 #include <cmath>
@@ -152,13 +152,17 @@ class Follower {
     text_ += "#" + name + "=" + value + "\n";
   }
 
-  void words(const std::vector<Word>& words) {
+  struct Block {
     std::array<std::optional<double>, 3> axis;
     std::optional<double> dwell_p, feed, speed;
     std::optional<int> m_code;
     bool dwell = false;
-    std::string seen;
     std::string head;
+  };
+
+  void words(const std::vector<Word>& words) {
+    Block block;
+    std::string seen;
     for (const Word& word : words) {
       if (word.letter != 'G') {
         if (seen.find(word.letter) != std::string::npos) {
@@ -166,51 +170,59 @@ class Follower {
         }
         seen += word.letter;
       }
-      switch (word.letter) {
-        case 'N':
-          head = "N" + std::to_string(whole(word, 99999)) + " " + head;
-          break;
-        case 'G':
-          gCode(word, dwell, head);
-          break;
-        case 'X':
-        case 'Y':
-        case 'Z':
-          axis[static_cast<std::size_t>(word.letter - 'X')] = word.value;
-          break;
-        case 'P':
-          dwell_p = whole(word, 99999999);
-          break;
-        case 'F':
-          feed = word.value;
-          break;
-        case 'S':
-          speed = word.value;
-          break;
-        case 'M':
-          m_code = whole(word, 999);
-          break;
-        default:
-          notUnderstood(std::string("word ") + word.letter + word.digits + " is not understood");
-      }
+      take(word, block);
     }
-    std::string out = head;
-    if (dwell) {
-      out += dwellWords(axis, dwell_p);
-    } else if (dwell_p) {
+    write(block, words);
+  }
+
+  void take(const Word& word, Block& block) {
+    switch (word.letter) {
+      case 'N':
+        block.head = "N" + std::to_string(whole(word, 99999)) + " " + block.head;
+        break;
+      case 'G':
+        gCode(word, block.dwell, block.head);
+        break;
+      case 'X':
+      case 'Y':
+      case 'Z':
+        block.axis[static_cast<std::size_t>(word.letter - 'X')] = word.value;
+        break;
+      case 'P':
+        block.dwell_p = whole(word, 99999999);
+        break;
+      case 'F':
+        block.feed = word.value;
+        break;
+      case 'S':
+        block.speed = word.value;
+        break;
+      case 'M':
+        block.m_code = whole(word, 999);
+        break;
+      default:
+        notUnderstood(std::string("word ") + word.letter + word.digits + " is not understood");
+    }
+  }
+
+  void write(const Block& block, const std::vector<Word>& words) {
+    std::string out = block.head;
+    if (block.dwell) {
+      out += dwellWords(block.axis, block.dwell_p);
+    } else if (block.dwell_p) {
       notUnderstood("P without G4");
     }
-    if (feed) {
-      out += feedWord(*feed);
+    if (block.feed) {
+      out += feedWord(*block.feed);
     }
-    if (speed) {
-      out += speedWord(*speed, words);
+    if (block.speed) {
+      out += speedWord(*block.speed, words);
     }
-    if (!dwell) {
-      out += move(axis);
+    if (!block.dwell) {
+      out += move(block.axis);
     }
-    if (m_code) {
-      out += mCode(*m_code);
+    if (block.m_code) {
+      out += mCode(*block.m_code);
     }
     while (!out.empty() && out.back() == ' ') {
       out.pop_back();

@@ -1,0 +1,146 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "smartmill_cnc/controller/controller.h"
+#include "smartmill_cnc/log.h"
+#include "smartmill_cnc/motion/nc_program.h"
+#include "smartmill_core/signal/streams.h"
+
+namespace smartmill::cnc {
+
+struct MotionParameters {
+  double settle_time = 0.1;       ///< [s] of standstill that ends a motion
+  double standstill_speed = 0.2;  ///< [rad/s] a spindle slower than this stands
+  double stall_timeout = 60.0;    ///< [s] without any progress (feed hold excepted) end a motion
+  double stop_timeout = 5.0;      ///< [s] a cancelled motion may take to stop
+  double open_timeout = 3.0;      ///< [s] the controller may put off to take programs after a cancelled one
+  double condition_lead = 0.3;    ///< [s] >= 0 by which a cutting condition is told before it begins or ends
+  MotionLimits limits;
+
+  /// @throws Error naming key and value.
+  void validate() const;
+};
+
+/// Codes of the actions RunProgram, Jog, OrientSpindle.
+enum class MotionCode : std::uint8_t {
+  ok = 0,
+  cancelled = 1,
+  not_connected = 2,
+  not_armed = 3,
+  wrong_mode = 4,
+  limit = 5,
+  alarm = 6,
+  lost = 7,
+  busy = 8,
+  bad_goal = 9
+};
+/// Codes of the service ArmMotion.
+enum class ArmCode : std::uint8_t { ok = 0, not_connected = 1, wrong_mode = 2, alarm = 3 };
+/// Codes of the service SetMacro.
+enum class MacroCode : std::uint8_t { ok = 0, not_connected = 1, refused = 2 };
+
+template <class Code>
+struct Answer {
+  Code code = Code::ok;
+  std::string message;  ///< one line
+};
+using Outcome = Answer<MotionCode>;
+
+struct Progress {
+  std::size_t bytes_sent = 0, bytes_total = 0;
+  std::string stage;            ///< opening, sending, running, stopping; empty when idle
+  double distance_to_go = 0.0;  ///< [m] of the axis of a jog
+};
+
+/// Moves the machine: one motion at a time, only while armed, everything checked against the limits before it
+/// is sent. A motion goes through opening (the controller gets ready to take programs), sending, running (it
+/// has ended when all has been executed, no distance is left and nothing has moved for settle_time; Dunwoody
+/// 6.2 and 7.1), or stopping after a cancel. An alarm, another mode or a reset at the panel disarms.
+class MotionMachine {
+ public:
+  /// @throws Error of MotionParameters::validate().
+  MotionMachine(Controller& controller, const MotionParameters& parameters, Log& log);
+
+  /// Goes on with the running motion. @param reading of this period @param now [s] its stamp
+  /// @return a failure only when the connection went with it.
+  Status step(const Reading& reading, double now);
+  /// There is no connection: ends a running motion. @return why, naming the motion that it ended.
+  std::string lost(const std::string& why, double now);
+
+  bool armed() const { return armed_; }
+  Result<Answer<ArmCode>> arm();
+  Status disarm();
+
+  /// Starts a motion; an Outcome now is a refusal, nothing was sent.
+  std::optional<Outcome> runProgram(const std::string& name, const std::string& program,
+                                    const CuttingCondition& condition);
+  /// @param distance [m]. @param feed [m/s], 0: rapid.
+  std::optional<Outcome> jog(const std::string& axis, double distance, double feed);
+  /// @param angle [rad]
+  std::optional<Outcome> orient(double angle);
+  /// Stops the running motion; its Outcome follows when it stands. @param why for the Outcome
+  Status cancel(const std::string& why = "cancelled");
+
+  bool busy() const { return phase_ != Phase::idle; }
+  Progress progress() const;
+  /// How the last motion ended, once.
+  std::optional<Outcome> takeOutcome() { return std::exchange(outcome_, std::nullopt); }
+  /// Cutting conditions that began or ended since the last call, with their stamps.
+  std::vector<CuttingCondition> takeConditions() { return std::exchange(conditions_, {}); }
+
+ private:
+  enum class Phase { idle, opening, sending, running, stopping };
+  struct Motion {
+    std::string name;
+    std::string program;
+    bool orient = false;
+    int axis = -1;  // of a jog
+    std::optional<CuttingCondition> condition;
+  };
+
+  std::optional<Outcome> start(Motion motion, const std::string& program);
+  std::optional<Outcome> refusal(const std::string& name) const;
+  std::optional<std::size_t> axisIndex(int axis) const;
+  std::string alarmLine() const;
+  std::string modeLine() const;
+  std::string lineOf(const Failure& failure) const;
+  void setArmed(bool armed);
+  void enter(Phase phase);
+  Status watch();
+  Status giveUp(MotionCode code, const std::string& why);
+  Status stop(Outcome outcome);
+  Status open();
+  void tellCondition();
+  Status send();
+  Status run();
+  bool ended() const;
+  Status checkStall();
+  void endStop();
+  void finish(const Outcome& outcome);
+
+  Controller& controller_;
+  MotionParameters parameters_;
+  Log& log_;
+
+  bool armed_ = false;
+  std::optional<Reading> reading_;  // of the last step, none before the first and after a loss
+  double now_ = 0.0;                // [s]
+  Phase phase_ = Phase::idle;
+  Motion motion_;
+  double entered_ = 0.0;     // [s] into the phase
+  double progressed_ = 0.0;  // [s]
+  std::optional<double> still_since_;
+  CncState stall_;  // where the machine was when it last got on
+  Outcome stopping_outcome_;
+  std::optional<Outcome> outcome_;
+  std::vector<CuttingCondition> conditions_;
+  double condition_from_ = 0.0, condition_to_ = 0.0;  // [s] of the running motion
+};
+
+}  // namespace smartmill::cnc

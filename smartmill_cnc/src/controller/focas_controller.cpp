@@ -1,0 +1,241 @@
+#include "smartmill_cnc/controller/focas_controller.h"
+
+#include <cmath>
+#include <exception>
+#include <utility>
+
+#include "controller/focas_reader.h"
+#include "smartmill_core/error.h"
+#include "smartmill_focas/client.h"
+
+namespace smartmill::cnc {
+namespace {
+
+using focas::FocasError;
+
+constexpr int MAX_MARKER = 9999999;  // seven digits are exact in any variable
+
+Failure::Kind kindOf(int code) {
+  switch (code) {
+    case focas::EW_ALARM:
+      return Failure::Kind::alarm;
+    case focas::EW_MODE:
+      return Failure::Kind::wrong_mode;
+    case focas::EW_BUSY:
+    case focas::EW_REJECT:
+      return Failure::Kind::not_yet;
+    default:
+      return Failure::Kind::refused;
+  }
+}
+
+std::string sessionLine(const FocasError& e) {
+  switch (e.code()) {
+    case focas::EW_REJECT:
+      return "the controller does not take a DNC session yet (press CYCLE START at its panel): " +
+             std::string(e.what());
+    case focas::EW_BUSY:
+      return "another client has a DNC session: " + std::string(e.what());
+    case focas::EW_RESET:
+      return "the controller was reset";
+    default:
+      return e.what();
+  }
+}
+
+std::string endedLine(const FocasError& e) {
+  return e.code() == focas::EW_RESET ? sessionLine(e)
+                                     : "the controller ended the DNC session: " + std::string(e.what());
+}
+
+std::string plainLine(const FocasError& e) { return e.what(); }
+
+class FocasController : public Controller {
+ public:
+  explicit FocasController(const FocasParameters& parameters)
+      : parameters_(parameters), reader_(client_, parameters_) {
+    parameters_.validate();
+  }
+
+  std::string name() const override {
+    return "controller " + parameters_.host + ":" + std::to_string(parameters_.port);
+  }
+
+  Result<std::string> connect() override {
+    open_ = false;
+    const Status done = attempt(plainLine, [&] {
+      client_.connect(parameters_.host, static_cast<std::uint16_t>(parameters_.port),
+                      parameters_.reply_timeout);
+      reader_.connected();
+    });
+    if (!done) {
+      return done.failure();
+    }
+    const focas::ControllerInfo& info = client_.info();
+    return "type " + info.cnc_type + info.mt_type + ", series " + info.series;
+  }
+
+  bool connected() const override { return client_.connected(); }
+  void close() override { client_.close(); }
+
+  Result<Reading> read() override {
+    Reading reading;
+    try {
+      reading = reader_.read();
+    } catch (const focas::ConnectionError& e) {
+      return lost(e.what());
+    } catch (const std::exception& e) {
+      return lost(name() + ": " + e.what());
+    }
+    reading.program_done = reader_.marker() == static_cast<double>(marker_);
+    return reading;
+  }
+
+  Status setVariable(int number, double value) override {
+    if (number == parameters_.marker_macro) {
+      return Failure{Failure::Kind::refused, "#" + std::to_string(number) + " is the bridge's own variable"};
+    }
+    return attempt(plainLine, [&] { client_.writeMacro(number, value); });
+  }
+
+  DialectOptions dialect() const override {
+    DialectOptions options;
+    options.marker_macro = parameters_.marker_macro;
+    options.decimals = reader_.decimals();
+    return options;
+  }
+
+  std::string orientProgram(double angle) const override {
+    return cnc::orientProgram(angle, parameters_.orient_macro);
+  }
+
+  Status openPrograms() override {
+    const Status started = attempt(sessionLine, [&] { client_.dncStart(); });
+    if (!started) {
+      return started;
+    }
+    // A marker left from before must not end the first piece.
+    const Status cleared = attempt(plainLine, [&] { client_.writeMacro(parameters_.marker_macro, 0.0); });
+    if (!cleared) {
+      return cleared.lost() ? cleared : attempt(plainLine, [&] {
+        client_.dncCancel();
+        throw FocasError(cleared.failure().message, focas::EW_FUNC);
+      });
+    }
+    open_ = first_piece_ = true;
+    marker_ = 0;
+    return {};
+  }
+
+  bool programsOpen() const override { return open_ && client_.connected(); }
+
+  Status checkPrograms() override {
+    const Status status = attempt(endedLine, [&] { client_.dncCheck(); });
+    open_ = open_ && status;
+    return status;
+  }
+
+  Status closePrograms() override {
+    if (!std::exchange(open_, false)) {
+      return {};
+    }
+    return attempt(plainLine, [&] {
+      const std::string text = "M30\n%\n";
+      if (client_.dncSend(text.data(), text.size()) == text.size()) {
+        client_.dncEnd();
+      } else {
+        client_.dncCancel();
+      }
+    });
+  }
+
+  void begin(const std::string& program) override {
+    marker_ = marker_ >= MAX_MARKER ? 1 : marker_ + 1;
+    // A control skips what comes before the first end of block.
+    text_ = (std::exchange(first_piece_, false) ? "\n" : "") + program + "#" +
+            std::to_string(parameters_.marker_macro) + "=" + std::to_string(marker_) + "\n";
+    sent_ = 0;
+    complete_ = false;
+  }
+
+  Status send() override {
+    const Status status = attempt(sessionLine, [&] {
+      sent_ += client_.dncSend(text_.data() + sent_, text_.size() - sent_);
+      complete_ = sent_ == text_.size() && client_.dncFlush() == 0;
+    });
+    open_ = open_ && status;
+    return status;
+  }
+
+  Transfer transfer() const override { return {sent_, text_.size(), complete_}; }
+
+  Status abandonPrograms() override {
+    open_ = false;
+    return attempt(plainLine, [&] { client_.dncCancel(); });
+  }
+
+  Status abort() override {
+    // The DNC cancel alone may come late behind text in the stream. Not every controller lets itself be reset:
+    // the cancel must do there.
+    const Status reset = attempt(plainLine, [&] { client_.reset(); });
+    return reset.lost() ? reset : abandonPrograms();
+  }
+
+ private:
+  Failure lost(const std::string& why) {
+    client_.drop();
+    open_ = false;
+    return {Failure::Kind::lost, why};
+  }
+
+  /// Talks to the controller: the one place where the client's exceptions become failures.
+  template <class Line, class Talk>
+  Status attempt(Line line, Talk&& talk) {
+    try {
+      talk();
+      return {};
+    } catch (const focas::ConnectionError& e) {
+      return lost(e.what());
+    } catch (const FocasError& e) {
+      return Failure{kindOf(e.code()), line(e)};
+    } catch (const std::exception& e) {
+      return lost(e.what());
+    }
+  }
+
+  FocasParameters parameters_;
+  focas::Client client_;
+  FocasReader reader_;
+  bool open_ = false, first_piece_ = false, complete_ = false;
+  int marker_ = 0;
+  std::string text_;
+  std::size_t sent_ = 0;  // [byte]
+};
+
+void check(bool good, const std::string& key, int value, const std::string& due) {
+  if (!good) {
+    throw Error(key + ": " + std::to_string(value) + " is not " + due);
+  }
+}
+
+}  // namespace
+
+void FocasParameters::validate() const {
+  if (host.empty()) {
+    throw Error("host: is empty");
+  }
+  check(port >= 1 && port <= 65535, "port", port, "within 1 .. 65535");
+  check(spindle >= 1, "spindle", spindle, "1 or more");
+  check(marker_macro >= 1 && marker_macro <= 99999, "marker_macro", marker_macro, "within 1 .. 99999");
+  check(orient_macro >= 1 && orient_macro <= 99999, "orient_macro", orient_macro, "within 1 .. 99999");
+  check(marker_macro != orient_macro, "marker_macro", marker_macro, "another variable than orient_macro");
+  if (!(reply_timeout > 0.0) || !std::isfinite(reply_timeout)) {
+    throw Error("reply_timeout: " + fixedDecimals(reply_timeout, 3) + " is not above 0");
+  }
+}
+
+std::unique_ptr<Controller> makeFocasController(const FocasParameters& parameters) {
+  return std::make_unique<FocasController>(parameters);
+}
+
+}  // namespace smartmill::cnc

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "smartmill_cnc/controller/controller.h"
+#include "smartmill_cnc/controller/focas_controller.h"
+#include "smartmill_focas/client.h"
+
+namespace smartmill::cnc {
+
+/// Asks a FOCAS controller for its state in one PDU, or in several when it does not take them all at once.
+class FocasReader {
+ public:
+  FocasReader(focas::Client& client, const FocasParameters& parameters);
+  ~FocasReader();
+
+  /// Anew after each connection.
+  void connected();
+
+  /// @throws FocasError, ConnectionError, WireError: the connection is of no use any more.
+  Reading read();
+  /// Value of the marker variable in the last reading; NaN: vacant.
+  double marker() const { return marker_; }
+  /// Decimals of lengths in mm.
+  int decimals() const { return decimals_; }
+
+ private:
+  class Questions;
+  std::vector<focas::SubReply> ask();
+  void askAllAtOnce(bool all_at_once);
+  void readState(const std::vector<focas::SubReply>& replies, std::size_t axes, Reading& reading);
+  void readPositions(const std::vector<focas::SubReply>& replies, std::size_t axes, Reading& reading);
+  void readAlarms(std::uint32_t bits, CncState& state);
+  void readLoad(const std::vector<focas::SubReply>& replies, std::size_t axes, Reading& reading) const;
+
+  focas::Client& client_;
+  FocasParameters parameters_;
+  std::unique_ptr<Questions> questions_;
+  bool all_at_once_ = true;
+  bool asked_ = false, answered_ = false;
+  std::uint32_t alarm_bits_ = 0;
+  std::string alarm_text_;
+  double marker_;
+  int decimals_;
+};
+
+}  // namespace smartmill::cnc

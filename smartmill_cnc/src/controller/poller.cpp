@@ -1,0 +1,67 @@
+#include "smartmill_cnc/controller/poller.h"
+
+#include <utility>
+
+namespace smartmill::cnc {
+
+Poller::Poller(Controller& controller, double reconnect_period, Log& log)
+    : controller_(controller), reconnect_period_(reconnect_period), log_(log) {}
+
+void Poller::fetch(double now) {
+  reading_.reset();
+  if (!controller_.connected()) {
+    // A time that jumps back must not put the next attempt off for ever.
+    if (now < next_connect_ && now >= next_connect_ - reconnect_period_) {
+      return;
+    }
+    next_connect_ = now + reconnect_period_;
+    connect();
+  }
+  if (!controller_.connected()) {
+    return;
+  }
+  Result<Reading> reading = controller_.read();
+  if (reading) {
+    reading_ = *reading;
+  } else {
+    last_error_ = reading.failure().message;
+  }
+}
+
+void Poller::connect() {
+  const Result<std::string> identity = controller_.connect();
+  if (identity) {
+    identity_ = *identity;
+  } else {
+    last_error_ = identity.failure().message;
+  }
+}
+
+std::optional<Reading> Poller::take() {
+  // A command may have found the connection dead since.
+  if (!reading_ || !controller_.connected()) {
+    return std::nullopt;
+  }
+  if (!std::exchange(connected_, true)) {
+    told_error_.clear();
+    std::string axes;
+    for (const std::string& axis : reading_->state.axes) {
+      axes += " " + axis;
+    }
+    log_.info("connected to the " + controller_.name() + ": " + identity_ + ", axes" + axes);
+  }
+  return std::exchange(reading_, std::nullopt);
+}
+
+void Poller::lost() {
+  const bool was_connected = std::exchange(connected_, false);
+  // That nothing can be reached after a loss is no news; a refusal of another kind is.
+  const bool expected = loss_told_ && !was_connected;
+  if (was_connected || (last_error_ != told_error_ && !expected)) {
+    log_.error(last_error_ + "; trying again every " + fixedDecimals(reconnect_period_, 1) + " s");
+  }
+  loss_told_ = was_connected || (loss_told_ && last_error_ == told_error_);
+  told_error_ = last_error_;
+}
+
+}  // namespace smartmill::cnc
