@@ -21,11 +21,16 @@ Bridge::Bridge(std::unique_ptr<Controller> controller, double reconnect_period,
                const MotionParameters& motion)
     : controller_(std::move(controller)),
       poller_(*controller_, checkedPeriod(reconnect_period), log_),
-      motion_(*controller_, motion, log_) {}
+      motion_(*controller_, motion, log_) {
+}
 
-Bridge::~Bridge() { shutdown(); }
+Bridge::~Bridge() {
+  shutdown();
+}
 
-void Bridge::fetch(double now) { poller_.fetch(now); }
+void Bridge::fetch(double now) {
+  poller_.fetch(now);
+}
 
 void Bridge::step(double now) {
   load_.reset();
@@ -34,7 +39,7 @@ void Bridge::step(double now) {
     state_.connected = true;
     load_ = reading->load;
     increment_ = reading->increment;
-    noticed(motion_.step(*reading, now));
+    notice(motion_.step(*reading, now));
   }
   if (!controller_->connected()) {
     endWithoutConnection(now);
@@ -52,16 +57,15 @@ void Bridge::endWithoutConnection(double now) {
   poller_.lost();
 }
 
-Status Bridge::noticed(Status status) {
+void Bridge::notice(const Status& status) {
   if (status.lost()) {
     poller_.failed(status.failure().message);
   }
-  return status;
 }
 
 Answer<ArmCode> Bridge::arm(bool on) {
   if (!on) {
-    noticed(motion_.disarm());
+    notice(motion_.disarm());
     state_.armed = false;
     return {ArmCode::ok, "motion is disarmed"};
   }
@@ -73,7 +77,7 @@ Answer<ArmCode> Bridge::arm(bool on) {
   if (answer) {
     return *answer;
   }
-  noticed(answer.failure());
+  notice(answer.failure());
   return {ArmCode::not_connected, "motion is not armed: " + answer.failure().message};
 }
 
@@ -85,21 +89,24 @@ Answer<MacroCode> Bridge::setMacro(int number, double value) {
   if (!std::isfinite(value)) {
     return {MacroCode::refused, name + ": the value is not a finite number"};
   }
-  const Status written = noticed(controller_->setVariable(number, value));
+  const Status written = controller_->setVariable(number, value);
+  notice(written);
   if (written) {
     return {MacroCode::ok, name + " is set"};
   }
   return {written.lost() ? MacroCode::not_connected : MacroCode::refused, written.failure().message};
 }
 
-void Bridge::cancel() { noticed(motion_.cancel()); }
+void Bridge::cancel() {
+  notice(motion_.cancel());
+}
 
 void Bridge::shutdown() {
   if (!controller_->connected()) {
     return;
   }
-  noticed(motion_.cancel("the bridge ends"));
-  noticed(motion_.disarm());
+  notice(motion_.cancel("the bridge ends"));
+  notice(motion_.disarm());
   if (controller_->connected()) {
     controller_->close();
   }

@@ -68,7 +68,7 @@ class Bridge {
 
  private:
   /// Remembers why the connection went, when it did.
-  Status noticed(Status status);
+  void notice(const Status& status);
   void endWithoutConnection(double now);
 
   Log log_;

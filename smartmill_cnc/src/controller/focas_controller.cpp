@@ -48,7 +48,9 @@ std::string endedLine(const FocasError& e) {
                                      : "the controller ended the DNC session: " + std::string(e.what());
 }
 
-std::string plainLine(const FocasError& e) { return e.what(); }
+std::string plainLine(const FocasError& e) {
+  return e.what();
+}
 
 class FocasController : public Controller {
  public:
@@ -175,8 +177,8 @@ class FocasController : public Controller {
   }
 
   Status abort() override {
-    // The DNC cancel alone may come late behind text in the stream. Not every controller lets itself be reset:
-    // the cancel must do there.
+    // The DNC cancel alone may come late behind text in the stream. Not every controller lets itself be
+    // reset: the cancel must do there.
     const Status reset = attempt(plainLine, [&] { client_.reset(); });
     return reset.lost() ? reset : abandonPrograms();
   }

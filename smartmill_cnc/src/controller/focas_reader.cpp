@@ -140,7 +140,8 @@ FocasReader::FocasReader(focas::Client& client, const FocasParameters& parameter
     : client_(client),
       parameters_(parameters),
       marker_(std::numeric_limits<double>::quiet_NaN()),
-      decimals_(DEFAULT_DECIMALS) {}
+      decimals_(DEFAULT_DECIMALS) {
+}
 
 FocasReader::~FocasReader() = default;
 

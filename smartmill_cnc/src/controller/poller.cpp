@@ -5,7 +5,8 @@
 namespace smartmill::cnc {
 
 Poller::Poller(Controller& controller, double reconnect_period, Log& log)
-    : controller_(controller), reconnect_period_(reconnect_period), log_(log) {}
+    : controller_(controller), reconnect_period_(reconnect_period), log_(log) {
+}
 
 void Poller::fetch(double now) {
   reading_.reset();

@@ -319,8 +319,8 @@ void MotionMachine::endStop() {
   } else {
     outcome.message += "; stopped at";
     for (std::size_t i = 0; i < state.position.size(); ++i) {
-      outcome.message += " " + state.axes[i] +
-                         fixedDecimals(state.position[i] / units::MM, controller_.dialect().decimals);
+      outcome.message +=
+          " " + state.axes[i] + fixedDecimals(state.position[i] / units::MM, controller_.dialect().decimals);
     }
     outcome.message += " mm";
   }

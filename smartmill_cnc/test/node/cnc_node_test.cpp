@@ -11,6 +11,7 @@
 #include <cstdio>
 #include <thread>
 
+#include "../test_machine.h"
 #include "smartmill_msgs/ArmMotion.h"
 #include "smartmill_msgs/CncState.h"
 #include "smartmill_msgs/CuttingCondition.h"
@@ -19,7 +20,6 @@
 #include "smartmill_msgs/OrientSpindleAction.h"
 #include "smartmill_msgs/RunProgramAction.h"
 #include "smartmill_msgs/SetMacro.h"
-#include "../test_machine.h"
 
 namespace smartmill::cnc {
 namespace {

@@ -69,9 +69,9 @@ struct Transfer {
   bool complete = false;            ///< nothing waits on this side any more
 };
 
-/// A machine's controller as the bridge needs it, whatever wire leads there: its state, its variables, and one
-/// program at a time. Nothing throws where an error is to be expected, nothing waits longer than the reply
-/// timeout that the implementation was made with. One thread drives it.
+/// A machine's controller as the bridge needs it, whatever wire leads there: its state, its variables, and
+/// one program at a time. Nothing throws where an error is to be expected, nothing waits longer than the
+/// reply timeout that the implementation was made with. One thread drives it.
 class Controller {
  public:
   virtual ~Controller() = default;

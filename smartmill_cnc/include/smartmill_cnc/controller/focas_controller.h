@@ -19,8 +19,8 @@ struct FocasParameters {
   void validate() const;
 };
 
-/// A Fanuc controller over FOCAS2 Ethernet. A program goes to it as a piece of one long DNC session: its text,
-/// then #marker=k; all of it has been executed when the variable is set (Dunwoody 6.2 and 7.1).
+/// A Fanuc controller over FOCAS2 Ethernet. A program goes to it as a piece of one long DNC session: its
+/// text, then #marker=k; all of it has been executed when the variable is set (Dunwoody 6.2 and 7.1).
 /// @throws Error of FocasParameters::validate().
 std::unique_ptr<Controller> makeFocasController(const FocasParameters& parameters);
 

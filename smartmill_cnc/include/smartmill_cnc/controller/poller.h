@@ -9,8 +9,8 @@
 
 namespace smartmill::cnc {
 
-/// Keeps the connection to a controller and reads it once a period. A loss, or that no connection comes about,
-/// is told in one line, not in one a period.
+/// Keeps the connection to a controller and reads it once a period. A loss, or that no connection comes
+/// about, is told in one line, not in one a period.
 class Poller {
  public:
   /// @param reconnect_period [s] between two attempts
