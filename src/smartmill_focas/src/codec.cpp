@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <map>
 
 namespace smartmill::focas {
 namespace {
@@ -23,74 +24,21 @@ void appendTo(Bytes& target, const Bytes& data) {
 }  // namespace
 
 std::string ewName(int code) {
-  switch (code) {
-    case EW_PROTOCOL:
-      return "EW_PROTOCOL";
-    case EW_SOCKET:
-      return "EW_SOCKET";
-    case EW_BUS:
-      return "EW_BUS";
-    case EW_SYSTEM2:
-      return "EW_SYSTEM2";
-    case EW_HSSB:
-      return "EW_HSSB";
-    case EW_HANDLE:
-      return "EW_HANDLE";
-    case EW_VERSION:
-      return "EW_VERSION";
-    case EW_UNEXP:
-      return "EW_UNEXP";
-    case EW_SYSTEM:
-      return "EW_SYSTEM";
-    case EW_PARITY:
-      return "EW_PARITY";
-    case EW_MMCSYS:
-      return "EW_MMCSYS";
-    case EW_RESET:
-      return "EW_RESET";
-    case EW_BUSY:
-      return "EW_BUSY";
-    case EW_OK:
-      return "EW_OK";
-    case EW_FUNC:
-      return "EW_FUNC";
-    case EW_LENGTH:
-      return "EW_LENGTH";
-    case EW_NUMBER:
-      return "EW_NUMBER";
-    case EW_ATTRIB:
-      return "EW_ATTRIB";
-    case EW_DATA:
-      return "EW_DATA";
-    case EW_NOOPT:
-      return "EW_NOOPT";
-    case EW_PROT:
-      return "EW_PROT";
-    case EW_OVRFLOW:
-      return "EW_OVRFLOW";
-    case EW_PARAM:
-      return "EW_PARAM";
-    case EW_BUFFER:
-      return "EW_BUFFER";
-    case EW_PATH:
-      return "EW_PATH";
-    case EW_MODE:
-      return "EW_MODE";
-    case EW_REJECT:
-      return "EW_REJECT";
-    case EW_DTSRVR:
-      return "EW_DTSRVR";
-    case EW_ALARM:
-      return "EW_ALARM";
-    case EW_STOP:
-      return "EW_STOP";
-    case EW_PASSWD:
-      return "EW_PASSWD";
-    case EW_PMC:
-      return "EW_PMC";
-    default:
-      return "code " + std::to_string(code);
-  }
+  static const std::map<int, const char*> NAMES{
+      {EW_PROTOCOL, "EW_PROTOCOL"}, {EW_SOCKET, "EW_SOCKET"}, {EW_BUS, "EW_BUS"},
+      {EW_SYSTEM2, "EW_SYSTEM2"},   {EW_HSSB, "EW_HSSB"},     {EW_HANDLE, "EW_HANDLE"},
+      {EW_VERSION, "EW_VERSION"},   {EW_UNEXP, "EW_UNEXP"},   {EW_SYSTEM, "EW_SYSTEM"},
+      {EW_PARITY, "EW_PARITY"},     {EW_MMCSYS, "EW_MMCSYS"}, {EW_RESET, "EW_RESET"},
+      {EW_BUSY, "EW_BUSY"},         {EW_OK, "EW_OK"},         {EW_FUNC, "EW_FUNC"},
+      {EW_LENGTH, "EW_LENGTH"},     {EW_NUMBER, "EW_NUMBER"}, {EW_ATTRIB, "EW_ATTRIB"},
+      {EW_DATA, "EW_DATA"},         {EW_NOOPT, "EW_NOOPT"},   {EW_PROT, "EW_PROT"},
+      {EW_OVRFLOW, "EW_OVRFLOW"},   {EW_PARAM, "EW_PARAM"},   {EW_BUFFER, "EW_BUFFER"},
+      {EW_PATH, "EW_PATH"},         {EW_MODE, "EW_MODE"},     {EW_REJECT, "EW_REJECT"},
+      {EW_DTSRVR, "EW_DTSRVR"},     {EW_ALARM, "EW_ALARM"},   {EW_STOP, "EW_STOP"},
+      {EW_PASSWD, "EW_PASSWD"},     {EW_PMC, "EW_PMC"},
+  };
+  const auto found = NAMES.find(code);
+  return found != NAMES.end() ? found->second : "code " + std::to_string(code);
 }
 
 double Value8::toDouble() const {

@@ -68,70 +68,14 @@ int DataCalls::call(const SubRequest& request, Writer& out) {
       return controller_.cycleStart();
     case OP_RESET:
       return controller_.reset();
-    case OP_SYSTEM_INFO: {
-      const std::size_t axes = info_.axes.size();
-      const std::string count = (axes < 10 ? "0" : "") + std::to_string(axes);
-      out.u16(2).u16(32).text(info_.cnc_type, 2, ' ').text(info_.mt_type, 2, ' ');
-      out.text(info_.series, 4, ' ').text(info_.version, 4, ' ').text(count, 2, ' ');
-      return EW_OK;
-    }
-    case OP_STATUS:
-      status(controller_.status(), out);
-      return EW_OK;
-    case OP_STATUS2:
-      // ODBST2 without hdck and tmmode, which have requests of their own: statinfo's seven, then warning,
-      // o3dchk, ext_opt and restart.
-      status(controller_.status(), out);
-      out.zeros(8);
-      return EW_OK;
-    case OP_HDCK:
-      out.i16(controller_.status().hdck);
-      return EW_OK;
-    case OP_TMMODE:
-      out.i16(controller_.status().tmmode);
-      return EW_OK;
-    case OP_ACTUAL_FEED:
-      out.value8(Value8::fromDouble(controller_.actualFeed(), 0));
-      return EW_OK;
-    case OP_ACTUAL_SPEED: {
-      const std::vector<double> speeds = controller_.spindleSpeed();
-      out.value8(Value8::fromDouble(speeds.empty() ? 0.0 : speeds.front(), 0));
-      return EW_OK;
-    }
-    case OP_LOCK:
-      // a4 frames the calls that read several things and tells how many elements there are: 1 spindles, 3
-      // rdspeed.
-      out.i16(static_cast<std::int16_t>(request.v[0] == 1   ? info_.spindles.size()
-                                        : request.v[0] == 3 ? 1
-                                                            : info_.axes.size()));
-      return EW_OK;
     case OP_SPINDLE:
       return spindle(request, out);
     case OP_SERVO:
       return servo(request, out);
     case OP_POSITION:
       return position(request, out);
-    case OP_AXIS_NAMES:
-      axisNames(request, out);
-      return EW_OK;
     case OP_SPINDLE_NAMES:
-      if (request.v[0] > static_cast<int>(info_.spindles.size())) {
-        return EW_NUMBER;
-      }
-      for (std::size_t i = 0; i < info_.spindles.size(); ++i) {
-        if (request.v[0] < 1 || request.v[0] == static_cast<int>(i) + 1) {
-          out.text(info_.spindles[i], NAME_WIDTH);
-        }
-      }
-      return EW_OK;
-    case OP_UNITS:
-      units(request, out);
-      return EW_OK;
-    case OP_DISPLAY_FLAGS:
-      for (std::size_t i = 0; i < info_.axes.size(); ++i) {
-        out.u32(DISPLAYED);
-      }
-      return EW_OK;
+      return spindleNames(request, out);
     case OP_READ_MACRO:
       return readMacros(request, out);
     case OP_WRITE_MACRO:
@@ -140,48 +84,133 @@ int DataCalls::call(const SubRequest& request, Writer& out) {
       return readMacroDoubles(request, out);
     case OP_WRITE_MACRO_DOUBLE:
       return writeMacroDoubles(request);
-    case OP_ALARM:
-      out.u32(controller_.alarmBits());
-      return EW_OK;
     case OP_ALARM_MESSAGES:
       return alarmMessages(request, out);
+    default:
+      return tellsState(request, out) || tellsProgram(request, out) || tellsMachine(request, out) ? EW_OK
+                                                                                                  : EW_FUNC;
+  }
+}
+
+/// What the controller does now.
+bool DataCalls::tellsState(const SubRequest& request, Writer& out) const {
+  switch (request.c3) {
+    case OP_STATUS:
+      status(controller_.status(), out);
+      return true;
+    case OP_STATUS2:
+      // ODBST2 without hdck and tmmode, which have requests of their own: statinfo's seven, then warning,
+      // o3dchk, ext_opt and restart.
+      status(controller_.status(), out);
+      out.zeros(8);
+      return true;
+    case OP_HDCK:
+      out.i16(controller_.status().hdck);
+      return true;
+    case OP_TMMODE:
+      out.i16(controller_.status().tmmode);
+      return true;
+    case OP_OPERATION_MODE:
+      out.i16(controller_.status().aut);
+      return true;
+    case OP_ACTUAL_FEED:
+      out.value8(Value8::fromDouble(controller_.actualFeed(), 0));
+      return true;
+    case OP_ACTUAL_SPEED: {
+      const std::vector<double> speeds = controller_.spindleSpeed();
+      out.value8(Value8::fromDouble(speeds.empty() ? 0.0 : speeds.front(), 0));
+      return true;
+    }
+    case OP_ALARM:
+      out.u32(controller_.alarmBits());
+      return true;
+    case OP_DNC_DIAGNOSIS:
+      out.i16(0).i16(0).text("", 16).zeros(10);
+      return true;
+    default:
+      return false;
+  }
+}
+
+/// The program that it runs.
+bool DataCalls::tellsProgram(const SubRequest& request, Writer& out) const {
+  switch (request.c3) {
     case OP_PROGRAM_NUMBER:
       out.i32(controller_.runningProgram()).i32(controller_.mainProgram());
-      return EW_OK;
+      return true;
     case OP_SEQUENCE_NUMBER:
       out.i32(controller_.sequenceNumber());
-      return EW_OK;
+      return true;
     case OP_BLOCK_COUNT:
       out.i32(controller_.blockCount());
-      return EW_OK;
+      return true;
     case OP_EXECUTING_PROGRAM: {
       const int number = controller_.runningProgram();
       out.i32(number).text("O" + std::to_string(number), PROGRAM_WIDTH);
-      return EW_OK;
+      return true;
     }
     case OP_MAIN_PROGRAM:
       out.text(controller_.programPath(), PATH_WIDTH);
-      return EW_OK;
+      return true;
     case OP_EXECUTING_BLOCK: {
       const std::string text = controller_.executingBlock();
       const int room = std::clamp(request.v[0], 0, MAX_BLOCK_TEXT);
       out.i32(controller_.blockCount()).text(text, std::min(text.size(), static_cast<std::size_t>(room)));
-      return EW_OK;
+      return true;
     }
+    default:
+      return false;
+  }
+}
+
+/// What it is made of.
+bool DataCalls::tellsMachine(const SubRequest& request, Writer& out) const {
+  switch (request.c3) {
+    case OP_SYSTEM_INFO: {
+      const std::size_t axes = info_.axes.size();
+      const std::string count = (axes < 10 ? "0" : "") + std::to_string(axes);
+      out.u16(2).u16(32).text(info_.cnc_type, 2, ' ').text(info_.mt_type, 2, ' ');
+      out.text(info_.series, 4, ' ').text(info_.version, 4, ' ').text(count, 2, ' ');
+      return true;
+    }
+    case OP_LOCK:
+      // a4 frames the calls that read several things and tells how many elements there are: 1 spindles, 3
+      // rdspeed.
+      out.i16(static_cast<std::int16_t>(request.v[0] == 1   ? info_.spindles.size()
+                                        : request.v[0] == 3 ? 1
+                                                            : info_.axes.size()));
+      return true;
+    case OP_AXIS_NAMES:
+      axisNames(request, out);
+      return true;
+    case OP_UNITS:
+      units(request, out);
+      return true;
+    case OP_DISPLAY_FLAGS:
+      for (std::size_t i = 0; i < info_.axes.size(); ++i) {
+        out.u32(DISPLAYED);
+      }
+      return true;
     case OP_CNC_ID:
       for (std::uint32_t word : info_.cnc_id) {
         out.u32(word);
       }
-      return EW_OK;
-    case OP_OPERATION_MODE:
-      out.i16(controller_.status().aut);
-      return EW_OK;
-    case OP_DNC_DIAGNOSIS:
-      out.i16(0).i16(0).text("", 16).zeros(10);
-      return EW_OK;
+      return true;
     default:
-      return EW_FUNC;
+      return false;
   }
+}
+
+int DataCalls::spindleNames(const SubRequest& request, Writer& out) const {
+  if (request.v[0] > static_cast<int>(info_.spindles.size())) {
+    return EW_NUMBER;
+  }
+  for (std::size_t i = 0; i < info_.spindles.size(); ++i) {
+    if (request.v[0] < 1 || request.v[0] == static_cast<int>(i) + 1) {
+      out.text(info_.spindles[i], NAME_WIDTH);
+    }
+  }
+  return EW_OK;
 }
 
 void DataCalls::status(const Status& s, Writer& out) const {

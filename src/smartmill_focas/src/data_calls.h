@@ -17,6 +17,10 @@ class DataCalls {
 
  private:
   int call(const SubRequest& request, Writer& out);
+  bool tellsState(const SubRequest& request, Writer& out) const;
+  bool tellsProgram(const SubRequest& request, Writer& out) const;
+  bool tellsMachine(const SubRequest& request, Writer& out) const;
+  int spindleNames(const SubRequest& request, Writer& out) const;
   int position(const SubRequest& request, Writer& out) const;
   int spindle(const SubRequest& request, Writer& out) const;
   int servo(const SubRequest& request, Writer& out) const;

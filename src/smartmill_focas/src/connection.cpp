@@ -1,0 +1,213 @@
+#include "connection.h"
+
+#include <netdb.h>
+#include <poll.h>
+#include <sys/socket.h>
+
+#include <algorithm>
+#include <cerrno>
+
+#include "smartmill_focas/client.h"
+
+namespace smartmill::focas {
+namespace {
+
+constexpr int STREAM_SEND_BUFFER = 4096;  // [byte] little text on its way, so that a cancel is soon heard
+constexpr double CLOSE_TIMEOUT = 0.2;     // [s]
+constexpr std::size_t READ_STEP = 1 << 17;
+
+}  // namespace
+
+std::string failureLine(const std::string& call, int code, int detail) {
+  return call + ": " + ewName(code) + " (" + std::to_string(code) + "), detail " + std::to_string(detail);
+}
+
+int millisecondsUntil(Clock::time_point deadline) {
+  const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(deadline - Clock::now()).count();
+  return static_cast<int>(std::clamp<long long>(left + 1, 0, 3600000));
+}
+
+Clock::time_point deadlineIn(double seconds) {
+  return Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
+}
+
+void Connection::setTarget(const std::string& host, std::uint16_t port, double timeout) {
+  host_ = host;
+  port_ = port;
+  timeout_ = timeout;
+}
+
+std::string Connection::where() const {
+  return host_ + ":" + std::to_string(port_);
+}
+
+void Connection::drop() {
+  stream.drop();
+  data.drop();
+}
+
+void Connection::close() {
+  for (Circuit* circuit : {&stream, &data}) {
+    if (!circuit->valid()) {
+      continue;
+    }
+    try {
+      const Clock::time_point deadline = deadlineIn(CLOSE_TIMEOUT);
+      queue(*circuit, FRAME_CLOSE, DIR_REQUEST, {});
+      flushUntil(*circuit, deadline);
+      while (receive(*circuit, deadline).type != FRAME_CLOSE) {
+      }
+    } catch (const std::exception&) {
+      // Gone already: nothing to say goodbye to.
+    }
+  }
+  drop();
+}
+
+void Connection::need() {
+  if (!valid()) {
+    drop();
+    throw ConnectionError("not connected to the controller at " + where());
+  }
+}
+
+void Connection::lost(const std::string& why) {
+  drop();
+  throw ConnectionError("connection to the controller at " + where() + " lost: " + why);
+}
+
+OpenReply Connection::open(Circuit& circuit) {
+  const Clock::time_point deadline = deadlineIn(timeout_);
+  circuit.drop();
+  connectSocket(circuit, deadline);
+  const std::uint16_t code = &circuit == &stream ? STREAM_CIRCUIT : DATA_CIRCUIT;
+  queue(circuit, FRAME_OPEN, DIR_REQUEST, Writer().u16(code).data());
+  flushUntil(circuit, deadline);
+  for (;;) {
+    const Frame frame = receive(circuit, deadline);
+    if (frame.type != FRAME_OPEN) {
+      continue;
+    }
+    if (frame.direction == DIR_ERROR) {
+      const ErrorBody error = decodeErrorBody(frame.body);
+      drop();
+      throw FocasError("controller at " + where() +
+                           " refuses the connection (all its sessions may be taken): " + ewName(error.code) +
+                           " (" + std::to_string(error.code) + ")",
+                       error.code, error.detail1);
+    }
+    if (frame.version < 1) {
+      throw WireError("reply with version 0");
+    }
+    return decodeOpenReply(frame.body);
+  }
+}
+
+void Connection::cannotConnect(const std::string& why) {
+  drop();
+  throw ConnectionError("cannot connect to the controller at " + where() + ": " + why);
+}
+
+void Connection::connectSocket(Circuit& circuit, Clock::time_point deadline) {
+  addrinfo hints{};
+  hints.ai_family = AF_INET;
+  hints.ai_socktype = SOCK_STREAM;
+  addrinfo* found = nullptr;
+  const int resolved = ::getaddrinfo(host_.c_str(), std::to_string(port_).c_str(), &hints, &found);
+  if (resolved != 0) {
+    cannotConnect(::gai_strerror(resolved));
+  }
+  circuit.socket = Descriptor(::socket(AF_INET, SOCK_STREAM, 0));
+  int error = circuit.socket.valid() ? 0 : errno;
+  if (error == 0) {
+    prepareSocket(circuit.socket.get());
+    if (&circuit == &stream) {
+      ::setsockopt(circuit.socket.get(), SOL_SOCKET, SO_SNDBUF, &STREAM_SEND_BUFFER,
+                   sizeof STREAM_SEND_BUFFER);
+    }
+    if (::connect(circuit.socket.get(), found->ai_addr, found->ai_addrlen) != 0) {
+      error = errno;
+    }
+  }
+  ::freeaddrinfo(found);
+  if (error == EINPROGRESS) {
+    error = waitForConnect(circuit.socket.get(), deadline);
+  }
+  if (error != 0) {
+    cannotConnect(errorText(error));
+  }
+}
+
+int Connection::waitForConnect(int socket, Clock::time_point deadline) {
+  pollfd wait{socket, POLLOUT, 0};
+  int ready = 0;
+  do {
+    ready = ::poll(&wait, 1, millisecondsUntil(deadline));
+  } while (ready < 0 && errno == EINTR);
+  if (ready == 0) {
+    cannotConnect("no answer in time");
+  }
+  int error = 0;
+  socklen_t size = sizeof error;
+  ::getsockopt(socket, SOL_SOCKET, SO_ERROR, &error, &size);
+  return error;
+}
+
+void Connection::queue(Circuit& circuit, std::uint8_t type, std::uint8_t direction, const Bytes& body) {
+  const Bytes frame = encodeFrame(type, direction, body, REQUEST_VERSION);
+  circuit.unsent.insert(circuit.unsent.end(), frame.begin(), frame.end());
+}
+
+bool Connection::flush(Circuit& circuit) {
+  const Transfer result = writeSome(circuit.socket.get(), circuit.unsent);
+  if (result == Transfer::closed) {
+    lost("the controller closed it");
+  }
+  return result == Transfer::done;
+}
+
+void Connection::flushUntil(Circuit& circuit, Clock::time_point deadline) {
+  while (!flush(circuit)) {
+    if (Clock::now() >= deadline) {
+      lost("it takes no data");
+    }
+    pollfd wait{circuit.socket.get(), POLLOUT, 0};
+    ::poll(&wait, 1, millisecondsUntil(deadline));
+  }
+}
+
+std::optional<Frame> Connection::poll(Circuit& circuit) {
+  std::optional<Frame> frame = circuit.reader.next();
+  if (frame) {
+    return frame;
+  }
+  const Transfer result = readSome(circuit.socket.get(), circuit.reader, READ_STEP);
+  frame = circuit.reader.next();
+  if (!frame && result == Transfer::closed) {
+    lost("the controller closed it");
+  }
+  return frame;
+}
+
+std::optional<Frame> Connection::pollOrDrop(Circuit& circuit) {
+  try {
+    return poll(circuit);
+  } catch (const WireError& e) {
+    lost(e.what());
+  }
+}
+
+Frame Connection::receive(Circuit& circuit, Clock::time_point deadline) {
+  for (;;) {
+    if (std::optional<Frame> frame = poll(circuit)) {
+      return std::move(*frame);
+    }
+    if (Clock::now() >= deadline) {
+      lost("no answer in time");
+    }
+    pollfd wait{circuit.socket.get(), POLLIN, 0};
+    ::poll(&wait, 1, millisecondsUntil(deadline));
+  }
+}
+
+}  // namespace smartmill::focas
