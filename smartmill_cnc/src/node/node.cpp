@@ -286,16 +286,16 @@ bool CncNode::setMacro(smartmill_msgs::SetMacro::Request& request,
 }
 
 void CncNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
-  using Status = diagnostic_msgs::DiagnosticStatus;
+  using Level = diagnostic_msgs::DiagnosticStatus;
   const std::lock_guard<std::mutex> lock(mutex_);
   if (!seen_.connected) {
-    status.summary(Status::ERROR, seen_note_.empty() ? "not connected" : seen_note_);
+    status.summary(Level::ERROR, seen_note_.empty() ? "not connected" : seen_note_);
   } else if (seen_.emergency || seen_.alarm) {
-    status.summary(Status::ERROR, seen_.emergency ? "emergency stop" : "alarm " + seen_.alarm_text);
+    status.summary(Level::ERROR, seen_.emergency ? "emergency stop" : "alarm " + seen_.alarm_text);
   } else if (seen_.mode != CncMode::dnc) {
-    status.summary(Status::WARN, "connected; not in DNC mode, nothing can be moved");
+    status.summary(Level::WARN, "connected; not in DNC mode, nothing can be moved");
   } else {
-    status.summary(Status::OK, seen_.armed ? "connected, motion armed" : "connected, motion disarmed");
+    status.summary(Level::OK, seen_.armed ? "connected, motion armed" : "connected, motion disarmed");
   }
   status.add("mode", static_cast<int>(seen_.mode));
   status.add("armed", seen_.armed);
