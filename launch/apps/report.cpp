@@ -27,7 +27,9 @@ using namespace smartmill;
 using namespace smartmill::report;
 namespace fs = std::filesystem;
 
-/// The limit of the true machine, by the tool that makes charts of models.
+/// The limit of the true machine, by the tool that makes charts of models and by another solver than the
+/// session's chart: collocation is exact where the zero-order solution averages, so that the check can tell
+/// both errors, of the measured FRF and of the method.
 class TrueLimit {
  public:
   /// @param model file of the true machine @param folder for what the tool writes
@@ -43,7 +45,7 @@ class TrueLimit {
                   units::degFromRad(chart_.entry_angle), units::degFromRad(chart_.exit_angle),
                   units::rpmFromRadPerSec(low), units::rpmFromRadPerSec(high), count);
     const std::string command = "rosrun smartmill_stability lobes " + shellQuoted(model_) + numbers +
-                                " --method zero_order -o " + shellQuoted(csv) + " >" + shellQuoted(log) +
+                                " --method collocation -o " + shellQuoted(csv) + " >" + shellQuoted(log) +
                                 " 2>&1";
     if (std::system(command.c_str()) != 0) throw Error("lobes failed on the true machine, see " + log);
     return read(csv);
