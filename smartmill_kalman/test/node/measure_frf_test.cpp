@@ -27,7 +27,7 @@
 #include <tf2_msgs/TFMessage.h>
 #include <topic_tools/shape_shifter.h>
 
-#include "../src/bag_compensation.h"
+#include "node/bag_compensation.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/units.h"

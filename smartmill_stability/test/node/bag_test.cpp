@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 #include <rosbag/bag.h>
 
-#include "../src/bag_charts.h"
+#include "node/bag_charts.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_ros/conversions.h"
 #include "smartmill_stability_testing/benchmark.h"
