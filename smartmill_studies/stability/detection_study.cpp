@@ -125,7 +125,7 @@ std::vector<ChatterState> verdicts(const std::vector<std::vector<double>>& signa
 }  // namespace
 
 std::vector<DetectionCut> detectionStudy(const MachineModel& model, const RegenerativeSystem& system,
-                                         const DetectionOptions& options, const TwinCuts& twin,
+                                         const DetectionOptions& options,
                                          const std::function<void(double)>& progress) {
   if (!(options.speed_low > 0.0) || !(options.speed_high > options.speed_low))
     throw Error("speeds: 0 < low < high is due");
@@ -165,8 +165,8 @@ std::vector<DetectionCut> detectionStudy(const MachineModel& model, const Regene
   // of an even number of teeth does so too; with teeth that are alike the tooth's period shows it.
   MachineModel plain = model;
   plain.effects.clear();
-  twin.run(
-      plain, plan, {"tool_x", "tool_y", "fx", "fy", "fz"}, false, options.seed,
+  runTwinCuts(
+      {plain}, plan, {{"tool_x", "tool_y", "fx", "fy", "fz"}},
       [&](std::size_t i, const Record& record) {
         DetectionCut& cut = cuts[i];
         const double rate = samples * cut.speed / units::TWO_PI;
@@ -194,10 +194,13 @@ std::vector<DetectionCut> detectionStudy(const MachineModel& model, const Regene
         if (progress) progress(0.5 * share);
       });
   const bool force = options.signal == "force";
-  twin.run(
-      model, plan,
-      force ? std::vector<std::string>{"fx", "fy", "fz"} : std::vector<std::string>{"tool_x", "tool_y"},
-      force, options.seed + 7u,
+  TwinRequest request;
+  request.columns =
+      force ? std::vector<std::string>{"fx", "fy", "fz"} : std::vector<std::string>{"tool_x", "tool_y"};
+  request.noise = force;
+  request.seed = options.seed + 7u;
+  runTwinCuts(
+      {model}, plan, request,
       [&](std::size_t i, const Record& record) {
         DetectionCut& cut = cuts[i];
         const double rate = samples * cut.speed / units::TWO_PI;

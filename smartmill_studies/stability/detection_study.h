@@ -42,7 +42,7 @@ struct DetectionCut {
 /// sudden end, at random speeds and at 0.4 .. 0.9 and 1.2 .. 2 times the believed limit, through the
 /// detector.
 std::vector<DetectionCut> detectionStudy(const MachineModel& model, const RegenerativeSystem& system,
-                                         const DetectionOptions& options, const TwinCuts& twin,
+                                         const DetectionOptions& options,
                                          const std::function<void(double)>& progress = {});
 
 }  // namespace smartmill::stability

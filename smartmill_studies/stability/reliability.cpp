@@ -42,7 +42,7 @@ std::array<double, 2> wilson(int k, int n) {
 }
 
 std::vector<ReliabilityPoint> reliabilityStudy(const MachineModel& model, const RegenerativeSystem& system,
-                                               const ReliabilityOptions& options, const TwinCuts* twin,
+                                               const ReliabilityOptions& options,
                                                const std::function<void(double)>& progress) {
   if (options.machines < 1) throw Error("machines: at least 1 is due");
   if (options.draws < 1) throw Error("draws: at least 1 is due");
@@ -68,7 +68,7 @@ std::vector<ReliabilityPoint> reliabilityStudy(const MachineModel& model, const 
     p.predicted = chatterProbability(belief, p.speed, p.depth, options.draws,
                                      options.seed + 1000u + static_cast<unsigned>(points.size()));
     points.push_back(p);
-    if (!twin) continue;
+    if (!options.by_twin) continue;
     machines.push_back(machineOf(model, truth));
     TwinCut cut;
     cut.speed = p.speed;
@@ -78,10 +78,10 @@ std::vector<ReliabilityPoint> reliabilityStudy(const MachineModel& model, const 
     cuts.push_back(cut);
     if (progress) progress(0.5 * static_cast<double>(points.size()) / options.machines);
   }
-  if (twin) {
+  if (options.by_twin) {
     const int samples = cuts.front().samples, period = system.evenPitch() ? samples / system.teeth : samples;
-    twin->run(
-        machines, cuts, {"tool_x", "tool_y"}, false, options.seed,
+    runTwinCuts(
+        machines, cuts, {{"tool_x", "tool_y"}},
         [&](std::size_t i, const Record& record) {
           points[i].seen = repeatsNoMore(record, samples, period, cuts[i].engagement.feed_per_tooth);
         },

@@ -16,6 +16,7 @@ struct ReliabilityOptions {
   int machines = 200;
   int draws = 200;  ///< [1] behind each prediction
   unsigned seed = 1;
+  bool by_twin = true;  ///< each machine cuts once in the simulator
 };
 
 /// One machine drawn from the belief, with a cut at a random speed near the believed limit.
@@ -35,10 +36,9 @@ struct ReliabilityBin {
   bool holds() const { return count == 0 || (predicted >= low && predicted <= high); }
 };
 
-/// Machines drawn from the model's standard deviations, each cut once. @param twin nullptr: the solver is the
-/// observer
+/// Machines drawn from the model's standard deviations, each cut once.
 std::vector<ReliabilityPoint> reliabilityStudy(const MachineModel& model, const RegenerativeSystem& system,
-                                               const ReliabilityOptions& options, const TwinCuts* twin,
+                                               const ReliabilityOptions& options,
                                                const std::function<void(double)>& progress = {});
 
 /// Bins of equal width in the predicted probability. @param by_twin observed: seen, else chatters

@@ -50,7 +50,7 @@ bool repeatsNoMore(const Record& record, int samples, int period, double scale) 
 }
 
 std::vector<AgreementPoint> agreementWithTwin(const MachineModel& model, const RegenerativeSystem& system,
-                                              const AgreementOptions& options, const TwinCuts& twin,
+                                              const AgreementOptions& options,
                                               const std::function<void(double)>& progress) {
   options.validate();
   const auto solver = makeFloquetSolver(Method::collocation, system);
@@ -89,8 +89,8 @@ std::vector<AgreementPoint> agreementWithTwin(const MachineModel& model, const R
     cuts.push_back(cut);
   }
   const int period = system.evenPitch() ? samples / system.teeth : samples;
-  twin.run(
-      model, cuts, {"tool_x", "tool_y"}, false, options.seed,
+  runTwinCuts(
+      {model}, cuts, {{"tool_x", "tool_y"}},
       [&](std::size_t i, const Record& record) {
         points[i].seen = repeatsNoMore(record, samples, period, options.feed);
       },

@@ -43,7 +43,7 @@ bool repeatsNoMore(const Record& record, int samples, int period, double scale);
 /// @param system of the model (helix, pitch, arc); with a chip geometry its contact counts, and the first
 /// limits from which points are drawn stay those of the system without (they take longer)
 std::vector<AgreementPoint> agreementWithTwin(const MachineModel& model, const RegenerativeSystem& system,
-                                              const AgreementOptions& options, const TwinCuts& twin,
+                                              const AgreementOptions& options,
                                               const std::function<void(double)>& progress = {});
 
 }  // namespace smartmill::stability

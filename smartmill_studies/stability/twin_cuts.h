@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "smartmill_core/campaign/campaign.h"
 #include "smartmill_core/campaign/record.h"
+#include "smartmill_core/cutting/tool.h"
 #include "smartmill_core/model/machine_model.h"
 
 namespace smartmill::stability {
@@ -19,33 +19,19 @@ struct TwinCut {
   int air = 0;            ///< [1] revolutions before the tool engages
 };
 
-/// Cuts of one machine run by the simulator, `rosrun smartmill_sim simulate`, as a program: model and
-/// campaign go there as files, records come back. Spread over the cores, in batches.
-class TwinCuts {
- public:
-  /// @param simulate path of the program. @throws Error when it cannot be run.
-  explicit TwinCuts(std::string simulate);
-  /// Beside the running program in the same workspace: .../lib/smartmill_sim/simulate; "" when it is not
-  /// there.
-  static std::string besideThisProgram();
-
-  /// @param columns of the records besides the time, as in docs/formats.md without unit (tool_x, fx, ...)
-  /// @param noise of the sensors, seeded @param judge called once a cut with its index and record, in order
-  /// @param progress called with the share done. @throws Error with the simulator's own words.
-  void run(const MachineModel& model, const std::vector<TwinCut>& cuts,
-           const std::vector<std::string>& columns, bool noise, unsigned seed,
-           const std::function<void(std::size_t, const Record&)>& judge,
-           const std::function<void(double)>& progress = {}) const {
-    run(std::vector<MachineModel>{model}, cuts, columns, noise, seed, judge, progress);
-  }
-  /// The same with a machine of its own for each cut. @param models one, or one a cut
-  void run(const std::vector<MachineModel>& models, const std::vector<TwinCut>& cuts,
-           const std::vector<std::string>& columns, bool noise, unsigned seed,
-           const std::function<void(std::size_t, const Record&)>& judge,
-           const std::function<void(double)>& progress = {}) const;
-
- private:
-  std::string simulate_;
+/// What the simulator is asked for.
+struct TwinRequest {
+  std::vector<std::string> columns;  ///< of the records besides the time, as in docs/formats.md without unit
+  bool noise = false;                ///< of the sensors
+  unsigned seed = 1;                 ///< of the noise: this of the first cut, one more a cut
 };
+
+/// Cuts in the time domain of smartmill_sim, spread over the cores.
+/// @param models one for all cuts, or one a cut
+/// @param judge called once a cut with its index and record, in order
+/// @param progress called with the share done. @throws Error with the simulator's own words.
+void runTwinCuts(const std::vector<MachineModel>& models, const std::vector<TwinCut>& cuts,
+                 const TwinRequest& request, const std::function<void(std::size_t, const Record&)>& judge,
+                 const std::function<void(double)>& progress = {});
 
 }  // namespace smartmill::stability

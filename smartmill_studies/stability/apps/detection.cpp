@@ -21,7 +21,7 @@ namespace {
 using namespace smartmill;
 
 struct Request {
-  std::string model, speeds, out, simulate, signal = "force";
+  std::string model, speeds, out, signal = "force";
   double entry_deg = 0.0, exit_deg = 180.0, max_depth_mm = 0.0, runout_um = 5.0, noise_n = 3.0,
          severity = -1.0;
   int cuts = 300, teeth = 0;
@@ -58,9 +58,7 @@ bool run(const Request& request) {
   options.signal = request.signal;
   if (request.signal != "force") options.detector.least_severity = 0.0;
   if (request.severity >= 0.0) options.detector.least_severity = request.severity;
-  const stability::TwinCuts twin(request.simulate.empty() ? stability::TwinCuts::besideThisProgram()
-                                                          : request.simulate);
-  const auto cuts = detectionStudy(model, system, options, twin,
+  const auto cuts = detectionStudy(model, system, options,
                                    [](double share) { std::fprintf(stderr, "\r%3.0f %%", 100.0 * share); });
   std::fprintf(stderr, "\n");
   int stable = 0, alarms = 0, chattering = 0, found = 0, near = 0;
@@ -145,7 +143,6 @@ int main(int argc, char** argv) {
   app.add_option("--severity", request.severity, "least severity of a verdict [N or the signal's unit]");
   app.add_option("--seed", request.seed, "(1)");
   app.add_option("-o,--out", request.out, "CSV of all cuts");
-  app.add_option("--simulate", request.simulate, "the simulator's program; found in the same workspace");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

@@ -4,7 +4,6 @@
 #include <cstdio>
 #include <fstream>
 #include <iostream>
-#include <optional>
 #include <string>
 
 #include <CLI/CLI.hpp>
@@ -20,7 +19,7 @@ namespace {
 using namespace smartmill;
 
 struct Request {
-  std::string model, speeds, out, simulate;
+  std::string model, speeds, out;
   double entry_deg = 0.0, exit_deg = 180.0, max_depth_mm = 0.0;
   int machines = 200, draws = 200, bins = 4;
   unsigned seed = 1;
@@ -43,15 +42,11 @@ void run(const Request& request) {
   options.machines = request.machines;
   options.draws = request.draws;
   options.seed = request.seed;
-  std::optional<stability::TwinCuts> twin;
-  if (!request.solver_only)
-    twin.emplace(request.simulate.empty() ? stability::TwinCuts::besideThisProgram() : request.simulate);
-  const auto points = reliabilityStudy(model, system, options, twin ? &*twin : nullptr, [](double share) {
-    std::fprintf(stderr, "\r%3.0f %%", 100.0 * share);
-  });
+  options.by_twin = !request.solver_only;
+  const auto points = reliabilityStudy(
+      model, system, options, [](double share) { std::fprintf(stderr, "\r%3.0f %%", 100.0 * share); });
   std::fprintf(stderr, "\n");
-  const bool by_twin = twin.has_value();
-  const auto bins = reliabilityBins(points, request.bins, by_twin);
+  const auto bins = reliabilityBins(points, request.bins, options.by_twin);
   std::ofstream csv(request.out);
   csv << "predicted,observed,low,high,count\n";
   std::printf("%10s %10s %19s %6s\n", "predicted", "observed", "95 % of observed", "cuts");
@@ -68,8 +63,8 @@ void run(const Request& request) {
   if (!csv) throw Error(request.out + ": cannot be written");
   std::printf(
       "%zu machines, observed %s: all together %+.2f standard errors, %d bins outside their interval\n",
-      points.size(), by_twin ? "in the simulator's records" : "by the solver",
-      reliabilityScore(points, by_twin), outside);
+      points.size(), options.by_twin ? "in the simulator's records" : "by the solver",
+      reliabilityScore(points, options.by_twin), outside);
   stability::drawBeside(
       request.out,
       "set xlabel 'Predicted probability of chatter'\nset ylabel 'Observed share'\nset xrange [0:1]\nset "
@@ -97,7 +92,6 @@ int main(int argc, char** argv) {
   app.add_option("--bins", request.bins, "of the predicted probability (4)");
   app.add_option("--seed", request.seed, "(1)");
   app.add_flag("--solver-only", request.solver_only, "the solver is the observer too, no simulator");
-  app.add_option("--simulate", request.simulate, "the simulator's program; found in the same workspace");
   app.add_option("-o,--out", request.out, "CSV file; the diagram of the same name with .png stands beside it")
       ->required();
   try {

@@ -20,7 +20,7 @@ namespace {
 using namespace smartmill;
 
 struct Request {
-  std::string model, speeds, out, simulate;
+  std::string model, speeds, out;
   double entry_deg = 0.0, exit_deg = 180.0, max_depth_mm = 0.0, band_percent = 5.0, least_percent = 98.0;
   double helix_deg = -1.0, feed_mm = 0.1;
   std::vector<double> pitch_deg;
@@ -56,9 +56,7 @@ bool run(const Request& request) {
     system.chip.emplace();
     system.chip->feed = options.feed;
   }
-  const stability::TwinCuts twin(request.simulate.empty() ? stability::TwinCuts::besideThisProgram()
-                                                          : request.simulate);
-  const auto points = agreementWithTwin(model, system, options, twin, [](double share) {
+  const auto points = agreementWithTwin(model, system, options, [](double share) {
     std::fprintf(stderr, "\r%3.0f %% of the cuts", 100.0 * share);
   });
   std::fprintf(stderr, "\n");
@@ -115,7 +113,6 @@ int main(int argc, char** argv) {
   app.add_option("--feed-mm", request.feed_mm, "per tooth [mm] (0.1)");
   app.add_option("--revolutions", request.revolutions, "of a cut (180)");
   app.add_option("-o,--out", request.out, "CSV of all points");
-  app.add_option("--simulate", request.simulate, "the simulator's program; found in the same workspace");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

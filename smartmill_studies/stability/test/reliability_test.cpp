@@ -17,6 +17,7 @@ ReliabilityOptions options() {
   o.max_depth = 10e-3;
   o.machines = 60;
   o.draws = 60;
+  o.by_twin = false;
   return o;
 }
 
@@ -33,7 +34,7 @@ TEST(Wilson, publishedIntervals) {
 TEST(Reliability, anHonestBeliefIsConfirmedAndAFalseOneIsNot) {
   const MachineModel model = readMachineModel(MODEL_FILE);
   const RegenerativeSystem system = systemOf(model, 90.0, 180.0);
-  auto points = reliabilityStudy(model, system, options(), nullptr);
+  auto points = reliabilityStudy(model, system, options());
   ASSERT_EQ(points.size(), 60u);
   EXPECT_LT(std::abs(reliabilityScore(points, false)), 3.0);
   int count = 0;
@@ -49,10 +50,10 @@ TEST(Reliability, refusesWhatCannotBe) {
   const RegenerativeSystem system = systemOf(model, 90.0, 180.0);
   ReliabilityOptions o = options();
   o.machines = 0;
-  EXPECT_THROW(reliabilityStudy(model, system, o, nullptr), Error);
+  EXPECT_THROW(reliabilityStudy(model, system, o), Error);
   o = options();
   o.speed_low = 0.0;
-  EXPECT_THROW(reliabilityStudy(model, system, o, nullptr), Error);
+  EXPECT_THROW(reliabilityStudy(model, system, o), Error);
 }
 
 }  // namespace

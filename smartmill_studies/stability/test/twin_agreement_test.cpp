@@ -1,7 +1,6 @@
 #include "stability/twin_agreement.h"
 
 #include <cmath>
-#include <iostream>
 
 #include <gtest/gtest.h>
 
@@ -23,14 +22,9 @@ AgreementOptions options() {
 // The simulator of smartmill_sim knows nothing of this package: what it records judges the solver. The study
 // over 400 points is rosrun smartmill_studies stability_twin_agreement.
 TEST(TwinAgreement, twelveCutsOfTheSimulator) {
-  const std::string simulate = TwinCuts::besideThisProgram();
-  if (simulate.empty()) {
-    std::cout << "simulate of smartmill_sim absent, not checked\n";
-    return;
-  }
   MachineModel model = readMachineModel(MODEL_FILE);
   model.tool->helix = units::radFromDeg(30.0);
-  const auto points = agreementWithTwin(model, systemOf(model, 90.0, 180.0), options(), TwinCuts(simulate));
+  const auto points = agreementWithTwin(model, systemOf(model, 90.0, 180.0), options());
   ASSERT_EQ(points.size(), 12u);
   int agree = 0, chatter = 0;
   for (const AgreementPoint& p : points) {
@@ -44,11 +38,6 @@ TEST(TwinAgreement, twelveCutsOfTheSimulator) {
 
 // 5 % immersion, 20,000 rpm: a flip at 3.250386 mm in the tables where zero-order says 6.850 mm.
 TEST(TwinAgreement, theSimulatorFindsTheFlipThatZeroOrderMisses) {
-  const std::string simulate = TwinCuts::besideThisProgram();
-  if (simulate.empty()) {
-    std::cout << "simulate of smartmill_sim absent, not checked\n";
-    return;
-  }
   const MachineModel model = readMachineModel(MODEL_FILE);
   std::vector<TwinCut> cuts(2);
   for (TwinCut& cut : cuts) {
@@ -58,17 +47,15 @@ TEST(TwinAgreement, theSimulatorFindsTheFlipThatZeroOrderMisses) {
     cut.revolutions = 400;
   }
   cuts[1].engagement.axial_depth = 3.32e-3;
-  TwinCuts(simulate).run(model, cuts, {"tool_x", "tool_y"}, false, 1,
-                         [](std::size_t i, const Record& record) {
-                           EXPECT_EQ(repeatsNoMore(record, 720, 360, 0.1e-3), i == 1);
-                           // With two teeth the flip repeats every revolution.
-                           EXPECT_FALSE(repeatsNoMore(record, 720, 720, 0.1e-3)) << i;
-                         });
+  runTwinCuts({model}, cuts, {{"tool_x", "tool_y"}}, [](std::size_t i, const Record& record) {
+    EXPECT_EQ(repeatsNoMore(record, 720, 360, 0.1e-3), i == 1);
+    // With two teeth the flip repeats every revolution.
+    EXPECT_FALSE(repeatsNoMore(record, 720, 720, 0.1e-3)) << i;
+  });
 }
 
 TEST(TwinAgreement, refusesWhatCannotBe) {
-  EXPECT_THROW(TwinCuts(""), Error);
-  EXPECT_THROW(TwinCuts("/no/such/simulate"), Error);
+  EXPECT_THROW(runTwinCuts(std::vector<MachineModel>(2), std::vector<TwinCut>(3), {}, {}), Error);
   AgreementOptions o = options();
   o.points = 0;
   EXPECT_THROW(o.validate(), Error);
