@@ -7,6 +7,7 @@
 #include <Eigen/Core>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_core/modal/state_space.h"
 #include "smartmill_core/units.h"
 
@@ -54,7 +55,7 @@ DelayModel::DelayModel(const ModalModel& sensor, double period, double sample_ra
     a.block(0, m, m, 1) = continuous.b / sample_rate;
   }
   for (Eigen::Index i = 0; i + 1 < HOLD_INDEX; ++i) a(m + i, m + i + 1) = 1.0;
-  const Eigen::MatrixXd phi = matrixExponential(a);
+  const Eigen::MatrixXd phi = linear::exponential(a);
   for (std::size_t k = 0; k < modes; ++k) {
     const auto i = static_cast<Eigen::Index>(2 * k);
     transition.insert(transition.end(), {phi(i, i), phi(i, i + 1), phi(i + 1, i), phi(i + 1, i + 1)});

@@ -10,6 +10,7 @@
 
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_core/modal/modal_filter.h"
 #include "smartmill_core/modal/state_space.h"
 #include "smartmill_core/signal/statistics.h"
@@ -222,7 +223,7 @@ TEST(HarmonicFilter, isTheMatrixRecursion) {
   a.topRows(2) += modes.b * d;
   c.head(2) = modes.c;
   c += model.direct * d;
-  const Eigen::MatrixXd phi = matrixExponential(a / RATE);
+  const Eigen::MatrixXd phi = linear::exponential(a / RATE);
   const Eigen::VectorXd k = Eigen::Map<const Eigen::VectorXd>(gain.filter.data(), n);
   Eigen::VectorXd x = Eigen::VectorXd::Zero(n);
   std::mt19937 random(5);

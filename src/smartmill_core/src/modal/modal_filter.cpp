@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_core/modal/state_space.h"
 #include "smartmill_core/units.h"
 
@@ -27,7 +28,7 @@ ModalFilter::ModalFilter(const ModalModel& model, double sample_rate, Hold hold)
     joint(1, 1) = -2.0 * mode.damping_ratio * angle;
     joint(1, 2) = angle;
     joint(2, 3) = 1.0;
-    const Eigen::MatrixXd e = matrixExponential(joint);
+    const Eigen::MatrixXd e = linear::exponential(joint);
     Section section{e(0, 0),
                     e(0, 1) / w,
                     e(1, 0) * w,

@@ -2,9 +2,7 @@
 
 #include <cmath>
 
-#include <Eigen/Dense>
-#include <unsupported/Eigen/MatrixFunctions>
-
+#include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill {
@@ -29,12 +27,8 @@ StateSpace discretise(const StateSpace& continuous, double dt) {
   Eigen::MatrixXd joint = Eigen::MatrixXd::Zero(n + m, n + m);
   joint.topLeftCorner(n, n) = continuous.a * dt;
   joint.topRightCorner(n, m) = continuous.b * dt;
-  const Eigen::MatrixXd transition = matrixExponential(joint);
+  const Eigen::MatrixXd transition = linear::exponential(joint);
   return {transition.topLeftCorner(n, n), transition.topRightCorner(n, m), continuous.c, continuous.d};
-}
-
-Eigen::MatrixXd matrixExponential(const Eigen::MatrixXd& m) {
-  return m.size() == 0 ? m : Eigen::MatrixXd(m.exp());
 }
 
 std::pair<Eigen::MatrixXd, Eigen::MatrixXd> discretiseNoise(const Eigen::MatrixXd& a,
@@ -51,7 +45,7 @@ std::pair<Eigen::MatrixXd, Eigen::MatrixXd> discretiseNoise(const Eigen::MatrixX
   joint.topLeftCorner(n, n) = -a * step;
   joint.topRightCorner(n, n) = q * step;
   joint.bottomRightCorner(n, n) = a.transpose() * step;
-  const Eigen::MatrixXd exponential = matrixExponential(joint);
+  const Eigen::MatrixXd exponential = linear::exponential(joint);
   Eigen::MatrixXd phi = exponential.bottomRightCorner(n, n).transpose();
   Eigen::MatrixXd noise = phi * exponential.topRightCorner(n, n);
   for (int i = 0; i < doublings; ++i) {

@@ -5,7 +5,9 @@
 
 #include <gtest/gtest.h>
 
+#include "modal/modal_residuals.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/fit/derivative_check.h"
 
 namespace smartmill {
 namespace {
@@ -91,7 +93,8 @@ TEST(ModalFit, statedStandardDeviationsAreHonest) {
       count += 3;
     }
   }
-  // Mean square of 600 z-scores, about 300 of them independent: 1 within four of its standard deviations sqrt(2 / 300).
+  // Mean square of 600 z-scores, about 300 of them independent: 1 within four of its standard deviations
+  // sqrt(2 / 300).
   EXPECT_NEAR(squares / count, 1.0, 0.33);
 }
 
@@ -118,6 +121,26 @@ TEST(ModalFit, refusesWhatCannotBeFitted) {
   bad.value[100] = std::nan("");
   options.high = 4000.0;
   EXPECT_THROW(fitModes(bad, options), Error);
+}
+
+TEST(ModalFit, derivativesAgreeWithDifferences) {
+  const FrequencyResponse frf = measured(sensor(), 0.05, 1);
+  ModalLines lines;
+  lines.frequency = frf.frequency;
+  lines.value = frf.value;
+  lines.weight.assign(frf.size(), 20.0);
+  lines.scale = 3.0;
+  lines.low = 100.0;
+  for (const bool unit_static_gain : {false, true}) {
+    lines.unit_static_gain = unit_static_gain;
+    lines.direct = !unit_static_gain;
+    lines.mass = true;
+    Eigen::VectorXd at(lines.parameters(2));
+    at.head(6) << std::log(900.0), std::log(0.04), 0.3, std::log(2000.0), std::log(0.01), -0.1;
+    at.tail(at.size() - 6).setConstant(0.05);
+    const fit::DerivativeGap gap = fit::checkDerivatives(ModalResiduals(lines, 2), at);
+    EXPECT_LT(gap.relative, 1e-8) << gap.row << " " << gap.column << " " << gap.given << " " << gap.numeric;
+  }
 }
 
 TEST(FindPeaks, strongestFirst) {

@@ -5,6 +5,7 @@
 #include <Eigen/Dense>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_core/modal/modal_filter.h"
 #include "smartmill_core/modal/modal_model.h"
 #include "smartmill_core/modal/state_space.h"
@@ -135,16 +136,16 @@ TEST(StateSpace, discretisedItIsTheZeroOrderFilter) {
 TEST(MatrixExponential, closedForms) {
   Eigen::MatrixXd rotation(2, 2);
   rotation << 0.0, -3.0, 3.0, 0.0;
-  const Eigen::MatrixXd turned = matrixExponential(rotation);
+  const Eigen::MatrixXd turned = linear::exponential(rotation);
   EXPECT_NEAR(turned(0, 0), std::cos(3.0), 1e-14);
   EXPECT_NEAR(turned(1, 0), std::sin(3.0), 1e-14);
   Eigen::MatrixXd nilpotent = Eigen::MatrixXd::Zero(3, 3);
   nilpotent(0, 1) = 2.0;
   nilpotent(1, 2) = 5.0;
-  const Eigen::MatrixXd finite = matrixExponential(nilpotent);
+  const Eigen::MatrixXd finite = linear::exponential(nilpotent);
   EXPECT_NEAR(finite(0, 2), 5.0, 1e-14);
   EXPECT_NEAR(finite(0, 1), 2.0, 1e-14);
-  EXPECT_EQ(matrixExponential(Eigen::MatrixXd(0, 0)).size(), 0);
+  EXPECT_EQ(linear::exponential(Eigen::MatrixXd(0, 0)).size(), 0);
 }
 
 TEST(DiscretiseNoise, integratorChain) {

@@ -13,18 +13,17 @@ struct StateSpace {
   Eigen::MatrixXd a, b, c, d;
 };
 
-/// Observable form mode by mode (Dunwoody eq. 5.18..5.23), two states a mode, one input, one output. Well conditioned
-/// for any number of modes; states are scaled by the natural frequency so that A has entries of one size a mode.
+/// Observable form mode by mode (Dunwoody eq. 5.18..5.23), two states a mode, one input, one output. Well
+/// conditioned for any number of modes; states are scaled by the natural frequency so that A has entries of
+/// one size a mode.
 StateSpace stateSpace(const ModalModel& model);
 
 /// Exact zero-order-hold discretisation by the matrix exponential. @param dt [s]
 StateSpace discretise(const StateSpace& continuous, double dt);
 
-/// exp(m), by scaling and squaring; compiled once here because the template is slow to compile.
-Eigen::MatrixXd matrixExponential(const Eigen::MatrixXd& m);
-
 /// Van Loan: exact discrete transition and process noise covariance of x' = A x + w, E w w' = q.
 /// @return {phi, qd} for a step dt [s].
-std::pair<Eigen::MatrixXd, Eigen::MatrixXd> discretiseNoise(const Eigen::MatrixXd& a, const Eigen::MatrixXd& q, double dt);
+std::pair<Eigen::MatrixXd, Eigen::MatrixXd> discretiseNoise(const Eigen::MatrixXd& a,
+                                                            const Eigen::MatrixXd& q, double dt);
 
 }  // namespace smartmill
