@@ -13,7 +13,7 @@ constexpr double SAY_EVERY = 5.0;  // [s] of lines in the log about one input
 }  // namespace
 
 std::string InputHealth::take(double now, const std::function<void()>& handle) {
-  watchdog_.heard(now);
+  watchdog_.heard();
   try {
     handle();
     standing_ = false;
@@ -36,23 +36,22 @@ std::string InputHealth::takeProblem() {
   return problem_;
 }
 
-Inputs::Inputs(ros::NodeHandle nh, double timeout)
-    : nh_(std::move(nh)), timeout_(timeout), any_(timeout, now()) {
+Inputs::Inputs(ros::NodeHandle nh, double timeout) : nh_(std::move(nh)), timeout_(timeout), any_(timeout) {
 }
 
-double Inputs::now() {
-  return ros::WallTime::now().toSec();
+void Inputs::tick(double period) {
+  any_.tick(period);
+  for (InputHealth& input : inputs_) input.watchdog().tick(period);
 }
 
 InputHealth& Inputs::add(const std::string& topic) {
-  inputs_.emplace_back(topic, timeout_, now());
+  inputs_.emplace_back(topic, timeout_);
   return inputs_.back();
 }
 
 void Inputs::take(InputHealth& health, const std::function<void()>& handle) {
-  const double received = now();
-  any_.heard(received);
-  const std::string line = health.take(received, handle);
+  any_.heard();
+  const std::string line = health.take(ros::WallTime::now().toSec(), handle);
   if (!line.empty()) ROS_ERROR_STREAM(line);
 }
 
@@ -66,7 +65,7 @@ const Watchdog& Inputs::watchdog(const std::string& topic) const {
 const InputHealth* Inputs::dead(std::initializer_list<const char*> topics) const {
   for (const InputHealth& input : inputs_) {
     for (const char* topic : topics) {
-      if (input.topic() == topic && input.watchdog().dead(now())) return &input;
+      if (input.topic() == topic && input.watchdog().dead()) return &input;
     }
   }
   return nullptr;
@@ -79,7 +78,7 @@ void Inputs::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
     const std::string problem = input.takeProblem();
     if (!problem.empty()) status.mergeSummary(Level::ERROR, input.topic() + ": " + problem);
     if (input.watchdog().ever()) {
-      status.addf(input.topic(), "%.2f s since the last message, %zu refused", input.watchdog().silent(now()),
+      status.addf(input.topic(), "%.2f s since the last message, %zu refused", input.watchdog().silent(),
                   input.refused());
     } else {
       status.add(input.topic(), "nothing yet");

@@ -6,14 +6,21 @@
 #include <ros/console.h>
 
 namespace smartmill {
+namespace {
+
+constexpr double TICK = 0.05;  // [s]
+
+}  // namespace
 
 NodeShell::NodeShell(ros::NodeHandle nh, ros::NodeHandle private_nh, const std::string& hardware,
                      double input_timeout)
     : nh_(nh), inputs_(nh, input_timeout), diagnostics_(nh, std::move(private_nh)) {
   diagnostics_.setHardwareID(hardware);
   diagnostics_.add("inputs", &inputs_, &Inputs::diagnose);
-  // The updater itself publishes once a second.
-  every(0.2, [this] { diagnostics_.update(); });
+  every(TICK, [this] {
+    inputs_.tick(TICK);
+    diagnostics_.update();  // publishes once a second
+  });
 }
 
 void NodeShell::diagnose(const std::string& name,

@@ -12,7 +12,7 @@ void refuse() {
 }
 
 TEST(InputHealth, WhatAHandlerThrowsStaysThereAndIsSaidNowAndThen) {
-  InputHealth input("daq/dynamometer", 1.0, 0.0);
+  InputHealth input("daq/dynamometer", 1.0);
   int handled = 0;
   EXPECT_EQ(input.take(10.0, [&] { ++handled; }), "");
   EXPECT_EQ(input.take(10.1, refuse), "daq/dynamometer: channel fx is missing");
@@ -24,7 +24,7 @@ TEST(InputHealth, WhatAHandlerThrowsStaysThereAndIsSaidNowAndThen) {
 }
 
 TEST(InputHealth, TheDiagnosticsHearOfEveryProblemAtLeastOnce) {
-  InputHealth input("daq/dynamometer", 1.0, 0.0);
+  InputHealth input("daq/dynamometer", 1.0);
   input.take(1.0, refuse);
   input.take(1.1, [] {});
   EXPECT_EQ(input.takeProblem(), "channel fx is missing");  // though it is over
@@ -37,10 +37,12 @@ TEST(InputHealth, TheDiagnosticsHearOfEveryProblemAtLeastOnce) {
 }
 
 TEST(InputHealth, ARefusedMessageIsHeardAllTheSame) {
-  InputHealth input("daq/dynamometer", 1.0, 0.0);
+  InputHealth input("daq/dynamometer", 1.0);
   input.take(5.0, refuse);
-  EXPECT_FALSE(input.watchdog().dead(5.5));
-  EXPECT_TRUE(input.watchdog().dead(6.5));
+  input.watchdog().tick(0.5);
+  EXPECT_FALSE(input.watchdog().dead());
+  input.watchdog().tick(1.0);
+  EXPECT_TRUE(input.watchdog().dead());
 }
 
 }  // namespace

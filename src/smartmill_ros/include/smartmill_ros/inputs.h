@@ -14,18 +14,22 @@
 
 namespace smartmill {
 
-/// One input of a node: when it was heard, and what its handler refused last. Wall time [s] is passed in.
+/// Messages of sampled streams that wait, in publishers and subscribers: 1000 s of blocks, so that a node
+/// that was starved catches up instead of losing.
+constexpr std::uint32_t STREAM_QUEUE = 100000;
+
+/// One input of a node: whether it is alive, and what its handler refused last.
 class InputHealth {
  public:
-  InputHealth(std::string topic, double timeout, double now)
-      : topic_(std::move(topic)), watchdog_(timeout, now) {}
+  InputHealth(std::string topic, double timeout) : topic_(std::move(topic)), watchdog_(timeout) {}
 
-  /// Hands on what came; whatever that throws stays here.
+  /// Hands on what came; whatever that throws stays here. @param now [s] wall time
   /// @return a line for the log, empty when there is nothing to say (again).
   std::string take(double now, const std::function<void()>& handle);
 
   const std::string& topic() const { return topic_; }
   const Watchdog& watchdog() const { return watchdog_; }
+  Watchdog& watchdog() { return watchdog_; }
   /// What was refused since it was asked for last; empty: nothing.
   std::string takeProblem();
   std::size_t refused() const { return refused_; }  ///< [1] since the start
@@ -43,7 +47,7 @@ class InputHealth {
 /// node goes on.
 class Inputs {
  public:
-  /// @param timeout [s] of wall time without a message after which an input counts as dead
+  /// @param timeout [s] of ticks without a message after which an input counts as dead
   Inputs(ros::NodeHandle nh, double timeout);
 
   /// The handler gets the message and the time of its reception [s].
@@ -53,7 +57,7 @@ class Inputs {
     const boost::function<void(const Message&)> callback = [this, &health, handler](const Message& message) {
       take(health, [&] { handler(message, toSec(ros::Time::now())); });
     };
-    subscribers_.push_back(nh_.subscribe<Message>(topic, QUEUE, callback, ros::VoidConstPtr(),
+    subscribers_.push_back(nh_.subscribe<Message>(topic, STREAM_QUEUE, callback, ros::VoidConstPtr(),
                                                   ros::TransportHints().tcpNoDelay()));
   }
 
@@ -64,13 +68,13 @@ class Inputs {
   /// Of all inputs together. ended() is the end of data: nothing more will come to release what waits.
   Watchdog& any() { return any_; }
 
-  static double now();  ///< [s] wall time
+  /// From a wall timer of the thread that reads the inputs. @param period [s] of that timer
+  void tick(double period);
 
   /// What is silent and what was refused.
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
  private:
-  static constexpr std::uint32_t QUEUE = 2000;  // 20 s of blocks
   InputHealth& add(const std::string& topic);
   void take(InputHealth& health, const std::function<void()>& handle);
 

@@ -30,6 +30,7 @@ class NodeShell {
   void tell() { diagnostics_.force_update(); }
 
   /// @param period [s] of wall time: it goes on when a recording's clock stands. What work throws is logged.
+  /// Timers wait behind the messages that have come.
   void every(double period, std::function<void()> work);
 
  private:

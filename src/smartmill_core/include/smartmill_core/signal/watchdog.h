@@ -2,32 +2,34 @@
 
 namespace smartmill {
 
-/// Tells when a source has fallen silent. Time comes in as an argument: wall time, for the stamps of a
-/// recording stand still when it ends.
+/// Tells when a source has fallen silent. Silence is counted in ticks of whoever reads the source, not on a
+/// clock: a reader that was starved finds what waits for it before its next tick, and does not take its own
+/// delay for silence.
 class Watchdog {
  public:
-  /// @param timeout [s] of silence after which the source counts as dead @param now [s]
-  Watchdog(double timeout, double now) : timeout_(timeout), last_(now) {}
+  /// @param timeout [s] of silence after which the source counts as dead
+  explicit Watchdog(double timeout) : timeout_(timeout) {}
 
-  void heard(double now) {
-    last_ = now;
+  void heard() {
+    silent_ = 0.0;
     ever_ = true;
     ended_ = false;
   }
+  /// Everything that waited was read; so much time has passed since the last tick. @param period [s]
+  void tick(double period) { silent_ += period; }
 
-  bool ever() const { return ever_; }                      ///< anything heard yet?
-  double silent(double now) const { return now - last_; }  ///< [s] since the last, or since the start
-  bool dead(double now) const { return silent(now) > timeout_; }
-  double timeout() const { return timeout_; }  ///< [s]
+  bool ever() const { return ever_; }        ///< anything heard yet?
+  double silent() const { return silent_; }  ///< [s] since the last, or since the start
+  bool dead() const { return silent_ > timeout_; }
 
   /// True once after each end of what was heard: nothing more will come to release what waits.
-  bool ended(double now) {
-    if (ended_ || !ever_ || !dead(now)) return false;
+  bool ended() {
+    if (ended_ || !ever_ || !dead()) return false;
     return ended_ = true;
   }
 
  private:
-  double timeout_, last_;
+  double timeout_, silent_ = 0.0;
   bool ever_ = false, ended_ = false;
 };
 
