@@ -16,6 +16,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/units.h"
 #include "smartmill_hammer/analysis/tap_records.h"
+#include "smartmill_ros/parameter_options.h"
 
 namespace smartmill {
 namespace hammer {
@@ -23,9 +24,9 @@ namespace {
 
 struct Options {
   std::vector<std::string> inputs;
-  std::string out = "frf", format = "auto", model, parameters;
-  double low = 500.0, high = 3500.0, peak_share = 0.02, weak_force = 20.0, second_hit_share = 0.1,
-         exponential_time = 0.0;
+  std::string out = "frf", format = "auto", model;
+  NodeParameters parameters;
+  double low = 500.0, high = 3500.0, peak_share = 0.02;
   int modes = 0, max_modes = 8, max_peaks = 20;
   bool mass_line = false, no_picture = false;
 };
@@ -84,8 +85,9 @@ void runTaps(const Options& options, TapFormat format) {
       std::cerr << "reading " << file << "\n";
       taps.push_back(format == TapFormat::csv ? readTapCsv(file) : readTapText(file));
     }
-    const TapFrf frf =
-        averageTaps(taps, {options.weak_force, options.second_hit_share, 0.0}, options.exponential_time);
+    const HammerParameters& parameters = options.parameters.measurement;
+    const TapFrf frf = averageTaps(taps, {parameters.weak_force, parameters.second_hit_share, 0.0},
+                                   parameters.exponential_time);
     for (const std::string& note : frf.notes) std::cerr << "frf: " << note << "\n";
     receptance = frf.receptance;
     peaks_of = frf.measured;
@@ -118,9 +120,9 @@ void runTaps(const Options& options, TapFormat format) {
   fit_options.fit_mass_line = options.mass_line;
   fit_options.positive_gains = direct;
   ModalFit fit = fitModes(receptance, fit_options);
-  if (options.exponential_time > 0.0) {
+  if (options.parameters.measurement.exponential_time > 0.0) {
     ImpactOptions window;
-    window.exponential_time = options.exponential_time;
+    window.exponential_time = options.parameters.measurement.exponential_time;
     ImpactAnalysis(window).removeWindowDamping(fit.model);
   }
   std::printf("modes fitted together (%serror of the fit %.1f %% of the receptance in the band):\n",
@@ -136,10 +138,11 @@ void runTaps(const Options& options, TapFormat format) {
 void runBag(const Options& options) {
   if (options.inputs.size() != 1) throw Error(options.inputs[1] + ": one bag at a time");
   if (options.model.empty()) throw Error("--model: a bag needs the machine model that the session ran with");
-  const BagReplay replay = replayBag(options.inputs[0], options.model, options.parameters);
-  if (replay.results.empty()) throw Error(options.inputs[0] + ": holds no goal of hammer/measure_frf");
+  const std::vector<MeasureFrfResult> results =
+      replayBag(options.inputs[0], options.model, options.parameters);
+  if (results.empty()) throw Error(options.inputs[0] + ": holds no goal of hammer/measure_frf");
   int good = 0;
-  for (const MeasureFrfResult& result : replay.results) {
+  for (const MeasureFrfResult& result : results) {
     std::printf("%s %s: %s\n", result.frf.tool.c_str(), result.frf.direction.c_str(), result.message.c_str());
     if (result.code != FrfCode::ok) continue;
     ++good;
@@ -149,11 +152,11 @@ void runBag(const Options& options) {
     printModes(readModes(result.modes.model, result.frf.frf));
     write(options, "_" + result.frf.direction,
           "tool tip " + result.frf.direction + ", " + std::to_string(result.frf.frf.averages) + " hits",
-          result.frf.frf, result.modes.model, replay.fit_low, replay.fit_high);
+          result.frf.frf, result.modes.model, options.parameters.measurement.fit_low,
+          options.parameters.measurement.fit_high);
   }
   if (good == 0)
-    throw Error(options.inputs[0] +
-                ": no measurement came to its end; the last: " + replay.results.back().message);
+    throw Error(options.inputs[0] + ": no measurement came to its end; the last: " + results.back().message);
 }
 
 void run(const Options& options) {
@@ -206,13 +209,12 @@ int main(int argc, char** argv) {
   app.add_option("--max-peaks", o.max_peaks, "strongest peaks kept")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
-  app.add_option("--weak-force", o.weak_force, "hits below this are left out [N]")->capture_default_str();
-  app.add_option("--second-hit-share", o.second_hit_share, "double hit above this share of the peak")
-      ->capture_default_str();
-  app.add_option("--exponential-time", o.exponential_time,
-                 "time constant of an exponential window [s]; 0: none");
   app.add_option("--model", o.model, "machine model (bags)");
-  app.add_option("--params", o.parameters, "parameters of the hammer node, YAML (bags)");
+  const smartmill::ParameterTable table = smartmill::tableOf(o.parameters);
+  smartmill::ParameterOptions parameters(app, table, "launch/config/hammer.yaml");
+  parameters.add("--weak-force", "weak_force");
+  parameters.add("--second-hit-share", "second_hit_share");
+  parameters.add("--exponential-time", "exponential_time");
   app.add_flag("--no-picture", o.no_picture, "no PNG");
   try {
     app.parse(argc, argv);
@@ -220,6 +222,8 @@ int main(int argc, char** argv) {
     return app.exit(error) == 0 ? 0 : 2;
   }
   try {
+    parameters.apply();
+    o.parameters.validate();
     smartmill::hammer::run(o);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "frf: %s\n", error.what());

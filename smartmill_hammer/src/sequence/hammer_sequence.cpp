@@ -43,65 +43,7 @@ std::string format(const char* pattern, double a, double b = 0.0, double c = 0.0
   return line;
 }
 
-void need(bool good, const char* key, double value, const char* range) {
-  if (!good)
-    throw Error("hammer parameter " + std::string(key) + ": " + format("%g", value) + ", " + range +
-                " is due");
-}
-
 }  // namespace
-
-void HammerParameters::validate() const {
-  const auto positive = [](double value, const char* key) {
-    need(std::isfinite(value) && value > 0.0, key, value, "above 0");
-  };
-  const auto not_negative = [](double value, const char* key) {
-    need(std::isfinite(value) && value >= 0.0, key, value, "at least 0");
-  };
-  need(std::isfinite(start_angle), "start_angle", start_angle, "a finite angle");
-  positive(bracket_first_step, "bracket_first_step");
-  need(bracket_max_step >= bracket_first_step && bracket_max_step < units::PI, "bracket_max_step",
-       bracket_max_step, "bracket_first_step..pi");
-  positive(flute_tolerance, "flute_tolerance");
-  positive(noise_sigmas, "noise_sigmas");
-  not_negative(least_rise, "least_rise");
-  need(command_delay >= 0.02, "command_delay", command_delay, "at least 0.02 (a block)");
-  need(settle_time >= 0.02, "settle_time", settle_time, "at least 0.02 (a block)");
-  positive(averaging_time, "averaging_time");
-  positive(angle_tolerance, "angle_tolerance");
-  positive(zero_speed, "zero_speed");
-  need(rest_readings >= 1, "rest_readings", rest_readings, "at least 1");
-  positive(position_tolerance, "position_tolerance");
-  positive(orient_timeout, "orient_timeout");
-  positive(motion_timeout, "motion_timeout");
-  not_negative(standoff, "standoff");
-  positive(retract_height, "retract_height");
-  positive(approach_feed, "approach_feed");
-  positive(jog_feed, "jog_feed");
-  positive(resolution, "resolution");
-  need(least_jog >= 4.0 * resolution, "least_jog", least_jog, "at least 4 x resolution");
-  need(first_jog >= least_jog, "first_jog", first_jog, "at least least_jog");
-  need(max_jog >= first_jog && max_jog <= 1e-3, "max_jog", max_jog, "first_jog..1e-3");
-  positive(zero_volt, "zero_volt");
-  need(check_jog == 0.0 || check_jog >= least_jog, "check_jog", check_jog, "0 or at least least_jog");
-  not_negative(position_std, "position_std");
-  need(min_gap_share > 0.0 && min_gap_share < 1.0, "min_gap_share", min_gap_share, "0..1");
-  positive(max_approach, "max_approach");
-  positive(trigger_force, "trigger_force");
-  need(weak_force >= trigger_force, "weak_force", weak_force, "at least trigger_force");
-  need(second_hit_share > 0.0 && second_hit_share < 1.0, "second_hit_share", second_hit_share, "0..1");
-  positive(pre_trigger, "pre_trigger");
-  need(record_length > 2.0 * pre_trigger, "record_length", record_length, "above 2 x pre_trigger");
-  need(rest_time >= 0.0 && std::isfinite(rest_time), "rest_time", rest_time, "at least 0");
-  positive(strike_timeout, "strike_timeout");
-  need(max_bad_hits >= 0, "max_bad_hits", max_bad_hits, "at least 0");
-  not_negative(exponential_time, "exponential_time");
-  need(straighten_sensor == 0 || straighten_sensor == 1, "straighten_sensor", straighten_sensor, "0 or 1");
-  positive(frf_high, "frf_high");
-  not_negative(fit_low, "fit_low");
-  need(fit_high > fit_low, "fit_high", fit_high, "above fit_low");
-  need(max_modes >= 1 && max_modes <= 20, "max_modes", max_modes, "1..20");
-}
 
 std::string moveProgram(const Axes3& from, const std::vector<Waypoint>& path) {
   std::string text = "G91\n";

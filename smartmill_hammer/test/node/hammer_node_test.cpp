@@ -103,9 +103,9 @@ TEST_F(HammerNode, MeasuresRecordsAndReplaysToTheLastDigit) {
   }
   std::string model;
   ASSERT_TRUE(nh.getParam("hammer/model", model));
-  const BagReplay replay = replayBag(bag_file, model, "");
-  ASSERT_EQ(replay.results.size(), 1u);
-  const MeasureFrfResult& again = replay.results[0];
+  const std::vector<MeasureFrfResult> results = replayBag(bag_file, model, {});
+  ASSERT_EQ(results.size(), 1u);
+  const MeasureFrfResult& again = results[0];
   ASSERT_EQ(again.code, FrfCode::ok) << again.message;
   EXPECT_EQ(again.sensitivity, result->sensitivity);
   ASSERT_EQ(again.frf.frf.size(), result->frf.real.size());

@@ -10,6 +10,7 @@
 #include "../closed_form_machine.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/signal/stream_sorter.h"
+#include "smartmill_hammer/sequence/sorted_sequence.h"
 
 namespace smartmill {
 namespace hammer {
@@ -390,6 +391,42 @@ TEST(HammerSequence, OneMeasurementAtATime) {
   HammerSequence sequence(HammerParameters(), machine.model);
   EXPECT_TRUE(sequence.handle(goalFor("x", machine.time)));
   EXPECT_FALSE(sequence.handle(goalFor("y", machine.time)));
+}
+
+TEST(SortedSequence, AJumpBackOfTimeStartsAfreshAndALateCancelFindsNothing) {
+  ClosedFormMachine machine(4), again(4);
+  int restarts = 0, results = 0;
+  std::vector<Command> commands;
+  SortedSequence sorted(HammerParameters(), machine.model, 0.05,
+                        {[&](const Command& c) { commands.push_back(c); },
+                         {},
+                         [&](const MeasureFrfResult&) { ++results; },
+                         [&] { ++restarts; }});
+  const auto run = [&](ClosedFormMachine& m, double seconds) {
+    for (const double end = m.time + seconds; m.time < end;) {
+      SampleBlock block;
+      SpindleAngle angle;
+      CncState state;
+      m.block(block, angle, state);
+      sorted.push(block);
+      sorted.push(state);
+      sorted.push(angle);
+    }
+  };
+  run(machine, 2.0);
+  sorted.push(goalFor("x", machine.time));
+  run(machine, 1.0);
+  EXPECT_TRUE(sorted.measuring());
+  EXPECT_FALSE(commands.empty());
+  run(again, 0.1);
+  EXPECT_EQ(restarts, 1);
+  EXPECT_FALSE(sorted.measuring());
+  sorted.cancel([] { return true; });
+  sorted.push(goalFor("x", again.time), [](bool free) { return !free; });  // refused
+  run(again, 1.0);
+  EXPECT_FALSE(sorted.measuring());
+  EXPECT_EQ(results, 0);
+  EXPECT_EQ(sorted.late(), 0u);
 }
 
 TEST(HammerParameters, NameWhatIsOutOfRange) {

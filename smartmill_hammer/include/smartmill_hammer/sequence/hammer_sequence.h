@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "smartmill_core/modal/hit_test_parameters.h"
 #include "smartmill_core/modal/impact_analysis.h"
 #include "smartmill_core/modal/results.h"
 #include "smartmill_core/model/machine_model.h"
@@ -19,59 +20,49 @@ namespace smartmill {
 namespace hammer {
 
 /// What may be tuned; defaults are the thesis's where it gives one.
-struct HammerParameters {
+struct HammerParameters : HitTestParameters {
   // Flute search.
-  double start_angle = 0.0;            ///< [rad] of the spindle, where the search begins
-  double bracket_first_step = 0.0977;  ///< [rad] 5.6 deg, > 0
-  double bracket_max_step = 0.3927;    ///< [rad] 22.5 deg
-  double flute_tolerance = 0.02618;    ///< [rad] 1.5 deg
-  double noise_sigmas = 5.0;           ///< [1] of a mean voltage; a fall or rise counts above this
-  double least_rise = 0.005;           ///< [V]
+  double start_angle = 0.0;
+  double bracket_first_step = 0.0977;
+  double bracket_max_step = 0.3927;
+  double flute_tolerance = 0.02618;
+  double noise_sigmas = 5.0;
+  double least_rise = 0.005;
   // When a command is done.
-  double command_delay =
-      0.2;  ///< [s] before a command is judged: the controller begins late; > a block's length
-  double settle_time = 0.05;           ///< [s] from standstill to the voltage reading; > a block's length
-  double averaging_time = 0.01;        ///< [s] of voltage averaged
-  double angle_tolerance = 2.6e-3;     ///< [rad] spindle at its angle
-  double zero_speed = 0.02;            ///< [rad/s] spindle at rest below this
-  int rest_readings = 5;               ///< [1] of the spindle in a row
-  double position_tolerance = 2.0e-6;  ///< [m] axis at its place; of a small jog a quarter of its distance
-  double orient_timeout = 20.0;        ///< [s]
-  double motion_timeout = 60.0;        ///< [s]
+  double command_delay = 0.2;
+  double settle_time = 0.05;
+  double averaging_time = 0.01;
+  double angle_tolerance = 2.6e-3;
+  double zero_speed = 0.02;
+  int rest_readings = 5;
+  double position_tolerance = 2.0e-6;
+  double orient_timeout = 20.0;
+  double motion_timeout = 60.0;
   // Paths.
-  double standoff = 5.0e-3;  ///< [m] sideways distance from the station while going down to it and up from it
-  double retract_height = 50.0e-3;  ///< [m] above the station's position: sideways motion is safe there
-  double approach_feed = 16.7e-3;   ///< [m/s]
-  double jog_feed = 1.0e-3;         ///< [m/s] thesis: 60 mm/min
+  double standoff = 5.0e-3;
+  double retract_height = 50.0e-3;
+  double approach_feed = 16.7e-3;
+  double jog_feed = 1.0e-3;
   // Sensor calibration.
-  double first_jog = 50.0e-6;  ///< [m]
-  double max_jog = 100.0e-6;   ///< [m]
-  double least_jog = 5.0e-6;   ///< [m]
-  double resolution = 1.0e-6;  ///< [m] of a commanded distance
-  double zero_volt = 0.1;      ///< [V]
-  double check_jog =
-      10.0e-6;  ///< [m] half width of the symmetric sensitivity measurement; 0: the thesis's way
-  double position_std = 0.1e-6;  ///< [m] of a distance moved
-  double min_gap_share = 0.4;    ///< [1] of gap_at_zero_volt: no nearer
-  double max_approach = 1.0e-3;  ///< [m] beyond the depth between two flutes
+  double first_jog = 50.0e-6;
+  double max_jog = 100.0e-6;
+  double least_jog = 5.0e-6;
+  double resolution = 1.0e-6;
+  double zero_volt = 0.1;
+  double check_jog = 10.0e-6;
+  double position_std = 0.1e-6;
+  double min_gap_share = 0.4;
+  double max_approach = 1.0e-3;
   // Hits.
-  double trigger_force = 10.0;    ///< [N]
-  double weak_force = 20.0;       ///< [N]
-  double second_hit_share = 0.1;  ///< [1]
-  double pre_trigger = 0.01;      ///< [s]
-  double record_length = 0.2;     ///< [s]
-  double rest_time = 0.1;         ///< [s] between a record's end and the next blow
-  double strike_timeout = 3.0;    ///< [s] from the command to the hit
-  int max_bad_hits = 5;           ///< [1] then it gives up
-  double exponential_time = 0.0;  ///< [s] time constant of an exponential window; 0: none
-  int straighten_sensor =
-      1;  ///< [1] 1: bend the sensor's nominal curve straight over the vibration; 0: linear
-  // FRF and fit.
-  double frf_high = 5000.0;  ///< [Hz] lines above are not handed out
-  double fit_low = 200.0;    ///< [Hz]
-  double fit_high = 3500.0;  ///< [Hz]
-  int max_modes = 6;         ///< [1] when the number is chosen by evidence
+  double exponential_time = 0.0;
+  int straighten_sensor = 1;
 
+  HammerParameters() {
+    fit_low = 200.0;
+    fit_high = 3500.0;
+    max_modes = 6;
+  }
+  void declare(ParameterTable& table);
   /// @throws Error naming the key and the value that is out of range.
   void validate() const;
 };

@@ -1,0 +1,16 @@
+#include "../../src/node/parameters.h"
+
+#include "smartmill_ros/testing/shipped_parameters.h"
+
+namespace smartmill {
+namespace hammer {
+namespace {
+
+TEST(Parameters, TheShippedFileIsTheTable) {
+  expectShipped<NodeParameters>("../launch/config/hammer.yaml", "smartmill_hammer hammer_node");
+  EXPECT_NO_THROW(NodeParameters().validate());
+}
+
+}  // namespace
+}  // namespace hammer
+}  // namespace smartmill
