@@ -18,8 +18,8 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/effect_catalogue.h"
 #include "smartmill_discrepancy/bench_campaign.h"
-#include "smartmill_discrepancy/explanation.h"
-#include "smartmill_discrepancy/twin_runner.h"
+#include "smartmill_discrepancy/explain/explanation.h"
+#include "smartmill_discrepancy/gap/twin_runner.h"
 
 namespace {
 

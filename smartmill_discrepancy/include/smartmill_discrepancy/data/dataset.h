@@ -1,0 +1,64 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "smartmill_core/campaign/campaign.h"
+#include "smartmill_core/campaign/record.h"
+#include "smartmill_core/model/machine_model.h"
+#include "smartmill_discrepancy/data/chatter.h"
+
+namespace smartmill::discrepancy {
+
+/// Force channels in the order of the axes x, y, z.
+inline const std::array<std::string, 3> FORCES{{"fx", "fy", "fz"}};
+
+/// One test with its record as measured, ready to be compared with the twin.
+struct TestData {
+  CampaignTest test;
+  Record record;  ///< forces as the sensor shows them; has spindle_angle for cuts, estimated where the file
+                  ///< has none
+  std::vector<std::string> channels;  ///< that count and that the twin gives
+  bool heldout = false;               ///< takes no part in any fit or choice
+  bool phase_estimated = false;       ///< the record has no spindle angle
+  std::size_t quiet = 0;              ///< samples before any force acts
+  std::size_t first_cut = 0;          ///< first sample in cut; record.size() without cut
+};
+
+/// A cut that was left aside because it chatters.
+struct ChatteringTest {
+  TestData data;
+  Chatter chatter;
+};
+
+/// A campaign in memory.
+struct Dataset {
+  Campaign campaign;
+  MachineModel nominal;
+  std::vector<TestData> tests;
+  std::vector<ChatteringTest> chattering;  ///< not among tests
+  std::map<std::string, double> noise;     ///< RMS of each channel [unit of the channel]
+  std::vector<std::string> notes;          ///< what was left aside, one line each
+
+  std::size_t samples() const;  ///< sum over tests of channels x samples
+};
+
+/// Reads every record and estimates the noise: the model's noise_rms_n where stated, else the parts of the
+/// records before any force, else what the upper half of the band of the records' spectra holds between the
+/// lines.
+/// @throws Error on what cannot be worked with, one line naming file and cause: missing file or column, wrong
+/// unit, clipped channel, no noise estimate possible.
+Dataset loadDataset(const Campaign& campaign, const MachineModel& nominal);
+
+/// Marks the held-out tests: about a quarter of the cuts and one air cut, at conditions inside the range of
+/// the others.
+void chooseHeldout(std::vector<TestData>& tests);
+
+/// Noise RMS of a series that holds lines and slow courses beside white noise: median of the upper half of
+/// its periodogram. @throws Error below 64 samples.
+double noiseBetweenLines(const std::vector<double>& values);
+
+}  // namespace smartmill::discrepancy

@@ -1,0 +1,72 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "smartmill_discrepancy/gap/twin_runner.h"
+#include "smartmill_discrepancy/hypotheses/hypothesis.h"
+
+namespace smartmill::discrepancy {
+
+/// An effect taken into the model.
+struct Member {
+  const Hypothesis* hypothesis = nullptr;
+  std::vector<double> values;  ///< of its coordinates
+};
+
+/// A point in the space of all models: nominal values and effects.
+struct FitState {
+  std::vector<double> nominal;  ///< coordinates of NominalFreedom
+  std::vector<Member> members;
+};
+
+struct Fit {
+  FitState state;
+  double chi2 = 0.0;             ///< sum of squares of residuals over noise
+  double penalty = 0.0;          ///< of the priors
+  double bic = 0.0;              ///< chi2 + penalty + effect coordinates x ln(samples)
+  std::vector<double> residual;  ///< (measured - simulated) / noise at the state
+  /// Covariance of nominal coordinates, then members' in their order: inverse of Fisher information with
+  /// priors.
+  Eigen::MatrixXd covariance;
+  bool converged = false;
+};
+
+/// Tangents of the nominal coordinates about a state.
+struct NominalTangents {
+  std::vector<double> at;   ///< nominal coordinates
+  Eigen::MatrixXd columns;  ///< samples x coordinates
+};
+
+struct FitOptions {
+  int iterations = 8;
+  double tolerance = 1e-4;  ///< relative change of the cost that ends a fit
+  bool nominal_free = true;
+  double prior_weight = 1.0;  ///< [1] of the priors' squares: the residual's variance where structure is left
+};
+
+/// Fits models to a campaign by Ceres: nominal values under their Gaussian priors, effects within bounds and
+/// weak priors; tangents by one simulation a coordinate.
+class Fitter {
+ public:
+  /// Both must outlive this.
+  Fitter(const TwinRunner& runner, const NominalFreedom& freedom);
+
+  MachineModel model(const FitState& state) const;
+
+  NominalTangents nominalTangents(const FitState& state) const;
+
+  /// @param frozen nominal values act linearly along these tangents; nullptr: they are simulated anew
+  Fit fit(const FitState& start, const NominalTangents* frozen, const FitOptions& options) const;
+
+  const TwinRunner& runner() const { return runner_; }
+  const NominalFreedom& freedom() const { return freedom_; }
+
+ private:
+  const TwinRunner& runner_;
+  const NominalFreedom& freedom_;
+};
+
+}  // namespace smartmill::discrepancy

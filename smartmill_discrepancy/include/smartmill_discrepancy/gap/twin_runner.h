@@ -1,0 +1,87 @@
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <deque>
+#include <functional>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "smartmill_core/campaign/record.h"
+#include "smartmill_core/model/machine_model.h"
+#include "smartmill_discrepancy/data/dataset.h"
+
+namespace smartmill::discrepancy {
+
+/// Where a channel of a test stands in a vector over the campaign.
+struct Block {
+  std::size_t test = 0;
+  std::string channel;
+  std::size_t offset = 0;
+  std::size_t size = 0;
+  double noise = 0.0;  ///< [unit of the channel]
+};
+
+/// Simulates tests of a campaign for many models at once. Vectors over the campaign hold all channels of the
+/// chosen tests one after the other, each over its noise.
+class TwinRunner {
+ public:
+  /// @param tests indices into data.tests, in the order of the vectors
+  /// @param data must outlive this. @param threads >= 1. @param substeps of the twin a sample
+  TwinRunner(const Dataset& data, std::vector<std::size_t> tests, int threads, int substeps);
+
+  const std::vector<Block>& blocks() const { return blocks_; }
+  const std::vector<std::size_t>& tests() const { return tests_; }
+  std::size_t size() const { return size_; }
+  const Dataset& data() const { return data_; }
+
+  /// The records.
+  const std::vector<double>& measured() const { return measured_; }
+
+  int threads() const { return threads_; }
+
+  /// Makes simulate() of the reference model give exactly this; what other models differ from it stays as it
+  /// is. Takes the error of few substeps out, which is nearly alike for models nearby.
+  void correctTo(const MachineModel& reference, const std::vector<double>& exact);
+
+  /// The phases and speeds of the dataset's records are others now.
+  void readPhases();
+
+  /// Steps of the twin a sample from here on.
+  void setSubsteps(int substeps);
+  int substeps() const { return substeps_; }
+
+  /// What each model says. @throws Error of the twin.
+  std::vector<std::vector<double>> simulate(const std::vector<MachineModel>& models) const;
+  std::vector<double> simulate(const MachineModel& model) const;
+
+  std::size_t simulations() const { return simulations_; }  ///< tests simulated so far
+
+ private:
+  // Of one test: what the twin needs of its record, and its last results by the values they depend on. A tap
+  // says nothing of a cutting coefficient: what a fit moves leaves many tests as they were.
+  struct Kept {
+    Record record;
+    double phase = 0.0;
+    std::mutex mutex;
+    std::deque<std::pair<std::vector<double>, std::vector<double>>> results;
+  };
+  std::vector<double> simulateOne(const MachineModel& model, std::size_t chosen) const;
+
+  const Dataset& data_;
+  std::vector<std::size_t> tests_;
+  mutable std::deque<Kept> kept_;
+  int threads_, substeps_;
+  std::vector<Block> blocks_;
+  std::vector<std::size_t> first_block_;  // of each chosen test; one more at the end
+  std::size_t size_ = 0;
+  std::vector<double> measured_;
+  std::vector<double> correction_;
+  mutable std::atomic<std::size_t> simulations_{0};
+};
+
+/// Calls job(0) .. job(count - 1), spread over threads. @throws the first exception of a job, by index.
+void runParallel(std::size_t count, int threads, const std::function<void(std::size_t)>& job);
+
+}  // namespace smartmill::discrepancy

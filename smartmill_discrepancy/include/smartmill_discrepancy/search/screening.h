@@ -1,0 +1,28 @@
+#pragma once
+
+#include <vector>
+
+#include "smartmill_discrepancy/fit/fit.h"
+
+namespace smartmill::discrepancy {
+
+/// What a hypothesis promises, from its tangents beside those of the nominal values and of the effects found
+/// so far.
+struct Promise {
+  const Hypothesis* hypothesis = nullptr;
+  double gain = 0.0;          ///< chi2 that it takes away in linear approximation
+  std::vector<double> start;  ///< coordinates to start a fit from
+  std::vector<double>
+      null;  ///< the point without effect that the start was reached from; empty: the start stands
+  Eigen::VectorXd signature;  ///< what it explains of the residual, free of the nominal tangents, of length 1
+};
+
+/// Score test of each hypothesis at a fitted state. Best first; hypotheses without any trace in the data come
+/// last.
+/// @param tangents of the nominal values at the state
+/// @param tried simulated one by one or in groups; may hold effects that are members already: those are
+/// passed over
+std::vector<Promise> screen(const Fitter& fitter, const Fit& now, const NominalTangents& tangents,
+                            const std::vector<Hypothesis>& tried);
+
+}  // namespace smartmill::discrepancy

@@ -1,0 +1,241 @@
+#include "smartmill_discrepancy/data/dataset.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <set>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/signal/fourier.h"
+#include "smartmill_core/signal/statistics.h"
+#include "smartmill_discrepancy/data/phase.h"
+
+namespace smartmill::discrepancy {
+namespace {
+
+const std::vector<std::string> COUNTING{"fx", "fy", "fz", "load_meter", "tool_x", "tool_y"};
+constexpr std::size_t LEAST_SAMPLES = 64;
+constexpr std::size_t LEAST_QUIET = 50;  // samples without force that make an estimate of noise
+constexpr std::size_t CLIPPED_RUN = 5;   // equal extreme readings in a row of a noisy channel
+
+std::size_t quietSamples(const CampaignTest& test, const Record& record) {
+  if (test.kind == TestKind::air) return record.size();
+  if (test.kind == TestKind::tap) {
+    const std::vector<double>& hammer = record.column("hammer");
+    double peak = 0.0;
+    for (const double f : hammer) peak = std::max(peak, std::abs(f));
+    std::size_t i = 0;
+    while (i < hammer.size() && std::abs(hammer[i]) < 0.05 * peak) ++i;
+    // The contact began before the force passed a twentieth of its peak.
+    const auto lead = static_cast<std::size_t>(std::lround(1e-3 * test.sample_rate));
+    return i > lead ? i - lead : 0;
+  }
+  if (!test.engage_time) return 0;
+  std::size_t i = 0;
+  while (i < record.size() && record.time[i] < *test.engage_time - 0.5 / test.sample_rate) ++i;
+  return i;
+}
+
+std::string number(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.6g", value);
+  return text;
+}
+
+// A noisy channel repeats its extreme reading only when it is clipped; a dead channel repeats everything.
+void checkChannel(const TestData& data, const std::string& channel) {
+  const std::vector<double>& values = data.record.column(channel);
+  const auto [low, high] = std::minmax_element(values.begin(), values.end());
+  if (*low == *high)
+    throw Error(data.record.file + ": " + channel + " is dead: every reading is " + number(*low));
+  if (channel == "load_meter") return;  // rounded and slow: repeats by nature
+  if (const std::size_t run = longestRunAtExtreme(values); run >= CLIPPED_RUN) {
+    throw Error(data.record.file + ": " + channel + " is clipped: " + std::to_string(run) +
+                " equal readings in a row at its extreme (range " + number(*low) + " to " + number(*high) +
+                ")");
+  }
+}
+
+struct Pool {
+  double squares = 0.0;
+  std::size_t freedom = 0;
+};
+
+std::map<std::string, double> noiseOf(const Dataset& data) {
+  std::map<std::string, Pool> quiet;
+  std::map<std::string, std::vector<double>> between_lines;
+  for (const TestData& t : data.tests) {
+    for (const std::string& channel : t.channels) {
+      const std::vector<double>& values = t.record.column(channel);
+      if (t.quiet >= LEAST_QUIET && t.test.kind != TestKind::air) {
+        const std::vector<double> part(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(t.quiet));
+        // Lines that stand there without cutting (hum, unbalance) are no noise.
+        const double deviation = part.size() >= LEAST_SAMPLES && channel != "load_meter"
+                                     ? std::min(standardDeviation(part), 1.5 * noiseBetweenLines(part))
+                                     : standardDeviation(part);
+        quiet[channel].squares += deviation * deviation * static_cast<double>(t.quiet - 1);
+        quiet[channel].freedom += t.quiet - 1;
+      } else {
+        between_lines[channel].push_back(noiseBetweenLines(values));
+      }
+      quiet[channel];
+    }
+  }
+  std::map<std::string, double> noise;
+  for (const auto& [channel, pool] : quiet) {
+    double& value = noise[channel];
+    if (data.nominal.force_sensor.noise_rms) {
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        if (channel == COUNTING[axis]) value = (*data.nominal.force_sensor.noise_rms)[axis];
+      }
+    }
+    if (value == 0.0 && pool.freedom >= LEAST_QUIET)
+      value = std::sqrt(pool.squares / static_cast<double>(pool.freedom));
+    if (value == 0.0 && !between_lines[channel].empty()) value = median(between_lines[channel]);
+    if (!(value > 0.0)) {
+      throw Error(data.campaign.folder + ": no noise estimate for " + channel +
+                  ": the model states none and no record shows any");
+    }
+  }
+  return noise;
+}
+
+// No model follows the phase of chatter: such cuts say that there is some, and are not compared.
+void setChatterAside(Dataset& data) {
+  for (std::size_t k = 0; k < data.tests.size();) {
+    TestData& t = data.tests[k];
+    const auto chatter = findChatter(t.record, t.test, t.first_cut);
+    if (!chatter) {
+      ++k;
+      continue;
+    }
+    data.notes.push_back("test " + t.test.name + " chatters at " + number(std::round(chatter->frequency)) +
+                         " Hz and is not compared sample by sample");
+    data.chattering.push_back({std::move(t), *chatter});
+    data.tests.erase(data.tests.begin() + static_cast<std::ptrdiff_t>(k));
+  }
+  if (data.tests.empty())
+    throw Error(data.campaign.folder + ": every test chatters, nothing can be compared");
+}
+
+}  // namespace
+
+std::size_t Dataset::samples() const {
+  std::size_t sum = 0;
+  for (const TestData& t : tests) sum += t.channels.size() * t.record.size();
+  return sum;
+}
+
+double noiseBetweenLines(const std::vector<double>& values) {
+  if (values.size() < LEAST_SAMPLES) {
+    throw Error("noise estimate: " + std::to_string(values.size()) + " samples, at least " +
+                std::to_string(LEAST_SAMPLES) + " are due");
+  }
+  // Second differences take the slow course away before the window's leakage spreads it over the band.
+  const std::size_t n = values.size() - 2;
+  std::vector<double> x(n);
+  double window_power = 0.0;
+  for (std::size_t i = 0; i < n; ++i) {
+    const double s = std::sin(3.14159265358979 * (static_cast<double>(i) + 0.5) / static_cast<double>(n));
+    x[i] = (values[i] - 2.0 * values[i + 1] + values[i + 2]) * s * s;
+    window_power += s * s * s * s;
+  }
+  const auto spectrum = fourier(x);
+  std::vector<double> power;
+  for (std::size_t k = spectrum.size() / 2; k + 1 < spectrum.size(); ++k) {
+    const double w = 3.14159265358979 * static_cast<double>(k) / static_cast<double>(spectrum.size() - 1);
+    const double gain = 2.0 - 2.0 * std::cos(w);  // of the second difference
+    power.push_back(std::norm(spectrum[k]) / (gain * gain));
+  }
+  // Median of an exponential distribution: mean times ln 2.
+  return std::sqrt(median(power) / std::log(2.0) / window_power);
+}
+
+void chooseHeldout(std::vector<TestData>& tests) {
+  std::vector<TestData*> cuts, air;
+  for (TestData& t : tests) {
+    t.heldout = false;
+    if (t.test.kind == TestKind::cut) cuts.push_back(&t);
+    if (t.test.kind == TestKind::air) air.push_back(&t);
+  }
+  // Conditions of a cut. A test alone at the end of any range stays for the fit.
+  const auto conditions = [](const TestData& t) {
+    return std::vector<double>{t.test.spindle_speed,           t.test.engagement->feed_per_tooth,
+                               t.test.engagement->axial_depth, t.test.engagement->entry,
+                               t.test.engagement->exit,        t.test.cut_time_before.value_or(0.0)};
+  };
+  std::vector<TestData*> inside;
+  for (TestData* t : cuts) {
+    bool alone = false;
+    const std::vector<double> mine = conditions(*t);
+    for (std::size_t c = 0; c < mine.size(); ++c) {
+      bool above = false, below = false, equal = false, differ = false;
+      for (const TestData* other : cuts) {
+        if (other == t) continue;
+        const double theirs = conditions(*other)[c];
+        const double near = 1e-6 * std::max(std::abs(theirs), std::abs(mine[c]));
+        if (std::abs(theirs - mine[c]) <= near) {
+          equal = true;
+        } else {
+          differ = true;
+          (theirs > mine[c] ? above : below) = true;
+        }
+      }
+      alone = alone || (differ && !equal && !(above && below));
+    }
+    if (!alone) inside.push_back(t);
+  }
+  const std::size_t due = cuts.size() >= 4 ? std::min(inside.size(), (cuts.size() + 3) / 4) : 0;
+  for (std::size_t k = 0; k < due; ++k) inside[(2 * k + 1) * inside.size() / (2 * due)]->heldout = true;
+  if (air.size() >= 4) {
+    std::sort(air.begin(), air.end(), [](const TestData* a, const TestData* b) {
+      return a->test.spindle_speed < b->test.spindle_speed;
+    });
+    air[air.size() / 2]->heldout = true;
+  }
+}
+
+Dataset loadDataset(const Campaign& campaign, const MachineModel& nominal) {
+  Dataset data;
+  data.campaign = campaign;
+  data.nominal = nominal;
+  std::set<std::string> aside;
+  for (const CampaignTest& test : campaign.tests) {
+    TestData t;
+    t.test = test;
+    t.record = readRecord(campaign, test);
+    if (t.record.size() < LEAST_SAMPLES) {
+      throw Error(t.record.file + ": " + std::to_string(t.record.size()) + " samples, at least " +
+                  std::to_string(LEAST_SAMPLES) + " are due");
+    }
+    for (const std::string& name : t.record.names) {
+      if (std::find(COUNTING.begin(), COUNTING.end(), name) != COUNTING.end()) {
+        if (name == "load_meter" && (!nominal.spindle || test.kind == TestKind::tap)) {
+          aside.insert(test.kind == TestKind::tap
+                           ? "load_meter of taps is not compared"
+                           : "load_meter is not compared: the model has no spindle section");
+          continue;
+        }
+        t.channels.push_back(name);
+        checkChannel(t, name);
+      } else if (name != "spindle_angle" && name != "hammer") {
+        aside.insert(name + " is not simulated");
+      }
+    }
+    if (t.channels.empty()) throw Error(t.record.file + ": no channel to compare");
+    t.phase_estimated = test.kind != TestKind::tap && !t.record.has("spindle_angle");
+    t.quiet = quietSamples(test, t.record);
+    t.first_cut = test.kind == TestKind::cut ? t.quiet : t.record.size();
+    for (const std::string& note : t.record.notes) aside.insert(note);
+    data.tests.push_back(std::move(t));
+  }
+  if (data.tests.empty()) throw Error(campaign.folder + ": no tests");
+  data.notes.assign(aside.begin(), aside.end());
+  data.noise = noiseOf(data);
+  for (const std::string& note : estimatePhases(data)) data.notes.push_back(note);
+  setChatterAside(data);
+  chooseHeldout(data.tests);
+  return data;
+}
+
+}  // namespace smartmill::discrepancy

@@ -1,0 +1,254 @@
+#include "smartmill_discrepancy/data/phase.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <complex>
+#include <cstdio>
+
+#include "smartmill_core/units.h"
+#include "smartmill_sim/twin/twin.h"
+
+namespace smartmill::discrepancy {
+namespace {
+
+using units::TWO_PI;
+
+std::complex<double> lineAt(const std::vector<double>& values, std::size_t from, std::size_t to,
+                            double step) {
+  std::complex<double> sum = 0.0, turn = std::polar(1.0, -step),
+                       at = std::polar(1.0, -step * static_cast<double>(from));
+  for (std::size_t i = from; i < to; ++i) {
+    sum += values[i] * at;
+    at *= turn;
+  }
+  return sum / static_cast<double>(to - from);
+}
+
+void setAngle(TestData& t, double phase) {
+  std::vector<double>& angle = t.record.add("spindle_angle");
+  angle.resize(t.record.size());
+  for (std::size_t i = 0; i < angle.size(); ++i) {
+    const double a =
+        std::fmod(phase + t.test.spindle_speed * static_cast<double>(i) / t.test.sample_rate, TWO_PI);
+    angle[i] = a < 0.0 ? a + TWO_PI : a;
+  }
+}
+
+// First sample in cut, of an air cut the first.
+std::size_t beginOf(const TestData& t) {
+  return t.first_cut < t.record.size() ? t.first_cut : 0;
+}
+
+/// Lines of a record and of a model at orders of the spindle, forces over their noise.
+struct Lines {
+  std::vector<std::complex<double>> measured, simulated;  // lowest order first, one channel after the other
+  int orders = 0;                                         // a channel
+  int spacing = 1;                                        // the lowest order, and from one to the next
+
+  int orderOf(std::size_t line) const { return (static_cast<int>(line) % orders + 1) * spacing; }
+
+  /// How well they agree when the model is turned by a phase [rad]: half of the squares it takes away.
+  double match(double phase) const {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < measured.size(); ++i)
+      sum += std::real(std::conj(simulated[i] * std::polar(1.0, orderOf(i) * phase)) * measured[i]);
+    return sum;
+  }
+
+  /// Best phase near one, within a range [rad] each way.
+  double best(double from, double range, int points) const {
+    double at = from, largest = -1e300;
+    const double step = 2.0 * range / points;
+    for (int p = 0; p <= points; ++p) {
+      const double phase = from - range + step * p, m = match(phase);
+      if (m > largest) {
+        largest = m;
+        at = phase;
+      }
+    }
+    const double a = match(at - step), c = match(at + step), curve = 2.0 * largest - a - c;
+    return curve > 0.0 ? at + 0.5 * step * (c - a) / curve : at;
+  }
+};
+
+// Every order of the spindle (spacing 1) or those of the tooth passing, as many as the sampling holds.
+Lines linesOf(const Dataset& data, const TestData& t, const Record& model, std::size_t from, std::size_t to,
+              int spacing, int most) {
+  const double step = spacing * t.test.spindle_speed / t.test.sample_rate;
+  Lines lines;
+  lines.spacing = spacing;
+  lines.orders = std::min(most, static_cast<int>(0.9 * units::PI / step));
+  for (const std::string& channel : FORCES) {
+    if (!t.record.has(channel) || data.noise.count(channel) == 0) continue;
+    const double noise = data.noise.at(channel);
+    for (int k = 1; k <= lines.orders; ++k) {
+      lines.measured.push_back(lineAt(t.record.column(channel), from, to, k * step) / noise);
+      lines.simulated.push_back(lineAt(model.column(channel), from, to, k * step) / noise);
+    }
+  }
+  return lines;
+}
+
+}  // namespace
+
+double refinedSpeed(const TestData& test, int teeth, double share) {
+  const double nominal = test.test.spindle_speed / test.test.sample_rate;  // [rad/sample]
+  const auto power = [&](double speed) {
+    double sum = 0.0;
+    for (const std::string& channel : FORCES) {
+      if (!test.record.has(channel)) continue;
+      for (int k = 1; k <= 3; ++k) {
+        if (k * teeth * speed > 0.9 * units::PI) break;
+        sum += std::norm(
+            lineAt(test.record.column(channel), test.first_cut, test.record.size(), k * teeth * speed));
+      }
+    }
+    return sum;
+  };
+  const double resolution =
+      TWO_PI / static_cast<double>(test.record.size() - test.first_cut) / (3 * teeth) / 8.0;
+  double best = nominal, largest = -1.0;
+  for (double s = nominal * (1.0 - share); s <= nominal * (1.0 + share); s += resolution) {
+    const double p = power(s);
+    if (p > largest) {
+      largest = p;
+      best = s;
+    }
+  }
+  const double a = power(best - resolution), c = power(best + resolution), curve = 2.0 * largest - a - c;
+  if (curve > 0.0) best += 0.5 * resolution * (c - a) / curve;
+  return best * test.test.sample_rate;
+}
+
+std::vector<std::string> estimatePhases(Dataset& data) {
+  constexpr double SPEED_SHARE = 0.01;
+  constexpr int PHASES = 240, TOOTH_LINES = 4;
+  std::vector<std::string> notes;
+  std::vector<TestData*> turned;
+  for (TestData& t : data.tests) {
+    if (!t.phase_estimated) continue;
+    if (t.test.kind != TestKind::cut || !data.nominal.tool) {
+      setAngle(t, 0.0);
+      turned.push_back(&t);
+      continue;
+    }
+    const int teeth = data.nominal.tool->teeth;
+    t.test.spindle_speed = refinedSpeed(t, teeth, SPEED_SHARE);
+    sim::SimulationOptions options;
+    options.noise = false;
+    options.substeps = 2;
+    // One tooth period of phases; of the lines of the tooth passing only the phase turns.
+    setAngle(t, 0.0);
+    const Record model = sim::simulateTest(data.nominal, t.test, t.record, options);
+    const Lines lines = linesOf(data, t, model, t.first_cut, t.record.size(), teeth, TOOTH_LINES);
+    double best = 0.0, largest = -1e300;
+    for (int p = 0; p < PHASES; ++p) {
+      const double phase = TWO_PI / teeth * p / PHASES, match = lines.match(phase);
+      if (match > largest) {
+        largest = match;
+        best = phase;
+      }
+    }
+    setAngle(t, best);
+    turned.push_back(&t);
+    char text[200];
+    std::snprintf(text, sizeof text,
+                  "%s: no spindle angle; speed %.2f rpm and phase %.1f deg estimated from the forces",
+                  t.test.name.c_str(), units::rpmFromRadPerSec(t.test.spindle_speed),
+                  units::degFromRad(best));
+    notes.push_back(text);
+  }
+  if (turned.size() < 2) return notes;
+  // Lines of once a revolution against the spindle angle, all records turned like the strongest.
+  const auto once = [&](const TestData& t) {
+    std::array<std::complex<double>, 3> line{};
+    const double phase = t.record.column("spindle_angle").front();
+    for (std::size_t a = 0; a < 3; ++a) {
+      if (t.record.has(FORCES[a]))
+        line[a] = lineAt(t.record.column(FORCES[a]), beginOf(t), t.record.size(),
+                         t.test.spindle_speed / t.test.sample_rate) *
+                  std::polar(1.0, -phase);
+    }
+    return line;
+  };
+  const auto strength = [](const std::array<std::complex<double>, 3>& l) {
+    return std::norm(l[0]) + std::norm(l[1]) + std::norm(l[2]);
+  };
+  std::array<std::complex<double>, 3> reference{};
+  for (const TestData* t : turned) {
+    const auto line = once(*t);
+    if (strength(line) > strength(reference)) reference = line;
+  }
+  for (TestData* t : turned) {
+    const auto line = once(*t);
+    // The force of the cut has left the tooth open, an air cut any angle.
+    const int teeth = t->test.kind == TestKind::cut && data.nominal.tool ? data.nominal.tool->teeth : 360;
+    int best = 0;
+    double largest = -1e300;
+    for (int k = 0; k < teeth; ++k) {
+      double match = 0.0;
+      for (std::size_t a = 0; a < 3; ++a)
+        match += std::real(std::conj(reference[a]) * line[a] * std::polar(1.0, -TWO_PI * k / teeth));
+      if (match > largest) {
+        largest = match;
+        best = k;
+      }
+    }
+    if (best != 0) setAngle(*t, t->record.column("spindle_angle").front() + TWO_PI * best / teeth);
+  }
+  return notes;
+}
+
+double turnPhases(Dataset& data, const MachineModel& model) {
+  constexpr double LEAST_GAIN = 25.0;   // of squares over noise: less tells no phase
+  constexpr double LEAST_SHOWN = 0.05;  // squares of the lines beside those of the tooth passing
+  constexpr int ALL_ROUND = 1440, NEAR = 40, MOST_ORDERS = 60;
+  double largest = 0.0;
+  for (TestData& t : data.tests) {
+    if (!t.phase_estimated) continue;
+    sim::SimulationOptions options;
+    options.noise = false;
+    options.substeps = 2;
+    const Record simulated = sim::simulateTest(model, t.test, t.record, options);
+    const std::size_t from = beginOf(t), end = t.record.size();
+    const auto linesBetween = [&](std::size_t first, std::size_t last) {
+      return linesOf(data, t, simulated, first, last, 1, MOST_ORDERS);
+    };
+    const Lines all = linesBetween(from, end);
+    // A model that shows little of what tells the teeth apart must not choose another tooth.
+    const int teeth = t.test.kind == TestKind::cut && data.nominal.tool ? data.nominal.tool->teeth : 1;
+    double shown = 0.0, seen = 0.0;
+    for (std::size_t i = 0; i < all.simulated.size(); ++i) {
+      if (teeth > 1 && all.orderOf(i) % teeth == 0) continue;
+      shown += std::norm(all.simulated[i]);
+      seen += std::norm(all.measured[i]);
+    }
+    const double reach = shown > LEAST_SHOWN * seen ? units::PI : units::PI / teeth;
+    double turn = all.best(0.0, reach, ALL_ROUND);
+    const auto samples = static_cast<double>(end - from);
+    double size = 0.0;
+    for (const auto& line : all.simulated) size += 4.0 * samples * std::norm(line);
+    if (size < LEAST_GAIN) continue;
+    // What the halves of a record differ by is the speed.
+    const double span = samples / t.test.sample_rate;
+    double early = turn, late = turn;
+    if (t.test.kind == TestKind::cut && span * t.test.spindle_speed > 4.0 * TWO_PI) {
+      const std::size_t middle = from + (end - from) / 2;
+      const double range = 0.25 * TWO_PI / all.orders;
+      early = linesBetween(from, middle).best(turn, range, NEAR);
+      late = linesBetween(middle, end).best(turn, range, NEAR);
+    }
+    turn = 0.5 * (early + late);
+    const double rate = (late - early) / (0.5 * span);  // [rad/s]
+    const double at_start = turn - rate * (0.5 * span + static_cast<double>(from) / t.test.sample_rate);
+    const double phase = t.record.column("spindle_angle").front() + at_start;
+    t.test.spindle_speed += rate;
+    setAngle(t, phase);
+    largest =
+        std::max({largest, std::abs(std::remainder(early, TWO_PI)), std::abs(std::remainder(late, TWO_PI))});
+  }
+  return largest;
+}
+
+}  // namespace smartmill::discrepancy

@@ -1,0 +1,30 @@
+#include "smartmill_discrepancy/gap/gap.h"
+
+#include <cmath>
+#include <numeric>
+
+#include "smartmill_discrepancy/gap/twin_runner.h"
+
+namespace smartmill::discrepancy {
+
+CampaignGap campaignGap(const Dataset& data, const MachineModel& model, int threads) {
+  constexpr int SUBSTEPS = 8;
+  std::vector<std::size_t> all(data.tests.size());
+  std::iota(all.begin(), all.end(), 0);
+  const TwinRunner runner(data, all, threads, SUBSTEPS);
+  const std::vector<double> simulated = runner.simulate(model);
+  CampaignGap result;
+  double sum = 0.0;
+  for (const Block& b : runner.blocks()) {
+    double squares = 0.0;
+    for (std::size_t i = b.offset; i < b.offset + b.size; ++i)
+      squares += std::pow(runner.measured()[i] - simulated[i], 2);
+    const double gap = std::sqrt(squares / static_cast<double>(b.size));
+    result.channels.push_back({data.tests[b.test].test.name, b.channel, gap, gap * b.noise});
+    sum += squares;
+  }
+  result.overall = std::sqrt(sum / static_cast<double>(runner.size()));
+  return result;
+}
+
+}  // namespace smartmill::discrepancy

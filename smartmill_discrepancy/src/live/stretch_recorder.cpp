@@ -1,0 +1,209 @@
+#include "smartmill_discrepancy/live/stretch_recorder.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include "smartmill_core/signal/steady_path.h"
+#include "smartmill_core/units.h"
+
+namespace smartmill::discrepancy {
+namespace {
+
+constexpr double RESTARTED = 1.0;         // [s] a jump back of stamps: a bag was restarted
+constexpr double SPEED_TOLERANCE = 0.02;  // of the stated speed, within which the spindle is there
+constexpr double ANGLE_TOLERANCE = 0.02;  // [rad] from an even turn
+constexpr double CONFIRMED = 0.05;  // [s] of steady motion beyond a stretch: a controller's state may be old
+constexpr double KEPT_AFTER = 1.0;  // [s] beyond a stretch's length that angles and loads are kept
+
+}  // namespace
+
+StretchRecorder::StretchRecorder(const StretchParameters& parameters,
+                                 std::function<void(const Stretch&)> deliver)
+    : parameters_(parameters), deliver_(std::move(deliver)) {
+}
+
+void StretchRecorder::reset() {
+  forget();
+  first_.reset();
+  cut_time_ = 0.0;
+  angles_.clear();
+  loads_.clear();
+}
+
+void StretchRecorder::forget() {
+  condition_.reset();
+  unsteady();
+}
+
+void StretchRecorder::unsteady() {
+  steady_since_.reset();
+  blocks_.clear();
+  unconfirmed_.clear();
+}
+
+void StretchRecorder::handle(const CuttingCondition& condition) {
+  forget();
+  condition_ = condition;
+}
+
+void StretchRecorder::handle(const CncState& state) {
+  if (!condition_ || condition_->kind == CuttingCondition::Kind::none) return;
+  const bool cut = condition_->kind == CuttingCondition::Kind::cut;
+  const bool path = !cut || onSteadyPath(*condition_, state, parameters_.path_tolerance);
+  const bool steady =
+      path && std::abs(state.spindle_speed / condition_->spindle_speed - 1.0) < SPEED_TOLERANCE;
+  if (steady && !steady_since_) steady_since_ = state.stamp;
+  if (!steady && steady_since_) {
+    if (cut) cut_time_ += state.stamp - *steady_since_;
+    unsteady();
+  }
+  while (!unconfirmed_.empty() && state.stamp >= unconfirmed_.front().stamp + CONFIRMED) {
+    const Stretch stretch = std::move(unconfirmed_.front());
+    unconfirmed_.pop_front();
+    deliver_(stretch);
+  }
+}
+
+void StretchRecorder::handle(const SpindleAngle& angle) {
+  angles_.push_back(angle);
+  while (angles_.front().stamp < angle.stamp - parameters_.length - KEPT_AFTER) angles_.pop_front();
+}
+
+void StretchRecorder::handle(const LoadSample& load) {
+  loads_.push_back(load);
+  while (loads_.front().stamp < load.stamp - parameters_.length - KEPT_AFTER) loads_.pop_front();
+}
+
+void StretchRecorder::handle(const SampleBlock& dynamometer) {
+  if (dynamometer.size() == 0) return;
+  if (!first_) first_ = dynamometer.stamp;
+  if (!steady_since_ || dynamometer.stamp < *steady_since_ + parameters_.settle) return;
+  const bool gap =
+      !blocks_.empty() && dynamometer.first_index != blocks_.back().first_index + blocks_.back().size();
+  if (gap) blocks_.clear();
+  blocks_.push_back(dynamometer);
+  // Stamps are rounded: half a sample is enough.
+  const double length = dynamometer.timeOf(dynamometer.size()) - blocks_.front().stamp;
+  if (length >= parameters_.length - 0.5 / dynamometer.sample_rate) finish();
+}
+
+void StretchRecorder::finish() {
+  const double begin = blocks_.front().stamp, end = blocks_.back().timeOf(blocks_.back().size());
+  // Speed and angle at the begin: the line that fits the angles of the stretch.
+  double n = 0.0, st = 0.0, sa = 0.0, stt = 0.0, sta = 0.0, turned = 0.0, last = 0.0, last_stamp = 0.0;
+  for (const SpindleAngle& a : angles_) {
+    if (a.stamp < begin || a.stamp > end) continue;
+    if (n == 0.0) {
+      turned = a.angle;
+    } else {
+      const double expected = a.speed * (a.stamp - last_stamp);
+      turned += expected + std::remainder(a.angle - last - expected, units::TWO_PI);
+    }
+    last = a.angle;
+    last_stamp = a.stamp;
+    const double t = a.stamp - begin;
+    n += 1.0;
+    st += t;
+    sa += turned;
+    stt += t * t;
+    sta += t * turned;
+  }
+  const double det = n * stt - st * st;
+  if (n < 3.0 || det <= 0.0) {
+    blocks_.clear();
+    return;
+  }
+  const double speed = (n * sta - st * sa) / det, phase = (sa - speed * st) / n;
+  const bool even = std::all_of(angles_.begin(), angles_.end(), [&](const SpindleAngle& a) {
+    return a.stamp < begin || a.stamp > end ||
+           std::abs(std::remainder(a.angle - phase - speed * (a.stamp - begin), units::TWO_PI)) <
+               ANGLE_TOLERANCE;
+  });
+  if (!even) {
+    blocks_.clear();
+    return;
+  }
+  Stretch stretch;
+  stretch.stamp = end;
+  CampaignTest& test = stretch.test;
+  test.name = condition_->name;
+  test.file = condition_->name + ".csv";
+  test.kind = condition_->kind == CuttingCondition::Kind::air ? TestKind::air : TestKind::cut;
+  test.sample_rate = blocks_.front().sample_rate;
+  test.spindle_speed = speed;
+  test.running_before = begin - *steady_since_;
+  test.start_time = begin - *first_;
+  if (test.kind == TestKind::cut) {
+    test.engagement = condition_->engagement;
+    test.cut_time_before = cut_time_ + *test.running_before;
+  }
+  Record& record = stretch.record;
+  record.file = test.name;
+  std::vector<double> angle;
+  std::array<std::vector<double>, 3> force;
+  for (const SampleBlock& b : blocks_) {
+    const std::array<std::size_t, 3> channel{{b.channel("fx"), b.channel("fy"), b.channel("fz")}};
+    for (std::size_t i = 0; i < b.size(); ++i) {
+      const double t = static_cast<double>(record.time.size()) / test.sample_rate;
+      record.time.push_back(t);
+      const double a = std::fmod(phase + speed * t, units::TWO_PI);
+      angle.push_back(a < 0.0 ? a + units::TWO_PI : a);
+      for (std::size_t axis = 0; axis < 3; ++axis) force[axis].push_back(b.at(i, channel[axis]));
+    }
+  }
+  record.add("spindle_angle") = std::move(angle);
+  record.add("fx") = std::move(force[0]);
+  record.add("fy") = std::move(force[1]);
+  record.add("fz") = std::move(force[2]);
+  blocks_.clear();
+  for (const LoadSample& l : loads_) {
+    if (l.stamp >= begin && l.stamp <= end) stretch.load.push_back({l.stamp - begin, l.spindle_load});
+  }
+  unconfirmed_.push_back(std::move(stretch));
+}
+
+SortedStretches::SortedStretches(const StretchParameters& parameters, double hold_back,
+                                 std::function<void(const Stretch&)> deliver)
+    : recorder_(parameters, std::move(deliver)),
+      sorter_(hold_back),
+      conditions_(sorter_.addEvents("cut/condition")),
+      states_(sorter_.addRegular("cnc/state")),
+      angles_(sorter_.addRegular("spindle/angle")),
+      blocks_(sorter_.addRegular("daq/dynamometer")),
+      // Absent from some machines: waited for only by the hold-back.
+      loads_(sorter_.addEvents("cnc/load")) {
+}
+
+void SortedStretches::watch(double stamp) {
+  if (stamp < newest_ - RESTARTED) {
+    sorter_.reset();
+    recorder_.reset();
+    newest_ = stamp;
+  }
+  newest_ = std::max(newest_, stamp);
+}
+
+void SortedStretches::push(const CuttingCondition& condition) {
+  sorter_.push(conditions_, condition.stamp, [this, condition] { recorder_.handle(condition); });
+}
+
+void SortedStretches::push(const CncState& state) {
+  watch(state.stamp);
+  sorter_.push(states_, state.stamp, [this, state] { recorder_.handle(state); });
+}
+
+void SortedStretches::push(const SpindleAngle& angle) {
+  sorter_.push(angles_, angle.stamp, [this, angle] { recorder_.handle(angle); });
+}
+
+void SortedStretches::push(const SampleBlock& dynamometer) {
+  sorter_.push(blocks_, dynamometer.stamp, [this, dynamometer] { recorder_.handle(dynamometer); });
+}
+
+void SortedStretches::push(const LoadSample& load) {
+  sorter_.push(loads_, load.stamp, [this, load] { recorder_.handle(load); });
+}
+
+}  // namespace smartmill::discrepancy

@@ -1,0 +1,147 @@
+#include <cstdio>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <sstream>
+
+#include "smartmill_core/error.h"
+#include "smartmill_discrepancy/explain/explanation.h"
+
+namespace smartmill::discrepancy {
+namespace {
+
+std::string escaped(const std::string& text) {
+  std::string out;
+  for (const char c : text)
+    out += c == '<' ? "&lt;" : c == '>' ? "&gt;" : c == '&' ? "&amp;" : std::string(1, c);
+  return out;
+}
+
+std::string number(double value, const char* format = "%.4g") {
+  char text[40];
+  std::snprintf(text, sizeof text, format, value);
+  return text;
+}
+
+std::string base64(const std::string& bytes) {
+  const char* const digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string out;
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    unsigned v = 0;
+    for (std::size_t k = 0; k < 3; ++k)
+      v = v << 8 | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0u);
+    for (std::size_t k = 0; k < 4; ++k) out += i + k > bytes.size() ? '=' : digits[v >> (18 - 6 * k) & 63u];
+  }
+  return out;
+}
+
+std::string joined(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& w : words) text += (text.empty() ? "" : ", ") + w;
+  return text;
+}
+
+void findings(std::ostream& out, const std::vector<Finding>& list) {
+  out << "<table><tr><th>channel<th>domain<th>where<th>largest amplitude<th>share of the gap<th>false "
+         "discovery rate<th>depends on<th>tests</tr>\n";
+  for (const Finding& f : list) {
+    out << "<tr><td>" << f.channel << "<td>" << f.domain << "<td>";
+    for (const auto& [key, value] : f.location) out << key << " " << number(value, "%.5g") << " ";
+    out << "<td>" << number(f.amplitude) << "<td>" << number(f.share_of_gap) << "<td>"
+        << number(f.p_value, "%.1e") << "<td>" << joined(f.depends_on) << "<td>" << f.tests.size() << ": "
+        << escaped(joined(f.tests)) << "</tr>\n";
+  }
+  out << "</table>\n";
+}
+
+const std::map<std::string, std::string> VERDICTS{
+    {"no_disagreement", "Model and records agree to the noise."},
+    {"explained", "The effects below explain what model and records differ by."},
+    {"partly_explained",
+     "The effects below explain a part; something remains that no effect of the catalogue explains."},
+    {"unknown_effect", "Model and records differ, and no effect of the catalogue explains it."}};
+const std::map<std::string, std::string> CAPTIONS{
+    {"gaps.png", "Gap of every test and channel before and after"},
+    {"revolution.png", "One revolution of the cut that differed most: measured, nominal, improved"},
+    {"spectra.png",
+     "Spectra of the difference before and after; arrows: lines found (orange) and left (violet)"},
+    {"ladder.png", "Evidence of the hypotheses tried"},
+    {"remains.png", "Gap after, test by test"}};
+
+}  // namespace
+
+void writeHtml(const Explanation& e, const std::string& campaign, const std::vector<std::string>& pictures,
+               const std::string& folder) {
+  const std::string file = folder + "/report.html";
+  std::ofstream out(file);
+  out << "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>Discrepancy report: "
+      << escaped(campaign)
+      << "</title>\n<style>body{font-family:sans-serif;max-width:78em;margin:2em auto;padding:0 "
+         "1em;color:#222}"
+         "table{border-collapse:collapse;margin:1em 0;font-size:90%}td,th{border:1px solid "
+         "#ccc;padding:.25em .6em;text-align:left;"
+         "vertical-align:top}th{background:#f0f0f0}img{max-width:100%}.verdict{font-size:130%;padding:.5em;"
+         "background:#eef5ee}"
+         "</style></head><body>\n<h1>Where simulation and measurement disagree: "
+      << escaped(campaign) << "</h1>\n";
+  out << "<p class=\"verdict\"><b>" << e.verdict << "</b>. " << VERDICTS.at(e.verdict) << "</p>\n";
+  out << "<table><tr><th>gap<th>before<th>after</tr><tr><td>fit tests<td>" << number(e.before.fit) << "<td>"
+      << number(e.after.fit) << "</tr><tr><td>held-out tests<td>" << number(e.before.heldout) << "<td>"
+      << number(e.after.heldout)
+      << "</tr></table>\n<p>The gap is the RMS of (measured - simulated) over the noise; 1 is the noise "
+         "floor.</p>\n";
+  if (!e.effects.empty()) {
+    out << "<h2>Effects found</h2>\n<table><tr><th>effect<th>parameters<th>evidence lost without it<th>share "
+           "of the held-out gap<th>alternatives (evidence)</tr>\n";
+    for (const FoundEffect& f : e.effects) {
+      out << "<tr><td><b>" << f.name << "</b><td>";
+      for (const auto& [key, word] : f.words) out << key << " " << escaped(word) << "<br>";
+      for (const FoundParameter& p : f.parameters)
+        out << p.key << " = " << number(p.value, "%.5g") << " &plusmn; " << number(p.std_dev, "%.2g")
+            << "<br>";
+      out << "<td>" << number(f.delta_bic) << "<td>" << number(f.heldout_gap_reduction) << "<td>";
+      for (const auto& [name, delta] : f.alternatives) out << name << " (" << number(delta) << ")<br>";
+      out << "</tr>\n";
+    }
+    out << "</table>\n";
+  }
+  for (const auto& group : e.not_separable)
+    out << "<p>Not to be told apart on this campaign: " << joined(group) << ".</p>\n";
+  if (e.suggested_test)
+    out << "<p>A test that would tell them apart: " << escaped(*e.suggested_test) << ".</p>\n";
+  if (!e.unexplained.empty()) {
+    out << "<h2>What remains unexplained</h2>\n";
+    findings(out, e.unexplained);
+  }
+  if (!e.where.empty()) {
+    out << "<h2>Where the nominal model differs</h2>\n";
+    findings(out, e.where);
+  }
+  for (const std::string& name : pictures) {
+    std::ifstream png(folder + "/" + name, std::ios::binary);
+    const std::string bytes((std::istreambuf_iterator<char>(png)), std::istreambuf_iterator<char>());
+    const auto caption = CAPTIONS.find(name);
+    out << "<h2>" << (caption != CAPTIONS.end() ? caption->second : name) << "</h2>\n<img alt=\"" << name
+        << "\" src=\"data:image/png;base64," << base64(bytes) << "\">\n";
+  }
+  if (!e.ladder.empty()) {
+    out << "<h2>Candidates fitted</h2>\n<table><tr><th>round<th>effect<th>evidence promised by its "
+           "tangents<th>evidence gained<th>tests simulated<th>seconds</tr>\n";
+    for (const Rung& r : e.ladder) {
+      out << "<tr><td>" << r.round + 1 << "<td>" << (r.taken ? "<b>" : "") << r.effect
+          << (r.variant.empty() ? "" : " (" + r.variant + ")") << (r.taken ? "</b>" : "") << "<td>"
+          << number(r.promised) << "<td>" << number(r.delta_bic) << "<td>" << r.simulations << "<td>"
+          << number(r.seconds, "%.1f") << "</tr>\n";
+    }
+    out << "</table>\n";
+  }
+  if (!e.notes.empty()) {
+    out << "<h2>Notes</h2>\n<ul>";
+    for (const std::string& note : e.notes) out << "<li>" << escaped(note) << "</li>";
+    out << "</ul>\n";
+  }
+  out << "<p>" << number(e.seconds, "%.0f") << " s.</p></body></html>\n";
+  if (!out) throw Error(file + ": cannot be written");
+}
+
+}  // namespace smartmill::discrepancy

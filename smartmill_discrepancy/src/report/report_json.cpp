@@ -1,0 +1,94 @@
+#include <cmath>
+#include <fstream>
+
+#include <nlohmann/json.hpp>
+
+#include "smartmill_core/error.h"
+#include "smartmill_discrepancy/explain/explanation.h"
+
+namespace smartmill::discrepancy {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+double rounded(double value) {
+  if (value == 0.0 || !std::isfinite(value)) return 0.0;
+  const double scale = std::pow(10.0, 8.0 - std::floor(std::log10(std::abs(value))));
+  return std::isfinite(scale) && scale > 0.0 ? std::round(value * scale) / scale : value;
+}
+
+Json findingsOf(const std::vector<Finding>& findings) {
+  Json list = Json::array();
+  for (const Finding& f : findings) {
+    Json location = Json::object();
+    for (const auto& [key, value] : f.location) location[key] = rounded(value);
+    list.push_back({{"channel", f.channel},
+                    {"tests", f.tests},
+                    {"domain", f.domain},
+                    {"location", location},
+                    {"depends_on", f.depends_on},
+                    {"share_of_gap", rounded(f.share_of_gap)},
+                    {"p_value", f.p_value},
+                    {"amplitude", rounded(f.amplitude)}});
+  }
+  return list;
+}
+
+}  // namespace
+
+void writeReport(const Explanation& e, const std::string& folder) {
+  Json report;
+  report["format"] = "smartmill-report/1";
+  report["verdict"] = e.verdict;
+  report["where"] = findingsOf(e.where);
+  report["effects"] = Json::array();
+  for (const FoundEffect& effect : e.effects) {
+    Json parameters = Json::object();
+    for (const FoundParameter& p : effect.parameters)
+      parameters[p.key] = {{"value", rounded(p.value)}, {"std", rounded(p.std_dev)}};
+    for (const auto& [key, word] : effect.words) parameters[key] = {{"value", word}};
+    Json alternatives = Json::array();
+    for (const auto& [name, delta] : effect.alternatives)
+      alternatives.push_back({{"name", name}, {"delta_bic", rounded(delta)}});
+    report["effects"].push_back({{"name", effect.name},
+                                 {"parameters", parameters},
+                                 {"delta_bic", rounded(effect.delta_bic)},
+                                 {"heldout_gap_reduction", rounded(effect.heldout_gap_reduction)},
+                                 {"confidence", rounded(effect.confidence)},
+                                 {"alternatives", alternatives}});
+  }
+  report["not_separable"] = e.not_separable;
+  report["suggested_test"] = e.suggested_test ? Json(*e.suggested_test) : Json(nullptr);
+  report["unexplained"] = findingsOf(e.unexplained);
+  report["gap"] = {{"before", {{"fit", rounded(e.before.fit)}, {"heldout", rounded(e.before.heldout)}}},
+                   {"after", {{"fit", rounded(e.after.fit)}, {"heldout", rounded(e.after.heldout)}}}};
+  report["gaps"] = Json::array();
+  for (const BlockGap& g : e.gaps) {
+    report["gaps"].push_back(
+        {{"test", g.test},
+         {"channel", g.channel},
+         {"heldout", g.heldout},
+         {"before", rounded(g.before)},
+         {"after", rounded(g.after)},
+         {"interval", {rounded(g.after - 1.96 * g.std_dev), rounded(g.after + 1.96 * g.std_dev)}}});
+  }
+  report["candidates"] = Json::array();
+  for (const Rung& r : e.ladder) {
+    report["candidates"].push_back({{"round", r.round + 1},
+                                    {"name", r.effect},
+                                    {"variant", r.variant},
+                                    {"promised", rounded(r.promised)},
+                                    {"delta_bic", rounded(r.delta_bic)},
+                                    {"taken", r.taken},
+                                    {"simulations", r.simulations},
+                                    {"seconds", rounded(r.seconds)}});
+  }
+  report["notes"] = e.notes;
+  report["seconds"] = rounded(e.seconds);
+  const std::string file = folder + "/report.json";
+  std::ofstream out(file);
+  out << report.dump(1) << "\n";
+  if (!out) throw Error(file + ": cannot be written");
+}
+
+}  // namespace smartmill::discrepancy

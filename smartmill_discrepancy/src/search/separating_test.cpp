@@ -1,0 +1,79 @@
+#include <cmath>
+#include <cstdio>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/units.h"
+#include "smartmill_discrepancy/search/search.h"
+#include "smartmill_sim/twin/twin.h"
+
+namespace smartmill::discrepancy {
+namespace {
+
+// RMS difference of two models over the noise in one test.
+double separation(const Dataset& data, const CampaignTest& test, const MachineModel& a,
+                  const MachineModel& b) {
+  sim::SimulationOptions options;
+  options.noise = false;
+  options.substeps = 2;
+  const Record first = sim::simulateTest(a, test, 0.15, options);
+  const Record second = sim::simulateTest(b, test, 0.15, options);
+  double squares = 0.0;
+  std::size_t count = 0;
+  for (const auto& [channel, noise] : data.noise) {
+    if (!first.has(channel) || !second.has(channel)) continue;
+    const auto &x = first.column(channel), &y = second.column(channel);
+    for (std::size_t i = 0; i < x.size(); ++i) squares += (x[i] - y[i]) * (x[i] - y[i]) / (noise * noise);
+    count += x.size();
+  }
+  return count ? std::sqrt(squares / static_cast<double>(count)) : 0.0;
+}
+
+}  // namespace
+
+std::optional<std::string> separatingTest(const Dataset& data, const MachineModel& a, const MachineModel& b) {
+  std::optional<std::string> best;
+  double largest = 0.0;
+  for (const TestData& t : data.tests) {
+    if (t.test.kind == TestKind::tap) continue;
+    for (const double speed : {0.4, 1.0, 1.8}) {
+      for (const double feed : {0.4, 1.0, 2.0}) {
+        for (const double depth : {0.5, 1.0, 2.0}) {
+          if (t.test.kind == TestKind::air && (feed != 1.0 || depth != 1.0)) continue;
+          CampaignTest test = t.test;
+          test.spindle_speed *= speed;
+          if (test.engagement) {
+            test.engagement->feed_per_tooth *= feed;
+            test.engagement->axial_depth *= depth;
+            test.engage_time = 0.02;
+          }
+          double value = 0.0;
+          try {
+            value = separation(data, test, a, b);
+          } catch (const Error&) {
+            continue;  // the twin does not run this one
+          }
+          if (value <= largest) continue;
+          largest = value;
+          char text[300];
+          if (test.engagement) {
+            std::snprintf(text, sizeof text,
+                          "a cut at %.0f rpm, %.3g mm a tooth, %.3g mm deep, from %.0f to %.0f deg: the two "
+                          "predictions "
+                          "differ there by %.2g times the noise",
+                          units::rpmFromRadPerSec(test.spindle_speed), test.engagement->feed_per_tooth * 1e3,
+                          test.engagement->axial_depth * 1e3, units::degFromRad(test.engagement->entry),
+                          units::degFromRad(test.engagement->exit), value);
+          } else {
+            std::snprintf(text, sizeof text,
+                          "an air cut at %.0f rpm: the two predictions differ there by %.2g times the noise",
+                          units::rpmFromRadPerSec(test.spindle_speed), value);
+          }
+          best = text;
+        }
+      }
+    }
+  }
+  return best;
+}
+
+}  // namespace smartmill::discrepancy

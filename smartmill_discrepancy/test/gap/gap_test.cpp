@@ -1,0 +1,57 @@
+#include "smartmill_discrepancy/gap/gap.h"
+
+#include <algorithm>
+#include <cstdlib>
+#include <filesystem>
+#include <iostream>
+
+#include <gtest/gtest.h>
+
+#include "smartmill_core/error.h"
+
+namespace smartmill::discrepancy {
+namespace {
+
+std::string campaigns() {
+  const char* folder = std::getenv("SMARTMILL_SHARED");
+  return std::string(folder ? folder : SMARTMILL_SHARED_FOLDER) + "/campaigns";
+}
+
+double largestOf(const CampaignGap& gap, const std::string& channel) {
+  double largest = 0.0;
+  for (const ChannelGap& row : gap.channels) {
+    if (row.channel == channel) largest = std::max(largest, row.gap);
+  }
+  return largest;
+}
+
+// Independent campaigns: one whose model is exact, others with something hidden in the channels named.
+TEST(Gap, isTheNoiseFloorOnlyWhereNothingIsHidden) {
+  if (!std::filesystem::exists(campaigns())) {
+    std::cout << campaigns() << " is absent, not checked\n";
+    return;
+  }
+  const auto load = [](const std::string& name) {
+    const Campaign campaign = readCampaign(campaigns() + "/" + name);
+    return loadDataset(campaign, readMachineModel(campaign.modelPath()));
+  };
+  const auto gapOf = [&](const std::string& name) {
+    const Dataset data = load(name);
+    return campaignGap(data, data.nominal, 2);
+  };
+  const CampaignGap none = gapOf("none");
+  for (const char* channel : {"fx", "fy", "fz", "load_meter"})
+    EXPECT_LE(largestOf(none, channel), 1.05) << channel;
+  EXPECT_NEAR(none.overall, 1.0, 0.01);
+  EXPECT_NEAR(load("none").noise.at("load_meter"), 2.2e-4, 0.1e-4);  // as the campaigns' maker states it
+
+  const CampaignGap friction = gapOf("stribeck_friction");
+  EXPECT_GT(largestOf(friction, "load_meter"), 2.0);
+  EXPECT_LE(largestOf(friction, "fx"), 1.05);
+  const CampaignGap runout = gapOf("runout");
+  EXPECT_GT(largestOf(runout, "fx"), 2.0);
+  EXPECT_GT(largestOf(runout, "fy"), 2.0);
+}
+
+}  // namespace
+}  // namespace smartmill::discrepancy
