@@ -8,7 +8,6 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/testing/temporary_folder.h"
-#include "smartmill_discrepancy/bench_campaign.h"
 #include "smartmill_discrepancy/data/labels.h"
 #include "smartmill_discrepancy/explain/explanation.h"
 

@@ -1,5 +1,5 @@
-// rosrun smartmill_discrepancy bench: hides causes in drawn machines, lets explain find them, opens the seal
-// and scores.
+// rosrun smartmill_studies discrepancy_bench: hides causes in drawn machines, lets explain find them, opens
+// the seal and scores.
 
 #include <algorithm>
 #include <cmath>
@@ -15,9 +15,9 @@
 
 #include <CLI/CLI.hpp>
 
+#include "discrepancy/bench_campaign.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/effect_catalogue.h"
-#include "smartmill_discrepancy/bench_campaign.h"
 #include "smartmill_discrepancy/explain/explanation.h"
 #include "smartmill_discrepancy/gap/twin_runner.h"
 
@@ -344,7 +344,7 @@ int main(int argc, char** argv) {
   try {
     run(o);
   } catch (const std::exception& e) {
-    std::cerr << "bench: " << e.what() << "\n";
+    std::cerr << "discrepancy_bench: " << e.what() << "\n";
     return 1;
   }
   return 0;

@@ -1,4 +1,4 @@
-#include "smartmill_discrepancy/bench_campaign.h"
+#include "discrepancy/bench_campaign.h"
 
 #include <algorithm>
 #include <array>
