@@ -239,7 +239,7 @@ void ForceCompensation::watchZero(const ForceBlock& measured) {
   }
 }
 
-void ForceCompensation::handle(const SampleBlock& block) {
+ForceBlock ForceCompensation::measuredIn(const SampleBlock& block) {
   std::array<std::size_t, 3> column{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     column[axis] = block.channel(CHANNELS[axis]);
@@ -248,12 +248,6 @@ void ForceCompensation::handle(const SampleBlock& block) {
                   block.units[column[axis]] + ", N is due");
     }
   }
-  if (next_index_ && *next_index_ != block.first_index) {
-    ++health_.gaps;
-    stop();
-  }
-  next_index_ = block.first_index + block.size();
-
   ForceBlock measured;
   measured.stamp = block.stamp;
   measured.sample_rate = block.sample_rate;
@@ -268,6 +262,32 @@ void ForceCompensation::handle(const SampleBlock& block) {
       force.push_back(sign_ * sample);
     }
   }
+  return measured;
+}
+
+/// Filters for the speed and rate of now: laid out anew, or turned to a speed that moved a little.
+void ForceCompensation::prepareFilters(double sample_rate) {
+  const double off_grid = std::abs(std::log(speed_) / SPEED_GRID - grid_point_);
+  if (filters_.empty() || design_rate_ != sample_rate || off_grid > GRID_HYSTERESIS) {
+    design(speed_, sample_rate);
+  } else if (std::abs(speed_ / filters_.front().spindleSpeed() - 1.0) > RETUNE) {
+    retune(sample_rate);
+  }
+  if (parameters_.track_speed && !tracker_) tracker_.emplace(parameters_.tracker, speed_, sample_rate);
+}
+
+void ForceCompensation::retune(double sample_rate) {
+  for (std::size_t axis = 0; axis < 3; ++axis) filters_[axis].retune(*sensor_[axis], speed_);
+  layOutCrossTalk(sample_rate);
+}
+
+void ForceCompensation::handle(const SampleBlock& block) {
+  ForceBlock measured = measuredIn(block);
+  if (next_index_ && *next_index_ != block.first_index) {
+    ++health_.gaps;
+    stop();
+  }
+  next_index_ = block.first_index + block.size();
   watchZero(measured);
   ForceBlock compensated = measured;
   if (!hasSensor() || speed_ < parameters_.least_speed || block.stamp < changing_until_) {
@@ -277,14 +297,7 @@ void ForceCompensation::handle(const SampleBlock& block) {
     output_(measured, compensated);
     return;
   }
-  const double off_grid = std::abs(std::log(speed_) / SPEED_GRID - grid_point_);
-  if (filters_.empty() || design_rate_ != block.sample_rate || off_grid > GRID_HYSTERESIS) {
-    design(speed_, block.sample_rate);
-  } else if (std::abs(speed_ / filters_.front().spindleSpeed() - 1.0) > RETUNE) {
-    for (std::size_t axis = 0; axis < 3; ++axis) filters_[axis].retune(*sensor_[axis], speed_);
-    layOutCrossTalk(block.sample_rate);
-  }
-  if (parameters_.track_speed && !tracker_) tracker_.emplace(parameters_.tracker, speed_, block.sample_rate);
+  prepareFilters(block.sample_rate);
   health_.speed = filters_.front().spindleSpeed();
   run(compensated.force, block.sample_rate);
   const bool settling = settling_left_ > 0.0 || (tracker_ && tracker_->speedStd() > TRACKED * speed_);
@@ -301,72 +314,78 @@ void ForceCompensation::handle(const SampleBlock& block) {
   if (follower_) follow(block.timeOf(block.size()), block.sample_rate);
 }
 
+void ForceCompensation::take(std::size_t axis, double& sample, Innovations& innovations) {
+  HarmonicFilter& filter = filters_[axis];
+  // A sample that is not a number is bridged by the model, never passed on.
+  if (parameters_.lag > 0.0) {
+    sample = smoothers_[axis].step(filter, sample);
+  } else {
+    sample = std::isfinite(sample) ? filter.step(sample) : filter.coast();
+  }
+  const double innovation = filter.innovation() / filter.innovationStd();
+  innovations.own[axis] += innovation * innovation;
+  innovations.neighbours[axis] += innovation * innovations.last[axis];
+  innovations.last[axis] = innovation;
+}
+
+void ForceCompensation::couple(std::array<std::vector<double>, 3>& force, std::size_t i) {
+  std::array<double, 3> now{{force[0][i], force[1][i], force[2][i]}};
+  cross_talk_->add(filters_, now);
+  for (std::size_t axis = 0; axis < 3; ++axis) force[axis][i] = now[axis];
+}
+
+/// The samples of one time, and what they tell of the speed.
+void ForceCompensation::track(std::array<std::vector<double>, 3>& force, std::size_t i, double sample_rate,
+                              Innovations& innovations) {
+  const std::size_t level = std::min({filters_[0].level(), filters_[1].level(), filters_[2].level()});
+  const double memory = parameters_.filter.memory(level) * units::TWO_PI / speed_;
+  // A harmonic that may lie nearer to its neighbour's place than to its own would mislead.
+  const double highest = std::max(LEAST_TELLING, TELLING * speed_ / tracker_->speedStd());
+  // Root of the sum of n^2: what harmonics of noise make of a slope.
+  const double n = std::min(highest, static_cast<double>(filters_.front().harmonics()));
+  const double slope_gain = std::sqrt(n * (n + 1.0) * (2.0 * n + 1.0) / 6.0);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const double slope = filters_[axis].slope(highest);
+    take(axis, force[axis][i], innovations);
+    tracker_->update(axis, filters_[axis].innovation(), slope, noise_rms_[axis],
+                     noise_rms_[axis] * slope_gain / std::sqrt(memory * sample_rate));
+  }
+  if (matrix_) couple(force, i);
+  tracker_->predict(speed_, memory);
+  std::size_t restarts = 0;
+  for (const HarmonicFilter& filter : filters_) restarts += filter.restarts();
+  if (restarts != restarts_) tracker_->reopen();
+  restarts_ = restarts;
+  if ((i + 1) % TRACK_EVERY == 0 && std::abs(tracker_->speed() / speed_ - 1.0) > RETUNE) {
+    speed_ = tracker_->speed();
+    retune(sample_rate);
+  }
+}
+
 /// Takes a block's samples through the filters, in place.
 void ForceCompensation::run(std::array<std::vector<double>, 3>& force, double sample_rate) {
-  std::array<double, 3> last{}, own{}, neighbours{};
-  const auto take = [&](std::size_t axis, double& sample) {
-    HarmonicFilter& filter = filters_[axis];
-    // A sample that is not a number is bridged by the model, never passed on.
-    if (parameters_.lag > 0.0) {
-      sample = smoothers_[axis].step(filter, sample);
-    } else {
-      sample = std::isfinite(sample) ? filter.step(sample) : filter.coast();
-    }
-    const double innovation = filter.innovation() / filter.innovationStd();
-    own[axis] += innovation * innovation;
-    neighbours[axis] += innovation * last[axis];
-    last[axis] = innovation;
-  };
+  Innovations innovations;
   const std::size_t count = force[0].size();
-  const auto couple = [&](std::size_t i) {
-    std::array<double, 3> now{{force[0][i], force[1][i], force[2][i]}};
-    cross_talk_->add(filters_, now);
-    for (std::size_t axis = 0; axis < 3; ++axis) force[axis][i] = now[axis];
-  };
-  if (!tracker_ && matrix_) {
-    for (std::size_t i = 0; i < count; ++i) {
-      for (std::size_t axis = 0; axis < 3; ++axis) take(axis, force[axis][i]);
-      couple(i);
-    }
-  } else if (!tracker_) {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      for (double& sample : force[axis]) take(axis, sample);
-    }
-  } else {
-    for (std::size_t i = 0; i < count; ++i) {
-      const std::size_t level = std::min({filters_[0].level(), filters_[1].level(), filters_[2].level()});
-      const double memory = parameters_.filter.memory(level) * units::TWO_PI / speed_;
-      // A harmonic that may lie nearer to its neighbour's place than to its own would mislead.
-      const double highest = std::max(LEAST_TELLING, TELLING * speed_ / tracker_->speedStd());
-      // Root of the sum of n^2: what harmonics of noise make of a slope.
-      const double n = std::min(highest, static_cast<double>(filters_.front().harmonics()));
-      const double slope_gain = std::sqrt(n * (n + 1.0) * (2.0 * n + 1.0) / 6.0);
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        const double slope = filters_[axis].slope(highest);
-        take(axis, force[axis][i]);
-        tracker_->update(axis, filters_[axis].innovation(), slope, noise_rms_[axis],
-                         noise_rms_[axis] * slope_gain / std::sqrt(memory * sample_rate));
-      }
-      if (matrix_) couple(i);
-      tracker_->predict(speed_, memory);
-      std::size_t restarts = 0;
-      for (const HarmonicFilter& filter : filters_) restarts += filter.restarts();
-      if (restarts != restarts_) tracker_->reopen();
-      restarts_ = restarts;
-      if ((i + 1) % TRACK_EVERY == 0 && std::abs(tracker_->speed() / speed_ - 1.0) > RETUNE) {
-        speed_ = tracker_->speed();
-        for (std::size_t axis = 0; axis < 3; ++axis) filters_[axis].retune(*sensor_[axis], speed_);
-        layOutCrossTalk(sample_rate);
-      }
-    }
+  if (tracker_) {
+    for (std::size_t i = 0; i < count; ++i) track(force, i, sample_rate, innovations);
     health_.speed = speed_;
     health_.speed_std = tracker_->speedStd();
+  } else if (matrix_) {
+    for (std::size_t i = 0; i < count; ++i) {
+      for (std::size_t axis = 0; axis < 3; ++axis) take(axis, force[axis][i], innovations);
+      couple(force, i);
+    }
+  } else {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      for (double& sample : force[axis]) take(axis, sample, innovations);
+    }
   }
   double squares = 0.0;
   health_.colour = 0.0;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    squares += own[axis];
-    if (own[axis] > 0.0) health_.colour = std::max(health_.colour, std::abs(neighbours[axis] / own[axis]));
+    const double own = innovations.own[axis];
+    squares += own;
+    if (own > 0.0) health_.colour = std::max(health_.colour, std::abs(innovations.neighbours[axis] / own));
   }
   health_.innovation_ratio = count == 0 ? 0.0 : std::sqrt(squares / (3.0 * static_cast<double>(count)));
 }

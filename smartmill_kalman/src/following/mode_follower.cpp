@@ -19,8 +19,11 @@ namespace {
 using Complex = std::complex<double>;
 constexpr std::size_t POINTS = 1024;  // a revolution
 constexpr int MAX_ITERATIONS = 20;
-constexpr double RADIUS_UNIT = 1e-6;  // [m]
-constexpr double RADIUS_STD = 20.0;   // [RADIUS_UNIT]
+constexpr double RADIUS_UNIT = 1e-6;       // [m]
+constexpr double RADIUS_STD = 20.0;        // [RADIUS_UNIT]
+constexpr std::size_t TERMS = 4;           // tangential and radial, chip and edge
+using Sensor = std::array<ModalModel, 2>;  // x, y
+using Basis = std::array<ModeFollower::Harmonics, TERMS>;
 
 void requirePositive(const char* key, double value) {
   if (!(value > 0.0) || !std::isfinite(value)) throw Error(std::string(key) + ": above 0 is due");
@@ -38,6 +41,227 @@ std::array<ModalModel, 2> moved(const std::array<ModalModel, 2>& from, const Eig
   }
   return sensor;
 }
+
+/// Harmonics of the force for each coefficient alone: tangential and radial, chip and edge.
+Basis harmonicsOf(const ToolGeometry& tool, const Engagement& engagement, const std::vector<double>& radius) {
+  const double chip = 1.0 / engagement.feed_per_tooth;
+  const std::array<CuttingCoefficients, TERMS> unit{
+      {{chip, 0, 0, 0, 0, 0}, {0, chip, 0, 0, 0, 0}, {0, 0, 0, 1, 0, 0}, {0, 0, 0, 0, 1, 0}}};
+  Basis result;
+  for (std::size_t u = 0; u < TERMS; ++u) {
+    const auto force = revolutionForce(tool, unit[u], engagement, radius, POINTS);
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      result[u][axis] = fourier(force[axis]);
+      for (Complex& value : result[u][axis]) value *= 2.0 / POINTS;
+      result[u][axis][0] *= 0.5;
+    }
+  }
+  return result;
+}
+
+/// Solution of a linear least-squares problem, its normal matrix stiffened by a share of its diagonal.
+Eigen::VectorXd leastSquares(const Eigen::MatrixXd& seen, const Eigen::VectorXd& target, double stiffer) {
+  Eigen::MatrixXd normal = seen.transpose() * seen;
+  normal.diagonal().array() *= 1.0 + stiffer;
+  return normal.ldlt().solve(seen.transpose() * target);
+}
+
+/// What is measured in one revolution of the cut, weighted: for each axis and harmonic (the mean first: it
+/// tells the pressures) a real and an imaginary row.
+class WeightedHarmonics {
+ public:
+  WeightedHarmonics(const ModeFollower::Harmonics& measured, std::size_t count, double noise_std,
+                    double misfit, const Sensor& now, double spindle_speed)
+      : count_(count), spindle_frequency_(spindle_speed / units::TWO_PI), weight_(rows()), target_(rows()) {
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      // What the force model misses passes the sensor too.
+      double largest = 0.0;
+      for (std::size_t n = 0; n < count_; ++n) {
+        const double passed = std::abs(now[axis].response(frequency(n)));
+        largest = std::max(largest, std::abs(measured[axis][n]) / std::max(1.0, passed));
+      }
+      for (std::size_t n = 0; n < count_; ++n) {
+        const double passed = std::abs(now[axis].response(frequency(n)));
+        const double missed = misfit * std::max(0.1 * passed * largest, std::abs(measured[axis][n]));
+        const Eigen::Index row = rowOf(axis, n);
+        weight_(row) = weight_(row + 1) = 1.0 / std::hypot(noise_std, missed);
+        target_(row) = measured[axis][n].real();
+        target_(row + 1) = measured[axis][n].imag();
+      }
+    }
+    target_.array() *= weight_.array();
+  }
+
+  Eigen::Index rows() const { return static_cast<Eigen::Index>(4 * count_); }
+  const Eigen::VectorXd& target() const { return target_; }
+
+  /// A force's harmonics as the sensor shows them, weighted. @param harmonic (axis, n) to [N]
+  template <class Harmonic>
+  Eigen::VectorXd seen(const Sensor& sensor, const Harmonic& harmonic) const {
+    Eigen::VectorXd column(rows());
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      for (std::size_t n = 0; n < count_; ++n) {
+        const Complex y = sensor[axis].response(frequency(n)) * harmonic(axis, n);
+        const Eigen::Index row = rowOf(axis, n);
+        column(row) = weight_(row) * y.real();
+        column(row + 1) = weight_(row) * y.imag();
+      }
+    }
+    return column;
+  }
+  Eigen::MatrixXd seen(const Sensor& sensor, const Basis& basis) const {
+    Eigen::MatrixXd columns(rows(), static_cast<Eigen::Index>(TERMS));
+    for (std::size_t term = 0; term < TERMS; ++term)
+      columns.col(static_cast<Eigen::Index>(term)) =
+          seen(sensor, [&](std::size_t axis, std::size_t n) { return basis[term][axis][n]; });
+    return columns;
+  }
+
+  /// Residual with the force model's numbers at their best for this sensor.
+  Eigen::VectorXd innovations(const Sensor& sensor, const Basis& basis) const {
+    const Eigen::MatrixXd columns = seen(sensor, basis);
+    return target_ - columns * leastSquares(columns, target_, 1e-10);
+  }
+
+ private:
+  double frequency(std::size_t n) const { return static_cast<double>(n) * spindle_frequency_; }
+  Eigen::Index rowOf(std::size_t axis, std::size_t n) const {
+    return static_cast<Eigen::Index>(2 * (axis * count_ + n));
+  }
+
+  std::size_t count_;
+  double spindle_frequency_;  // [Hz]
+  Eigen::VectorXd weight_, target_;
+};
+
+/// To first order runout adds to each tooth's edge force what its chip is thicker by: radii [m] of the teeth
+/// to begin with.
+std::vector<double> firstRadii(const WeightedHarmonics& measured, const Sensor& now, const ToolGeometry& tool,
+                               const Engagement& engagement) {
+  std::vector<double> radius(static_cast<std::size_t>(tool.teeth), 0.0);
+  ToolGeometry one = tool;
+  one.teeth = 1;
+  one.pitch.clear();
+  const Basis tooth = harmonicsOf(one, engagement, {0.0});
+  const Eigen::MatrixXd even = measured.seen(now, harmonicsOf(tool, engagement, radius));
+  const Eigen::VectorXd x = leastSquares(even, measured.target(), 0.0);
+  Eigen::MatrixXd seen(measured.rows(), tool.teeth);
+  for (int k = 0; k < tool.teeth; ++k) {
+    seen.col(k) = measured.seen(now, [&](std::size_t axis, std::size_t n) {
+      const Complex turned = std::polar(1.0, static_cast<double>(n) * tool.toothAngle(k));
+      return turned * (x(0) * tooth[2][axis][n] + x(1) * tooth[3][axis][n]) / engagement.feed_per_tooth;
+    });
+  }
+  const Eigen::VectorXd thicker = leastSquares(seen, measured.target() - even * x, 1e-6);  // [m]
+  for (Eigen::Index k = 0; k + 1 < tool.teeth; ++k) {
+    // Tooth k cuts what tooth k + 1 has left.
+    const double limit = 0.5 * engagement.feed_per_tooth;
+    radius[static_cast<std::size_t>(k + 1)] =
+        radius[static_cast<std::size_t>(k)] - std::clamp(thicker(k) - thicker.mean(), -limit, limit);
+  }
+  return radius;
+}
+
+/// Least squares over the modes (log frequency, log damping of each, x then y) and the teeth's radii, the
+/// first tooth's being the datum.
+class CutFit {
+ public:
+  CutFit(const WeightedHarmonics& measured, const Sensor& now, const ToolGeometry& tool,
+         const Engagement& engagement, const std::vector<double>& radius, const FollowParameters& parameters)
+      : measured_(measured), now_(now), tool_(tool), engagement_(engagement), radius_(radius) {
+    modal_ = static_cast<Eigen::Index>(2 * (now[0].modes.size() + now[1].modes.size()));
+    const Eigen::Index freedom = modal_ + tool.teeth - 1;
+    prior_.resize(freedom);
+    for (Eigen::Index i = 0; i < freedom; ++i) {
+      const double modes = i % 2 == 0 ? parameters.frequency_std : parameters.damping_std;
+      prior_(i) = 1.0 / (i >= modal_ ? RADIUS_STD : modes);
+    }
+    p_ = Eigen::VectorXd::Zero(freedom);
+    force_ = harmonicsOf(tool_, engagement_, radius_);
+    residual_ = measured_.innovations(now_, force_);
+    best_ = cost(residual_, p_);
+  }
+
+  void fitRadii() { descend(modal_); }
+  void fitAll() { descend(0); }
+
+  double cost() const { return best_; }                       ///< with what the prior says against the move
+  double squares() const { return residual_.squaredNorm(); }  ///< of the innovations
+  Sensor sensor() const { return moved(now_, p_); }
+  const Basis& force() const { return force_; }
+  std::vector<double> radii() const { return radii(p_); }
+  Eigen::Index freedom() const { return p_.size(); }
+
+ private:
+  double cost(const Eigen::VectorXd& residual, const Eigen::VectorXd& at) const {
+    return residual.squaredNorm() + (prior_.array() * at.array()).square().sum();
+  }
+  std::vector<double> radii(const Eigen::VectorXd& at) const {
+    std::vector<double> radius = radius_;
+    for (Eigen::Index i = modal_; i < at.size(); ++i)
+      radius[static_cast<std::size_t>(i - modal_ + 1)] += RADIUS_UNIT * at(i);
+    return radius;
+  }
+
+  /// Derivatives of the innovations by the unknowns from `first` on.
+  Eigen::MatrixXd slope(Eigen::Index first) const {
+    Eigen::MatrixXd slope(residual_.size(), p_.size() - first);
+    for (Eigen::Index i = first; i < p_.size(); ++i) {
+      const bool of_mode = i < modal_;
+      const double step = of_mode ? 1e-5 : 0.05;
+      Eigen::VectorXd other = p_;
+      other(i) += step;
+      const Basis& force = of_mode ? force_ : harmonicsOf(tool_, engagement_, radii(other));
+      slope.col(i - first) = (measured_.innovations(moved(now_, other), force) - residual_) / step;
+    }
+    return slope;
+  }
+
+  /// The unknowns before `first` stay as they are.
+  void descend(Eigen::Index first) {
+    const Eigen::Index free = p_.size() - first;
+    const Eigen::VectorXd weight = prior_.tail(free).array().square();
+    double damping = 1e-3;
+    for (int iteration = 0; iteration < MAX_ITERATIONS; ++iteration) {
+      const Eigen::MatrixXd by = slope(first);
+      Eigen::MatrixXd normal = by.transpose() * by;
+      normal.diagonal() += weight;
+      const Eigen::VectorXd gradient = by.transpose() * residual_ + weight.cwiseProduct(p_.tail(free));
+      const double before = best_;
+      for (int attempt = 0; attempt < 8 && !(best_ < before); ++attempt) {
+        Eigen::MatrixXd damped = normal;
+        damped.diagonal() *= 1.0 + damping;
+        Eigen::VectorXd trial = p_;
+        trial.tail(free) -= damped.ldlt().solve(gradient);
+        damping *= take(trial) ? 0.2 : 6.0;
+      }
+      if (!(best_ < before) || before - best_ < 1e-3 * best_) break;
+    }
+  }
+
+  /// @return whether the trial is better and taken.
+  bool take(const Eigen::VectorXd& trial) {
+    const Basis force = harmonicsOf(tool_, engagement_, radii(trial));
+    const Eigen::VectorXd residual = measured_.innovations(moved(now_, trial), force);
+    const double trial_cost = cost(residual, trial);
+    if (!(trial_cost < best_)) return false;
+    p_ = trial;
+    force_ = force;
+    residual_ = residual;
+    best_ = trial_cost;
+    return true;
+  }
+
+  const WeightedHarmonics& measured_;
+  const Sensor& now_;
+  const ToolGeometry& tool_;
+  const Engagement& engagement_;
+  std::vector<double> radius_;  // [m] to begin with
+  Eigen::Index modal_ = 0;      // so many unknowns are of the modes
+  Eigen::VectorXd prior_, p_, residual_;
+  Basis force_;
+  double best_ = 0.0;
+};
 
 }  // namespace
 
@@ -58,195 +282,36 @@ ModeFollower::ModeFollower(const ToolGeometry& tool, const Engagement& engagemen
   radius_.assign(static_cast<std::size_t>(tool.teeth), 0.0);
 }
 
-// Harmonics of the force for each coefficient alone: tangential and radial, chip and edge.
-ModeFollower::Basis ModeFollower::harmonicsOf(const ToolGeometry& tool,
-                                              const std::vector<double>& radius) const {
-  const double chip = 1.0 / engagement_.feed_per_tooth;
-  const std::array<CuttingCoefficients, TERMS> unit{
-      {{chip, 0, 0, 0, 0, 0}, {0, chip, 0, 0, 0, 0}, {0, 0, 0, 1, 0, 0}, {0, 0, 0, 0, 1, 0}}};
-  Basis result;
-  for (std::size_t u = 0; u < TERMS; ++u) {
-    const auto force = revolutionForce(tool, unit[u], engagement_, radius, POINTS);
-    for (std::size_t axis = 0; axis < 2; ++axis) {
-      result[u][axis] = fourier(force[axis]);
-      for (Complex& value : result[u][axis]) value *= 2.0 / POINTS;
-      result[u][axis][0] *= 0.5;
-    }
-  }
-  return result;
-}
-
 std::optional<ModeFollower::Move> ModeFollower::look(const Harmonics& measured, double noise_std,
                                                      const std::array<ModalModel, 2>& now,
                                                      double spindle_speed) {
-  const auto n_max = static_cast<std::size_t>(harmonics_) + 1;  // the mean first: it tells the pressures
-  if (measured[0].size() < n_max || measured[1].size() < n_max)
+  const auto count = static_cast<std::size_t>(harmonics_) + 1;
+  if (measured[0].size() < count || measured[1].size() < count)
     throw Error("mode follower: too few harmonics");
   if (!first_ || (*first_)[0].modes.size() != now[0].modes.size() ||
       (*first_)[1].modes.size() != now[1].modes.size()) {
     first_ = now;
   }
-  const auto rows = static_cast<Eigen::Index>(4 * n_max), terms = static_cast<Eigen::Index>(TERMS);
-  const auto modal = static_cast<Eigen::Index>(2 * (now[0].modes.size() + now[1].modes.size()));
-  const auto freedom =
-      modal + static_cast<Eigen::Index>(tool_.teeth - 1);  // the first tooth's radius is the datum
-  const auto frequency = [&](std::size_t n) {
-    return static_cast<double>(n) * spindle_speed / units::TWO_PI;
-  };
+  const WeightedHarmonics seen(measured, count, noise_std, parameters_.misfit, now, spindle_speed);
+  if (std::all_of(radius_.begin(), radius_.end(), [](double r) { return r == 0.0; }))
+    radius_ = firstRadii(seen, now, tool_, engagement_);
 
-  // What the force model misses passes the sensor too.
-  std::array<double, 2> largest{};
-  for (std::size_t axis = 0; axis < 2; ++axis) {
-    for (std::size_t n = 0; n < n_max; ++n) {
-      largest[axis] = std::max(largest[axis], std::abs(measured[axis][n]) /
-                                                  std::max(1.0, std::abs(now[axis].response(frequency(n)))));
-    }
-  }
-  Eigen::VectorXd weight(rows), target(rows);
-  for (std::size_t axis = 0; axis < 2; ++axis) {
-    for (std::size_t n = 0; n < n_max; ++n) {
-      const double passed = std::abs(now[axis].response(frequency(n)));
-      const double missed =
-          parameters_.misfit * std::max(0.1 * passed * largest[axis], std::abs(measured[axis][n]));
-      const auto row = static_cast<Eigen::Index>(2 * (axis * n_max + n));
-      weight(row) = weight(row + 1) = 1.0 / std::hypot(noise_std, missed);
-      target(row) = measured[axis][n].real();
-      target(row + 1) = measured[axis][n].imag();
-    }
-  }
-  target.array() *= weight.array();
-  const auto fill = [&](Eigen::MatrixXd& seen, Eigen::Index column, const std::array<ModalModel, 2>& sensor,
-                        const auto& harmonic) {
-    for (std::size_t axis = 0; axis < 2; ++axis) {
-      for (std::size_t n = 0; n < n_max; ++n) {
-        const Complex y = sensor[axis].response(frequency(n)) * harmonic(axis, n);
-        const auto row = static_cast<Eigen::Index>(2 * (axis * n_max + n));
-        seen(row, column) = weight(row) * y.real();
-        seen(row + 1, column) = weight(row) * y.imag();
-      }
-    }
-  };
-  const auto columns = [&](const std::array<ModalModel, 2>& sensor, const Basis& basis) {
-    Eigen::MatrixXd seen(rows, terms);
-    for (Eigen::Index j = 0; j < terms; ++j) {
-      fill(seen, j, sensor,
-           [&](std::size_t axis, std::size_t n) { return basis[static_cast<std::size_t>(j)][axis][n]; });
-    }
-    return seen;
-  };
-  // To first order runout adds to each tooth's edge force what its chip is thicker by: tells the radii to
-  // begin with.
-  if (std::all_of(radius_.begin(), radius_.end(), [](double r) { return r == 0.0; })) {
-    ToolGeometry one = tool_;
-    one.teeth = 1;
-    one.pitch.clear();
-    const Basis tooth = harmonicsOf(one, {0.0});
-    const Eigen::MatrixXd even = columns(now, harmonicsOf(tool_, radius_));
-    const Eigen::VectorXd x = (even.transpose() * even).ldlt().solve(even.transpose() * target);
-    Eigen::MatrixXd seen(rows, tool_.teeth);
-    for (int k = 0; k < tool_.teeth; ++k) {
-      fill(seen, k, now, [&](std::size_t axis, std::size_t n) {
-        const Complex turned = std::polar(1.0, static_cast<double>(n) * tool_.toothAngle(k));
-        return turned * (x(0) * tooth[2][axis][n] + x(1) * tooth[3][axis][n]) / engagement_.feed_per_tooth;
-      });
-    }
-    Eigen::MatrixXd normal = seen.transpose() * seen;
-    normal.diagonal().array() *= 1.0 + 1e-6;
-    const Eigen::VectorXd thicker = normal.ldlt().solve(seen.transpose() * (target - even * x));  // [m]
-    for (Eigen::Index k = 0; k + 1 < tool_.teeth; ++k) {
-      // Tooth k cuts what tooth k + 1 has left.
-      const double limit = 0.5 * engagement_.feed_per_tooth;
-      radius_[static_cast<std::size_t>(k + 1)] =
-          radius_[static_cast<std::size_t>(k)] - std::clamp(thicker(k) - thicker.mean(), -limit, limit);
-    }
-  }
-  // Residual with the force model's numbers at their best for this sensor.
-  const auto innovations = [&](const std::array<ModalModel, 2>& sensor, const Basis& basis) {
-    const Eigen::MatrixXd seen = columns(sensor, basis);
-    Eigen::MatrixXd normal = seen.transpose() * seen;
-    normal.diagonal().array() *= 1.0 + 1e-10;
-    return Eigen::VectorXd(target - seen * normal.ldlt().solve(seen.transpose() * target));
-  };
-  Eigen::VectorXd prior(freedom);
-  for (Eigen::Index i = 0; i < freedom; ++i) {
-    prior(i) = 1.0 / (i >= modal   ? RADIUS_STD
-                      : i % 2 == 0 ? parameters_.frequency_std
-                                   : parameters_.damping_std);
-  }
-  const auto radii = [&](const Eigen::VectorXd& at) {
-    std::vector<double> radius = radius_;
-    for (Eigen::Index i = modal; i < freedom; ++i)
-      radius[static_cast<std::size_t>(i - modal + 1)] += RADIUS_UNIT * at(i);
-    return radius;
-  };
-
-  // Least squares over the unknowns from `first` on; the ones before stay as they are.
-  Eigen::VectorXd p = Eigen::VectorXd::Zero(freedom);
-  Basis force = harmonicsOf(tool_, radius_);
-  Eigen::VectorXd residual = innovations(now, force);
-  double best = 0.0;
-  const auto cost = [&](const Eigen::VectorXd& r, const Eigen::VectorXd& at) {
-    return r.squaredNorm() + (prior.array() * at.array()).square().sum();
-  };
-  const auto descend = [&](Eigen::Index first) {
-    best = cost(residual, p);
-    double damping = 1e-3;
-    const Eigen::Index free = freedom - first;
-    for (int iteration = 0; iteration < MAX_ITERATIONS; ++iteration) {
-      Eigen::MatrixXd slope(rows, free);
-      for (Eigen::Index i = first; i < freedom; ++i) {
-        const double step = i < modal ? 1e-5 : 0.05;
-        Eigen::VectorXd other = p;
-        other(i) += step;
-        const auto sensor = moved(now, other);
-        slope.col(i - first) =
-            (innovations(sensor, i < modal ? force : harmonicsOf(tool_, radii(other))) - residual) / step;
-      }
-      const auto weightOf = prior.tail(free).array().square();
-      Eigen::MatrixXd normal = slope.transpose() * slope;
-      normal.diagonal().array() += weightOf;
-      const Eigen::VectorXd gradient =
-          slope.transpose() * residual + (weightOf * p.tail(free).array()).matrix();
-      bool better = false;
-      double gained = 0.0;
-      for (int attempt = 0; attempt < 8 && !better; ++attempt) {
-        Eigen::MatrixXd damped = normal;
-        damped.diagonal() *= 1.0 + damping;
-        Eigen::VectorXd trial = p;
-        trial.tail(free) -= damped.ldlt().solve(gradient);
-        const Basis trial_force = harmonicsOf(tool_, radii(trial));
-        const Eigen::VectorXd trial_residual = innovations(moved(now, trial), trial_force);
-        const double trial_cost = cost(trial_residual, trial);
-        if (trial_cost < best) {
-          gained = best - trial_cost;
-          best = trial_cost;
-          p = trial;
-          force = trial_force;
-          residual = trial_residual;
-          damping *= 0.2;
-          better = true;
-        } else {
-          damping *= 6.0;
-        }
-      }
-      if (!better || gained < 1e-3 * best) break;
-    }
-  };
   // The tool's runout first, with the sensor as believed: that is what the cut may be without any move.
+  CutFit fit(seen, now, tool_, engagement_, radius_, parameters_);
+  fit.fitRadii();
+  const double unmoved = fit.cost();
+  const std::vector<double> radius = fit.radii();
   Move move;
-  descend(modal);
-  move.before = residual.squaredNorm();
-  const double unmoved = best;
-  const std::vector<double> radius = radii(p);
-  const Basis unmoved_force = force;
-  descend(0);
-  move.after = residual.squaredNorm();
-  move.sensor = moved(now, p);
+  move.before = fit.squares();
+  const double first = seen.innovations(*first_, fit.force()).squaredNorm();
+  fit.fitAll();
+  move.after = fit.squares();
+  move.sensor = fit.sensor();
   // The force model's own shortcomings raise what counts as evidence.
-  const double scale = std::max(1.0, move.after / static_cast<double>(rows - terms - freedom));
-  const double first = innovations(*first_, unmoved_force).squaredNorm();
-  if ((unmoved - best) / scale > parameters_.evidence) {
-    radius_ = radii(p);
+  const auto left = seen.rows() - static_cast<Eigen::Index>(TERMS) - fit.freedom();
+  const double scale = std::max(1.0, move.after / static_cast<double>(left));
+  if ((unmoved - fit.cost()) / scale > parameters_.evidence) {
+    radius_ = fit.radii();
     return move;
   }
   radius_ = radius;

@@ -27,6 +27,19 @@ ModalModel ideal() {
   return model;
 }
 
+/// Of the six sensors. @throws Error when one is missing or not in N.
+std::array<std::size_t, 6> columnsOf(const SampleBlock& block) {
+  std::array<std::size_t, 6> column{};
+  for (std::size_t k = 0; k < 6; ++k) {
+    column[k] = block.channel(SPINDLE_SENSOR_CHANNELS[k]);
+    if (block.units.at(column[k]) != "N") {
+      throw Error(std::string("spindle sensor: channel ") + SPINDLE_SENSOR_CHANNELS[k] + " is in " +
+                  block.units[column[k]] + ", N is due");
+    }
+  }
+  return column;
+}
+
 }  // namespace
 
 SpindleForceSensor::SpindleForceSensor(const SpindleSensorCalibration& calibration, double length)
@@ -230,26 +243,66 @@ void SpindleForceSensor::closeStretch() {
   }
 }
 
-SampleBlock SpindleForceSensor::handle(const SampleBlock& block) {
-  std::array<std::size_t, 6> column{};
-  for (std::size_t k = 0; k < 6; ++k) {
-    column[k] = block.channel(SPINDLE_SENSOR_CHANNELS[k]);
-    if (block.units.at(column[k]) != "N") {
-      throw Error(std::string("spindle sensor: channel ") + SPINDLE_SENSOR_CHANNELS[k] + " is in " +
-                  block.units[column[k]] + ", N is due");
-    }
-  }
-  learnPending(std::numeric_limits<double>::infinity());
+void SpindleForceSensor::layOutCourses(const SampleBlock& block) {
   const bool gap = next_index_ && *next_index_ != block.first_index;
   next_index_ = block.first_index + block.size();
-  if (courses_.empty() || course_rate_ != block.sample_rate || gap) {
-    courses_.clear();
-    for (const ModalModel* course :
-         {&calibration_.dynamic_yx, &calibration_.dynamic_yz, &calibration_.dynamic_xz})
-      courses_.emplace_back(*course, block.sample_rate, Hold::first_order);
-    course_rate_ = block.sample_rate;
-  }
+  if (!courses_.empty() && course_rate_ == block.sample_rate && !gap) return;
+  courses_.clear();
+  for (const ModalModel* course :
+       {&calibration_.dynamic_yx, &calibration_.dynamic_yz, &calibration_.dynamic_xz})
+    courses_.emplace_back(*course, block.sample_rate, Hold::first_order);
+  course_rate_ = block.sample_rate;
+}
 
+bool SpindleForceSensor::turning() const {
+  return angle_known_ && angle_.speed >= LEAST_SPEED;
+}
+
+std::array<Complex, 3> SpindleForceSensor::unbalancePull(double time) const {
+  std::array<Complex, 3> pull{};
+  if (!turning()) return pull;
+  const double f = angle_.speed / units::TWO_PI;
+  const Complex phase = std::polar(1.0, angle_.angle + angle_.speed * (time - angle_.stamp));
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (weight_[axis] > 0.0)
+      pull[axis] = health_.unbalance[axis] * angle_.speed * angle_.speed * sensor_[axis].response(f) * phase;
+  }
+  return pull;
+}
+
+bool SpindleForceSensor::takeZeroOff(double time, std::array<double, 6>& sensors) {
+  bool unloaded = false, overloaded = false;
+  for (std::size_t k = 0; k < 6; ++k) {
+    if (zero_) sensors[k] -= zero_->offset[k] + zero_->drift[k] * (time - zero_->at);
+    const double compression = calibration_.preload[k] + sensors[k];
+    const double left = compression - calibration_.least_compression;
+    health_.least_left = std::min(health_.least_left, left);
+    unloaded = unloaded || left <= 0.0;
+    overloaded = overloaded || compression > calibration_.range_limit;
+  }
+  if (unloaded) ++health_.unloaded;
+  if (overloaded) ++health_.overloaded;
+  return !unloaded && !overloaded;
+}
+
+std::array<double, 3> SpindleForceSensor::forceOf(const std::array<double, 6>& sensors) {
+  const std::array<double, 3> means = pairMeans(sensors);
+  const double y = means[1] * constant_[1];
+  const double x = (means[0] - yx_ * courses_[0].step(y)) * constant_[0];
+  const double z = (means[2] - yz_ * courses_[1].step(y) - xz_ * courses_[2].step(x)) * constant_[2];
+  return {x, y, z};
+}
+
+void SpindleForceSensor::passOver() {
+  courses_[0].step(last_[1]);
+  courses_[1].step(last_[1]);
+  courses_[2].step(last_[0]);
+}
+
+SampleBlock SpindleForceSensor::handle(const SampleBlock& block) {
+  const std::array<std::size_t, 6> column = columnsOf(block);
+  learnPending(std::numeric_limits<double>::infinity());
+  layOutCourses(block);
   SampleBlock forces;
   forces.stamp = block.stamp;
   forces.sample_rate = block.sample_rate;
@@ -265,24 +318,10 @@ SampleBlock SpindleForceSensor::handle(const SampleBlock& block) {
     pending_rate_ = block.sample_rate;
     pending_angle_ = angle_known_ ? angle_ : SpindleAngle{};
   }
-
   // Unbalance at the first sample and what turns it to the next.
-  std::array<Complex, 3> pull{};
-  Complex turn = 1.0;
-  if (angle_known_ && angle_.speed >= LEAST_SPEED) {
-    const double f = angle_.speed / units::TWO_PI;
-    const Complex phase = std::polar(1.0, angle_.angle + angle_.speed * (block.stamp - angle_.stamp));
-    turn = std::polar(1.0, angle_.speed / block.sample_rate);
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      if (weight_[axis] > 0.0) {
-        pull[axis] =
-            health_.unbalance[axis] * angle_.speed * angle_.speed * sensor_[axis].response(f) * phase;
-      }
-    }
-  }
-
+  std::array<Complex, 3> pull = unbalancePull(block.stamp);
+  const Complex turn = turning() ? std::polar(1.0, angle_.speed / block.sample_rate) : 1.0;
   for (std::size_t i = 0; i < block.size(); ++i) {
-    const double time = block.timeOf(i);
     std::array<double, 6> sensors{};
     bool finite = true;
     for (std::size_t k = 0; k < 6; ++k) {
@@ -290,33 +329,14 @@ SampleBlock SpindleForceSensor::handle(const SampleBlock& block) {
       finite = finite && std::isfinite(sensors[k]);
     }
     if (learning) pending_.push_back(sensors);
-    bool unloaded = false, overloaded = false;
-    for (std::size_t k = 0; k < 6 && finite; ++k) {
-      if (zero_) sensors[k] -= zero_->offset[k] + zero_->drift[k] * (time - zero_->at);
-      const double compression = calibration_.preload[k] + sensors[k];
-      const double left = compression - calibration_.least_compression;
-      health_.least_left = std::min(health_.least_left, left);
-      unloaded = unloaded || left <= 0.0;
-      overloaded = overloaded || compression > calibration_.range_limit;
-    }
-    if (unloaded) ++health_.unloaded;
-    if (overloaded) ++health_.overloaded;
-    invalid_[i] = unloaded || overloaded;
+    invalid_[i] = finite && !takeZeroOff(block.timeOf(i), sensors);
     any_invalid_ = any_invalid_ || invalid_[i];
-    if (!finite || invalid_[i]) {
-      // The cross-talk's courses go on with the last forces that were measured.
-      courses_[0].step(last_[1]);
-      courses_[1].step(last_[1]);
-      courses_[2].step(last_[0]);
-      forces.samples.insert(forces.samples.end(), 3, NOT_A_NUMBER);
+    if (finite && !invalid_[i]) {
+      last_ = forceOf(sensors);
+      for (std::size_t axis = 0; axis < 3; ++axis) forces.samples.push_back(last_[axis] - pull[axis].real());
     } else {
-      const std::array<double, 3> means = pairMeans(sensors);
-      const double y = means[1] * constant_[1];
-      const double x = (means[0] - yx_ * courses_[0].step(y)) * constant_[0];
-      const double z = (means[2] - yz_ * courses_[1].step(y) - xz_ * courses_[2].step(x)) * constant_[2];
-      last_ = {x, y, z};
-      forces.samples.insert(forces.samples.end(),
-                            {x - pull[0].real(), y - pull[1].real(), z - pull[2].real()});
+      passOver();
+      forces.samples.insert(forces.samples.end(), 3, NOT_A_NUMBER);
     }
     for (Complex& p : pull) p *= turn;
   }

@@ -102,6 +102,17 @@ class ForceCompensation {
 
  private:
   void design(double speed, double sample_rate);
+  ForceBlock measuredIn(const SampleBlock& block);
+  void prepareFilters(double sample_rate);
+  void retune(double sample_rate);
+  /// Sums over a block, each innovation over its design.
+  struct Innovations {
+    std::array<double, 3> last{}, own{}, neighbours{};
+  };
+  void take(std::size_t axis, double& sample, Innovations& innovations);
+  void couple(std::array<std::vector<double>, 3>& force, std::size_t i);
+  void track(std::array<std::vector<double>, 3>& force, std::size_t i, double sample_rate,
+             Innovations& innovations);
   void run(std::array<std::vector<double>, 3>& force, double sample_rate);
   void layOutCrossTalk(double sample_rate);
   void follow(double time, double sample_rate);

@@ -49,10 +49,6 @@ class ModeFollower {
                            double spindle_speed);
 
  private:
-  static constexpr std::size_t TERMS = 4;  // tangential and radial, chip and edge
-  using Basis = std::array<std::array<std::vector<std::complex<double>>, 2>, TERMS>;  // n = 0..
-  Basis harmonicsOf(const ToolGeometry& tool, const std::vector<double>& radius) const;
-
   ToolGeometry tool_;
   Engagement engagement_;
   int harmonics_;

@@ -61,7 +61,6 @@ class SpindleForceSensor {
 
   /// The causal low-pass of the calibration on a measured block, NaN kept.
   void lowPass(ForceBlock& block);
-  double lowPassDelay() const { return low_pass_.empty() ? 0.0 : low_pass_[0].delay(); }  ///< [samples]
 
   void reset();
   const SpindleSensorHealth& health() const { return health_; }
@@ -85,6 +84,15 @@ class SpindleForceSensor {
   void learn(double time, double angle, double speed, const std::array<double, 6>& sensors);
   void closeStretch();
   void tellZero();
+  void layOutCourses(const SampleBlock& block);
+  bool turning() const;
+  /// [N] of the unbalance at a time [s], complex: its real part shows.
+  std::array<std::complex<double>, 3> unbalancePull(double time) const;
+  /// @return whether all six measure: none unloaded or overloaded, which is counted.
+  bool takeZeroOff(double time, std::array<double, 6>& sensors);
+  std::array<double, 3> forceOf(const std::array<double, 6>& sensors);
+  /// A sample that is no measurement: the cross-talk's courses go on with the last forces.
+  void passOver();
   std::array<std::complex<double>, 3> throughCalibration(const std::array<std::complex<double>, 3>& means,
                                                          double f) const;
 
