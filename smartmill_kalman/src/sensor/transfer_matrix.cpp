@@ -23,7 +23,7 @@ using Eigen::Index;
 using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
 
-constexpr Index SMOOTH = 8;         // lines to each side that share a residual variance
+constexpr std::size_t SMOOTH = 8;   // lines to each side that share a residual variance
 constexpr double FULL_RANK = 1e-6;  // [1] smallest over largest singular value of the directions tapped
 
 /// Force and moment of a unit blow (eq. 2.2, 2.6), moments over the lever.
@@ -74,6 +74,12 @@ void check(const std::vector<MatrixTap>& taps) {
 
 }  // namespace
 
+Eigen::VectorXd TransferMatrix::scale() const {
+  Eigen::VectorXd scale = Eigen::VectorXd::Ones(static_cast<Index>(channels));
+  if (channels == 6) scale.tail<3>().setConstant(lever);
+  return scale;
+}
+
 TransferMatrix TransferMatrix::band(double low, double high) const {
   TransferMatrix result = *this;
   result.frequency.clear();
@@ -106,40 +112,54 @@ FrequencyResponse TransferMatrix::element(std::size_t row, std::size_t column) c
   return frf;
 }
 
-TransferMatrix identifyTransferMatrix(const std::vector<MatrixTap>& taps, double sample_rate) {
-  check(taps);
-  const auto channels = static_cast<Index>(taps.front().channels.size());
-  const auto hits = static_cast<Index>(taps.size());
-  const std::size_t samples = taps.front().hammer.size();
+namespace {
 
-  TransferMatrix result;
-  result.channels = static_cast<std::size_t>(channels);
-  result.hits = static_cast<int>(hits);
-  result.frequency = fourierFrequencies(samples, sample_rate);
-  const std::size_t lines = result.frequency.size();
-  double distance = 0.0;
-  for (const MatrixTap& tap : taps) {
-    for (const double p : tap.point) distance += p * p;
-  }
-  result.lever = std::max(1e-3, std::sqrt(distance / static_cast<double>(hits)));
+template <class Matrix>
+Matrix scaledBy(const Eigen::VectorXd& scale, const Matrix& matrix) {
+  return scale.asDiagonal() * matrix * scale.cwiseInverse().asDiagonal();
+}
 
-  // Scaled: moments over the lever, so that a condition number means something.
-  Eigen::VectorXd scale = Eigen::VectorXd::Ones(channels);
-  if (channels == 6) scale.tail<3>().setConstant(result.lever);
-  MatrixXd blows(channels, hits);
-  for (Index k = 0; k < hits; ++k)
-    blows.col(k) = blow(taps[static_cast<std::size_t>(k)], channels, result.lever);
+/// Forces and moments of every tap over its hammer's force, a column a tap. @throws Error when they leave a
+/// direction out.
+MatrixXd blowsOf(const std::vector<MatrixTap>& taps, Index channels, double lever) {
+  MatrixXd blows(channels, static_cast<Index>(taps.size()));
+  for (std::size_t k = 0; k < taps.size(); ++k)
+    blows.col(static_cast<Index>(k)) = blow(taps[k], channels, lever);
   const Eigen::VectorXd values = Eigen::JacobiSVD<MatrixXd>(blows).singularValues();
   if (!(values(channels - 1) > FULL_RANK * values(0))) {
     throw Error(channels == 6 ? "transfer matrix: the taps do not press along and turn about every axis"
                               : "transfer matrix: the taps do not press along every axis");
   }
+  return blows;
+}
 
+/// What every tap shows on the lines, scaled.
+struct TapSpectra {
   std::vector<std::vector<Complex>> hammer;                 // [tap][line]
   std::vector<std::vector<std::vector<Complex>>> measured;  // [tap][channel][line]
-  MatrixXd noise(channels, hits);                           // [N^2 samples] of a line
-  for (Index k = 0; k < hits; ++k) {
-    const MatrixTap& tap = taps[static_cast<std::size_t>(k)];
+  MatrixXd noise;                                           // [N^2 samples] of a line; channel, tap
+
+  MatrixXcd applied(const MatrixXd& blows, std::size_t line) const {
+    MatrixXcd e(blows.rows(), blows.cols());
+    for (Index k = 0; k < e.cols(); ++k) e.col(k) = blows.col(k) * hammer[static_cast<std::size_t>(k)][line];
+    return e;
+  }
+  MatrixXcd shown(std::size_t line) const {
+    MatrixXcd m(noise.rows(), noise.cols());
+    for (Index k = 0; k < m.cols(); ++k) {
+      for (Index c = 0; c < m.rows(); ++c)
+        m(c, k) = measured[static_cast<std::size_t>(k)][static_cast<std::size_t>(c)][line];
+    }
+    return m;
+  }
+};
+
+TapSpectra spectraOf(const std::vector<MatrixTap>& taps, const Eigen::VectorXd& scale) {
+  TapSpectra spectra;
+  spectra.noise.resize(scale.size(), static_cast<Index>(taps.size()));
+  for (std::size_t k = 0; k < taps.size(); ++k) {
+    const MatrixTap& tap = taps[k];
+    const std::size_t samples = tap.hammer.size();
     const std::vector<double> window = impactWindow(tap.hammer);
     std::size_t before = 0;
     while (before < samples && window[before] == 0.0) ++before;
@@ -151,165 +171,103 @@ TransferMatrix identifyTransferMatrix(const std::vector<MatrixTap>& taps, double
     std::vector<double> force = tap.hammer;
     const double hammer_level = level(force);
     for (std::size_t i = 0; i < samples; ++i) force[i] = (force[i] - hammer_level) * window[i];
-    hammer.push_back(fourier(force));
-    measured.emplace_back();
-    for (Index c = 0; c < channels; ++c) {
+    spectra.hammer.push_back(fourier(force));
+    spectra.measured.emplace_back();
+    for (Index c = 0; c < scale.size(); ++c) {
       std::vector<double> response = tap.channels[static_cast<std::size_t>(c)];
       const double base = level(response);
       double squares = 0.0;
       for (double& v : response) v = (v - base) / scale(c);
       for (std::size_t i = 0; i < before; ++i) squares += response[i] * response[i];
-      noise(c, k) =
+      spectra.noise(c, static_cast<Index>(k)) =
           before > 1 ? squares / static_cast<double>(before - 1) * static_cast<double>(samples) : 0.0;
-      measured.back().push_back(fourier(response));
+      spectra.measured.back().push_back(fourier(response));
     }
   }
-
-  // First what each line leaves over, then its standard deviations.
-  MatrixXd left(channels, static_cast<Index>(lines));
-  std::vector<MatrixXcd> applied_inverse, scaled;
-  for (std::size_t l = 0; l < lines; ++l) {
-    MatrixXcd e(channels, hits), m(channels, hits);
-    for (Index k = 0; k < hits; ++k) {
-      e.col(k) = blows.col(k) * hammer[static_cast<std::size_t>(k)][l];
-      for (Index c = 0; c < channels; ++c)
-        m(c, k) = measured[static_cast<std::size_t>(k)][static_cast<std::size_t>(c)][l];
-    }
-    const MatrixXcd square = e * e.adjoint();
-    applied_inverse.push_back(square.ldlt().solve(MatrixXcd::Identity(channels, channels)));
-    scaled.push_back(m * e.adjoint() * applied_inverse.back());
-    left.col(static_cast<Index>(l)) = (m - scaled.back() * e).rowwise().squaredNorm();
-    result.inverse.push_back(scale.asDiagonal() * (e * pseudoInverse(m)) * scale.cwiseInverse().asDiagonal());
-  }
-  const double free = static_cast<double>(hits - channels);
-  const Eigen::VectorXd before_hits = noise.rowwise().mean();
-  for (std::size_t l = 0; l < lines; ++l) {
-    const auto at = static_cast<Index>(l), from = std::max<Index>(0, at - SMOOTH);
-    const Index count = std::min(static_cast<Index>(lines), at + SMOOTH + 1) - from;
-    Eigen::VectorXd variance = before_hits;
-    if (free > 0.0) variance = variance.cwiseMax(left.middleCols(from, count).rowwise().mean() / free);
-    MatrixXd std_dev(channels, channels);
-    for (Index i = 0; i < channels; ++i) {
-      for (Index j = 0; j < channels; ++j)
-        std_dev(i, j) = std::sqrt(variance(i) * std::max(0.0, applied_inverse[l](j, j).real()));
-    }
-    // d(G^-1) = -G^-1 dG G^-1; G's columns in one row share their noise: covariance of row i is variance(i)
-    // times the inverse of E E'.
-    const MatrixXcd h = scale.cwiseInverse().asDiagonal() * result.inverse[l] * scale.asDiagonal();
-    const MatrixXcd right = h.adjoint() * applied_inverse[l] * h;
-    MatrixXd inverse_std(channels, channels);
-    for (Index i = 0; i < channels; ++i) {
-      const double rows = (h.row(i).cwiseAbs2().transpose().array() * variance.array()).sum();
-      for (Index j = 0; j < channels; ++j)
-        inverse_std(i, j) = std::sqrt(std::max(0.0, rows * right(j, j).real()));
-    }
-    const Eigen::VectorXd singular = Eigen::JacobiSVD<MatrixXcd>(scaled[l]).singularValues();
-    result.condition.push_back(singular(channels - 1) > 0.0 ? singular(0) / singular(channels - 1)
-                                                            : HUGE_VAL);
-    const auto backScaled = [&scale](const auto& matrix) {
-      return (scale.asDiagonal() * matrix * scale.cwiseInverse().asDiagonal()).eval();
-    };
-    result.forward.push_back(backScaled(scaled[l]));
-    result.forward_std.push_back(backScaled(std_dev));
-    result.inverse_std.push_back(backScaled(inverse_std));
-  }
-  return result;
+  return spectra;
 }
 
-namespace {
+/// One line's matrices, scaled.
+struct LineFit {
+  MatrixXcd forward, inverse;
+  MatrixXcd covariance;  // of a row of forward, over the channel's variance: inverse of E E'
+  Eigen::VectorXd left;  // sum of squares that the hits leave over, a channel each
+};
 
-/// Element of the matrix on the lines of a longer transform: the impulse response, with nothing between its
-/// end and its beginning. Lines above the band are faded out, for no tap has told them.
-std::vector<Complex> onLines(const std::vector<Complex>& element, double spacing, double bandwidth,
-                             std::size_t length) {
-  const std::size_t samples = 2 * (element.size() - 1);
-  std::vector<Complex> faded = element;
-  for (std::size_t l = 0; l < faded.size(); ++l) {
-    const double f = spacing * static_cast<double>(l);
-    const double beyond = std::clamp((f / bandwidth - 1.2) / 0.3, 0.0, 1.0);
-    faded[l] *= 0.5 * (1.0 + std::cos(units::PI * beyond));
+LineFit fitLine(const MatrixXcd& e, const MatrixXcd& m) {
+  LineFit line;
+  const MatrixXcd square = e * e.adjoint();
+  line.covariance = square.ldlt().solve(MatrixXcd::Identity(e.rows(), e.rows()));
+  line.forward = m * e.adjoint() * line.covariance;
+  line.inverse = e * pseudoInverse(m);
+  line.left = (m - line.forward * e).rowwise().squaredNorm();
+  return line;
+}
+
+/// Standard deviations of a line's two matrices. @param variance of what a channel shows there
+std::array<MatrixXd, 2> deviations(const LineFit& line, const Eigen::VectorXd& variance) {
+  const Index channels = variance.size();
+  MatrixXd forward(channels, channels), inverse(channels, channels);
+  // d(G^-1) = -G^-1 dG G^-1; G's columns in one row share their noise: covariance of row i is variance(i)
+  // times the inverse of E E'.
+  const MatrixXcd right = line.inverse.adjoint() * line.covariance * line.inverse;
+  for (Index i = 0; i < channels; ++i) {
+    const double rows = (line.inverse.row(i).cwiseAbs2().transpose().array() * variance.array()).sum();
+    for (Index j = 0; j < channels; ++j) {
+      forward(i, j) = std::sqrt(variance(i) * std::max(0.0, line.covariance(j, j).real()));
+      inverse(i, j) = std::sqrt(std::max(0.0, rows * right(j, j).real()));
+    }
   }
-  faded.back() = faded.back().real();
-  const std::vector<double> impulse = inverseFourier(faded, samples);
-  std::vector<double> longer(length, 0.0);
-  const std::size_t early = samples / 8;  // fading leaves a little before the beginning
-  std::copy(impulse.begin(), impulse.end() - static_cast<std::ptrdiff_t>(early), longer.begin());
-  std::copy(impulse.end() - static_cast<std::ptrdiff_t>(early), impulse.end(),
-            longer.end() - static_cast<std::ptrdiff_t>(early));
-  return fourier(longer);
+  return {forward, inverse};
+}
+
+/// Variance of what every channel shows on a line: what the hits leave over there and on its neighbours,
+/// never below what stands before the hits.
+Eigen::VectorXd varianceAt(const std::vector<LineFit>& lines, std::size_t at, const Eigen::VectorXd& before,
+                           Index hits) {
+  const Index free = hits - before.size();
+  if (free <= 0) return before;
+  const std::size_t from = at < SMOOTH ? 0 : at - SMOOTH, to = std::min(lines.size(), at + SMOOTH + 1);
+  Eigen::VectorXd left = Eigen::VectorXd::Zero(before.size());
+  for (std::size_t l = from; l < to; ++l) left += lines[l].left;
+  return before.cwiseMax(left / static_cast<double>(to - from) / static_cast<double>(free));
 }
 
 }  // namespace
 
-std::vector<std::vector<double>> invertRecord(const TransferMatrix& matrix,
-                                              const std::vector<std::vector<double>>& measured,
-                                              double sample_rate, double bandwidth) {
-  const std::size_t channels = matrix.channels;
-  const auto size = static_cast<Index>(channels);
-  if (measured.size() != channels || matrix.frequency.size() < 2 || matrix.frequency.front() != 0.0) {
-    throw Error("transfer matrix: " + std::to_string(measured.size()) + " records, " +
-                std::to_string(channels) + " and all lines of the matrix are due");
+TransferMatrix identifyTransferMatrix(const std::vector<MatrixTap>& taps, double sample_rate) {
+  check(taps);
+  const auto channels = static_cast<Index>(taps.front().channels.size());
+  const auto hits = static_cast<Index>(taps.size());
+  TransferMatrix result;
+  result.channels = static_cast<std::size_t>(channels);
+  result.hits = static_cast<int>(hits);
+  result.frequency = fourierFrequencies(taps.front().hammer.size(), sample_rate);
+  double distance = 0.0;
+  for (const MatrixTap& tap : taps) {
+    for (const double p : tap.point) distance += p * p;
   }
-  const std::size_t samples = measured.front().size(), lines = matrix.frequency.size();
-  const double spacing = matrix.frequency[1];
-  // Behind the record room for what the inverse rings, so that the end does not come round to the beginning.
-  std::size_t length = 1;
-  while (length < samples + 2 * lines) length *= 2;
-  if (std::abs(spacing * 2.0 * static_cast<double>(lines - 1) / sample_rate - 1.0) > 1e-9)
-    throw Error("transfer matrix: taps and record need one sample rate and taps an even number of samples");
-  Eigen::VectorXd scale = Eigen::VectorXd::Ones(size);
-  if (channels == 6) scale.tail<3>().setConstant(matrix.lever);
-  std::vector<std::vector<Complex>> spectra, g;
-  for (std::vector<double> record : measured) {
-    if (record.size() != samples) throw Error("transfer matrix: records of different lengths");
-    record.resize(length, 0.0);
-    spectra.push_back(fourier(record));
-  }
-  std::vector<double> floor(lines, 0.0);
-  for (Index i = 0; i < size; ++i) {
-    for (Index j = 0; j < size; ++j) {
-      std::vector<Complex> element;
-      for (std::size_t l = 0; l < lines; ++l) {
-        element.push_back(matrix.forward[l](i, j) * scale(j) / scale(i));
-        floor[l] +=
-            std::pow(matrix.forward_std[l](i, j) * scale(j) / scale(i), 2) / static_cast<double>(size);
-      }
-      g.push_back(onLines(element, spacing, bandwidth, length));
-    }
-  }
-  for (std::size_t i = 0; i < g.front().size(); ++i) {
-    const double f = sample_rate * static_cast<double>(i) / static_cast<double>(length);
-    const double beyond = std::clamp((f / bandwidth - 1.0) / 0.15, 0.0, 1.0);
-    const double weight = 0.5 * (1.0 + std::cos(units::PI * beyond));
-    Eigen::VectorXcd m(size);
-    MatrixXcd here(size, size);
-    for (Index c = 0; c < size; ++c) {
-      m(c) = spectra[static_cast<std::size_t>(c)][i] / scale(c);
-      for (Index j = 0; j < size; ++j) here(c, j) = g[static_cast<std::size_t>(c * size + j)][i];
-    }
-    if (weight <= 0.0) {
-      m.setZero();
-    } else {
-      const double unknown = floor[std::min(lines - 1, static_cast<std::size_t>(f / spacing + 0.5))];
-      const MatrixXcd square = here.adjoint() * here + unknown * MatrixXcd::Identity(size, size);
-      m = weight * square.ldlt().solve(here.adjoint() * m);
-    }
-    for (Index c = 0; c < size; ++c) spectra[static_cast<std::size_t>(c)][i] = m(c) * scale(c);
-  }
-  std::vector<std::vector<double>> applied;
-  for (const auto& spectrum : spectra) {
-    applied.push_back(inverseFourier(spectrum, length));
-    applied.back().resize(samples);
-  }
-  return applied;
-}
+  result.lever = std::max(1e-3, std::sqrt(distance / static_cast<double>(hits)));
+  const Eigen::VectorXd scale = result.scale();
+  const MatrixXd blows = blowsOf(taps, channels, result.lever);
+  const TapSpectra spectra = spectraOf(taps, scale);
 
-std::array<double, 2> pointOfApplication(const std::array<double, 3>& force,
-                                         const std::array<double, 3>& moment, double z) {
-  // M_x = y F_z - z F_y, M_y = z F_x - x F_z
-  const double largest = std::max({std::abs(force[0]), std::abs(force[1]), std::abs(force[2])});
-  if (!(std::abs(force[2]) > 1e-6 * largest)) return {std::nan(""), std::nan("")};
-  return {(z * force[0] - moment[1]) / force[2], (moment[0] + z * force[1]) / force[2]};
+  // First what each line leaves over, then its standard deviations.
+  std::vector<LineFit> lines;
+  for (std::size_t l = 0; l < result.frequency.size(); ++l)
+    lines.push_back(fitLine(spectra.applied(blows, l), spectra.shown(l)));
+  const Eigen::VectorXd before = spectra.noise.rowwise().mean();
+  for (std::size_t l = 0; l < lines.size(); ++l) {
+    const auto std_dev = deviations(lines[l], varianceAt(lines, l, before, hits));
+    const Eigen::VectorXd singular = Eigen::JacobiSVD<MatrixXcd>(lines[l].forward).singularValues();
+    result.condition.push_back(singular(channels - 1) > 0.0 ? singular(0) / singular(channels - 1)
+                                                            : HUGE_VAL);
+    result.forward.push_back(scaledBy(scale, lines[l].forward));
+    result.inverse.push_back(scaledBy(scale, lines[l].inverse));
+    result.forward_std.push_back(scaledBy(scale, std_dev[0]));
+    result.inverse_std.push_back(scaledBy(scale, std_dev[1]));
+  }
+  return result;
 }
 
 }  // namespace smartmill::kalman

@@ -11,9 +11,9 @@
 #include <string>
 #include <vector>
 
+#include "kalman/record_inversion.h"
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/units.h"
-#include "smartmill_kalman/sensor/transfer_matrix.h"
 #include "smartmill_kalman_testing/plate_sensor.h"
 #include "smartmill_kalman_testing/reference_case.h"
 

@@ -33,6 +33,8 @@ struct TransferMatrix {
   double lever =
       0.0;  ///< [m] root mean square distance of the taps from the sensor's origin; moments over it
 
+  /// What a condition number counts in: forces as they are, moments over the lever.
+  Eigen::VectorXd scale() const;
   /// Lines with low <= frequency <= high [Hz].
   TransferMatrix band(double low, double high) const;
   /// Element as an FRF with its standard deviations. @param row measured @param column applied
@@ -46,21 +48,5 @@ struct TransferMatrix {
 /// @param sample_rate [Hz] @throws Error when taps differ in length, are fewer than channels, or do not press
 /// in every direction (and, of six channels, turn about every axis).
 TransferMatrix identifyTransferMatrix(const std::vector<MatrixTap>& taps, double sample_rate);
-
-/// What the sensor would have shown without its dynamics: (G' G + floor)^-1 G' at every line, floor what the
-/// matrix is not known to. A record of any length, no latency.
-/// @param measured one record a channel [N, N m] @param bandwidth [Hz] full to there, nothing beyond 1.15
-/// times
-/// @return applied force (and moment) of every channel. @throws Error on another number of channels or rate,
-/// or when the matrix is only a band.
-std::vector<std::vector<double>> invertRecord(const TransferMatrix& matrix,
-                                              const std::vector<std::vector<double>>& measured,
-                                              double sample_rate, double bandwidth);
-
-/// Point at height z above the sensor's origin at which a single force gives this moment, M = r x F.
-/// @return x, y [m]; NaN where the force along z cannot tell. @param force [N] @param moment [N m] @param z
-/// [m]
-std::array<double, 2> pointOfApplication(const std::array<double, 3>& force,
-                                         const std::array<double, 3>& moment, double z);
 
 }  // namespace smartmill::kalman
