@@ -2,7 +2,6 @@
 
 #include <cstdio>
 #include <functional>
-#include <iostream>
 #include <memory>
 #include <string>
 #include <vector>
@@ -13,9 +12,8 @@
 #include <smartmill_msgs/Frf.h>
 #include <smartmill_msgs/ModalModel.h>
 #include <smartmill_msgs/StabilityChart.h>
-#include <CLI/CLI.hpp>
-
 #include "smartmill_core/error.h"
+#include "smartmill_core/program.h"
 #include "smartmill_launch/comparison/topic_comparison.h"
 #include "smartmill_ros/bag_reader.h"
 
@@ -160,29 +158,19 @@ int run(const std::string& first, const std::string& second, double slack, doubl
 int main(int argc, char** argv) {
   std::string first, second;
   double slack = 1.0, most_lost = 0.0;
-  CLI::App app{
+  CommandLine line{
       "Compares the results in two recordings (a session and its replay) to the last digit; exit code 1 on "
       "any "
       "difference."};
-  app.add_option("first", first, "bag")->required();
-  app.add_option("second", second, "bag")->required();
-  app.add_option("--slack", slack,
-                 "seconds at begin and end that a recorder may have missed of forces and verdicts")
-      ->capture_default_str()
-      ->check(CLI::NonNegativeNumber);
-  app.add_option("--most-lost", most_lost,
-                 "share of forces and verdicts that a recorder may have lost in between, as a busy one does")
-      ->capture_default_str()
-      ->check(CLI::Range(0.0, 1.0));
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : 2;
-  }
-  try {
-    return run(first, second, slack, most_lost);
-  } catch (const std::exception& e) {
-    std::cerr << "compare_bags: " << e.what() << "\n";
-    return 1;
-  }
+  line.option("first", first, "bag").required();
+  line.option("second", second, "bag").required();
+  line.option("--slack", slack,
+              "seconds at begin and end that a recorder may have missed of forces and verdicts")
+      .showDefault()
+      .notNegative();
+  line.option("--most-lost", most_lost,
+              "share of forces and verdicts that a recorder may have lost in between, as a busy one does")
+      .showDefault()
+      .within(0.0, 1.0);
+  return runProgram(line, argc, argv, [&] { return run(first, second, slack, most_lost); });
 }

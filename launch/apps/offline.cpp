@@ -9,17 +9,15 @@
 #include <cstdlib>
 #include <filesystem>
 #include <functional>
-#include <iostream>
 #include <string>
 #include <vector>
 
 #include <ros/package.h>
-#include <CLI/CLI.hpp>
-
 #include "../src/report/session_bag.h"
 #include "../src/shell.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/strict_yaml.h"
+#include "smartmill_core/program.h"
 #include "smartmill_core/units.h"
 #include "smartmill_launch/comparison/offline_comparison.h"
 
@@ -186,25 +184,15 @@ int main(int argc, char** argv) {
   const std::string package = ros::package::getPath("smartmill_launch");
   request.model = package + "/models/mill.yaml";
   request.config = package + "/config";
-  CLI::App app{
+  CommandLine line{
       "Puts a recorded session through the offline tools, times them and holds their results against those "
       "of the "
       "nodes; exit code 1 when one differs in its printed digits or is slower than asked for."};
-  app.add_option("bag", request.bag, "recorded session")->required()->check(CLI::ExistingFile);
-  app.add_option("-o,--out", request.out, "folder for what the tools write")->capture_default_str();
-  app.add_option("--model", request.model, "machine model that the session ran with")->capture_default_str();
-  app.add_option("--config", request.config, "folder with the nodes' parameter files")->capture_default_str();
-  app.add_option("--least-ratio", request.least_ratio, "times real time that each tool must reach")
-      ->capture_default_str();
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : 2;
-  }
-  try {
-    return run(request);
-  } catch (const std::exception& e) {
-    std::cerr << "offline: " << e.what() << "\n";
-    return 1;
-  }
+  line.option("bag", request.bag, "recorded session").required().existingFile();
+  line.option("-o,--out", request.out, "folder for what the tools write").showDefault();
+  line.option("--model", request.model, "machine model that the session ran with").showDefault();
+  line.option("--config", request.config, "folder with the nodes' parameter files").showDefault();
+  line.option("--least-ratio", request.least_ratio, "times real time that each tool must reach")
+      .showDefault();
+  return runProgram(line, argc, argv, [&] { return run(request); });
 }

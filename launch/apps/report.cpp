@@ -7,18 +7,16 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
-#include <iostream>
 #include <limits>
 #include <sstream>
 #include <string>
-
-#include <CLI/CLI.hpp>
 
 #include "../src/report/report_pictures.h"
 #include "../src/report/session_bag.h"
 #include "../src/shell.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/machine_model.h"
+#include "smartmill_core/program.h"
 #include "smartmill_core/units.h"
 
 namespace {
@@ -158,25 +156,14 @@ int run(const Request& request) {
 
 int main(int argc, char** argv) {
   Request request;
-  CLI::App app{
+  CommandLine line{
       "Tells what a recorded session measured, beside the truth where a simulator has recorded it: tables, a "
       "summary "
       "file and pictures."};
-  app.add_option("bag", request.bag, "recorded session")->required();
-  app.add_option("--session", request.session, "JSON summary of the session node, kept in summary.json");
-  app.add_option("-o,--out", request.out, "folder for summary.md, summary.json and pictures")
-      ->capture_default_str();
-  app.add_flag("--check", request.check, "exit code 1 when a target is missed");
-  app.add_flag("!--no-pictures", request.pictures, "tables only");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : 2;
-  }
-  try {
-    return run(request);
-  } catch (const std::exception& e) {
-    std::cerr << "report: " << e.what() << "\n";
-    return 1;
-  }
+  line.option("bag", request.bag, "recorded session").required();
+  line.option("--session", request.session, "JSON summary of the session node, kept in summary.json");
+  line.option("-o,--out", request.out, "folder for summary.md, summary.json and pictures").showDefault();
+  line.flag("--check", request.check, "exit code 1 when a target is missed");
+  line.flag("!--no-pictures", request.pictures, "tables only");
+  return runProgram(line, argc, argv, [&] { return run(request); });
 }

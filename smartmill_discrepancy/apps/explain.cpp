@@ -2,15 +2,12 @@
 
 #include <chrono>
 #include <cstdio>
-#include <exception>
 #include <filesystem>
-#include <iostream>
 #include <string>
-
-#include <CLI/CLI.hpp>
 
 #include "node/bag_campaign.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/program.h"
 #include "smartmill_discrepancy/explain/explanation.h"
 
 namespace {
@@ -64,21 +61,12 @@ void run(const std::string& folder, const std::string& model_file, const std::st
 int main(int argc, char** argv) {
   std::string campaign, model, out;
   int threads = 2;
-  CLI::App app{"Finds where twin and records of a campaign part and which effects the model lacks."};
-  app.add_option("campaign", campaign, "campaign folder, or a bag")->required();
-  app.add_option("--model", model, "machine model file (default: the campaign's)");
-  app.add_option("-o,--out", out, "folder of the report")->required();
-  app.add_option("--threads", threads, "threads")->check(CLI::Range(1, 64));
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : 2;
-  }
-  try {
+  smartmill::CommandLine line{"Finds where twin and records of a campaign part and which effects the model lacks."};
+  line.option("campaign", campaign, "campaign folder, or a bag").required();
+  line.option("--model", model, "machine model file (default: the campaign's)");
+  line.option("-o,--out", out, "folder of the report").required();
+  line.option("--threads", threads, "threads").within(1, 64);
+  return runProgram(line, argc, argv, [&] {
     run(campaign, model, out, threads);
-  } catch (const std::exception& e) {
-    std::cerr << "explain: " << e.what() << "\n";
-    return 1;
-  }
-  return 0;
+  });
 }

@@ -2,13 +2,10 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <exception>
-#include <iostream>
 #include <map>
 #include <string>
 
-#include <CLI/CLI.hpp>
-
+#include "smartmill_core/program.h"
 #include "smartmill_discrepancy/data/phase.h"
 #include "smartmill_discrepancy/gap/gap.h"
 
@@ -42,22 +39,13 @@ void run(const std::string& folder, const std::string& model_file, int threads) 
 int main(int argc, char** argv) {
   std::string campaign, model;
   int threads = 2;
-  CLI::App app{
+  smartmill::CommandLine line{
       "Gap between a campaign's records and the twin: RMS of the difference over the noise; 1 is the noise "
       "floor."};
-  app.add_option("campaign", campaign, "campaign folder")->required();
-  app.add_option("--model", model, "machine model file (default: the campaign's)");
-  app.add_option("--threads", threads, "computing threads")->check(CLI::Range(1, 64));
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : 2;
-  }
-  try {
+  line.option("campaign", campaign, "campaign folder").required();
+  line.option("--model", model, "machine model file (default: the campaign's)");
+  line.option("--threads", threads, "computing threads").within(1, 64);
+  return runProgram(line, argc, argv, [&] {
     run(campaign, model, threads);
-  } catch (const std::exception& e) {
-    std::cerr << "gap: " << e.what() << "\n";
-    return 1;
-  }
-  return 0;
+  });
 }

@@ -10,10 +10,9 @@
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
-
 #include "../src/node/bag_replay.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/program.h"
 #include "smartmill_core/units.h"
 #include "smartmill_hammer/analysis/tap_records.h"
 #include "smartmill_ros/parameter_options.h"
@@ -184,50 +183,36 @@ void run(const Options& options) {
 int main(int argc, char** argv) {
   using smartmill::hammer::FORMATS;
   smartmill::hammer::Options o;
-  CLI::App app(
+  smartmill::CommandLine line(
       "Frequency response and modes from hammer tests: a recorded session (bag), hammer records of one point "
       "(CSV with "
       "time[s],hammer[N],acceleration[m/s2] or displacement[m]; or three columns without header), or a "
       "measured receptance "
-      "(three columns Hz, Re, Im in m/N).",
-      "frf");
-  app.add_option("input", o.inputs, "files; several hammer records are averaged as hits of one point")
-      ->required();
-  app.add_option("-o,--out", o.out, "folder for frf.csv, modes.csv and frf.png")->capture_default_str();
-  app.add_option("--format", o.format, "auto (by content), bag, csv, text or frf")
-      ->check(CLI::IsMember({"auto", "bag", "csv", "text", "frf"}))
-      ->capture_default_str();
-  app.add_option("--low", o.low, "fit from here [Hz] (bags: fit_low of --params)")->capture_default_str();
-  app.add_option("--high", o.high, "to here [Hz]")->capture_default_str();
-  app.add_option("--modes", o.modes, "modes to fit; 0: as many as the data prove")->check(CLI::Range(0, 20));
-  app.add_option("--max-modes", o.max_modes, "at most, when the data decide")
-      ->check(CLI::Range(1, 20))
-      ->capture_default_str();
-  app.add_flag("--mass-line", o.mass_line, "free structure: fit a rigid-body mass line too");
-  app.add_option("--peak-share", o.peak_share, "least prominence of a listed peak, of the largest")
-      ->capture_default_str();
-  app.add_option("--max-peaks", o.max_peaks, "strongest peaks kept")
-      ->check(CLI::Range(1, 1000))
-      ->capture_default_str();
-  app.add_option("--model", o.model, "machine model (bags)");
+      "(three columns Hz, Re, Im in m/N).");
+  line.option("input", o.inputs, "files; several hammer records are averaged as hits of one point")
+      .required();
+  line.option("-o,--out", o.out, "folder for frf.csv, modes.csv and frf.png").showDefault();
+  line.option("--format", o.format, "auto (by content), bag, csv, text or frf")
+      .oneOf({"auto", "bag", "csv", "text", "frf"})
+      .showDefault();
+  line.option("--low", o.low, "fit from here [Hz] (bags: fit_low of --params)").showDefault();
+  line.option("--high", o.high, "to here [Hz]").showDefault();
+  line.option("--modes", o.modes, "modes to fit; 0: as many as the data prove").within(0, 20);
+  line.option("--max-modes", o.max_modes, "at most, when the data decide").within(1, 20).showDefault();
+  line.flag("--mass-line", o.mass_line, "free structure: fit a rigid-body mass line too");
+  line.option("--peak-share", o.peak_share, "least prominence of a listed peak, of the largest")
+      .showDefault();
+  line.option("--max-peaks", o.max_peaks, "strongest peaks kept").within(1, 1000).showDefault();
+  line.option("--model", o.model, "machine model (bags)");
   const smartmill::ParameterTable table = smartmill::tableOf(o.parameters);
-  smartmill::ParameterOptions parameters(app, table, "launch/config/hammer.yaml");
+  smartmill::ParameterOptions parameters(line, table, "launch/config/hammer.yaml");
   parameters.add("--weak-force", "weak_force");
   parameters.add("--second-hit-share", "second_hit_share");
   parameters.add("--exponential-time", "exponential_time");
-  app.add_flag("--no-picture", o.no_picture, "no PNG");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  }
-  try {
+  line.flag("--no-picture", o.no_picture, "no PNG");
+  return runProgram(line, argc, argv, [&] {
     parameters.apply();
     o.parameters.validate();
     smartmill::hammer::run(o);
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "frf: %s\n", error.what());
-    return 1;
-  }
-  return 0;
+  });
 }

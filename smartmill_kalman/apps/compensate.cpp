@@ -8,16 +8,14 @@
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
-#include <iostream>
 #include <optional>
 #include <set>
 #include <string>
 
-#include <CLI/CLI.hpp>
-
 #include "node/bag_compensation.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/machine_model.h"
+#include "smartmill_core/program.h"
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/units.h"
 #include "smartmill_kalman/compensation/campaign_compensation.h"
@@ -223,41 +221,27 @@ void run(const Request& request) {
 
 int main(int argc, char** argv) {
   Request request;
-  CLI::App app{"Recovers the force at the tool from the records of a force sensor: one CSV a cut."};
-  app.add_option("SOURCE", request.source, "campaign folder, or a bag")->required();
-  app.add_option("-o,--out", request.out, "folder for one CSV a cut")->required();
-  app.add_option("--model", request.model, "model file with the force sensor (default: the campaign's)");
-  app.add_option("--params", request.parameters, "parameter file of the node (launch/config/kalman.yaml)");
-  app.add_flag("--identify", request.identify, "campaign: take the sensor's modes from its own taps");
-  app.add_flag("--blind", request.blind,
-               "campaign: say what the cuts show of the sensor's modes without a tap");
-  app.add_option("--blind-low-hz", request.blind_low, "band of --blind")->capture_default_str();
-  app.add_option("--blind-high-hz", request.blind_high, "band of --blind")->capture_default_str();
-  app.add_flag(
+  CommandLine line{"Recovers the force at the tool from the records of a force sensor: one CSV a cut."};
+  line.option("SOURCE", request.source, "campaign folder, or a bag").required();
+  line.option("-o,--out", request.out, "folder for one CSV a cut").required();
+  line.option("--model", request.model, "model file with the force sensor (default: the campaign's)");
+  line.option("--params", request.parameters, "parameter file of the node (launch/config/kalman.yaml)");
+  line.flag("--identify", request.identify, "campaign: take the sensor's modes from its own taps");
+  line.flag("--blind", request.blind, "campaign: say what the cuts show of the sensor's modes without a tap");
+  line.option("--blind-low-hz", request.blind_low, "band of --blind").showDefault();
+  line.option("--blind-high-hz", request.blind_high, "band of --blind").showDefault();
+  line.flag(
       "--coupled", request.coupled,
       "campaign: sensor with its cross-talk from the campaign's own taps along x, y and z; method kalman");
-  app.add_option("--matrix-out", request.matrix_out,
-                 "with --coupled: file of the matrix, for the node's parameter sensor_matrix");
-  app.add_option("--method", request.method,
-                 "kalman (causal, as the node), smoother, fixed-lag (as the node with `lag`) or inverse")
-      ->check(CLI::IsMember({"kalman", "smoother", "fixed-lag", "inverse"}))
-      ->capture_default_str();
-  app.add_option("--lag-s", request.lag, "lag of fixed-lag")
-      ->check(CLI::Range(0.0, 10.0))
-      ->capture_default_str();
-  app.add_option("--bandwidth-hz", request.bandwidth, "harmonics up to this frequency");
-  app.add_option("--noise-rms-n", request.noise, "noise of one sample");
-  app.add_option("--settling-revolutions", request.settling, "time constant of the amplitudes");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : 2;
-  }
-  try {
-    run(request);
-  } catch (const std::exception& e) {
-    std::cerr << "compensate: " << e.what() << "\n";
-    return 1;
-  }
-  return 0;
+  line.option("--matrix-out", request.matrix_out,
+              "with --coupled: file of the matrix, for the node's parameter sensor_matrix");
+  line.option("--method", request.method,
+              "kalman (causal, as the node), smoother, fixed-lag (as the node with `lag`) or inverse")
+      .oneOf({"kalman", "smoother", "fixed-lag", "inverse"})
+      .showDefault();
+  line.option("--lag-s", request.lag, "lag of fixed-lag").within(0.0, 10.0).showDefault();
+  line.option("--bandwidth-hz", request.bandwidth, "harmonics up to this frequency");
+  line.option("--noise-rms-n", request.noise, "noise of one sample");
+  line.option("--settling-revolutions", request.settling, "time constant of the amplitudes");
+  return runProgram(line, argc, argv, [&] { run(request); });
 }

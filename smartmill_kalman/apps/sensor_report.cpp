@@ -6,16 +6,14 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
-#include <iostream>
 #include <string>
 #include <vector>
-
-#include <CLI/CLI.hpp>
 
 #include "smartmill_core/campaign/campaign.h"
 #include "smartmill_core/campaign/record.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/strict_yaml.h"
+#include "smartmill_core/program.h"
 #include "smartmill_core/units.h"
 #include "smartmill_kalman/sensor/numeric_table.h"
 #include "smartmill_kalman/sensor/state_space_checks.h"
@@ -186,25 +184,19 @@ int main(int argc, char** argv) {
   std::string source, out;
   double low = 100.0, high = 0.0;
   int max_modes = 4;
-  CLI::App app{
+  CommandLine line{
       "Transfer matrix of a force sensor from all taps (3x3, or 6x6 with moments), with standard deviations, "
       "condition number, stability and observability."};
-  app.add_option(
-         "SOURCE", source,
-         "campaign folder with taps, or a smartmill-taps/1 file (sample_rate_hz, channels 3 or 6, taps: "
-         "file, direction, point_mm; columns hammer[N], fx[N] .. mz[Nm])")
-      ->required();
-  app.add_option("-o,--out", out, "CSV of every line: both matrices with standard deviations");
-  app.add_option("--low-hz", low, "band of the report")->capture_default_str();
-  app.add_option("--high-hz", high, "band of the report; 0: as far as the taps tell the matrix to 0.1")
-      ->capture_default_str();
-  app.add_option("--max-modes", max_modes, "of an axis")->capture_default_str();
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : 2;
-  }
-  try {
+  line.option("SOURCE", source,
+              "campaign folder with taps, or a smartmill-taps/1 file (sample_rate_hz, channels 3 or 6, taps: "
+              "file, direction, point_mm; columns hammer[N], fx[N] .. mz[Nm])")
+      .required();
+  line.option("-o,--out", out, "CSV of every line: both matrices with standard deviations");
+  line.option("--low-hz", low, "band of the report").showDefault();
+  line.option("--high-hz", high, "band of the report; 0: as far as the taps tell the matrix to 0.1")
+      .showDefault();
+  line.option("--max-modes", max_modes, "of an axis").showDefault();
+  return runProgram(line, argc, argv, [&] {
     const Taps taps = std::filesystem::path(source).filename() != "campaign.yaml" &&
                               std::filesystem::path(source).extension() == ".yaml"
                           ? fromList(source)
@@ -219,9 +211,5 @@ int main(int argc, char** argv) {
       writeMatrix(matrix.band(low, high), out);
       std::printf("written to %s\n", out.c_str());
     }
-  } catch (const std::exception& e) {
-    std::cerr << "sensor_report: " << e.what() << "\n";
-    return 1;
-  }
-  return 0;
+  });
 }

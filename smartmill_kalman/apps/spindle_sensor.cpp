@@ -5,13 +5,11 @@
 #include <cmath>
 #include <cstdio>
 #include <fstream>
-#include <iostream>
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
-
 #include "smartmill_core/error.h"
+#include "smartmill_core/program.h"
 #include "smartmill_core/units.h"
 #include "smartmill_kalman/filter/low_pass.h"
 #include "smartmill_kalman/sensor/spindle_sensor_calibration.h"
@@ -120,35 +118,26 @@ void apply(const Request& request) {
 
 int main(int argc, char** argv) {
   Request request;
-  CLI::App app{
+  CommandLine line{
       "Spindle-integrated force sensor of six preloaded quartz rings.\nTables: test, time[s], length[mm], "
       "load_x[N], load_y[N], load_z[N], x1[N], x2[N], y1[N], y2[N], z1[N], z2[N]; one row a reading."};
-  app.require_subcommand(1);
-  CLI::App* c = app.add_subcommand("calibrate", "constants over tool length from weights hung on a tool");
-  c->add_option("TABLE", request.table, "readings; those of one test drift together")->required();
-  c->add_option("-o,--out", request.out, "calibration file")->required();
-  c->add_option("--base", request.base,
-                "calibration file with preload, limits and low-pass (default: Burzoni's sensor)");
-  CLI::App* v = app.add_subcommand("verify", "compares with reference forces; fails beyond 5 %");
-  v->add_option("CALIBRATION", request.calibration, "calibration file")->required();
-  v->add_option("TABLE", request.table, "readings with reference forces as loads")->required();
-  CLI::App* a = app.add_subcommand("apply", "forces of a record");
-  a->add_option("CALIBRATION", request.calibration, "calibration file")->required();
-  a->add_option("TABLE", request.table, "record, evenly sampled")->required();
-  a->add_option("-o,--out", request.out, "CSV")->required();
-  a->add_option("--low-pass-hz", request.low_pass, "zero-phase low-pass; 0: none")->capture_default_str();
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : 2;
-  }
-  try {
-    if (c->parsed()) calibrate(request);
-    if (v->parsed()) verify(request);
-    if (a->parsed()) apply(request);
-  } catch (const std::exception& e) {
-    std::cerr << "spindle_sensor: " << e.what() << "\n";
-    return 1;
-  }
-  return 0;
+  const CommandOptions c =
+      line.command("calibrate", "constants over tool length from weights hung on a tool");
+  c.option("TABLE", request.table, "readings; those of one test drift together").required();
+  c.option("-o,--out", request.out, "calibration file").required();
+  c.option("--base", request.base,
+           "calibration file with preload, limits and low-pass (default: Burzoni's sensor)");
+  const CommandOptions v = line.command("verify", "compares with reference forces; fails beyond 5 %");
+  v.option("CALIBRATION", request.calibration, "calibration file").required();
+  v.option("TABLE", request.table, "readings with reference forces as loads").required();
+  const CommandOptions a = line.command("apply", "forces of a record");
+  a.option("CALIBRATION", request.calibration, "calibration file").required();
+  a.option("TABLE", request.table, "record, evenly sampled").required();
+  a.option("-o,--out", request.out, "CSV").required();
+  a.option("--low-pass-hz", request.low_pass, "zero-phase low-pass; 0: none").showDefault();
+  return runProgram(line, argc, argv, [&] {
+    if (c.parsed()) calibrate(request);
+    if (v.parsed()) verify(request);
+    if (a.parsed()) apply(request);
+  });
 }

@@ -1,13 +1,11 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <exception>
 #include <string>
-
-#include <CLI/CLI.hpp>
 
 #include "smartmill_core/campaign/record.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/program.h"
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/units.h"
 #include "smartmill_loadmeter/calibration/machine_calibration.h"
@@ -95,46 +93,36 @@ void runMotors(const std::string& standard, const std::string& currents, double 
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app(
+  CommandLine line(
       "Friction, load-meter constant and bandwidth of a machine from a campaign's air cuts and from cuts "
       "whose "
       "forces a dynamometer recorded; or feed drives and spindle from standard cuts and motor currents.");
   std::string path, model;
   std::string standard, currents, output;
   double base_speed = 1e9;
-  auto* campaign = app.add_option("CAMPAIGN", path, "campaign folder");
-  auto* cuts = app.add_option("--standard-cuts", standard,
-                              "CSV of standard cuts whose forces a remote dynamometer recorded: "
-                              "cut,force_x[N],force_y[N],force_z[N],torque[N m]");
-  auto* own =
-      app.add_option("--currents", currents,
-                     "CSV of this machine's current ranges in the same cuts and in air: "
-                     "cut,spindle_speed[rpm],current_x[A],air_x[A],..,current_spindle[A],air_spindle[A]");
-  cuts->needs(own)->excludes(campaign);
-  own->needs(cuts);
-  app.add_option("--base-speed", base_speed, "of the spindle motor in rpm (default: below it throughout)")
-      ->check(CLI::PositiveNumber)
-      ->needs(cuts);
-  app.add_option("-o,--output", output, "motor calibration for the node (parameter motor_calibration)")
-      ->needs(cuts);
-  app.add_option("--model", model, "model file (default: the campaign's)");
-  try {
-    app.parse(argc, argv);
-    if (path.empty() && standard.empty()) {
-      throw CLI::RequiredError("CAMPAIGN, or --standard-cuts and --currents,");
-    }
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  }
-  try {
+  const auto campaign = line.option("CAMPAIGN", path, "campaign folder");
+  const auto cuts = line.option("--standard-cuts", standard,
+                                "CSV of standard cuts whose forces a remote dynamometer recorded: "
+                                "cut,force_x[N],force_y[N],force_z[N],torque[N m]");
+  const auto own =
+      line.option("--currents", currents,
+                  "CSV of this machine's current ranges in the same cuts and in air: "
+                  "cut,spindle_speed[rpm],current_x[A],air_x[A],..,current_spindle[A],air_spindle[A]");
+  cuts.needs(own).excludes(campaign);
+  own.needs(cuts);
+  line.option("--base-speed", base_speed, "of the spindle motor in rpm (default: below it throughout)")
+      .positive()
+      .needs(cuts);
+  line.option("-o,--output", output, "motor calibration for the node (parameter motor_calibration)")
+      .needs(cuts);
+  line.option("--model", model, "model file (default: the campaign's)");
+  return runProgram(line, argc, argv, [&] {
+    if (path.empty() && standard.empty())
+      throw UsageError("CAMPAIGN, or --standard-cuts and --currents, is required");
     if (!standard.empty()) {
       runMotors(standard, currents, base_speed, output);
     } else {
       run(path, model);
     }
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "calibrate: %s\n", error.what());
-    return 1;
-  }
-  return 0;
+  });
 }

@@ -2,16 +2,14 @@
 
 #include <cmath>
 #include <cstdio>
-#include <exception>
 #include <filesystem>
 #include <fstream>
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
-
 #include "../src/node/bag_identification.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/program.h"
 #include "smartmill_core/units.h"
 #include "smartmill_loadmeter/database/database.h"
 #include "smartmill_loadmeter/identification/campaign_identification.h"
@@ -211,44 +209,33 @@ void run(const Options& o) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app(
+  CommandLine line(
       "Cutting coefficients with standard deviations, from the force records or the load meter of a campaign "
       "(a folder with campaign.yaml) or from the load meter in a recorded bag.");
   Options o;
-  app.add_option("SOURCE", o.source_path, "campaign folder, or a bag")->required();
-  app.add_option("--source", o.source, "what to use (default: force of a campaign, load_meter of a bag)")
-      ->check(CLI::IsMember({"force", "load_meter"}));
-  app.add_option("--model", o.model, "model file (default: the campaign's); its cutting section is not used");
-  app.add_option("--means", o.means, "force: means of all samples in cut, or over whole revolutions")
-      ->capture_default_str()
-      ->check(CLI::IsMember({"all", "revolutions"}));
-  app.add_flag("--spindle-uncertainty", o.spindle_uncertainty,
-               "load_meter of a campaign: the model's stated uncertainty of the spindle holds for "
-               "load_meter_v_per_w and the bandwidth too (default: both exact)");
-  app.add_option("--depth-uncertainty", o.depth_percent,
-                 "[%] load_meter of a campaign: standard deviation of the axial depth, common to all cuts")
-      ->check(CLI::Range(0.0, 100.0));
-  app.add_option("--runout-uncertainty", o.runout_um,
-                 "[um] load_meter of a campaign: standard deviation of the cutter axis' offset")
-      ->check(CLI::Range(0.0, 100.0));
-  app.add_flag("--plain-friction", o.plain_friction,
-               "load_meter of a campaign: Coulomb and viscous friction only, nothing added by evidence");
-  app.add_option("--params", o.parameters, "bag: parameter file of the node (launch/config/loadmeter.yaml)");
-  app.add_option("--database", o.database, "SQLite file of the machine that keeps the result");
-  app.add_option("--tool", o.tool, "name of the tool, for the database");
-  app.add_option("--material", o.material, "workpiece material, for the database");
-  app.add_option("--rake", o.rake, "[deg] normal rake of the tool, for the database");
-  app.add_option("-o,--output", o.output, "writes the coefficients as a model file's cutting section");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  }
-  try {
-    run(o);
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "coefficients: %s\n", error.what());
-    return 1;
-  }
-  return 0;
+  line.option("SOURCE", o.source_path, "campaign folder, or a bag").required();
+  line.option("--source", o.source, "what to use (default: force of a campaign, load_meter of a bag)")
+      .oneOf({"force", "load_meter"});
+  line.option("--model", o.model, "model file (default: the campaign's); its cutting section is not used");
+  line.option("--means", o.means, "force: means of all samples in cut, or over whole revolutions")
+      .showDefault()
+      .oneOf({"all", "revolutions"});
+  line.flag("--spindle-uncertainty", o.spindle_uncertainty,
+            "load_meter of a campaign: the model's stated uncertainty of the spindle holds for "
+            "load_meter_v_per_w and the bandwidth too (default: both exact)");
+  line.option("--depth-uncertainty", o.depth_percent,
+              "[%] load_meter of a campaign: standard deviation of the axial depth, common to all cuts")
+      .within(0.0, 100.0);
+  line.option("--runout-uncertainty", o.runout_um,
+              "[um] load_meter of a campaign: standard deviation of the cutter axis' offset")
+      .within(0.0, 100.0);
+  line.flag("--plain-friction", o.plain_friction,
+            "load_meter of a campaign: Coulomb and viscous friction only, nothing added by evidence");
+  line.option("--params", o.parameters, "bag: parameter file of the node (launch/config/loadmeter.yaml)");
+  line.option("--database", o.database, "SQLite file of the machine that keeps the result");
+  line.option("--tool", o.tool, "name of the tool, for the database");
+  line.option("--material", o.material, "workpiece material, for the database");
+  line.option("--rake", o.rake, "[deg] normal rake of the tool, for the database");
+  line.option("-o,--output", o.output, "writes the coefficients as a model file's cutting section");
+  return runProgram(line, argc, argv, [&] { run(o); });
 }

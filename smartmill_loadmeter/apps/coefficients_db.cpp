@@ -1,13 +1,11 @@
 #include <cmath>
 #include <cstdio>
-#include <exception>
 #include <filesystem>
 #include <string>
 
-#include <CLI/CLI.hpp>
-
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/machine_model.h"
+#include "smartmill_core/program.h"
 #include "smartmill_core/units.h"
 #include "smartmill_loadmeter/database/database.h"
 #include "smartmill_loadmeter/database/oblique.h"
@@ -91,63 +89,53 @@ void predictFor(const Options& o) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("What a machine has identified: the database of cutting coefficients.");
+  CommandLine line("What a machine has identified: the database of cutting coefficients.");
   Options o;
-  app.add_option("DATABASE", o.file, "SQLite file of the machine")->required();
-  app.require_subcommand(1);
-  const auto pair = [&](CLI::App* command) {
-    command->add_option("--tool", o.tool, "name of the tool (default: any)");
-    command->add_option("--material", o.material, "workpiece material (default: any)");
+  line.option("DATABASE", o.file, "SQLite file of the machine").required();
+  const auto pair = [&](const CommandOptions& command) {
+    command.option("--tool", o.tool, "name of the tool (default: any)");
+    command.option("--material", o.material, "workpiece material (default: any)");
   };
-  CLI::App* list_command = app.add_subcommand("list", "prints every identification, oldest first");
+  const CommandOptions list_command = line.command("list", "prints every identification, oldest first");
   pair(list_command);
-  CLI::App* find_command = app.add_subcommand(
-      "find", "best knowledge for a cut, uncertainty growing with distance from what was tried");
+  const CommandOptions find_command =
+      line.command("find", "best knowledge for a cut, uncertainty growing with distance from what was tried");
   pair(find_command);
-  find_command->add_option("--cutting-speed", o.cutting_speed, "[m/min]");
-  find_command->add_option("--feed-per-tooth", o.feed, "[mm]");
-  find_command->add_option("--diameter", o.diameter, "[mm]");
-  find_command->add_option("--helix", o.helix, "[deg]");
-  find_command->add_option("--rake", o.rake, "[deg] normal rake");
-  find_command->add_option("--edge-age", o.age, "[min] cutting time of the edge");
-  CLI::App* predict_command = app.add_subcommand(
+  find_command.option("--cutting-speed", o.cutting_speed, "[m/min]");
+  find_command.option("--feed-per-tooth", o.feed, "[mm]");
+  find_command.option("--diameter", o.diameter, "[mm]");
+  find_command.option("--helix", o.helix, "[deg]");
+  find_command.option("--rake", o.rake, "[deg] normal rake");
+  find_command.option("--edge-age", o.age, "[min] cutting time of the edge");
+  const CommandOptions predict_command = line.command(
       "predict", "another tool's coefficients by way of shear angle, friction angle and shear stress");
-  predict_command->add_option("--material", o.material, "workpiece material")->required();
-  predict_command->add_option("--rake", o.rake, "[deg] normal rake")->required();
-  predict_command->add_option("--helix", o.helix, "[deg]")->required();
-  CLI::App* merge_command = app.add_subcommand("merge", "takes over what another machine's file has");
-  merge_command->add_option("OTHER", o.other, "SQLite file")->required();
-  CLI::App* export_command = app.add_subcommand("export", "writes everything as .csv or .yaml");
-  export_command->add_option("FILE", o.other, "file to write")->required();
+  predict_command.option("--material", o.material, "workpiece material").required();
+  predict_command.option("--rake", o.rake, "[deg] normal rake").required();
+  predict_command.option("--helix", o.helix, "[deg]").required();
+  const CommandOptions merge_command = line.command("merge", "takes over what another machine's file has");
+  merge_command.option("OTHER", o.other, "SQLite file").required();
+  const CommandOptions export_command = line.command("export", "writes everything as .csv or .yaml");
+  export_command.option("FILE", o.other, "file to write").required();
   pair(export_command);
-  CLI::App* import_command = app.add_subcommand("import", "reads .csv or .yaml in");
-  import_command->add_option("FILE", o.other, "file to read")->required();
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  }
-  try {
-    if (list_command->parsed()) list(o);
-    if (find_command->parsed()) find(o);
-    if (predict_command->parsed()) predictFor(o);
-    if (merge_command->parsed()) {
+  const CommandOptions import_command = line.command("import", "reads .csv or .yaml in");
+  import_command.option("FILE", o.other, "file to read").required();
+  return runProgram(line, argc, argv, [&] {
+    if (list_command.parsed()) list(o);
+    if (find_command.parsed()) find(o);
+    if (predict_command.parsed()) predictFor(o);
+    if (merge_command.parsed()) {
       std::printf("%zu new\n", CoefficientDatabase(o.file).merge(o.other));
     }
-    if (export_command->parsed()) {
+    if (export_command.parsed()) {
       mustExist(o.file);
       const bool csv = isCsv(o.other);
       const auto records = CoefficientDatabase(o.file).records(o.tool, o.material);
       (csv ? exportCsv : exportYaml)(records, o.other);
       std::printf("%zu written\n", records.size());
     }
-    if (import_command->parsed()) {
+    if (import_command.parsed()) {
       const auto records = isCsv(o.other) ? importCsv(o.other) : importYaml(o.other);
       std::printf("%zu new of %zu\n", CoefficientDatabase(o.file).add(records), records.size());
     }
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "coefficients_db: %s\n", error.what());
-    return 1;
-  }
-  return 0;
+  });
 }

@@ -1,10 +1,8 @@
 #include <cstdio>
-#include <exception>
 #include <string>
 
-#include <CLI/CLI.hpp>
-
 #include "smartmill_core/error.h"
+#include "smartmill_core/program.h"
 #include "smartmill_core/units.h"
 #include "smartmill_loadmeter/identification/force_law.h"
 
@@ -67,22 +65,11 @@ void run(const std::string& path) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app(
+  CommandLine line(
       "Which force law a campaign's force records prefer: linear, shifted linear or power against chip "
       "thickness, "
       "size effect, runout.");
   std::string path;
-  app.add_option("CAMPAIGN", path, "campaign folder")->required();
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  }
-  try {
-    run(path);
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "force_law: %s\n", error.what());
-    return 1;
-  }
-  return 0;
+  line.option("CAMPAIGN", path, "campaign folder").required();
+  return runProgram(line, argc, argv, [&] { run(path); });
 }

@@ -1,14 +1,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <exception>
 #include <fstream>
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
-
 #include "smartmill_core/error.h"
+#include "smartmill_core/program.h"
 #include "smartmill_core/units.h"
 #include "smartmill_loadmeter/identification/production.h"
 
@@ -107,34 +105,23 @@ void run(const Options& o) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("The fewest test cuts that reach asked standard deviations of Ktc and Kte within the limits.");
+  CommandLine line(
+      "The fewest test cuts that reach asked standard deviations of Ktc and Kte within the limits.");
   Options o;
-  app.add_option("MODEL", o.model, "model file: tool, spindle, and cutting unless --ktc and --kte")
-      ->required();
-  app.add_option("--speeds", o.speeds, "[rpm] to choose among")->required()->expected(1, 100);
-  app.add_option("--feeds", o.feeds, "[mm] per tooth to choose among")->required()->expected(3, 100);
-  app.add_option("--depths", o.depths, "[mm] axial, to choose among")->required()->expected(1, 100);
-  app.add_option("--entry", o.entry, "[deg] entry angle")->capture_default_str();
-  app.add_option("--exit", o.exit, "[deg] exit angle")->capture_default_str();
-  app.add_option("--ktc-std", o.ktc_std, "[N/mm2] asked")->required()->check(CLI::PositiveNumber);
-  app.add_option("--kte-std", o.kte_std, "[N/mm] asked")->required()->check(CLI::PositiveNumber);
-  app.add_option("--ktc", o.ktc, "[N/mm2] expected (default: the model's)");
-  app.add_option("--kte", o.kte, "[N/mm] expected (default: the model's)");
-  app.add_option("--voltage-std", o.voltage_std, "[V] of one cut's mean reading")->capture_default_str();
-  app.add_option("--torque", o.torque, "[Nm] limit of the mean torque (default: the model's rated torque)");
-  app.add_option("--power", o.power, "[W] limit (default: the model's rated power)");
-  app.add_option("--stable", o.limits, "CSV speed_rpm,axial_depth_mm: largest stable depth");
-  app.add_option("--most", o.most, "cuts allowed")->capture_default_str();
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  }
-  try {
-    run(o);
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "plan_cuts: %s\n", error.what());
-    return 1;
-  }
-  return 0;
+  line.option("MODEL", o.model, "model file: tool, spindle, and cutting unless --ktc and --kte").required();
+  line.option("--speeds", o.speeds, "[rpm] to choose among").required().count(1, 100);
+  line.option("--feeds", o.feeds, "[mm] per tooth to choose among").required().count(3, 100);
+  line.option("--depths", o.depths, "[mm] axial, to choose among").required().count(1, 100);
+  line.option("--entry", o.entry, "[deg] entry angle").showDefault();
+  line.option("--exit", o.exit, "[deg] exit angle").showDefault();
+  line.option("--ktc-std", o.ktc_std, "[N/mm2] asked").required().positive();
+  line.option("--kte-std", o.kte_std, "[N/mm] asked").required().positive();
+  line.option("--ktc", o.ktc, "[N/mm2] expected (default: the model's)");
+  line.option("--kte", o.kte, "[N/mm] expected (default: the model's)");
+  line.option("--voltage-std", o.voltage_std, "[V] of one cut's mean reading").showDefault();
+  line.option("--torque", o.torque, "[Nm] limit of the mean torque (default: the model's rated torque)");
+  line.option("--power", o.power, "[W] limit (default: the model's rated power)");
+  line.option("--stable", o.limits, "CSV speed_rpm,axial_depth_mm: largest stable depth");
+  line.option("--most", o.most, "cuts allowed").showDefault();
+  return runProgram(line, argc, argv, [&] { run(o); });
 }

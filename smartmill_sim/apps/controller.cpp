@@ -5,16 +5,13 @@
 #include <csignal>
 #include <cstdint>
 #include <cstdio>
-#include <exception>
-#include <iostream>
 #include <map>
 #include <string>
 #include <thread>
 #include <vector>
 
-#include <CLI/CLI.hpp>
-
 #include "smartmill_core/model/machine_model.h"
+#include "smartmill_core/program.h"
 #include "smartmill_focas/server.h"
 #include "smartmill_sim/controller/controller.h"
 
@@ -57,28 +54,22 @@ int main(int argc, char** argv) {
                                          {"reference", focas::AUT_REF}, {"dnc", focas::AUT_REMOTE}};
   std::string mode = "dnc", model_file;
   focas::ServerOptions server_options;
-  CLI::App app{
+  CommandLine line{
       "Simulated Fanuc controller of a three-axis mill: FOCAS2 over Ethernet, in wall-clock time, until "
       "Ctrl-C.\n"
       "Without a model: travel x -250..250, y -200..200, z -300..0 mm, start at 0 0 0, rapid 30 m/min, 5 "
       "m/s2,\n"
       "spindle to 20000 rpm at 10000 rpm/s."};
-  app.add_option("--port", server_options.port, "TCP port, 0: any free one")->capture_default_str();
-  app.add_option("--bind", server_options.bind_address, "address to listen on")->capture_default_str();
-  app.add_option(
-         "--mode", mode,
-         "at the panel: mdi, mem, edit, handle, jog, inc, reference, dnc (the one that runs programs)")
-      ->check(CLI::IsMember(modes))
-      ->capture_default_str();
-  app.add_option("--model", model_file, "machine model file: its sections axes and spindle");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : 2;
-  }
-  std::signal(SIGINT, requestStop);
-  std::signal(SIGTERM, requestStop);
-  try {
+  line.option("--port", server_options.port, "TCP port, 0: any free one").showDefault();
+  line.option("--bind", server_options.bind_address, "address to listen on").showDefault();
+  line.option("--mode", mode,
+              "at the panel: mdi, mem, edit, handle, jog, inc, reference, dnc (the one that runs programs)")
+      .oneOf({"mdi", "mem", "edit", "handle", "jog", "inc", "reference", "dnc"})
+      .showDefault();
+  line.option("--model", model_file, "machine model file: its sections axes and spindle");
+  return runProgram(line, argc, argv, [&] {
+    std::signal(SIGINT, requestStop);
+    std::signal(SIGTERM, requestStop);
     sim::ControllerOptions options =
         sim::ControllerOptions::ofModel(model_file.empty() ? MachineModel{} : readMachineModel(model_file));
     options.mode = modes.at(mode);
@@ -88,9 +79,5 @@ int main(int argc, char** argv) {
                 mode.c_str());
     std::fflush(stdout);
     run(controller);
-  } catch (const std::exception& e) {
-    std::cerr << "controller: " << e.what() << "\n";
-    return 1;
-  }
-  return 0;
+  });
 }

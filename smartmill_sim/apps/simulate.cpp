@@ -3,17 +3,14 @@
 #include <algorithm>
 #include <cstdio>
 #include <ctime>
-#include <exception>
 #include <filesystem>
-#include <iostream>
 #include <string>
-
-#include <CLI/CLI.hpp>
 
 #include "smartmill_core/campaign/campaign.h"
 #include "smartmill_core/campaign/record.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/machine_model.h"
+#include "smartmill_core/program.h"
 #include "smartmill_sim/twin/twin.h"
 
 namespace {
@@ -57,25 +54,15 @@ void run(const std::string& model_file, const std::string& campaign_path, const 
 int main(int argc, char** argv) {
   std::string model, campaign, out, noise = "on";
   smartmill::sim::SimulationOptions options;
-  CLI::App app{"Re-creates a campaign from a machine model and the campaign's plan."};
-  app.add_option("model", model, "machine model file")->required();
-  app.add_option("campaign", campaign, "campaign folder: plan, sample times, spindle phase, hammer forces")
-      ->required();
-  app.add_option("-o,--out", out, "folder of the new campaign")->required();
-  app.add_option("--noise", noise, "on, or off: neither noise nor rounding")
-      ->check(CLI::IsMember({"on", "off"}));
-  app.add_option("--seed", options.seed, "of the noise");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : 2;
-  }
-  options.noise = noise == "on";
-  try {
+  CommandLine line{"Re-creates a campaign from a machine model and the campaign's plan."};
+  line.option("model", model, "machine model file").required();
+  line.option("campaign", campaign, "campaign folder: plan, sample times, spindle phase, hammer forces")
+      .required();
+  line.option("-o,--out", out, "folder of the new campaign").required();
+  line.option("--noise", noise, "on, or off: neither noise nor rounding").oneOf({"on", "off"});
+  line.option("--seed", options.seed, "of the noise");
+  return runProgram(line, argc, argv, [&] {
+    options.noise = noise == "on";
     run(model, campaign, out, options);
-  } catch (const std::exception& e) {
-    std::cerr << "simulate: " << e.what() << "\n";
-    return 1;
-  }
-  return 0;
+  });
 }

@@ -5,14 +5,12 @@
 
 #include <cmath>
 #include <cstdio>
-#include <exception>
 #include <fstream>
 #include <string>
 
-#include <CLI/CLI.hpp>
-
 #include "node/bag_charts.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/program.h"
 #include "smartmill_core/units.h"
 #include "smartmill_stability/chart/picture.h"
 
@@ -118,23 +116,13 @@ void run(const Options& o) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("The stability chart and the chatter verdicts that stability_node makes of a recorded bag.");
+  CommandLine line(
+      "The stability chart and the chatter verdicts that stability_node makes of a recorded bag.");
   Options o;
-  app.add_option("BAG", o.bag, "recording with tool/frf, material/coefficients, cuts")->required();
-  app.add_option("--model", o.model, "machine model file: tool and spindle limits (default: the parameter)");
-  app.add_option("--params", o.parameters, "parameter file of the node (launch/config/stability.yaml)");
-  app.add_option("-o,--out", o.output, "CSV of the chart; a picture of the same name with .png beside it");
-  app.add_option("--states", o.states, "CSV of the chatter verdicts");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  }
-  try {
-    run(o);
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "chart: %s\n", error.what());
-    return 1;
-  }
-  return 0;
+  line.option("BAG", o.bag, "recording with tool/frf, material/coefficients, cuts").required();
+  line.option("--model", o.model, "machine model file: tool and spindle limits (default: the parameter)");
+  line.option("--params", o.parameters, "parameter file of the node (launch/config/stability.yaml)");
+  line.option("-o,--out", o.output, "CSV of the chart; a picture of the same name with .png beside it");
+  line.option("--states", o.states, "CSV of the chatter verdicts");
+  return runProgram(line, argc, argv, [&] { run(o); });
 }

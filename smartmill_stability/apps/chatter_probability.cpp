@@ -6,12 +6,10 @@
 #include <cmath>
 #include <cstdio>
 #include <fstream>
-#include <iostream>
 #include <string>
 
-#include <CLI/CLI.hpp>
-
 #include "smartmill_core/error.h"
+#include "smartmill_core/program.h"
 #include "smartmill_stability/chart/picture.h"
 #include "smartmill_stability/chart/uncertainty.h"
 #include "smartmill_stability/solvers/model_system.h"
@@ -76,31 +74,19 @@ void run(const Request& request) {
 
 int main(int argc, char** argv) {
   Request request;
-  CLI::App app{
+  CommandLine line{
       "Probability of chatter over speed and depth, from the standard deviations of a machine model."};
-  app.add_option("model", request.model, "machine model file with tool, cutting and tool_tip")->required();
-  app.add_option("--entry-deg", request.entry_deg, "immersion angle at which a tooth enters [deg]")
-      ->required();
-  app.add_option("--exit-deg", request.exit_deg, "immersion angle at which a tooth leaves [deg]")->required();
-  app.add_option("--speeds", request.speeds, "LO:HI:N [rpm]")->required();
-  app.add_option("--depths-mm", request.depths, "LO:HI:N [mm]")->required();
-  app.add_option("--draws", request.draws, "machines drawn (60)");
-  app.add_option("--seed", request.seed, "of the draws (1)");
-  app.add_option("--risk", request.risk, "probability of chatter that robust points may have (0.05)");
-  app.add_option("--speed-margin", request.speed_margin, "share of the speed to both sides (0.02)");
-  app.add_option("--points", request.points, "robust points printed (5)");
-  app.add_option("-o,--out", request.out, "CSV file; a picture of the same name with .png stands beside it")
-      ->required();
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : 2;
-  }
-  try {
-    run(request);
-  } catch (const std::exception& e) {
-    std::cerr << "chatter_probability: " << e.what() << "\n";
-    return 1;
-  }
-  return 0;
+  line.option("model", request.model, "machine model file with tool, cutting and tool_tip").required();
+  line.option("--entry-deg", request.entry_deg, "immersion angle at which a tooth enters [deg]").required();
+  line.option("--exit-deg", request.exit_deg, "immersion angle at which a tooth leaves [deg]").required();
+  line.option("--speeds", request.speeds, "LO:HI:N [rpm]").required();
+  line.option("--depths-mm", request.depths, "LO:HI:N [mm]").required();
+  line.option("--draws", request.draws, "machines drawn (60)");
+  line.option("--seed", request.seed, "of the draws (1)");
+  line.option("--risk", request.risk, "probability of chatter that robust points may have (0.05)");
+  line.option("--speed-margin", request.speed_margin, "share of the speed to both sides (0.02)");
+  line.option("--points", request.points, "robust points printed (5)");
+  line.option("-o,--out", request.out, "CSV file; a picture of the same name with .png stands beside it")
+      .required();
+  return runProgram(line, argc, argv, [&] { run(request); });
 }

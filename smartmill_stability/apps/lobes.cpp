@@ -6,14 +6,12 @@
 #include <cmath>
 #include <cstdio>
 #include <fstream>
-#include <iostream>
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
-
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/machine_model.h"
+#include "smartmill_core/program.h"
 #include "smartmill_core/units.h"
 #include "smartmill_stability/chart/picture.h"
 #include "smartmill_stability/solvers/boundary.h"
@@ -157,39 +155,27 @@ void run(const Request& request) {
 
 int main(int argc, char** argv) {
   Request request;
-  CLI::App app{
+  CommandLine line{
       "Stability lobes of a machine model: the first loss of stability when the depth grows, over spindle "
       "speed."};
-  app.add_option("model", request.model, "machine model file with tool, cutting and tool_tip")->required();
-  app.add_option("--entry-deg", request.entry_deg, "immersion angle at which a tooth enters [deg]")
-      ->required();
-  app.add_option("--exit-deg", request.exit_deg, "immersion angle at which a tooth leaves [deg]")->required();
-  app.add_option("--method", request.method,
-                 "solver: collocation (default), semi_discretization, multi_frequency, zero_order");
-  app.add_option("--speeds", request.speeds, "LO:HI:N [rpm]")->required();
-  app.add_option("--max-depth-mm", request.max_depth_mm, "depths up to here [mm]")->required();
-  app.add_option("-o,--out", request.out, "CSV file; a picture of the same name with .png stands beside it")
-      ->required();
-  app.add_option("--boundary", request.boundary,
-                 "CSV of the whole boundary with its islands, besides the first loss; a picture beside it");
-  app.add_option(
+  line.option("model", request.model, "machine model file with tool, cutting and tool_tip").required();
+  line.option("--entry-deg", request.entry_deg, "immersion angle at which a tooth enters [deg]").required();
+  line.option("--exit-deg", request.exit_deg, "immersion angle at which a tooth leaves [deg]").required();
+  line.option("--method", request.method,
+              "solver: collocation (default), semi_discretization, multi_frequency, zero_order");
+  line.option("--speeds", request.speeds, "LO:HI:N [rpm]").required();
+  line.option("--max-depth-mm", request.max_depth_mm, "depths up to here [mm]").required();
+  line.option("-o,--out", request.out, "CSV file; a picture of the same name with .png stands beside it")
+      .required();
+  line.option("--boundary", request.boundary,
+              "CSV of the whole boundary with its islands, besides the first loss; a picture beside it");
+  line.option(
       "--feed-mm", request.feed_mm,
       "per tooth [mm]: contact of the teeth about the forced vibration counts (uneven pitch, serration); "
       "without it every tooth cuts all along its arc");
-  app.add_option(
+  line.option(
       "--serration-mm", request.serration,
       "AMPLITUDE:WAVELENGTH [mm] of a serrated edge, evenly shifted from tooth to tooth; needs --feed-mm");
-  app.add_flag("--errors", request.errors, "estimate the error of each limit by a refined solution");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : 2;
-  }
-  try {
-    run(request);
-  } catch (const std::exception& e) {
-    std::cerr << "lobes: " << e.what() << "\n";
-    return 1;
-  }
-  return 0;
+  line.flag("--errors", request.errors, "estimate the error of each limit by a refined solution");
+  return runProgram(line, argc, argv, [&] { run(request); });
 }

@@ -4,20 +4,17 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <exception>
 #include <filesystem>
 #include <fstream>
-#include <iostream>
 #include <map>
 #include <mutex>
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
-
 #include "discrepancy/bench_campaign.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/effect_catalogue.h"
+#include "smartmill_core/program.h"
 #include "smartmill_discrepancy/explain/explanation.h"
 #include "smartmill_discrepancy/gap/twin_runner.h"
 
@@ -321,31 +318,21 @@ void run(const Options& o) {
 
 int main(int argc, char** argv) {
   Options o;
-  CLI::App app{"Blind bench of explain: hides causes in drawn machines and scores what is named."};
-  app.add_option("-o,--out", o.out, "folder of cases and scores")->required();
-  app.add_option("--singles", o.singles, "cases of each single effect");
-  app.add_option("--pairs", o.pairs, "pairs of effects");
-  app.add_option("--triples", o.triples, "cases of three effects");
-  app.add_option("--none", o.none, "cases with nothing hidden");
-  app.add_option("--outside", o.outside, "cases with a cause outside the catalogue");
-  app.add_option("--only", o.only, "effects to draw from, comma separated");
-  app.add_option("--case", o.only_case, "only this case of those drawn, with its progress");
-  app.add_option("--seed", o.seed, "of everything drawn");
-  app.add_option("--threads", o.threads, "cases at a time")->check(CLI::Range(1, 64));
-  app.add_option("--substeps", o.substeps, "integration steps a sample of the hidden machine")
-      ->check(CLI::Range(2, 64));
-  app.add_flag("--keep", o.keep, "keep the campaigns of right cases too");
-  app.add_flag("--exact-nominal", o.exact_nominal, "nominal values are true");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : 2;
-  }
-  try {
+  CommandLine line{"Blind bench of explain: hides causes in drawn machines and scores what is named."};
+  line.option("-o,--out", o.out, "folder of cases and scores").required();
+  line.option("--singles", o.singles, "cases of each single effect");
+  line.option("--pairs", o.pairs, "pairs of effects");
+  line.option("--triples", o.triples, "cases of three effects");
+  line.option("--none", o.none, "cases with nothing hidden");
+  line.option("--outside", o.outside, "cases with a cause outside the catalogue");
+  line.option("--only", o.only, "effects to draw from, comma separated");
+  line.option("--case", o.only_case, "only this case of those drawn, with its progress");
+  line.option("--seed", o.seed, "of everything drawn");
+  line.option("--threads", o.threads, "cases at a time").within(1, 64);
+  line.option("--substeps", o.substeps, "integration steps a sample of the hidden machine").within(2, 64);
+  line.flag("--keep", o.keep, "keep the campaigns of right cases too");
+  line.flag("--exact-nominal", o.exact_nominal, "nominal values are true");
+  return runProgram(line, argc, argv, [&] {
     run(o);
-  } catch (const std::exception& e) {
-    std::cerr << "discrepancy_bench: " << e.what() << "\n";
-    return 1;
-  }
-  return 0;
+  });
 }

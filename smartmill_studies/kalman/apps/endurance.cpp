@@ -9,13 +9,11 @@
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
-#include <iostream>
 #include <new>
 #include <string>
 
-#include <CLI/CLI.hpp>
-
 #include "smartmill_core/error.h"
+#include "smartmill_core/program.h"
 #include "smartmill_core/units.h"
 #include "smartmill_kalman/compensation/sorted_compensation.h"
 #include "smartmill_kalman_testing/reference_case.h"
@@ -58,16 +56,11 @@ long resident() {
 
 int main(int argc, char** argv) {
   double minutes = 60.0;
-  CLI::App app{
+  CommandLine line{
       "Feeds an hour of samples (three axes, 25.6 kHz, with speed changes, gaps and cuts) through the node's "
       "estimator and prints its memory."};
-  app.add_option("--minutes", minutes, "of data")->capture_default_str()->check(CLI::Range(0.1, 1e5));
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : 2;
-  }
-  try {
+  line.option("--minutes", minutes, "of data").showDefault().within(0.1, 1e5);
+  return runProgram(line, argc, argv, [&] {
     ForceSensor sensor;
     for (ModalModel& axis : sensor.axis) axis = kalman::ReferenceCase::exactSensor();
     std::size_t blocks_out = 0;
@@ -129,9 +122,5 @@ int main(int argc, char** argv) {
     const double wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     std::printf("%zu blocks out, %.1f minutes of data in %.1f s, %.0f x real time%s\n", blocks_out, minutes,
                 wall, 60.0 * minutes / wall, std::isfinite(sum) ? "" : ", NOT A NUMBER");
-  } catch (const std::exception& e) {
-    std::cerr << "endurance: " << e.what() << "\n";
-    return 1;
-  }
-  return 0;
+  });
 }

@@ -6,15 +6,14 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <iostream>
 #include <string>
 #include <thread>
 #include <vector>
 
-#include <CLI/CLI.hpp>
 #include <Eigen/Core>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/program.h"
 #include "smartmill_core/units.h"
 #include "smartmill_kalman/compensation/sorted_compensation.h"
 #include "smartmill_kalman_testing/reference_case.h"
@@ -83,20 +82,13 @@ Took run(int blocks, Handle handle) {
 int main(int argc, char** argv) {
   double seconds = 10.0;
   int loads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
-  CLI::App app{
+  CommandLine line{
       "Latency of three axes at 50 kHz in 10 ms blocks with every core busy; baseline: the same filters as "
       "dense "
       "fixed-size products."};
-  app.add_option("--seconds", seconds, "of each run")->capture_default_str()->check(CLI::Range(0.1, 1000.0));
-  app.add_option("--loads", loads, "busy threads beside it")
-      ->capture_default_str()
-      ->check(CLI::Range(0, 256));
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : 2;
-  }
-  try {
+  line.option("--seconds", seconds, "of each run").showDefault().within(0.1, 1000.0);
+  line.option("--loads", loads, "busy threads beside it").showDefault().within(0, 256);
+  return runProgram(line, argc, argv, [&] {
     std::atomic<bool> stop{false};
     std::vector<std::thread> busy;
     for (int i = 0; i < loads; ++i) {
@@ -152,9 +144,5 @@ int main(int argc, char** argv) {
         blocks, loads, std::thread::hardware_concurrency(), std::isfinite(sum) ? 0.0 : 1.0);
     print("ForceCompensation", own);
     print("dense fixed-size Eigen (baseline)", baseline);
-  } catch (const std::exception& e) {
-    std::cerr << "latency: " << e.what() << "\n";
-    return 1;
-  }
-  return 0;
+  });
 }

@@ -5,14 +5,12 @@
 #include <cstdio>
 #include <ctime>
 #include <functional>
-#include <iostream>
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
-
 #include "kalman/delay_filter.h"
 #include "kalman/tuning.h"
+#include "smartmill_core/program.h"
 #include "smartmill_core/units.h"
 #include "smartmill_kalman/compensation/campaign_compensation.h"
 #include "smartmill_kalman/compensation/record_compensation.h"
@@ -416,22 +414,16 @@ int main(int argc, char** argv) {
   double duration = 1.0;
   std::string picture;
   bool errors = false, tuning = false, force_models = false, track = false, lags = false;
-  CLI::App app{"Errors of the force compensation in the reference cut, beside their targets."};
-  app.add_option("--speed-rpm", speeds, "spindle speeds")->check(CLI::Range(500.0, 60000.0));
-  app.add_option("--duration-s", duration, "length of a record")->check(CLI::Range(0.3, 100.0));
-  app.add_flag("--model-errors", errors,
-               "a sensor that is not what it is believed to be: frozen and following");
-  app.add_flag("--force-models", force_models, "Fourier series beside F(t) = F(t - T): error and cost");
-  app.add_flag("--track-speed", track, "no tachometer: the speed as a state beside the tachometer");
-  app.add_flag("--lags", lags, "error of the fixed-lag smoother over its lag");
-  app.add_flag("--tuning", tuning, "seven speeds: laid out from the taps against the best q of the cut");
-  app.add_option("--picture", picture, "with --tuning: PNG of the maps q over speed, with confidence plants");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : 2;
-  }
-  try {
+  CommandLine line{"Errors of the force compensation in the reference cut, beside their targets."};
+  line.option("--speed-rpm", speeds, "spindle speeds").within(500.0, 60000.0);
+  line.option("--duration-s", duration, "length of a record").within(0.3, 100.0);
+  line.flag("--model-errors", errors, "a sensor that is not what it is believed to be: frozen and following");
+  line.flag("--force-models", force_models, "Fourier series beside F(t) = F(t - T): error and cost");
+  line.flag("--track-speed", track, "no tachometer: the speed as a state beside the tachometer");
+  line.flag("--lags", lags, "error of the fixed-lag smoother over its lag");
+  line.flag("--tuning", tuning, "seven speeds: laid out from the taps against the best q of the cut");
+  line.option("--picture", picture, "with --tuning: PNG of the maps q over speed, with confidence plants");
+  return runProgram(line, argc, argv, [&] {
     if (force_models) {
       runForceModels(speeds, duration);
       return 0;
@@ -449,9 +441,7 @@ int main(int argc, char** argv) {
       return 0;
     }
     errors ? runErrors(speeds, std::max(duration, 1.6)) : run(speeds, duration);
-  } catch (const std::exception& e) {
-    std::cerr << "reference: " << e.what() << "\n";
-    return 1;
-  }
-  return 0;
+
+    return 0;
+  });
 }

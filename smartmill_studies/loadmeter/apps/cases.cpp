@@ -3,14 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <exception>
 #include <map>
 #include <vector>
 
-#include <CLI/CLI.hpp>
-
 #include "loadmeter/machine_cases.h"
 #include "loadmeter/turning_scene.h"
+#include "smartmill_core/program.h"
 #include "smartmill_core/signal/statistics.h"
 
 namespace {
@@ -102,22 +100,13 @@ void turning(unsigned seed) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Randomised cases with known truth: what the estimators reach.");
+  CommandLine line("Randomised cases with known truth: what the estimators reach.");
   int count = 200;
   unsigned first = 1;
-  app.add_option("--cases", count, "how many")->capture_default_str()->check(CLI::Range(2, 100000));
-  app.add_option("--seed", first, "of the first case")->capture_default_str();
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  }
-  try {
+  line.option("--cases", count, "how many").showDefault().within(2, 100000);
+  line.option("--seed", first, "of the first case").showDefault();
+  return runProgram(line, argc, argv, [&] {
     machines(first, count);
     turning(first);
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "loadmeter_cases: %s\n", error.what());
-    return 1;
-  }
-  return 0;
+  });
 }

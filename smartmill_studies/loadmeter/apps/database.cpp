@@ -14,9 +14,8 @@
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
-
 #include "smartmill_core/error.h"
+#include "smartmill_core/program.h"
 #include "smartmill_core/signal/streams.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_loadmeter/database/database.h"
@@ -172,32 +171,24 @@ bool crash(const std::string& file, int writers, double seconds, double every) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("The database of coefficients under load.");
+  CommandLine line("The database of coefficients under load.");
   int records = 100000, writers = 8;
   double seconds = 60.0, every = 1.0;
-  auto* look = app.add_subcommand("lookup", "time of a look-up among many records, beside baselines");
-  look->add_option("--records", records)->capture_default_str()->check(CLI::Range(1000, 10000000));
-  auto* kills =
-      app.add_subcommand("crash", "writers killed while they write: is every acknowledged record there?");
-  kills->add_option("--writers", writers)->capture_default_str()->check(CLI::Range(1, 64));
-  kills->add_option("--seconds", seconds)->capture_default_str()->check(CLI::PositiveNumber);
-  kills->add_option("--kill-every", every, "s")->capture_default_str()->check(CLI::PositiveNumber);
-  app.require_subcommand(1);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  }
-  try {
+  const CommandOptions look =
+      line.command("lookup", "time of a look-up among many records, beside baselines");
+  look.option("--records", records).showDefault().within(1000, 10000000);
+  const CommandOptions kills =
+      line.command("crash", "writers killed while they write: is every acknowledged record there?");
+  kills.option("--writers", writers).showDefault().within(1, 64);
+  kills.option("--seconds", seconds).showDefault().positive();
+  kills.option("--kill-every", every, "s").showDefault().positive();
+  return runProgram(line, argc, argv, [&] {
     const TemporaryFolder folder;
     const std::string file = folder.file("study.sqlite");
-    if (look->parsed()) {
+    if (look.parsed()) {
       lookup(file, records);
       return 0;
     }
     return crash(file, writers, seconds, every) ? 0 : 1;
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "loadmeter_database: %s\n", error.what());
-    return 1;
-  }
+  });
 }

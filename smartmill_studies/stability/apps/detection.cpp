@@ -5,13 +5,11 @@
 #include <cmath>
 #include <cstdio>
 #include <fstream>
-#include <iostream>
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
-
 #include "smartmill_core/error.h"
+#include "smartmill_core/program.h"
 #include "smartmill_core/units.h"
 #include "smartmill_stability/solvers/model_system.h"
 #include "stability/detection_study.h"
@@ -125,33 +123,22 @@ bool run(const Request& request) {
 
 int main(int argc, char** argv) {
   Request request;
-  CLI::App app{
+  CommandLine line{
       "Chatter detection over simulated cuts with noise, runout and sudden entry and exit. Exit code 0: at "
       "most 1 % "
       "false alarms and at least 98 % found, 3: not so."};
-  app.add_option("model", request.model, "machine model file with tool, cutting and tool_tip")->required();
-  app.add_option("--entry-deg", request.entry_deg, "immersion angle at which a tooth enters [deg]")
-      ->required();
-  app.add_option("--exit-deg", request.exit_deg, "immersion angle at which a tooth leaves [deg]")->required();
-  app.add_option("--speeds", request.speeds, "LO:HI [rpm]")->required();
-  app.add_option("--max-depth-mm", request.max_depth_mm, "limits are looked for up to here [mm]")->required();
-  app.add_option("--cuts", request.cuts, "how many (300)");
-  app.add_option("--teeth", request.teeth, "instead of the model's");
-  app.add_option("--signal", request.signal, "force, vibration or sound (force)");
-  app.add_option("--runout-um", request.runout_um, "offset of the tool's axis [um] (5)");
-  app.add_option("--noise-n", request.noise_n, "of the force sensor, rms [N] (3)");
-  app.add_option("--severity", request.severity, "least severity of a verdict [N or the signal's unit]");
-  app.add_option("--seed", request.seed, "(1)");
-  app.add_option("-o,--out", request.out, "CSV of all cuts");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : 2;
-  }
-  try {
-    return run(request) ? 0 : 3;
-  } catch (const std::exception& e) {
-    std::cerr << "detection_study: " << e.what() << "\n";
-    return 1;
-  }
+  line.option("model", request.model, "machine model file with tool, cutting and tool_tip").required();
+  line.option("--entry-deg", request.entry_deg, "immersion angle at which a tooth enters [deg]").required();
+  line.option("--exit-deg", request.exit_deg, "immersion angle at which a tooth leaves [deg]").required();
+  line.option("--speeds", request.speeds, "LO:HI [rpm]").required();
+  line.option("--max-depth-mm", request.max_depth_mm, "limits are looked for up to here [mm]").required();
+  line.option("--cuts", request.cuts, "how many (300)");
+  line.option("--teeth", request.teeth, "instead of the model's");
+  line.option("--signal", request.signal, "force, vibration or sound (force)");
+  line.option("--runout-um", request.runout_um, "offset of the tool's axis [um] (5)");
+  line.option("--noise-n", request.noise_n, "of the force sensor, rms [N] (3)");
+  line.option("--severity", request.severity, "least severity of a verdict [N or the signal's unit]");
+  line.option("--seed", request.seed, "(1)");
+  line.option("-o,--out", request.out, "CSV of all cuts");
+  return runProgram(line, argc, argv, [&] { return run(request) ? 0 : 3; });
 }

@@ -3,12 +3,10 @@
 
 #include <cstdio>
 #include <fstream>
-#include <iostream>
 #include <string>
 
-#include <CLI/CLI.hpp>
-
 #include "smartmill_core/error.h"
+#include "smartmill_core/program.h"
 #include "smartmill_core/units.h"
 #include "smartmill_stability/chart/picture.h"
 #include "smartmill_stability/solvers/model_system.h"
@@ -77,33 +75,21 @@ void run(const Request& request) {
 
 int main(int argc, char** argv) {
   Request request;
-  CLI::App app{
+  CommandLine line{
       "Reliability diagram of the probability of chatter: machines drawn from the model's standard "
       "deviations, "
       "each cut once in the simulator."};
-  app.add_option("model", request.model, "machine model file with tool, cutting and tool_tip")->required();
-  app.add_option("--entry-deg", request.entry_deg, "immersion angle at which a tooth enters [deg]")
-      ->required();
-  app.add_option("--exit-deg", request.exit_deg, "immersion angle at which a tooth leaves [deg]")->required();
-  app.add_option("--speeds", request.speeds, "LO:HI [rpm]")->required();
-  app.add_option("--max-depth-mm", request.max_depth_mm, "limits are looked for up to here [mm]")->required();
-  app.add_option("--machines", request.machines, "drawn (200)");
-  app.add_option("--draws", request.draws, "behind each prediction (200)");
-  app.add_option("--bins", request.bins, "of the predicted probability (4)");
-  app.add_option("--seed", request.seed, "(1)");
-  app.add_flag("--solver-only", request.solver_only, "the solver is the observer too, no simulator");
-  app.add_option("-o,--out", request.out, "CSV file; the diagram of the same name with .png stands beside it")
-      ->required();
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : 2;
-  }
-  try {
-    run(request);
-  } catch (const std::exception& e) {
-    std::cerr << "reliability: " << e.what() << "\n";
-    return 1;
-  }
-  return 0;
+  line.option("model", request.model, "machine model file with tool, cutting and tool_tip").required();
+  line.option("--entry-deg", request.entry_deg, "immersion angle at which a tooth enters [deg]").required();
+  line.option("--exit-deg", request.exit_deg, "immersion angle at which a tooth leaves [deg]").required();
+  line.option("--speeds", request.speeds, "LO:HI [rpm]").required();
+  line.option("--max-depth-mm", request.max_depth_mm, "limits are looked for up to here [mm]").required();
+  line.option("--machines", request.machines, "drawn (200)");
+  line.option("--draws", request.draws, "behind each prediction (200)");
+  line.option("--bins", request.bins, "of the predicted probability (4)");
+  line.option("--seed", request.seed, "(1)");
+  line.flag("--solver-only", request.solver_only, "the solver is the observer too, no simulator");
+  line.option("-o,--out", request.out, "CSV file; the diagram of the same name with .png stands beside it")
+      .required();
+  return runProgram(line, argc, argv, [&] { run(request); });
 }

@@ -3,14 +3,12 @@
 
 #include <cstdio>
 #include <fstream>
-#include <iostream>
 #include <string>
 #include <vector>
 
-#include <CLI/CLI.hpp>
-
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/machine_model.h"
+#include "smartmill_core/program.h"
 #include "smartmill_core/units.h"
 #include "smartmill_stability/solvers/model_system.h"
 #include "stability/twin_agreement.h"
@@ -91,37 +89,24 @@ bool run(const Request& request) {
 
 int main(int argc, char** argv) {
   Request request;
-  CLI::App app{
+  CommandLine line{
       "Compares the solver with the simulator in time at random speeds and depths outside a band around the "
       "boundary. Exit code 0: they agree often enough, 3: they do not."};
-  app.add_option("model", request.model, "machine model file with tool, cutting and tool_tip")->required();
-  app.add_option("--entry-deg", request.entry_deg, "immersion angle at which a tooth enters [deg]")
-      ->required();
-  app.add_option("--exit-deg", request.exit_deg, "immersion angle at which a tooth leaves [deg]")->required();
-  app.add_option("--speeds", request.speeds, "LO:HI [rpm]")->required();
-  app.add_option("--max-depth-mm", request.max_depth_mm, "limits are looked for up to here [mm]")->required();
-  app.add_option("--points", request.points, "how many (400)");
-  app.add_option("--seed", request.seed, "of the points (1)");
-  app.add_option("--band", request.band_percent, "around the boundary, without points [% of the depth] (5)");
-  app.add_option("--least", request.least_percent, "agreement due [%] (98)");
-  app.add_option("--helix-deg", request.helix_deg, "instead of the model's [deg]");
-  app.add_option("--pitch-deg", request.pitch_deg, "instead of the model's, one a tooth [deg]")
-      ->delimiter(',');
-  app.add_flag(
-      "--linear-chips", request.linear,
-      "uneven pitch: the solver takes every tooth to cut all along its arc, as linear theory has it");
-  app.add_option("--feed-mm", request.feed_mm, "per tooth [mm] (0.1)");
-  app.add_option("--revolutions", request.revolutions, "of a cut (180)");
-  app.add_option("-o,--out", request.out, "CSV of all points");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : 2;
-  }
-  try {
-    return run(request) ? 0 : 3;
-  } catch (const std::exception& e) {
-    std::cerr << "twin_agreement: " << e.what() << "\n";
-    return 1;
-  }
+  line.option("model", request.model, "machine model file with tool, cutting and tool_tip").required();
+  line.option("--entry-deg", request.entry_deg, "immersion angle at which a tooth enters [deg]").required();
+  line.option("--exit-deg", request.exit_deg, "immersion angle at which a tooth leaves [deg]").required();
+  line.option("--speeds", request.speeds, "LO:HI [rpm]").required();
+  line.option("--max-depth-mm", request.max_depth_mm, "limits are looked for up to here [mm]").required();
+  line.option("--points", request.points, "how many (400)");
+  line.option("--seed", request.seed, "of the points (1)");
+  line.option("--band", request.band_percent, "around the boundary, without points [% of the depth] (5)");
+  line.option("--least", request.least_percent, "agreement due [%] (98)");
+  line.option("--helix-deg", request.helix_deg, "instead of the model's [deg]");
+  line.option("--pitch-deg", request.pitch_deg, "instead of the model's, one a tooth [deg]").commas();
+  line.flag("--linear-chips", request.linear,
+            "uneven pitch: the solver takes every tooth to cut all along its arc, as linear theory has it");
+  line.option("--feed-mm", request.feed_mm, "per tooth [mm] (0.1)");
+  line.option("--revolutions", request.revolutions, "of a cut (180)");
+  line.option("-o,--out", request.out, "CSV of all points");
+  return runProgram(line, argc, argv, [&] { return run(request) ? 0 : 3; });
 }

@@ -2,8 +2,6 @@
 
 #include <stdexcept>
 
-#include <CLI/CLI.hpp>
-
 #include "smartmill_core/error.h"
 #include "smartmill_ros/parameter_reader.h"
 
@@ -30,17 +28,17 @@ void set(const Parameter& parameter, const std::string& option, const std::strin
 
 }  // namespace
 
-ParameterOptions::ParameterOptions(CLI::App& app, const ParameterTable& table, const std::string& shipped)
-    : app_(app), table_(table) {
-  app.add_option("--params", file_, "parameter file, as the node's (" + shipped + "; its keys below)");
-  app.footer("\n" + table.yaml());
+ParameterOptions::ParameterOptions(CommandLine& line, const ParameterTable& table, const std::string& shipped)
+    : line_(line), table_(table) {
+  line.option("--params", file_, "parameter file, as the node's (" + shipped + "; its keys below)");
+  line.footer("\n" + table.yaml());
 }
 
 void ParameterOptions::add(const std::string& option, const std::string& key) {
   const Parameter* parameter = table_.find(key);
   if (!parameter) throw std::logic_error("no parameter " + key);
   given_.push_back({option, key});
-  app_.add_option(option, *given_.back().text, parameter->description() + " (" + parameter->value() + ")");
+  line_.option(option, *given_.back().text, parameter->description() + " (" + parameter->value() + ")");
 }
 
 void ParameterOptions::apply() {

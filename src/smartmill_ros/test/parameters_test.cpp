@@ -1,7 +1,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <CLI/CLI.hpp>
+#include <iterator>
+#include <sstream>
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/testing/temporary_folder.h"
@@ -116,13 +117,17 @@ TEST_F(ParameterFiles, EveryFaultIsOneLineWithKeyAndValue) {
 class Options : public ParameterFiles {
  protected:
   struct Tool {
-    Tool() : table(tableOf(parameters)), options(app, table, "launch/config/x.yaml") {
+    Tool() : table(tableOf(parameters)), options(line, table, "launch/config/x.yaml") {
       options.add("--bandwidth-hz", "bandwidth");
       options.add("--hits", "hits");
     }
-    std::string run(const std::string& line) {
+    std::string run(const std::string& typed) {
+      std::istringstream text("tool " + typed);
+      const std::vector<std::string> words{std::istream_iterator<std::string>(text), {}};
+      std::vector<const char*> argv;
+      for (const std::string& word : words) argv.push_back(word.c_str());
+      if (line.parse(static_cast<int>(argv.size()), argv.data()).stop) return "not parsed";
       try {
-        app.parse(line);
         options.apply();
       } catch (const Error& error) {
         return error.what();
@@ -131,7 +136,7 @@ class Options : public ParameterFiles {
     }
     Parameters parameters;
     ParameterTable table;
-    CLI::App app;
+    CommandLine line;
     ParameterOptions options;
   };
 };
@@ -154,7 +159,7 @@ TEST_F(Options, KeepTheBoundsOfTheTable) {
 }
 
 TEST_F(Options, HelpSaysUnitBoundsMeaningAndDefault) {
-  const std::string help = Tool().app.help();
+  const std::string help = Tool().line.help();
   EXPECT_THAT(help, HasSubstr("[Hz] > 0, up to here (5000.0)"));
   EXPECT_THAT(help, HasSubstr("launch/config/x.yaml"));
   EXPECT_THAT(help, HasSubstr("part_share: 0.5"));

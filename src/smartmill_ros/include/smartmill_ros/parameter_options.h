@@ -6,10 +6,7 @@
 #include <vector>
 
 #include "smartmill_core/parameters/parameter_table.h"
-
-namespace CLI {
-class App;
-}
+#include "smartmill_core/program.h"
 
 namespace smartmill {
 
@@ -19,7 +16,7 @@ class ParameterOptions {
  public:
   /// @param table of the struct that the command line changes; both outlive this
   /// @param shipped where the node's own file lies, for --help
-  ParameterOptions(CLI::App& app, const ParameterTable& table, const std::string& shipped);
+  ParameterOptions(CommandLine& line, const ParameterTable& table, const std::string& shipped);
 
   /// An option, e.g. "--bandwidth-hz", for the parameter of that key (a number); unit, bounds, meaning and
   /// default in --help are the table's.
@@ -34,7 +31,7 @@ class ParameterOptions {
     std::string option, key;
     std::shared_ptr<std::string> text = std::make_shared<std::string>();
   };
-  CLI::App& app_;
+  CommandLine& line_;
   const ParameterTable& table_;
   std::string file_;
   std::vector<Given> given_;
