@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "smartmill_core/signal/statistics.h"
-#include "smartmill_sim/twin/regenerative_cut.h"
+#include "smartmill_sim/twin/milling_process.h"
 
 #include "effects_rig.h"
 
@@ -82,7 +82,7 @@ TEST(Effects, chipCoefficientsAddToTheNominal) {
   EXPECT_NEAR(at(record, "fz", 0.5 * PI, EVEN_SPEED), (150e6 * 1e-4 + 3e3) * 2e-3, 1e-6);
 }
 
-// By all three laws of the twin.
+// By the twin's tables and by its history of passes.
 TEST(Effects, edgeBuildupGrowsWithTheChip) {
   MachineModel model = with(mill(2, 0.0), {effectEntry("edge_buildup", {{"chip_um", 30.0}})});
   const auto due = [](double h) { return (200e6 * h + 3e3 * (1.0 - std::exp(-h / 30e-6))) * 2e-3; };
@@ -96,18 +96,10 @@ TEST(Effects, edgeBuildupGrowsWithTheChip) {
   ToolMotion motion;
   motion.speed = speed;
   motion.velocity[0] = 2e-4 * speed / TWO_PI;
-  RegenerativeCut regenerative(*model.tool, state.law, dt);
-  regenerative.engage({{0.0, PI, 2e-3}}, motion);
-  EXPECT_NEAR(regenerative.at(0.5 * PI, {{0, 0}}).fz, due(1e-4), 1e-6);
-  CuttingProcess process(*model.tool, state.law);
+  MillingProcess process(*model.tool, state.law, dt);
+  motion.angle = 0.5 * PI;
   process.engage({{0.0, PI, 2e-3}}, motion);
-  CuttingForce force;
-  for (int i = 0; i <= 1024; ++i) {  // to 90 degrees
-    motion.angle = speed * i * dt;
-    motion.centre[0] = motion.velocity[0] * i * dt;
-    force = process.step(motion);
-  }
-  EXPECT_NEAR(force.fz, due(1e-4), 1e-3 * due(1e-4));
+  EXPECT_NEAR(process.step(motion).fz, due(1e-4), 1e-6);
 }
 
 TEST(Effects, toolWearGrowsEveryEdgeForceWithCuttingTime) {
@@ -210,15 +202,21 @@ TEST(Effects, processDampingOpposesTheMotionIntoTheWork) {
   CuttingLaw plain = damped.law;
   EffectSet(model).update({}, damped);
   const double dt = 1e-5, speed = 300.0, depth = 2e-3, v = 4e-3;
-  RegenerativeCut with_damping(*model.tool, damped.law, dt), without(*model.tool, plain, dt);
-  ToolMotion motion;
-  motion.speed = speed;
-  motion.velocity[0] = 1e-4 * speed / TWO_PI;
-  with_damping.engage({{0.0, PI, depth}}, motion);
-  without.engage({{0.0, PI, depth}}, motion);
-  // The tooth stands at 90 degrees, x is into the work.
-  const CuttingForce a = with_damping.at(0.5 * PI, {{v * dt, 0.0}}),
-                     b = without.at(0.5 * PI, {{v * dt, 0.0}});
+  // The tooth comes to 90 degrees, x is into the work.
+  const auto forceOf = [&](const CuttingLaw& law) {
+    MillingProcess process(*model.tool, law, dt);
+    ToolMotion motion;
+    motion.speed = speed;
+    motion.velocity[0] = 1e-4 * speed / TWO_PI;
+    motion.angle = 0.5 * PI - speed * dt;
+    process.engage({{0.0, PI, depth}}, motion);
+    process.step(motion);
+    process.settle({{0.0, 0.0}});
+    motion.angle = 0.5 * PI;
+    motion.displacement[0] = v * dt;
+    return process.step(motion);
+  };
+  const CuttingForce a = forceOf(damped.law), b = forceOf(plain);
   const double force = 120e3 * v / (speed * 0.01) * depth;
   EXPECT_NEAR(a.fx - b.fx, -force, 1e-6 * force);
   EXPECT_NEAR(a.fy - b.fy, 0.3 * force, 1e-6 * force);

@@ -215,7 +215,7 @@ TEST(World, ASlotByNcTextGivesClosedFormForceAndLoad) {
   const Engagement slot{0.0, PI, 1e-3, 0.1e-3};
   const MechanisticForce closed(*model.tool, *model.cutting, slot);
   const CuttingForce expected = closed.mean();
-  // The time lag of the surface's node is below 1e-3 of the chip (see CuttingProcess).
+  // Samples, 256 a revolution, and the sum over them.
   EXPECT_NEAR(mean(machine.force[0], from, to), expected.fx, 1e-3 * std::abs(expected.fx));
   EXPECT_NEAR(mean(machine.force[1], from, to), expected.fy, 1e-3 * std::abs(expected.fy));
   EXPECT_NEAR(mean(machine.force[2], from, to), expected.fz, 1e-3 * std::abs(expected.fz));

@@ -18,9 +18,6 @@ namespace {
 
 using Random = std::mt19937_64;
 
-// Finer than the simulator's own: the ends of its slices would ring sensor modes of little damping.
-constexpr double SLICE_ANGLE = 0.008;  // [rad]
-
 double between(Random& random, double low, double high) {
   return std::uniform_real_distribution<double>(low, high)(random);
 }
@@ -227,16 +224,7 @@ void writeBenchCampaign(const MachineModel& nominal, const BenchTruth& truth, co
   Random random(seed);
   std::normal_distribution<double> normal;
   for (const CampaignTest& test : campaign.tests) {
-    // A vibrating tool that is in full cut at once leaves marks on the slot's walls which only the surface
-    // model keeps for long; the records here, like those of other programs, forget them after two
-    // revolutions.
-    const bool vibrates = !truth.machine.tool_tip.x.modes.empty() ||
-                          !truth.machine.tool_tip.y.modes.empty() ||
-                          std::any_of(truth.machine.effects.begin(), truth.machine.effects.end(),
-                                      [](const EffectEntry& e) { return e.name == "tool_flexibility"; });
-    const int steps = vibrates ? 2 * substeps : substeps;
-    sim::CuttingMachine machine(truth.machine, 1.0 / (test.sample_rate * steps),
-                                vibrates ? sim::Feed::steady : sim::Feed::any, SLICE_ANGLE);
+    sim::CuttingMachine machine(truth.machine, 1.0 / (test.sample_rate * substeps));
     machine.setClock({test.start_time.value_or(0.0), test.cut_time_before.value_or(0.0), true});
     machine.resetLoadMeter(test.spindle_speed);
     for (sim::Tone* tone : machine.tones()) tone->phase = between(random, 0.0, units::TWO_PI);
@@ -253,8 +241,8 @@ void writeBenchCampaign(const MachineModel& nominal, const BenchTruth& truth, co
     bool engaged = false;
     for (std::size_t i = 0; i < samples; ++i) {
       sim::ChannelValues shown{};
-      for (int s = 0; s < steps; ++s) {
-        const double t = (static_cast<double>(i) + static_cast<double>(s) / steps) / test.sample_rate;
+      for (int s = 0; s < substeps; ++s) {
+        const double t = (static_cast<double>(i) + static_cast<double>(s) / substeps) / test.sample_rate;
         sim::CuttingMachine::Input input;
         input.motion.angle = phase + test.spindle_speed * t;
         input.motion.speed = test.spindle_speed;
@@ -266,7 +254,7 @@ void writeBenchCampaign(const MachineModel& nominal, const BenchTruth& truth, co
                                                      : 2] = peak * std::sin(units::PI * (t - hit) / width);
         if (cut && !engaged && t >= *test.engage_time - 1e-3 / test.sample_rate) {
           machine.engage({{test.engagement->entry, test.engagement->exit, test.engagement->axial_depth}},
-                         input.motion, sim::ENGAGEMENT_RISE * steps);
+                         input.motion, sim::engagementRise(machine.vibrates()) * substeps);
           engaged = true;
         }
         const sim::CuttingMachine::Output out = machine.step(input);

@@ -76,19 +76,17 @@ LiveGap liveGap(const MachineModel& model, const Stretch& stretch, const LiveGap
   if (with_load) shown.add("load_meter").assign(shown.size(), 0.0);
   sim::SimulationOptions twin;
   twin.noise = false;
-  Record simulated = sim::simulateTest(model, stretch.test, shown, twin);
+  const Record simulated = sim::simulateTest(model, stretch.test, shown, twin);
   const Axes3& noise = *model.force_sensor.noise_rms;
   const bool vibrates = !model.tool_tip.x.modes.empty() || !model.tool_tip.y.modes.empty();
   if (stretch.test.kind == TestKind::cut && vibrates &&
       unsettled(simulated, stretch.test) > std::min(noise[0], noise[1])) {
-    // A tool that is about to chatter: the walls of its slot must be kept.
+    // A tool that is about to chatter.
     result.at_the_edge = true;
     if (stretch.test.running_before.value_or(0.0) < EDGE_SETTLING) {
       result.aside = "is near its stability limit and has not settled yet";
       return result;
     }
-    twin.stored_surface = true;
-    simulated = sim::simulateTest(model, stretch.test, shown, twin);
   }
   const std::size_t from =
       stretch.test.running_before.value_or(0.0) >= LEAST_RUNNING ? 0 : stretch.record.size() / 2;

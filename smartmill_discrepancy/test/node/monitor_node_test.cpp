@@ -85,7 +85,7 @@ class MonitorNodeTest : public testing::Test {
     test.running_before = 0.4;
     sim::SimulationOptions options;
     options.seed = static_cast<std::uint64_t>(begin);
-    options.stored_surface = true;  // not the monitor's way to the same force
+    options.substeps = 8;  // finer than the monitor's
     options.phase = 0.3;
     const Record record = sim::simulateTest(machine, test, DURATION, options);
     const auto &fx = record.column("fx"), &fy = record.column("fy"), &fz = record.column("fz");

@@ -18,7 +18,7 @@ ModalModel firstModeAt(ModalModel axis, double factor) {
 
 }  // namespace
 
-CuttingMachine::CuttingMachine(const MachineModel& model, double time_step, Feed feed, double slice_angle)
+CuttingMachine::CuttingMachine(const MachineModel& model, double time_step, Feed feed)
     : effects_(model),
       model_(model),
       time_step_(time_step),
@@ -36,10 +36,8 @@ CuttingMachine::CuttingMachine(const MachineModel& model, double time_step, Feed
     nominal_.law.coefficients = model_.needCutting("simulate a cut");
     if (feed == Feed::steady && !vibrates_) {
       rigid_.emplace(*model_.tool, nominal_.law, setup.radius_offset);
-    } else if (feed == Feed::steady) {
-      regenerative_.emplace(*model_.tool, nominal_.law, time_step, setup.radius_offset);
     } else {
-      process_.emplace(*model_.tool, nominal_.law, setup.radius_offset, slice_angle);
+      process_.emplace(*model_.tool, nominal_.law, time_step, setup.radius_offset);
     }
   }
   state_ = nominal_;
@@ -72,7 +70,7 @@ ToolMotion CuttingMachine::fed(const ToolMotion& commanded) const {
 }
 
 void CuttingMachine::engage(const std::vector<ContactArc>& arcs, const ToolMotion& now, double rise) {
-  if (!process_ && !rigid_ && !regenerative_)
+  if (!process_ && !rigid_)
     throw Error(model_.file + ": tool or cutting is missing (needed to simulate a cut)");
   if (!feed_start_) feed_start_ = now.centre;
   Input input;
@@ -88,23 +86,21 @@ void CuttingMachine::engage(const std::vector<ContactArc>& arcs, const ToolMotio
     if (state_.depth_slope != 0.0) a.depth = std::max(a.depth + state_.depth_slope * feed_path_, LEAST_DEPTH);
   }
   if (process_) process_->engage(tilted, fed(now));
-  if (rigid_) rigid_->engage(tilted, fed(now));
-  if (regenerative_) regenerative_->engage(tilted, fed(now));
+  if (rigid_) rigid_->engage(tilted, feedOf(fed(now)));
 }
 
-void CuttingMachine::setTiltedDepths(const ToolMotion& now) {
+void CuttingMachine::setTiltedDepths() {
   std::vector<double> depths;
   for (const ContactArc& a : arcs_)
     depths.push_back(std::max(a.depth + state_.depth_slope * feed_path_, LEAST_DEPTH));
-  if (process_) process_->setDepths(depths, fed(now));
+  if (process_) process_->setDepths(depths);
   if (rigid_) rigid_->setDepths(depths);
-  if (regenerative_) regenerative_->setDepths(depths);
 }
 
-void CuttingMachine::setDepth(double depth, const ToolMotion& now, double passed_over) {
+void CuttingMachine::setDepth(double depth, double passed_over) {
   for (ContactArc& a : arcs_) a.depth = depth;
   feed_path_ += passed_over;
-  setTiltedDepths(now);
+  setTiltedDepths();
 }
 
 void CuttingMachine::resetLoadMeter(double spindle_speed) {
@@ -128,9 +124,8 @@ void CuttingMachine::update(const Input& input) {
   now_.edge_time = clock_.edge_time;
   state_ = nominal_;
   effects_.update(now_, state_);
-  if (process_) process_->law() = state_.law;
+  if (process_) process_->setLaw(state_.law);
   if (rigid_) rigid_->setLaw(state_.law);
-  if (regenerative_) regenerative_->setLaw(state_.law);
   if (drive_) drive_->setFriction(state_.friction_extra, state_.friction_factor);
   // The first time exactly, then only when it has moved.
   const double moved = std::abs(state_.sensor_frequency / sensor_frequency_ - 1.0);
@@ -155,7 +150,7 @@ void CuttingMachine::step(const Input& input, Output& out) {
   if (!effects_.empty() && (steps_to_update_ <= 0 || input.motion.speed != now_.speed)) {
     update(input);
     steps_to_update_ = UPDATE_STEPS;
-    if (state_.depth_slope != 0.0 && cutting()) setTiltedDepths(input.motion);
+    if (state_.depth_slope != 0.0 && cutting()) setTiltedDepths();
   }
   --steps_to_update_;
   now_.angle = input.motion.angle;
@@ -163,7 +158,7 @@ void CuttingMachine::step(const Input& input, Output& out) {
 
   if (rigid_) {
     out.force = rigid_->at(input.motion.angle);
-  } else if (process_ || regenerative_) {
+  } else if (process_) {
     ToolMotion motion = fed(input.motion);
     // The tip's place needs this step's force and the force needs the place: the force is first taken to go
     // on in a straight line, which errs by the square of the step.
@@ -171,7 +166,7 @@ void CuttingMachine::step(const Input& input, Output& out) {
       const std::array<double, 2>& f = tip_history_[axis];
       motion.displacement[axis] = tip_[axis].peek(2.0 * f[0] - f[1]);
     }
-    out.force = process_ ? process_->step(motion) : regenerative_->at(motion.angle, motion.displacement);
+    out.force = process_->step(motion);
   } else {
     out.force = {};
   }
@@ -190,7 +185,9 @@ void CuttingMachine::step(const Input& input, Output& out) {
     channels[DISPLACEMENT] = channels[TOOL_X + *probe_];
     channels[ACCELERATION] = tip_[*probe_].acceleration();
   }
-  if (regenerative_) regenerative_->push({{channels[TOOL_X], channels[TOOL_Y]}});
+  if (process_)
+    process_->settle(vibrates_ ? std::array<double, 2>{{channels[TOOL_X], channels[TOOL_Y]}}
+                               : std::array<double, 2>{{0.0, 0.0}});
   const std::array<double, 3> cut{{out.force.fx, out.force.fy, out.force.fz}};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const double before = out.applied[axis] - jump_ * (cut[axis] - last_cut_[axis]);

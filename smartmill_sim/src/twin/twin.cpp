@@ -245,8 +245,7 @@ Record simulate(const MachineModel& model, const CampaignTest& test, const Recor
                 double phase, const SimulationOptions& options) {
   if (options.substeps < 1) throw Error("simulation: substeps below 1");
   const double step_time = 1.0 / (test.sample_rate * options.substeps);
-  const Feed feed_kind = options.stored_surface ? Feed::any : Feed::steady;
-  CuttingMachine machine(model, step_time, feed_kind);
+  CuttingMachine machine(model, step_time, Feed::steady);
   if (test.kind == TestKind::tap) {
     const std::vector<double> hammer = contactForce(record.column("hammer"));
     const std::size_t axis = test.direction == "x" ? 0 : test.direction == "y" ? 1 : 2;
@@ -291,7 +290,7 @@ Record simulate(const MachineModel& model, const CampaignTest& test, const Recor
   bool engaged = false;
   const auto engage = [&](const ToolMotion& now, double depth) {
     machine.engage({{test.engagement->entry, test.engagement->exit, depth}}, now,
-                   ENGAGEMENT_RISE * options.substeps);
+                   engagementRise(machine.vibrates()) * options.substeps);
     engaged = true;
   };
   if (test.running_before) {
@@ -309,13 +308,11 @@ Record simulate(const MachineModel& model, const CampaignTest& test, const Recor
             LEAST_GROWTH + (1.0 - LEAST_GROWTH) * growth(static_cast<double>(steps - k) /
                                                          (GROWING_SHARE * static_cast<double>(steps)));
         if (!engaged) engage(input.motion, share * test.engagement->axial_depth);
-        machine.setDepth(share * test.engagement->axial_depth, input.motion);
+        machine.setDepth(share * test.engagement->axial_depth);
       }
       machine.step(input, out);
     }
-    if (engaged)
-      machine.setDepth(test.engagement->axial_depth, inputAt(record.time[0]).motion,
-                       feed * (*test.running_before - lead));
+    if (engaged) machine.setDepth(test.engagement->axial_depth, feed * (*test.running_before - lead));
   }
   run(
       model, test, options, machine,

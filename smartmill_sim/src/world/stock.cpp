@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "smartmill_core/math/angle.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::sim {
@@ -17,11 +18,6 @@ constexpr double LEAST_SPEED = 1e-7;     // [m/s]
 constexpr double ON_WALL = 1e-9;         // [m] a point this near to a slot's wall is on it: not material
 constexpr double SAME_WAY = 1.0 - 1e-9;  // [1] cosine
 constexpr double OFF_LINE = 1e-9;        // [m]
-
-double wrapped(double angle) {
-  const double a = std::fmod(angle, TWO_PI);
-  return a < 0.0 ? a + TWO_PI : a;
-}
 
 double distanceToLine(double x, double y, const std::array<double, 2>& from,
                       const std::array<double, 2>& to) {

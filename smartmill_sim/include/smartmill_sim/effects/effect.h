@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
+#include "smartmill_core/cutting/cutting_law.h"
 #include "smartmill_core/model/effect_catalogue.h"
 #include "smartmill_core/model/machine_model.h"
-#include "smartmill_sim/twin/cutting_process.h"
 
 namespace smartmill::sim {
 

@@ -6,13 +6,12 @@
 #include <utility>
 #include <vector>
 
+#include "smartmill_core/cutting/rigid_cut.h"
 #include "smartmill_core/modal/modal_filter.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_sim/effects/delay_line.h"
 #include "smartmill_sim/effects/effect.h"
-#include "smartmill_sim/twin/cutting_process.h"
-#include "smartmill_sim/twin/regenerative_cut.h"
-#include "smartmill_sim/twin/rigid_cut.h"
+#include "smartmill_sim/twin/milling_process.h"
 #include "smartmill_sim/twin/spindle_drive.h"
 
 namespace smartmill::sim {
@@ -48,18 +47,19 @@ class CuttingMachine {
   };
 
   /// Without tool and cutting sections nothing can be cut: engage() then refuses.
-  /// @param time_step [s] > 0. @param slice_angle [rad] of CuttingProcess, which runs Feed::any
-  /// @throws Error naming what of the model this twin cannot run.
-  CuttingMachine(const MachineModel& model, double time_step, Feed feed = Feed::any,
-                 double slice_angle = CuttingProcess::SLICE_ANGLE);
+  /// @param time_step [s] > 0. @throws Error naming what of the model this twin cannot run.
+  CuttingMachine(const MachineModel& model, double time_step, Feed feed = Feed::any);
 
-  /// Changes where the tool meets material, see CuttingProcess.
+  /// Whether the tip has modes: the chip then regenerates.
+  bool vibrates() const { return vibrates_; }
+
+  /// Changes where the tool meets material, see MillingProcess.
   /// @param rise [1] share of the change in force that comes on linearly over the step that ends now; the
   /// rest jumps at its end.
   void engage(const std::vector<ContactArc>& arcs, const ToolMotion& now, double rise = 1.0);
   bool cutting() const { return !arcs_.empty(); }
   /// Another axial depth [m] > 0 of every arc, the surface as it is. Feed [m] is passed over unseen.
-  void setDepth(double depth, const ToolMotion& now, double passed_over = 0.0);
+  void setDepth(double depth, double passed_over = 0.0);
 
   /// A record begins now: drift and hum start anew. A new edge has edge_time 0.
   void setClock(const Clock& clock);
@@ -85,7 +85,7 @@ class CuttingMachine {
 
  private:
   void update(const Input& input);
-  void setTiltedDepths(const ToolMotion& now);
+  void setTiltedDepths();
   ToolMotion fed(const ToolMotion& commanded) const;
 
   EffectSet effects_;
@@ -95,9 +95,8 @@ class CuttingMachine {
   Instant now_;
   Clock clock_;
   int steps_to_update_ = 0;
-  std::optional<CuttingProcess> process_;
-  std::optional<RigidCut> rigid_;                // instead of the process: steady, no modes
-  std::optional<RegenerativeCut> regenerative_;  // the same: steady, modes
+  std::optional<MillingProcess> process_;
+  std::optional<RigidCut> rigid_;  // instead of the process: steady, no modes
   bool vibrates_ = false;
   std::optional<std::size_t> probe_;
   std::vector<ContactArc> arcs_;                     // as engaged, without tilt

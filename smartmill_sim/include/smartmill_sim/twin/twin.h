@@ -18,14 +18,13 @@ struct SimulationOptions {
   std::optional<double> phase;
   /// Tones (mains hum) with a phase of the seed, not with the one that the recorded signals show.
   bool random_phases = false;
-  /// Surface of the cut stored over the turn instead of the last passes: several times slower, but it keeps
-  /// what a tool near its stability limit leaves on the walls of a slot.
-  bool stored_surface = false;
 };
 
-/// [1] The force of a cut comes on over this part of a sample before the engagement (so it fits campaigns
-/// that another program made).
-constexpr double ENGAGEMENT_RISE = 1.0 / 6.0;
+/// [1] The force of a cut comes on over this part of a sample before the engagement: a step of the programs
+/// that make campaigns, who take many more of them where the tool vibrates.
+constexpr double engagementRise(bool vibrates) {
+  return vibrates ? 1.0 / 64.0 : 1.0 / 6.0;
+}
 
 /// [rad] Spindle angle at a record's first sample: the phase that fits its angles best at the test's speed.
 /// 0 for a tap and for a record without spindle_angle.

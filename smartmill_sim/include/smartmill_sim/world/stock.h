@@ -4,8 +4,8 @@
 #include <cstddef>
 #include <vector>
 
+#include "smartmill_core/cutting/contact_arc.h"
 #include "smartmill_core/model/machine_model.h"
-#include "smartmill_sim/twin/cutting_process.h"
 
 namespace smartmill::sim {
 

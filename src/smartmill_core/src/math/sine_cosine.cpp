@@ -1,8 +1,9 @@
-#include "trigonometry.h"
+#include "smartmill_core/math/sine_cosine.h"
 
+#include <cmath>
 #include <vector>
 
-namespace smartmill::sim {
+namespace smartmill {
 
 const SineCosine* turnTable() {
   static const std::vector<SineCosine> TABLE = [] {
@@ -15,4 +16,4 @@ const SineCosine* turnTable() {
   return TABLE.data();
 }
 
-}  // namespace smartmill::sim
+}  // namespace smartmill

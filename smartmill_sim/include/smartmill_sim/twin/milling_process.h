@@ -1,0 +1,122 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include "smartmill_core/cutting/chip_rule.h"
+#include "smartmill_core/cutting/contact.h"
+#include "smartmill_core/cutting/cutting_law.h"
+#include "smartmill_core/cutting/mechanistic.h"
+#include "smartmill_core/cutting/rigid_cut.h"
+#include "smartmill_core/cutting/tool.h"
+
+namespace smartmill::sim {
+
+/// Where the tool is and how it moves.
+struct ToolMotion {
+  double angle = 0.0;                          ///< [rad] immersion angle of tooth 1 at its tip
+  double speed = 0.0;                          ///< [rad/s] of the spindle, >= 0
+  std::array<double, 2> centre{{0, 0}};        ///< [m] x, y of the undeflected tool
+  std::array<double, 2> velocity{{0, 0}};      ///< [m/s] of the undeflected tool
+  std::array<double, 2> displacement{{0, 0}};  ///< [m] vibration of the tip
+};
+
+/// [m/rad] Feed of a turn of the spindle. @throws Error when the spindle stands.
+std::array<double, 2> feedOf(const ToolMotion& motion);
+
+/// Milling in steps of constant length: every tooth meets what the teeth before it left by ChipRule, from the
+/// history of where the tool was and how its tip was displaced. Regeneration, loss of contact, runout and
+/// uneven pitch come out of it, and speed, feed and contact may change at any time (Dunwoody 2.2, 6.1 with
+/// exact kinematics). Each pass is one ChipShape for the whole edge, so that the force is integrated between
+/// the exact ends of every contact; passes are looked at from the last one back until none can be nearer.
+class MillingProcess {
+ public:
+  /// @param time_step [s] > 0 @param radius_offset [m] of each tooth, empty: none. @throws Error on an
+  /// impossible tool.
+  MillingProcess(const ToolGeometry& tool, const CuttingLaw& law, double time_step,
+                 std::vector<double> radius_offset = {});
+
+  /// Changes where there is material. Where there was none before, the tool had moved as now and had not
+  /// vibrated.
+  /// @throws Error on an impossible arc, a standing spindle, a tooth period shorter than two steps.
+  void engage(const std::vector<ContactArc>& arcs, const ToolMotion& now);
+  const std::vector<ContactArc>& arcs() const { return arcs_; }
+  /// Depth of each arc [m] > 0.
+  void setDepths(const std::vector<double>& depths);
+  void setLaw(const CuttingLaw& law) { law_ = law; }
+
+  /// Force on the tool with its tip displaced as in this motion.
+  CuttingForce step(const ToolMotion& now);
+  /// Ends the step with the tip there [m].
+  void settle(const std::array<double, 2>& displacement);
+
+ private:
+  /// A turn of the spindle back in the history.
+  struct Delay {
+    double turn;                           // [rad]
+    std::size_t steps = 0;                 // ago: the step before it
+    std::array<double, 4> weights{};       // of the steps steps + 1, steps, steps - 1, steps - 2 ago
+    long of_regime = -1;                   // for which these hold
+    long of_step = -1;                     // for which the rest holds
+    bool known = false;                    // the history reaches back to it
+    std::array<double, 2> displacement{};  // [m] then
+    std::array<double, 2> fed{};           // [m] since then; of an unsteady regime only
+  };
+  /// An earlier pass as one tooth meets it.
+  struct Pass {
+    std::size_t delay = 0;
+    double step = 0.0;    // [m] of the radii, over that of the first pass
+    long of_regime = -1;  // for which the shapes hold
+    ChipShape still;      // the chip without vibration
+    ChipShape behind;     // by how much it is thicker than that of the first pass
+    double bend = 0.0;    // of behind
+  };
+  void clear(const ToolMotion& now);
+  void advance(const ToolMotion& now);
+  bool steadySince(double turn) const;
+  const Pass& passOf(int tooth, int n) {
+    std::vector<Pass>& passes = passes_[static_cast<std::size_t>(tooth)];
+    if (passes.size() < static_cast<std::size_t>(n)) addPass(tooth);
+    Pass& pass = passes[static_cast<std::size_t>(n) - 1];
+    if (pass.of_regime != regime_ || regime_ != 0) shapePass(tooth, n, pass);
+    return pass;
+  }
+  const Delay& back(std::size_t delay) {
+    return delays_[delay].of_step == count_ ? delays_[delay] : lookBack(delays_[delay]);
+  }
+  void addPass(int tooth);
+  Delay& lookBack(Delay& delay);
+  void place(Delay& delay, double steps);
+  void search(Delay& delay);
+  void shapePass(int tooth, int n, Pass& pass);
+  bool gather(int tooth, const Stretch& cell, bool& certain);
+  void cut(int tooth, const Stretch& cell, EdgeForce& edge);
+  void grow();
+
+  ToolGeometry tool_;
+  ChipRule rule_;
+  CuttingLaw law_;
+  double time_step_, lag_;
+  std::vector<ContactArc> arcs_;
+  ToolMotion now_;
+  std::array<double, 2> feed_{{0, 0}}, first_feed_{{0, 0}};  // [m/rad] now, when the material began
+  std::array<double, 2> damping_{{0, 0}};  // [N/m] radial force of process damping: x sin + y cos
+
+  // What was at each step since the material began, newest at count_ - 1; rings.
+  std::vector<std::array<double, 2>> displacement_, centre_;  // [m]
+  std::vector<double> turned_;                                // [rad] since the first step
+  long count_ = 0;
+  double turned_now_ = 0.0;
+  std::size_t deepest_ = 0;                // steps that were looked back
+  std::array<double, 2> largest_{{0, 0}};  // [m] displacement, of the ring's length now and of the one before
+  // Speed and feed stay as they are within a regime.
+  long regime_ = 0;
+  double regime_began_ = 0.0;  // [rad]
+
+  std::vector<std::vector<Pass>> passes_;  // of each tooth
+  std::vector<Delay> delays_;
+  std::vector<ChipShape> shapes_;  // those that may give a cell's chip
+};
+
+}  // namespace smartmill::sim

@@ -1,0 +1,289 @@
+#include "smartmill_sim/twin/milling_process.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/math/angle.h"
+#include "smartmill_core/units.h"
+
+namespace smartmill::sim {
+namespace {
+
+constexpr std::size_t LEAST_HISTORY = 4096, MOST_HISTORY = 131072;  // steps; powers of two
+constexpr double SAME_TURN = 1e-10;                                 // [rad]
+constexpr double SETTLED_STEPS = 3.0;  // of a regime before its steps count as even
+
+std::size_t ring(long step, std::size_t size) {
+  return static_cast<std::size_t>(step) & (size - 1);
+}
+
+}  // namespace
+
+std::array<double, 2> feedOf(const ToolMotion& motion) {
+  if (!(motion.speed > 0.0)) throw Error("milling: the spindle stands");
+  return {{motion.velocity[0] / motion.speed, motion.velocity[1] / motion.speed}};
+}
+
+MillingProcess::MillingProcess(const ToolGeometry& tool, const CuttingLaw& law, double time_step,
+                               std::vector<double> radius_offset)
+    : tool_((validate(tool), tool)),
+      rule_(tool, std::move(radius_offset)),
+      law_(law),
+      time_step_(time_step),
+      lag_(tool.lag()),
+      passes_(static_cast<std::size_t>(tool.teeth)) {
+}
+
+void MillingProcess::engage(const std::vector<ContactArc>& arcs, const ToolMotion& now) {
+  for (const ContactArc& a : arcs) validate(a);
+  if (!arcs.empty()) {
+    feed_ = feedOf(now);
+    for (int j = 0; j < rule_.teeth(); ++j) {
+      if (rule_.turn(j, 1) < 2.0 * now.speed * time_step_)
+        throw Error("milling: a tooth period is shorter than two steps");
+    }
+    if (arcs_.empty()) clear(now);
+  }
+  arcs_ = arcs;
+}
+
+void MillingProcess::clear(const ToolMotion& now) {
+  displacement_.assign(LEAST_HISTORY, {{0.0, 0.0}});
+  centre_.assign(LEAST_HISTORY, {{0.0, 0.0}});
+  turned_.assign(LEAST_HISTORY, 0.0);
+  count_ = 0;
+  turned_now_ = 0.0;
+  deepest_ = 0;
+  largest_ = {{0.0, 0.0}};
+  regime_ = 0;
+  regime_began_ = 0.0;
+  now_ = now;
+  first_feed_ = feed_;
+  delays_.clear();
+  for (std::vector<Pass>& passes : passes_) passes.clear();
+}
+
+void MillingProcess::setDepths(const std::vector<double>& depths) {
+  for (std::size_t a = 0; a < arcs_.size(); ++a) arcs_[a].depth = depths.at(a);
+}
+
+// The spindle turns on to where it is now.
+void MillingProcess::advance(const ToolMotion& now) {
+  if (count_ > 0) turned_now_ += wrapped(now.angle - now_.angle);
+  if (now.speed != now_.speed || now.velocity != now_.velocity) {
+    ++regime_;
+    regime_began_ = turned_now_;
+    feed_ = feedOf(now);
+  }
+  now_ = now;
+}
+
+// Whether speed and feed have been as now for so long [rad]; before the history they always were.
+bool MillingProcess::steadySince(double turn) const {
+  return regime_ == 0 || turned_now_ - regime_began_ > turn + SETTLED_STEPS * now_.speed * time_step_;
+}
+
+/// Weights of a place so many steps ago: cubic through the four steps about it.
+void MillingProcess::place(Delay& delay, double steps) {
+  const double whole = std::max(std::floor(steps), 2.0), f = steps - whole;
+  delay.steps = static_cast<std::size_t>(whole);
+  delay.weights = {{(f + 1.0) * f * (f - 1.0) / 6.0, -(f + 1.0) * f * (f - 2.0) / 2.0,
+                    (f + 1.0) * (f - 1.0) * (f - 2.0) / 2.0, -f * (f - 1.0) * (f - 2.0) / 6.0}};
+}
+
+/// Finds the place in a history of changing speed or feed.
+void MillingProcess::search(Delay& delay) {
+  const double target = turned_now_ - delay.turn;
+  const long kept = std::min(count_, static_cast<long>(turned_.size()));
+  const auto turnedAt = [&](long ago) {
+    return ago == 0 ? turned_now_ : turned_[ring(count_ - ago, turned_.size())];
+  };
+  if (kept == 0 || target < turnedAt(kept)) {
+    // Before the history the tool went on as it then did.
+    const std::array<double, 2> oldest =
+        kept == 0 ? now_.centre : centre_[ring(count_ - kept, centre_.size())];
+    const double before = (kept == 0 ? turned_now_ : turnedAt(kept)) - target;
+    for (std::size_t i = 0; i < 2; ++i) delay.fed[i] = now_.centre[i] - oldest[i] + first_feed_[i] * before;
+    place(delay, static_cast<double>(count_ + 3));
+    return;
+  }
+  auto ago = static_cast<long>(delay.turn / (now_.speed * time_step_));
+  if (delay.steps > 0) ago = static_cast<long>(delay.steps) + 1;
+  ago = std::clamp(ago, 1L, kept);
+  while (turnedAt(ago) > target) ++ago;
+  while (ago > 1 && turnedAt(ago - 1) <= target) --ago;
+  const double at = turnedAt(ago), next = turnedAt(ago - 1);
+  place(delay, static_cast<double>(ago) - (next > at ? (target - at) / (next - at) : 0.0));
+  delay.fed = now_.centre;
+  for (std::size_t k = 0; k < 4; ++k) {
+    const long step = count_ - static_cast<long>(delay.steps) - 2 + static_cast<long>(k);
+    const std::array<double, 2>& centre = centre_[ring(std::max(step, count_ - kept), centre_.size())];
+    for (std::size_t i = 0; i < 2; ++i) delay.fed[i] -= delay.weights[k] * centre[i];
+  }
+}
+
+MillingProcess::Delay& MillingProcess::lookBack(Delay& delay) {
+  delay.of_step = count_;
+  const bool steady = steadySince(delay.turn);
+  if (!steady) {
+    search(delay);
+    delay.of_regime = -1;
+  } else if (delay.of_regime != regime_) {
+    place(delay, delay.turn / (now_.speed * time_step_));
+    delay.fed = {{feed_[0] * delay.turn, feed_[1] * delay.turn}};
+    delay.of_regime = regime_;
+  }
+  const auto kept = static_cast<std::size_t>(std::min(count_, static_cast<long>(displacement_.size())));
+  delay.displacement = {{0.0, 0.0}};
+  delay.known = delay.steps <= kept;
+  deepest_ = std::max(deepest_, delay.steps);
+  for (std::size_t k = 0; k < 4; ++k) {
+    const std::size_t ago = delay.steps + 2 - k;
+    if (ago > kept) continue;
+    const std::array<double, 2>& u =
+        displacement_[ring(count_ - static_cast<long>(ago), displacement_.size())];
+    for (std::size_t i = 0; i < 2; ++i) delay.displacement[i] += delay.weights[k] * u[i];
+  }
+  return delay;
+}
+
+void MillingProcess::addPass(int tooth) {
+  std::vector<Pass>& passes = passes_[static_cast<std::size_t>(tooth)];
+  const int n = static_cast<int>(passes.size()) + 1;
+  const double turn = rule_.turn(tooth, n);
+  std::size_t d = 0;
+  while (d < delays_.size() && std::abs(delays_[d].turn - turn) > SAME_TURN) ++d;
+  if (d == delays_.size()) {
+    delays_.emplace_back();
+    delays_.back().turn = turn;
+  }
+  Pass pass;
+  pass.delay = d;
+  pass.step = rule_.step(tooth, n) - rule_.step(tooth, 1);
+  passes.push_back(pass);
+}
+
+void MillingProcess::shapePass(int tooth, int n, Pass& pass) {
+  const bool steady = steadySince(delays_[pass.delay].turn);
+  if (steady && pass.of_regime == regime_) return;
+  const Pass& first = passes_[static_cast<std::size_t>(tooth)].front();
+  const std::array<double, 2> fed_first = back(first.delay).fed;
+  pass.still = rule_.shape(tooth, n, back(pass.delay).fed, fed_first);
+  pass.behind = pass.still - first.still;
+  pass.bend = pass.behind.bend();
+  pass.of_regime = steady ? regime_ : -1;
+}
+
+/// The passes that may give a tooth's chip over a cell of its edge: from the last one back until none can be
+/// nearer.
+/// @return whether there is contact; a single pass is in contact all along when `certain`
+bool MillingProcess::gather(int tooth, const Stretch& cell, bool& certain) {
+  shapes_.clear();
+  const Pass& last = passOf(tooth, 1);
+  const std::array<double, 2> then = back(last.delay).displacement;
+  const auto chip = [&](const Pass& pass, const std::array<double, 2>& u) {
+    ChipShape shape = pass.still;
+    shape.sine += now_.displacement[0] - u[0];
+    shape.cosine += now_.displacement[1] - u[1];
+    return shape;
+  };
+  const ChipShape first = chip(last, then);
+  const ChipBounds of_first = bounds(first, cell);
+  if (of_first.high <= 0.0) return false;
+  certain = of_first.low > 0.0;
+  shapes_.push_back(first);
+  // By so much vibration may bring an older surface nearer than the last one: (u_1 - u_n).e.
+  const double reach = std::max(largest_[0], largest_[1]) -
+                       (then[0] * cell.at.sine + then[1] * cell.at.cosine) +
+                       cell.half * (std::abs(then[0]) + std::abs(then[1]));
+  const double end = reach + rule_.overhang(tooth);
+  int unknown = 0;
+  for (int n = 2; unknown < rule_.teeth(); ++n) {
+    const Pass& pass = passOf(tooth, n);
+    const double behind = bounds(pass.behind, pass.bend, cell).low;
+    if (behind - pass.step > end) break;
+    const Delay& delay = back(pass.delay);
+    // Older than the history none has vibrated, and a tooth is only farther than a turn later.
+    unknown = delay.known ? 0 : unknown + 1;
+    if (behind > reach) continue;
+    const ChipShape shape = chip(pass, delay.displacement);
+    if (bounds(shape - first, cell).low >= 0.0) continue;
+    if (bounds(shape, cell).high <= 0.0) return false;
+    shapes_.push_back(shape);
+  }
+  certain = certain && shapes_.size() == 1;
+  return true;
+}
+
+/// Adds what one edge gets over a cell of it, integrated over the immersion angle.
+void MillingProcess::cut(int tooth, const Stretch& cell, EdgeForce& edge) {
+  bool certain = false;
+  if (!gather(tooth, cell, certain)) return;
+  const auto add = [&](const ChipShape& shape, const Stretch& over) {
+    addForce(law_, shape, over, damping_[0], damping_[1], edge);
+  };
+  if (certain) {
+    add(shapes_[0], cell);
+  } else {
+    leastPositive(shapes_.data(), shapes_.size(), cell, add);
+  }
+}
+
+CuttingForce MillingProcess::step(const ToolMotion& now) {
+  CuttingForce sum;
+  if (arcs_.empty()) return sum;
+  advance(now);
+  damping_ = {{0.0, 0.0}};
+  if (law_.damping != 0.0) {
+    const double share = law_.damping / (time_step_ * now.speed * tool_.radius());
+    const std::array<double, 2> before =
+        count_ > 0 ? displacement_[ring(count_ - 1, displacement_.size())] : now.displacement;
+    for (std::size_t i = 0; i < 2; ++i) damping_[i] = share * (now.displacement[i] - before[i]);
+  }
+  forEachEdgePart(arcs_, lag_, rule_.toothAngle(), now.angle, [&](const EdgePart& part) {
+    // A straight edge stands at one angle: any little spread gives the same.
+    const double from = part.straight ? part.to : part.from,
+                 to = part.straight ? part.to + LEAST_LAG : part.to;
+    const double height = part.straight ? part.height / LEAST_LAG : part.height;
+    EdgeForce edge;
+    forEachCell(from, to, [&](const Stretch& cell) { cut(part.tooth, cell, edge); });
+    sum.fx += height * edge.fx;
+    sum.fy += height * edge.fy;
+    sum.fz += height * edge.fz;
+    sum.torque += height * edge.ft * tool_.radius();
+  });
+  return sum;
+}
+
+void MillingProcess::settle(const std::array<double, 2>& displacement) {
+  if (arcs_.empty()) return;
+  const std::size_t at = ring(count_, displacement_.size());
+  if (at == 0 && count_ > 0) largest_ = {{0.0, largest_[0]}};
+  displacement_[at] = displacement;
+  centre_[at] = now_.centre;
+  turned_[at] = turned_now_;
+  const double square = displacement[0] * displacement[0] + displacement[1] * displacement[1];
+  if (square > largest_[0] * largest_[0]) largest_[0] = std::sqrt(square);
+  ++count_;
+  const std::size_t size = displacement_.size();
+  if (static_cast<std::size_t>(count_) >= size && size < MOST_HISTORY && 2 * deepest_ > size) grow();
+}
+
+/// Rings of twice the length. Full ones lose nothing.
+void MillingProcess::grow() {
+  const std::size_t size = displacement_.size();
+  const auto wider = [&](auto& old) {
+    auto next = old;
+    next.resize(2 * size);
+    for (long step = count_ - static_cast<long>(size); step < count_; ++step)
+      next[ring(step, 2 * size)] = old[ring(step, size)];
+    old = std::move(next);
+  };
+  wider(displacement_);
+  wider(centre_);
+  wider(turned_);
+}
+
+}  // namespace smartmill::sim

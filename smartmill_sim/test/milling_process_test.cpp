@@ -1,0 +1,327 @@
+#include "smartmill_sim/twin/milling_process.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "smartmill_core/cutting/mechanistic.h"
+#include "smartmill_core/error.h"
+#include "smartmill_core/testing/disc_mill.h"
+#include "smartmill_core/units.h"
+#include "smartmill_sim/effects/effect.h"
+#include "smartmill_sim/twin/cutting_machine.h"
+
+namespace smartmill::sim {
+namespace {
+
+using units::PI;
+using units::TWO_PI;
+
+const CuttingCoefficients ALUMINIUM{796e6, 168e6, 222e6, 27.7e3, 30.8e3, 1.4e3};
+
+CuttingLaw aluminium() {
+  CuttingLaw law;
+  law.coefficients = ALUMINIUM;
+  return law;
+}
+
+ToolGeometry endMill(int teeth, double helix_deg) {
+  return {teeth, 19.05e-3, units::radFromDeg(helix_deg), {}};
+}
+
+ToolMotion motionAt(double t, double speed, double feed) {
+  ToolMotion motion;
+  motion.angle = 0.3 + speed * t;
+  motion.speed = speed;
+  motion.velocity = {{feed, 0.0}};
+  motion.centre = {{0.1 + feed * t, -0.05}};
+  return motion;
+}
+
+double largestDifference(const CuttingForce& a, const CuttingForce& b, double radius) {
+  return std::max({std::abs(a.fx - b.fx), std::abs(a.fy - b.fy), std::abs(a.fz - b.fz),
+                   std::abs(a.torque - b.torque) / radius});
+}
+
+/// Largest difference of any force component over a few revolutions, as a share of the largest force.
+double largestError(const ToolGeometry& tool, const Engagement& cut, double rpm, int steps_per_rev) {
+  const double speed = units::radPerSecFromRpm(rpm), dt = TWO_PI / speed / steps_per_rev;
+  const double feed = cut.feed_per_tooth * tool.teeth * speed / TWO_PI;
+  MillingProcess process(tool, aluminium(), dt);
+  const MechanisticForce closed(tool, ALUMINIUM, cut);
+  process.engage({{cut.entry, cut.exit, cut.axial_depth}}, motionAt(0.0, speed, feed));
+  double worst = 0.0, largest = 0.0;
+  for (int i = 0; i < 3 * steps_per_rev; ++i) {
+    const ToolMotion motion = motionAt(i * dt, speed, feed);
+    const CuttingForce f = process.step(motion), e = closed.at(motion.angle);
+    process.settle({{0.0, 0.0}});
+    worst = std::max(worst, largestDifference(f, e, tool.radius()));
+    largest = std::max({largest, std::abs(e.fx), std::abs(e.fy)});
+  }
+  return worst / largest;
+}
+
+// Steady cutting with a rigid even tool has a closed form (eq. 3.13..3.15 integrated along the helix).
+TEST(MillingProcess, rigidSteadyCutMatchesTheClosedForm) {
+  EXPECT_LT(largestError(endMill(4, 30.0), {0.0, PI, 2e-3, 6e-5}, 4500.0, 1731), 2e-6);
+  EXPECT_LT(largestError(endMill(4, 30.0), {0.0, 0.5 * PI, 4e-3, 8e-5}, 4500.0, 1731), 2e-6);
+  EXPECT_LT(largestError(endMill(4, 30.0), {0.5 * PI, PI, 4e-3, 8e-5}, 13950.0, 381), 2e-6);
+  EXPECT_LT(largestError(endMill(1, 45.0), {1.2, 1.3, 10e-3, 5e-5}, 600.0, 3973), 2e-6);
+  EXPECT_LT(largestError(endMill(2, 0.0), {0.4, 2.2, 3e-3, 1e-4}, 6000.0, 1001), 2e-6);
+  EXPECT_LT(largestError(endMill(4, 45.0), {0.0, PI, 70e-3, 5e-5}, 6000.0, 1001),
+            2e-6);  // lags by over a turn
+}
+
+/// A way to mill: all of it by the angle that the spindle has turned.
+struct Way {
+  std::function<double(double)> time;                                 // [s]
+  std::function<std::array<double, 2>(double)> centre, displacement;  // [m] by time
+  std::function<double(double)> speed;                                // [rad/s] by time
+  std::function<double(double)> turned;                               // [rad] by time
+};
+
+double derivative(const std::function<double(double)>& f, double t) {
+  constexpr double H = 1e-6;
+  return (f(t + H) - f(t - H)) / (2.0 * H);
+}
+
+/// Largest difference of a prescribed way from the rule summed over discs, as a share of the largest force.
+double differenceOnTheWay(const Way& way, const ToolGeometry& tool, const std::vector<double>& radius,
+                          const CuttingLaw& law, double duration) {
+  testing::DiscMill reference{tool, law, radius, [&](double turned) {
+                                const double t = way.time(turned);
+                                testing::DiscMill::State state{turned, way.centre(t), {{0.0, 0.0}}};
+                                state.speed = way.speed(t);
+                                if (t < 0.0) return state;
+                                state.displacement = way.displacement(t);
+                                for (std::size_t i = 0; i < 2; ++i)
+                                  state.rate[i] =
+                                      derivative([&](double s) { return way.displacement(s)[i]; }, t);
+                                return state;
+                              }};
+  const double dt = 1e-5, depth = 1.5e-3;
+  const auto motionOf = [&](double t) {
+    ToolMotion motion;
+    motion.angle = way.turned(t);
+    motion.speed = way.speed(t);
+    motion.centre = way.centre(t);
+    for (std::size_t i = 0; i < 2; ++i)
+      motion.velocity[i] = derivative([&](double s) { return way.centre(s)[i]; }, t);
+    motion.displacement = way.displacement(t);
+    return motion;
+  };
+  MillingProcess process(tool, law, dt, radius);
+  process.engage({{0.1, 2.9, depth}}, motionOf(0.0));
+  double worst = 0.0, largest = 0.0;
+  const auto steps = static_cast<int>(duration / dt);
+  for (int i = 0; i < steps; ++i) {
+    const ToolMotion motion = motionOf(i * dt);
+    const CuttingForce force = process.step(motion);
+    process.settle(motion.displacement);
+    if (i % 41 != 7) continue;
+    const CuttingForce due = reference.force(motion.angle, 0.1, 2.9, depth, 300);
+    worst = std::max(worst, largestDifference(force, due, tool.radius()));
+    largest = std::max({largest, std::abs(due.fx), std::abs(due.fy)});
+  }
+  return worst / largest;
+}
+
+std::array<double, 2> shaking(double t) {
+  return {{9e-6 * std::sin(8100.0 * t) + 4e-6 * std::sin(2300.0 * t),
+           12e-6 * std::sin(7300.0 * t + 1.0) - 10e-6}};
+}
+
+// Any vibration, runout and pitch: what earlier teeth left stays until the feed, or the roundness of the
+// tool, has taken it away.
+TEST(MillingProcess, isTheRuleSummedOverDiscs) {
+  const double speed = 471.0, feed = 4.0 * 3e-5 * speed / TWO_PI;
+  const Way way{[=](double turned) { return turned / speed; },
+                [=](double t) {
+                  return std::array<double, 2>{{feed * t, 0.0}};
+                },
+                shaking, [=](double) { return speed; }, [=](double t) { return speed * t; }};
+  ToolGeometry tool = endMill(4, 30.0);
+  EXPECT_LT(differenceOnTheWay(way, tool, {0, 0, 0, 0}, aluminium(), 0.12), 0.01);
+  tool.pitch = {1.5, 1.65, 1.55, TWO_PI - 4.7};
+  CuttingLaw law = aluminium();
+  law.damping = 2e5;
+  law.size_exponent = 0.15;
+  law.edge_chip = 4e-6;
+  EXPECT_LT(differenceOnTheWay(way, tool, {0.0, 14e-6, -6e-6, 5e-6}, law, 0.12), 0.01);
+}
+
+// The spindle runs up and the feed turns into a curve at the same time.
+TEST(MillingProcess, speedAndFeedMayChange) {
+  const double begin = 400.0, rise = 1200.0, feed = 9e-3, bend = 4.0;
+  // turned = begin t + rise t^2 / 2; before the beginning all went on as at it.
+  const auto speed = [=](double t) { return t < 0.0 ? begin : begin + rise * t; };
+  const auto turned = [=](double t) { return t < 0.0 ? begin * t : begin * t + 0.5 * rise * t * t; };
+  const auto time = [=](double angle) {
+    return angle < 0.0 ? angle / begin : (std::sqrt(begin * begin + 2.0 * rise * angle) - begin) / rise;
+  };
+  const auto centre = [=](double t) {
+    if (t < 0.0) return std::array<double, 2>{{feed * t, 0.0}};
+    return std::array<double, 2>{
+        {feed / bend * std::sin(bend * t), feed / bend * (1.0 - std::cos(bend * t))}};
+  };
+  const Way way{time, centre, shaking, speed, turned};
+  EXPECT_LT(differenceOnTheWay(way, endMill(4, 30.0), {0.0, 14e-6, -6e-6, 5e-6}, aluminium(), 0.12), 0.01);
+}
+
+// A steady stretch after a change is the same as one without it, once the teeth no longer meet what was
+// before.
+TEST(MillingProcess, aChangeIsForgotten) {
+  const double speed = 500.0, dt = 1e-5, feed = 4.0 * 5e-5 * speed / TWO_PI;
+  const ToolGeometry tool = endMill(4, 30.0);
+  const std::vector<double> radius{0.0, 14e-6, -6e-6, 5e-6};
+  MillingProcess steady(tool, aluminium(), dt, radius), changed(tool, aluminium(), dt, radius);
+  ToolMotion motion = motionAt(0.0, speed, feed), slower = motion;
+  slower.velocity[0] = 0.4 * feed;
+  steady.engage({{0.0, PI, 1e-3}}, motion);
+  changed.engage({{0.0, PI, 1e-3}}, slower);
+  for (int i = 0; i < 20000; ++i) {
+    const double t = i * dt;
+    motion = motionAt(t, speed, feed);
+    slower = motion;
+    if (i < 4000) slower.velocity[0] = 0.4 * feed;
+    slower.centre[0] -= 0.6 * feed * std::min(t, 4000 * dt);
+    motion.displacement = slower.displacement = shaking(t);
+    const CuttingForce a = steady.step(motion), b = changed.step(slower);
+    steady.settle(motion.displacement);
+    changed.settle(slower.displacement);
+    if (i > 14000) {
+      ASSERT_LT(largestDifference(a, b, tool.radius()), 1e-3) << i;
+    }
+  }
+}
+
+/// Growth of the vibration of a tool with one mode: size over the last quarter of a cut over that over the
+/// second quarter.
+double growth(double depth, double rpm, bool both_axes, int steps_per_rev, Feed steadiness = Feed::any) {
+  // Insperger's benchmark: m 0.03993 kg, 922 Hz, damping ratio 0.011, 2 teeth, Kt 6e8, Kn 2e8 N/m2.
+  MachineModel model;
+  model.tool = endMill(2, 0.0);
+  model.cutting = CuttingCoefficients{6e8, 2e8, 0.0, 0.0, 0.0, 0.0};
+  const Mode mode{922.0, 0.011, 1.0 / (0.03993 * std::pow(TWO_PI * 922.0, 2))};
+  model.tool_tip.x.modes = {mode};
+  if (both_axes) model.tool_tip.y.modes = {mode};
+  const double speed = units::radPerSecFromRpm(rpm), dt = TWO_PI / speed / steps_per_rev;
+  CuttingMachine machine(model, dt, steadiness);
+  const double feed = 2e-4 * 2.0 * speed / TWO_PI;  // large: the tool must not leave the cut
+  CuttingMachine::Input input;
+  input.motion = motionAt(0.0, speed, feed);
+  machine.engage({{0.0, PI, depth}}, input.motion);
+  const int revolutions = 240;
+  std::vector<double> x;
+  for (int i = 0; i < revolutions * steps_per_rev; ++i) {
+    input.motion = motionAt(i * dt, speed, feed);
+    // A push in the first revolution.
+    input.tip_force[0] = i < steps_per_rev / 8 ? 1.0 : 0.0;
+    x.push_back(machine.step(input).displacement[0]);
+  }
+  // What does not repeat from revolution to revolution is the vibration that grows or dies.
+  const auto size = [&](int from, int to) {
+    double sum = 0.0;
+    for (int i = from * steps_per_rev; i < to * steps_per_rev; ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      sum += std::pow(x[k] - x[k - static_cast<std::size_t>(steps_per_rev)], 2);
+    }
+    return std::sqrt(sum);
+  };
+  return size(3 * revolutions / 4, revolutions) / size(revolutions / 4, revolutions / 2);
+}
+
+// First limits of the oracle (converged Chebyshev collocation; see the stability oracles): slot, one mode in
+// x.
+TEST(CuttingMachine, chattersAboveTheStabilityLimitOnly) {
+  struct Case {
+    double rpm, limit;
+  };
+  for (const Case c : {Case{10000.0, 0.32238e-3}, Case{5000.0, 0.40863e-3}, Case{15000.0, 0.38659e-3}}) {
+    EXPECT_LT(growth(0.97 * c.limit, c.rpm, false, 1200), 1.0) << c.rpm;
+    EXPECT_GT(growth(1.03 * c.limit, c.rpm, false, 1200), 1.0) << c.rpm;
+  }
+}
+
+// The same mode in x and y, slot: 0.0714108 mm at 10000 rpm, 0.0483482 mm at 6000 rpm.
+TEST(CuttingMachine, chattersAboveTheLimitOfTwoAxes) {
+  EXPECT_LT(growth(0.97 * 0.0714108e-3, 10000.0, true, 1200), 1.0);
+  EXPECT_GT(growth(1.03 * 0.0714108e-3, 10000.0, true, 1200), 1.0);
+  EXPECT_LT(growth(0.97 * 0.0483482e-3, 6000.0, true, 2000), 1.0);
+  EXPECT_GT(growth(1.03 * 0.0483482e-3, 6000.0, true, 2000), 1.0);
+}
+
+TEST(CuttingMachine, steadyFeedChattersAtTheSameLimits) {
+  for (const auto& [rpm, limit] : {std::pair(10000.0, 0.32238e-3), std::pair(5000.0, 0.40863e-3)}) {
+    EXPECT_LT(growth(0.98 * limit, rpm, false, 1200, Feed::steady), 1.0) << rpm;
+    EXPECT_GT(growth(1.02 * limit, rpm, false, 1200, Feed::steady), 1.0) << rpm;
+  }
+  EXPECT_LT(growth(0.98 * 0.0483482e-3, 6000.0, true, 2000, Feed::steady), 1.0);
+  EXPECT_GT(growth(1.02 * 0.0483482e-3, 6000.0, true, 2000, Feed::steady), 1.0);
+}
+
+TEST(MillingProcess, runoutLetsOneToothOfTwoDoAllTheWork) {
+  // Offset over half the feed: tooth 1 takes the chip of both, tooth 2 never touches.
+  CuttingLaw law;
+  law.coefficients = {1e9, 0.0, 0.0, 0.0, 0.0, 0.0};
+  const double f = 5e-5, speed = 500.0, feed = f * 2.0 * speed / TWO_PI, depth = 1e-3;
+  const double dt = TWO_PI / speed / 1000.0;
+  MillingProcess process(endMill(2, 0.0), law, dt, {30e-6, -30e-6});
+  process.engage({{0.0, PI, depth}}, motionAt(0.0, speed, feed));
+  double first = 0.0, second = 0.0;
+  for (int i = 0; i < 5000; ++i) {
+    const ToolMotion motion = motionAt(i * dt, speed, feed);
+    const CuttingForce force = process.step(motion);
+    process.settle({{0.0, 0.0}});
+    const double angle = std::fmod(motion.angle, TWO_PI);
+    double& peak = angle < PI ? first : second;
+    peak = std::max(peak, force.torque);
+  }
+  // Where the chip is thickest, ahead of the tool, its roundness adds nothing.
+  EXPECT_NEAR(first, 1e9 * 2.0 * f * depth * 0.5 * 19.05e-3, 1e-4 * first);
+  EXPECT_EQ(second, 0.0);
+}
+
+// By tables and by history the forces of a rigid tool with runout and uneven pitch are the same.
+TEST(MillingProcess, isRigidCutWithoutVibration) {
+  MachineModel model;
+  model.tool = ToolGeometry{3, 12e-3, units::radFromDeg(35.0), {2.0, 2.2, TWO_PI - 4.2}};
+  model.cutting = CuttingCoefficients{953e6, 357e6, 188e6, 17.3e3, 17.7e3, 0.72e3};
+  model.effects = {effectEntry("runout", {{"offset_um", 30.0}, {"angle_deg", 40.0}})};
+  const double speed = units::radPerSecFromRpm(4500.0), dt = 1.0 / 51200.0;
+  CuttingMachine steady(model, dt, Feed::steady), any(model, dt);
+  CuttingMachine::Input input;
+  input.motion = motionAt(0.0, speed, 4e-5 * 3 * speed / TWO_PI);
+  steady.engage({{0.0, PI, 1e-3}}, input.motion);
+  any.engage({{0.0, PI, 1e-3}}, input.motion);
+  double squares = 0.0;
+  const int steps = 5000;
+  for (int i = 0; i < steps; ++i) {
+    input.motion = motionAt(i * dt, speed, 4e-5 * 3 * speed / TWO_PI);
+    const CuttingForce a = steady.step(input).force, b = any.step(input).force;
+    // A quarter of the edge force over a cell of the tables (0.46 N) while a contact begins or ends in it.
+    const double difference = largestDifference(a, b, 6e-3);
+    ASSERT_LT(difference, 0.15) << i;
+    squares += difference * difference;
+  }
+  EXPECT_LT(std::sqrt(squares / steps), 0.02);
+}
+
+TEST(MillingProcess, refusesContactThatCannotBe) {
+  CuttingLaw law;
+  MillingProcess process(endMill(2, 0.0), law, 1e-5);
+  const ToolMotion turning = motionAt(0.0, 100.0, 0.0);
+  EXPECT_THROW(process.engage({{0.5, 0.5, 1e-3}}, turning), Error);
+  EXPECT_THROW(process.engage({{0.0, 7.0, 1e-3}}, turning), Error);
+  EXPECT_THROW(process.engage({{0.0, 1.0, 0.0}}, turning), Error);
+  EXPECT_THROW(process.engage({{0.0, PI, 1e-3}}, {}), Error);                            // the spindle stands
+  EXPECT_THROW(process.engage({{0.0, PI, 1e-3}}, motionAt(0.0, 200000.0, 0.0)), Error);  // two steps a tooth
+  EXPECT_THROW(MillingProcess(endMill(2, 0.0), law, 1e-5, {1e-6}), Error);
+}
+
+}  // namespace
+}  // namespace smartmill::sim

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cmath>
+
+#include "smartmill_core/cutting/tool.h"
+
+namespace smartmill {
+
+/// How a chip turns into force. Per metre of edge and in the frame of the edge:
+///
+///     Ft = chip_factor ktc h' + edge_factor kte e + 0.3 d      Fr = chip_factor krc h' + edge_factor kre e +
+///     d Fa = chip_factor kac h' + edge_factor kae e
+///
+/// with h' = h (h / size_reference)^-size_exponent, e = 1 - exp(-h / edge_chip) and d = damping v_r / v_c,
+/// the velocity into the work over the cutting speed. Where h <= 0 there is no force at all (formats.md,
+/// effects.md).
+struct CuttingLaw {
+  CuttingCoefficients coefficients;
+  double chip_factor = 1.0;      ///< [1] on ktc, krc, kac
+  double edge_factor = 1.0;      ///< [1] on kte, kre, kae
+  double edge_chip = 0.0;        ///< [m] over which the edge terms come; 0: there at once
+  double size_exponent = 0.0;    ///< [1]
+  double size_reference = 1e-4;  ///< [m]
+  double damping = 0.0;          ///< [N/m]
+};
+
+/// [1] Tangential over radial force of process damping.
+inline constexpr double TANGENTIAL_DAMPING = 0.3;
+
+/// [m] h' of a chip h > 0.
+inline double effectiveChip(const CuttingLaw& law, double chip) {
+  return law.size_exponent == 0.0 ? chip : chip * std::pow(chip / law.size_reference, -law.size_exponent);
+}
+
+/// [1] e of a chip h > 0.
+inline double edgeShare(const CuttingLaw& law, double chip) {
+  return law.edge_chip > 0.0 ? -std::expm1(-chip / law.edge_chip) : 1.0;
+}
+
+/// Of the frame of the machine: x, y, axial and tangential [N/m of edge].
+struct EdgeForce {
+  double fx = 0.0, fy = 0.0, fz = 0.0, ft = 0.0;
+
+  void add(double weight, double tangential, double radial, double axial, double sine, double cosine) {
+    fx += weight * (-tangential * cosine - radial * sine);
+    fy += weight * (tangential * sine - radial * cosine);
+    fz += weight * axial;
+    ft += weight * tangential;
+  }
+};
+
+}  // namespace smartmill
