@@ -18,6 +18,7 @@ constexpr double NO_LIMIT = std::numeric_limits<double>::infinity();
 constexpr double SAME_POCKET = 0.03;
 /// A point for a check must lie at least so far above the limit, else its outcome would say nothing.
 constexpr double CLEARLY_UNSTABLE = 1.5;
+constexpr int LINES_BEYOND = 20;  // speeds on each side that the margin needs
 
 void bound(bool good, const char* key, double value, const char* range) {
   if (!good || !std::isfinite(value)) {
@@ -322,48 +323,32 @@ ChartPoint ChartMaker::point(double speed, double depth, double limit, double fr
   return result;
 }
 
-Chart ChartMaker::chart() const {
-  const Basis given = basis();
-  Chart chart;
-  chart.stamp = stamp_;
-  chart.tool = tool_;
-  chart.material = coefficients_->material;
-  const int n = parameters_.speeds;
-  // A little beyond both ends, so that the margin of speed holds there too.
-  const int beyond = parameters_.speed_margin > 0.0 ? 20 : 0;
-  StabilityLimit wide;
-  for (int i = -beyond; i < n + beyond; ++i) {
-    const double low = parameters_.speed_low, high = parameters_.speed_high,
-                 part = parameters_.speed_margin / 20.0;
-    wide.spindle_speed.push_back(i < 0    ? low * (1.0 + part * i)
-                                 : i >= n ? high * (1.0 + part * (i - n + 1))
-                                          : low + (high - low) * i / (n - 1));
-  }
-  wide = given.limits(wide.spindle_speed);
-  const auto inner = [&](const std::vector<double>& all) {
-    return std::vector<double>(all.begin() + beyond, all.end() - beyond);
-  };
-  chart.limit = {inner(wide.spindle_speed), inner(wide.depth), inner(wide.chatter_frequency)};
-  const std::vector<double>& speeds = chart.limit.spindle_speed;
-  const auto shift = static_cast<std::size_t>(beyond);
-  chart.method = given.solver ? nameOf(Method::collocation) : nameOf(Method::zero_order);
-  chart.absolute_depth_limit = given.solver
-                                   ? *std::min_element(chart.limit.depth.begin(), chart.limit.depth.end())
-                                   : absoluteDepthLimit(given.process, given.response);
+int ChartMaker::linesBeyond() const {
+  return parameters_.speed_margin > 0.0 ? LINES_BEYOND : 0;
+}
 
-  std::vector<ChartPoint> cuts, valleys;
-  std::vector<double> carried;  // [m] by the spindle, with its reserve
+StabilityLimit ChartMaker::wideLimits(const Basis& given) const {
+  const int n = parameters_.speeds, beyond = linesBeyond();
+  const double low = parameters_.speed_low, high = parameters_.speed_high,
+               part = parameters_.speed_margin / LINES_BEYOND;
+  std::vector<double> speeds;
+  for (int i = -beyond; i < n + beyond; ++i) {
+    speeds.push_back(i < 0    ? low * (1.0 + part * i)
+                     : i >= n ? high * (1.0 + part * (i - n + 1))
+                              : low + (high - low) * i / (n - 1));
+  }
+  return given.limits(speeds);
+}
+
+void ChartMaker::recommend(Chart& chart, const StabilityLimit& wide) const {
+  const std::vector<double>& speeds = chart.limit.spindle_speed;
+  std::vector<ChartPoint> cuts, peaks;
   for (std::size_t k = 0; k < speeds.size(); ++k) {
-    const auto [torque, power] = loadLimits(speeds[k]);
-    chart.torque_depth_limit.push_back(torque);
-    chart.power_depth_limit.push_back(power);
-    carried.push_back(
-        std::min({parameters_.load_share * torque, parameters_.load_share * power, parameters_.max_depth}));
-    const double stable = around(wide, k + shift, parameters_.speed_margin, std::less<>());
-    cuts.push_back(point(speeds[k], std::min((1.0 - parameters_.depth_margin) * stable, carried[k]),
+    const double stable =
+        around(wide, k + static_cast<std::size_t>(linesBeyond()), parameters_.speed_margin, std::less<>());
+    cuts.push_back(point(speeds[k], std::min((1.0 - parameters_.depth_margin) * stable, carried(chart, k)),
                          chart.limit.depth[k], chart.limit.chatter_frequency[k]));
   }
-  std::vector<ChartPoint> peaks;
   for (std::size_t k = 0; k < cuts.size(); ++k) {
     const double rate = cuts[k].material_removal_rate;
     const bool over_left = k == 0 || rate > cuts[k - 1].material_removal_rate;
@@ -373,11 +358,17 @@ Chart ChartMaker::chart() const {
   chart.recommended = pick(peaks, parameters_.recommended, [](const ChartPoint& a, const ChartPoint& b) {
     return a.material_removal_rate > b.material_removal_rate;
   });
+}
+
+void ChartMaker::proposeUnstable(Chart& chart, const StabilityLimit& wide) const {
+  const std::vector<double>& speeds = chart.limit.spindle_speed;
+  const std::vector<double>& depth = chart.limit.depth;
+  std::vector<ChartPoint> valleys;
   for (std::size_t k = 1; k + 1 < speeds.size(); ++k) {
-    const std::vector<double>& depth = chart.limit.depth;
     if (!(depth[k] < depth[k - 1] && depth[k] <= depth[k + 1])) continue;
-    const double highest = around(wide, k + shift, parameters_.speed_margin, std::greater<>());
-    const double proposed = std::min(parameters_.unstable_factor * highest, carried[k]);
+    const double highest =
+        around(wide, k + static_cast<std::size_t>(linesBeyond()), parameters_.speed_margin, std::greater<>());
+    const double proposed = std::min(parameters_.unstable_factor * highest, carried(chart, k));
     if (!std::isfinite(proposed) || proposed < CLEARLY_UNSTABLE * highest) continue;
     valleys.push_back(point(speeds[k], proposed, depth[k], chart.limit.chatter_frequency[k]));
   }
@@ -387,6 +378,35 @@ Chart ChartMaker::chart() const {
   chart.unstable = pick(valleys, parameters_.unstable, [&](const ChartPoint& a, const ChartPoint& b) {
     return std::abs(std::log(a.spindle_speed / reference)) < std::abs(std::log(b.spindle_speed / reference));
   });
+}
+
+double ChartMaker::carried(const Chart& chart, std::size_t k) const {
+  return std::min({parameters_.load_share * chart.torque_depth_limit[k],
+                   parameters_.load_share * chart.power_depth_limit[k], parameters_.max_depth});
+}
+
+Chart ChartMaker::chart() const {
+  const Basis given = basis();
+  Chart chart;
+  chart.stamp = stamp_;
+  chart.tool = tool_;
+  chart.material = coefficients_->material;
+  const StabilityLimit wide = wideLimits(given);
+  const auto inner = [beyond = linesBeyond()](const std::vector<double>& all) {
+    return std::vector<double>(all.begin() + beyond, all.end() - beyond);
+  };
+  chart.limit = {inner(wide.spindle_speed), inner(wide.depth), inner(wide.chatter_frequency)};
+  chart.method = given.solver ? nameOf(Method::collocation) : nameOf(Method::zero_order);
+  chart.absolute_depth_limit = given.solver
+                                   ? *std::min_element(chart.limit.depth.begin(), chart.limit.depth.end())
+                                   : absoluteDepthLimit(given.process, given.response);
+  for (const double speed : chart.limit.spindle_speed) {
+    const auto [torque, power] = loadLimits(speed);
+    chart.torque_depth_limit.push_back(torque);
+    chart.power_depth_limit.push_back(power);
+  }
+  recommend(chart, wide);
+  proposeUnstable(chart, wide);
   return chart;
 }
 

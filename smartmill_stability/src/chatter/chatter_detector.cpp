@@ -20,6 +20,87 @@ void bound(bool good, const char* key, double value, const char* range) {
     throw Error(std::string(key) + ": " + std::to_string(value) + " is out of range (" + range + ")");
 }
 
+/// What a window of whole turns holds, summed over the axes.
+class WindowContent {
+ public:
+  /// @param bins samples a turn @param teeth of the tool
+  WindowContent(std::size_t bins, std::size_t turns, int teeth)
+      : outside_of_turn(turns, 0.0),
+        bins_(bins),
+        turns_(turns),
+        half_(teeth > 0 && teeth % 2 == 0 ? static_cast<std::size_t>(teeth) / 2 : 0),
+        taper_(hannWindow(bins * turns)),
+        of_order_(bins / 2 + 1, 0.0),
+        power_(bins * turns / 2 + 1, 0.0) {}
+
+  double all = 0.0;                     // mean square about the mean
+  double outside = 0.0;                 // of what does not repeat with the turn
+  double alternating = 0.0;             // of what repeats with the turn where a flip lies
+  std::vector<double> outside_of_turn;  // mean square of each
+
+  void add(std::vector<double> force) {
+    const auto n = static_cast<double>(force.size());
+    double mean = 0.0;
+    std::vector<double> repeated(bins_, 0.0);
+    for (std::size_t i = 0; i < force.size(); ++i) {
+      mean += force[i] / n;
+      repeated[i % bins_] += force[i] / static_cast<double>(turns_);
+    }
+    // The mean over the turns takes one part in `turns` of whatever does not repeat with it.
+    const double share = static_cast<double>(turns_) / static_cast<double>(turns_ - 1);
+    for (std::size_t i = 0; i < force.size(); ++i) {
+      all += (force[i] - mean) * (force[i] - mean) / n;
+      force[i] -= repeated[i % bins_];
+      outside += share * force[i] * force[i] / n;
+      outside_of_turn[i / bins_] += share * force[i] * force[i] / static_cast<double>(bins_);
+      force[i] *= taper_[i];
+    }
+    addAlternation(repeated);
+    const auto spectrum = fourier(force);
+    for (std::size_t k = 0; k < power_.size(); ++k) power_[k] += std::norm(spectrum[k]);
+  }
+
+  /// [1 / window] frequency of the strongest line beside what repeats.
+  double strongest() const {
+    const auto peak =
+        static_cast<std::size_t>(std::max_element(power_.begin() + 1, power_.end() - 1) - power_.begin());
+    // Vertex of the parabola through the logarithms: exact to a few percent of a line under a Hann window.
+    const double a = std::log(power_[peak - 1] + 1e-300), b = std::log(power_[peak] + 1e-300),
+                 c = std::log(power_[peak + 1] + 1e-300);
+    const double curve = a - 2.0 * b + c;
+    const double shift = curve < 0.0 ? std::clamp(0.5 * (a - c) / curve, -0.5, 0.5) : 0.0;
+    return static_cast<double>(peak) + shift;
+  }
+
+  /// [1 / turn] the strongest of the orders where a flip lies.
+  double strongestOrder() const {
+    return static_cast<double>(std::max_element(of_order_.begin(), of_order_.end()) - of_order_.begin());
+  }
+
+  /// What dies out within the window is a transient (an entry), not chatter.
+  bool dies() const {
+    constexpr double DIES = 0.7;
+    double early = 0.0, late = 0.0;
+    for (std::size_t k = 0; k < turns_; ++k) (2 * k < turns_ ? early : late) += outside_of_turn[k];
+    return late < DIES * early;
+  }
+
+ private:
+  /// Orders of the spindle at which a flip of an even number of teeth lies: odd multiples of half the teeth.
+  void addAlternation(const std::vector<double>& repeated) {
+    if (half_ == 0) return;
+    const auto orders = fourier(repeated);
+    for (std::size_t k = half_; 2 * k < bins_; k += 2 * half_) {
+      const double square = 2.0 * std::norm(orders[k]) / std::pow(static_cast<double>(bins_), 2);
+      of_order_[k] += square;
+      alternating += square;
+    }
+  }
+
+  std::size_t bins_, turns_, half_;
+  std::vector<double> taper_, of_order_, power_;
+};
+
 }  // namespace
 
 void ChatterParameters::validate() const {
@@ -166,6 +247,21 @@ void ChatterDetector::evaluate() {
   while (angles_.size() > 2 && angles_[1].time < needed) angles_.pop_front();
 }
 
+std::vector<double> ChatterDetector::forceAt(const std::vector<double>& times, std::size_t axis,
+                                             double rate) const {
+  std::vector<double> force;
+  force.reserve(times.size());
+  for (const double time : times) {
+    const double place = (time - samples_.front().time) * rate;
+    const auto at = static_cast<std::size_t>(
+        std::clamp(std::floor(place), 1.0, static_cast<double>(samples_.size() - 3)));
+    force.push_back(catmullRom(samples_[at - 1].force[axis], samples_[at].force[axis],
+                               samples_[at + 1].force[axis], samples_[at + 2].force[axis],
+                               place - static_cast<double>(at)));
+  }
+  return force;
+}
+
 void ChatterDetector::judge(double from, double to) {
   const double start = timeAt(from), stop = timeAt(to);
   const double period = (stop - start) / parameters_.revolutions;
@@ -174,85 +270,30 @@ void ChatterDetector::judge(double from, double to) {
   if (!(period * rate >= 8.0)) return;  // fewer samples a turn carry no harmonics
   const auto bins = static_cast<std::size_t>(std::ceil(period * rate));
   const auto turns = static_cast<std::size_t>(parameters_.revolutions);
-  const std::size_t n = bins * turns;
+  std::vector<double> times;
+  for (std::size_t i = 0; i < bins * turns; ++i)
+    times.push_back(timeAt(from + units::TWO_PI * static_cast<double>(i) / static_cast<double>(bins)));
+  WindowContent content(bins, turns, condition_->tool.teeth);
+  for (std::size_t axis = 0; axis < 3; ++axis) content.add(forceAt(times, axis, rate));
+
   ChatterState state;
   state.stamp = stop;
   state.condition = condition_->name;
   state.valid = true;
-  double all = 0.0, outside = 0.0, alternating = 0.0;
-  // Orders of the spindle at which a flip of an even number of teeth lies: odd multiples of half the teeth.
-  const int teeth = condition_->tool.teeth;
-  const std::size_t half = teeth > 0 && teeth % 2 == 0 ? static_cast<std::size_t>(teeth) / 2 : 0;
-  std::vector<double> of_order(bins / 2 + 1, 0.0);
-  std::vector<double> power(n / 2 + 1, 0.0);
-  const std::vector<double> taper = hannWindow(n);
-  std::vector<double> outside_of_turn(turns, 0.0);
-  std::vector<double> times(n);
-  for (std::size_t i = 0; i < n; ++i) {
-    times[i] = timeAt(from + units::TWO_PI * static_cast<double>(i) / static_cast<double>(bins));
-  }
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    std::vector<double> force(n);
-    for (std::size_t i = 0; i < n; ++i) {
-      const double place = (times[i] - samples_.front().time) * rate;
-      const auto at = static_cast<std::size_t>(
-          std::clamp(std::floor(place), 1.0, static_cast<double>(samples_.size() - 3)));
-      force[i] =
-          catmullRom(samples_[at - 1].force[axis], samples_[at].force[axis], samples_[at + 1].force[axis],
-                     samples_[at + 2].force[axis], place - static_cast<double>(at));
-    }
-    double mean = 0.0;
-    std::vector<double> repeated(bins, 0.0);
-    for (std::size_t i = 0; i < n; ++i) {
-      mean += force[i] / static_cast<double>(n);
-      repeated[i % bins] += force[i] / static_cast<double>(turns);
-    }
-    // The mean over the turns takes one part in `turns` of whatever does not repeat with it.
-    const double share = static_cast<double>(turns) / static_cast<double>(turns - 1);
-    for (std::size_t i = 0; i < n; ++i) {
-      all += (force[i] - mean) * (force[i] - mean) / static_cast<double>(n);
-      force[i] -= repeated[i % bins];
-      outside += share * force[i] * force[i] / static_cast<double>(n);
-      outside_of_turn[i / bins] += share * force[i] * force[i] / static_cast<double>(bins);
-      force[i] *= taper[i];
-    }
-    if (half > 0) {
-      const auto orders = fourier(repeated);
-      for (std::size_t k = half; 2 * k < bins; k += 2 * half) {
-        of_order[k] += 2.0 * std::norm(orders[k]) / std::pow(static_cast<double>(bins), 2);
-        alternating += 2.0 * std::norm(orders[k]) / std::pow(static_cast<double>(bins), 2);
-      }
-    }
-    const auto spectrum = fourier(force);
-    for (std::size_t k = 0; k < power.size(); ++k) power[k] += std::norm(spectrum[k]);
-  }
-  state.alternation = all > 0.0 ? std::min(1.0, alternating / all) : 0.0;
-  const bool flip = state.alternation > parameters_.alternation_ratio && alternating > outside;
-  const double chatter_energy = flip ? outside + alternating : outside;
+  const double all = content.all;
+  state.alternation = all > 0.0 ? std::min(1.0, content.alternating / all) : 0.0;
+  const bool flip =
+      state.alternation > parameters_.alternation_ratio && content.alternating > content.outside;
+  const double chatter_energy = flip ? content.outside + content.alternating : content.outside;
   state.energy_ratio = all > 0.0 ? std::min(1.0, chatter_energy / all) : 0.0;
   state.severity = std::sqrt(chatter_energy);
-  const auto peak =
-      static_cast<std::size_t>(std::max_element(power.begin() + 1, power.end() - 1) - power.begin());
-  // Vertex of the parabola through the logarithms: exact to a few percent of a line under a Hann window.
-  const double a = std::log(power[peak - 1] + 1e-300), b = std::log(power[peak] + 1e-300),
-               c = std::log(power[peak + 1] + 1e-300);
-  const double curve = a - 2.0 * b + c;
-  const double shift = curve < 0.0 ? std::clamp(0.5 * (a - c) / curve, -0.5, 0.5) : 0.0;
-  state.frequency = (static_cast<double>(peak) + shift) / (stop - start);
-  if (flip)
-    state.frequency =
-        static_cast<double>(std::max_element(of_order.begin(), of_order.end()) - of_order.begin()) / period;
-  // What dies out within the window is a transient (an entry), not chatter.
-  constexpr double DIES = 0.7;
-  double early = 0.0, late = 0.0;
-  for (std::size_t k = 0; k < turns; ++k) (2 * k < turns ? early : late) += outside_of_turn[k];
-  const bool dies = !flip && late < DIES * early;
-  state.chatter =
-      !dies && state.energy_ratio > parameters_.energy_ratio && state.severity > parameters_.least_severity;
+  state.frequency = flip ? content.strongestOrder() / period : content.strongest() / (stop - start);
+  state.chatter = (flip || !content.dies()) && state.energy_ratio > parameters_.energy_ratio &&
+                  state.severity > parameters_.least_severity;
   if (state.chatter) {
     // A flip repeats: it was there from the window's beginning, as far as this window tells.
     std::size_t turn = flip ? 0 : turns - 1;
-    while (turn > 0 && outside_of_turn[turn - 1] > parameters_.energy_ratio * all) --turn;
+    while (turn > 0 && content.outside_of_turn[turn - 1] > parameters_.energy_ratio * all) --turn;
     state.onset = times[turn * bins];
   }
   said_invalid_ = false;

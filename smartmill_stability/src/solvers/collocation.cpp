@@ -86,67 +86,95 @@ struct Shape {
   MatrixXd state, force_state;            ///< 2M x 2M, 2M x (n D): state at the end
 };
 
+/// A mode's own motion: pole -a + i wd, w its size.
+struct Pole {
+  explicit Pole(const SystemMode& mode)
+      : w(units::TWO_PI * mode.frequency),
+        a(mode.damping_ratio * w),
+        wd(w * std::sqrt(1.0 - mode.damping_ratio * mode.damping_ratio)) {}
+
+  /// Free motion of q and q'/w over a time.
+  Eigen::Matrix2d flow(double t) const {
+    const double e = std::exp(-a * t), co = std::cos(wd * t), si = std::sin(wd * t);
+    Eigen::Matrix2d flow;
+    flow << e * (co + a / wd * si), e * w / wd * si, -e * w / wd * si, e * (co - a / wd * si);
+    return flow;
+  }
+
+  double w, a, wd;
+};
+
+/// Motion and velocity at the nodes (rows) that a unit of each polynomial of the force (columns) leaves.
+struct NodeAnswer {
+  MatrixXd motion, velocity;
+};
+
+NodeAnswer answerOf(const Pole& pole, const Reference& reference, double length) {
+  const Index n = reference.n;
+  MatrixXd re(n, n), im(n, n);
+  VectorXd wr(static_cast<Index>(reference.gauss.size())), wi(wr.size());
+  // integral of exp(s (t_i - t)) l_j(t) from 0 to t_i, s = -a + i wd.
+  for (Index i = 0; i < n; ++i) {
+    const double t = length * reference.node[static_cast<std::size_t>(i)];
+    for (Index q = 0; q < wr.size(); ++q) {
+      const double rest = t * (1.0 - reference.gauss[static_cast<std::size_t>(q)]);
+      const double e = std::exp(-pole.a * rest) * t * reference.weight[static_cast<std::size_t>(q)];
+      wr[q] = e * std::cos(pole.wd * rest);
+      wi[q] = e * std::sin(pole.wd * rest);
+    }
+    re.row(i).noalias() = (reference.lagrange[static_cast<std::size_t>(i)] * wr).transpose();
+    im.row(i).noalias() = (reference.lagrange[static_cast<std::size_t>(i)] * wi).transpose();
+  }
+  return {im / pole.wd, re - (pole.a / pole.wd) * im};
+}
+
+/// Adds a mode's part; c: first of its two columns of state.
+void addMode(Shape& shape, const SystemMode& mode, const Axes& axes, const Reference& reference, Index c) {
+  const Index n = reference.n, d = axes.count();
+  const bool with_velocity = shape.velocity.size() > 0;
+  const Pole pole(mode);
+  const NodeAnswer answer = answerOf(pole, reference, shape.length);
+  for (Index i = 0; i < n; ++i) {
+    const Eigen::Matrix2d flow = pole.flow(shape.length * reference.node[static_cast<std::size_t>(i)]);
+    for (Index p = 0; p < d; ++p) {
+      const double out = mode.output[axes.index[static_cast<std::size_t>(p)]];
+      shape.motion.block<1, 2>(i * d + p, c) = out * flow.row(0);
+      if (with_velocity) shape.velocity.block<1, 2>(i * d + p, c) = out * pole.w * flow.row(1);
+      for (Index r = 0; r < d; ++r) {
+        const double gain = out * mode.input[axes.index[static_cast<std::size_t>(r)]];
+        if (gain == 0.0) continue;
+        for (Index j = 0; j < n; ++j) {
+          shape.force_motion(i * d + p, j * d + r) += gain * answer.motion(i, j);
+          if (with_velocity) shape.force_velocity(i * d + p, j * d + r) += gain * answer.velocity(i, j);
+        }
+      }
+    }
+    if (i + 1 == n) shape.state.block<2, 2>(c, c) = flow;
+  }
+  for (Index r = 0; r < d; ++r) {
+    const double in = mode.input[axes.index[static_cast<std::size_t>(r)]];
+    for (Index j = 0; j < n; ++j) {
+      shape.force_state(c, j * d + r) = in * answer.motion(n - 1, j);
+      shape.force_state(c + 1, j * d + r) = in * answer.velocity(n - 1, j) / pole.w;
+    }
+  }
+}
+
 Shape shapeOf(const std::vector<SystemMode>& modes, const Axes& axes, const Reference& reference,
               double length, bool with_velocity) {
-  const Index n = reference.n, d = axes.count(), m2 = 2 * static_cast<Index>(modes.size());
+  const Index nd = reference.n * axes.count(), m2 = 2 * static_cast<Index>(modes.size());
   Shape shape;
   shape.length = length;
-  shape.motion = MatrixXd::Zero(n * d, m2);
-  shape.force_motion = MatrixXd::Zero(n * d, n * d);
+  shape.motion = MatrixXd::Zero(nd, m2);
+  shape.force_motion = MatrixXd::Zero(nd, nd);
   shape.state = MatrixXd::Zero(m2, m2);
-  shape.force_state = MatrixXd::Zero(m2, n * d);
+  shape.force_state = MatrixXd::Zero(m2, nd);
   if (with_velocity) {
     shape.velocity = shape.motion;
     shape.force_velocity = shape.force_motion;
   }
-  Eigen::MatrixXd re(n, n), im(n, n);
-  VectorXd wr(static_cast<Index>(reference.gauss.size())), wi(wr.size());
-  for (std::size_t k = 0; k < modes.size(); ++k) {
-    const SystemMode& mode = modes[k];
-    const Index c = 2 * static_cast<Index>(k);
-    const double w = units::TWO_PI * mode.frequency, a = mode.damping_ratio * w;
-    const double wd = w * std::sqrt(1.0 - mode.damping_ratio * mode.damping_ratio);
-    // integral of exp(s (t_i - t)) l_j(t) from 0 to t_i, s = -a + i wd.
-    for (Index i = 0; i < n; ++i) {
-      const double t = length * reference.node[static_cast<std::size_t>(i)];
-      for (Index q = 0; q < wr.size(); ++q) {
-        const double rest = t * (1.0 - reference.gauss[static_cast<std::size_t>(q)]);
-        const double e = std::exp(-a * rest) * t * reference.weight[static_cast<std::size_t>(q)];
-        wr[q] = e * std::cos(wd * rest);
-        wi[q] = e * std::sin(wd * rest);
-      }
-      re.row(i).noalias() = (reference.lagrange[static_cast<std::size_t>(i)] * wr).transpose();
-      im.row(i).noalias() = (reference.lagrange[static_cast<std::size_t>(i)] * wi).transpose();
-    }
-    const MatrixXd q_of_f = im / wd, v_of_f = re - (a / wd) * im;
-    for (Index i = 0; i < n; ++i) {
-      const double t = length * reference.node[static_cast<std::size_t>(i)];
-      const double e = std::exp(-a * t), co = std::cos(wd * t), si = std::sin(wd * t);
-      Eigen::Matrix2d flow;
-      flow << e * (co + a / wd * si), e * w / wd * si, -e * w / wd * si, e * (co - a / wd * si);
-      for (Index p = 0; p < d; ++p) {
-        const double out = mode.output[axes.index[static_cast<std::size_t>(p)]];
-        shape.motion.block<1, 2>(i * d + p, c) = out * flow.row(0);
-        if (with_velocity) shape.velocity.block<1, 2>(i * d + p, c) = out * w * flow.row(1);
-        for (Index r = 0; r < d; ++r) {
-          const double gain = out * mode.input[axes.index[static_cast<std::size_t>(r)]];
-          if (gain == 0.0) continue;
-          for (Index j = 0; j < n; ++j) {
-            shape.force_motion(i * d + p, j * d + r) += gain * q_of_f(i, j);
-            if (with_velocity) shape.force_velocity(i * d + p, j * d + r) += gain * v_of_f(i, j);
-          }
-        }
-      }
-      if (i + 1 == n) shape.state.block<2, 2>(c, c) = flow;
-    }
-    for (Index r = 0; r < d; ++r) {
-      const double in = mode.input[axes.index[static_cast<std::size_t>(r)]];
-      for (Index j = 0; j < n; ++j) {
-        shape.force_state(c, j * d + r) = in * q_of_f(n - 1, j);
-        shape.force_state(c + 1, j * d + r) = in * v_of_f(n - 1, j) / w;
-      }
-    }
-  }
+  for (std::size_t k = 0; k < modes.size(); ++k)
+    addMode(shape, modes[k], axes, reference, 2 * static_cast<Index>(k));
   return shape;
 }
 

@@ -219,65 +219,72 @@ class MultiFrequency : public StabilitySolver {
     limit.frequency = balance.strongest(at.w, at.value);
   }
 
+  /// The crossings of a feedback scaled with the sweep that the edge has at a depth.
+  struct Sweep {
+    double depth = 0.0;
+    int below = 0;         // crossings under the depth
+    double nearest = 0.0;  // log of the crossing nearest to the depth, over the depth
+    Crossing at;
+  };
+  Sweep sweep(double speed, int reach, double depth) const {
+    const Balance balance(system_, axes_, speed, reach, reach - 1, depth);
+    Sweep sweep;
+    sweep.depth = depth;
+    sweep.nearest = std::numeric_limits<double>::infinity();
+    for (const Crossing& c : crossings(balance, 4.0 * depth)) {
+      const double ratio = -std::log(c.value.real() * depth);
+      sweep.below += ratio < 0.0;
+      if (std::abs(ratio) < std::abs(sweep.nearest)) {
+        sweep.nearest = ratio;
+        sweep.at = c;
+      }
+    }
+    return sweep;
+  }
+
+  /// A straight edge loses stability near the same depth unless the sweep is long.
+  double straightLimit(double speed, double max_depth, int reach) const {
+    RegenerativeSystem straight = system_;
+    straight.helix = 0.0;
+    const Balance plain(straight, axes_, speed, reach, reach - 1);
+    double limit = max_depth;
+    for (const Crossing& c : crossings(plain, 4.0 * max_depth)) limit = std::min(limit, 1.0 / c.value.real());
+    return limit;
+  }
+
+  /// Between two depths with different numbers of crossings below them: the one where that changes.
+  Sweep change(double speed, int reach, Sweep a, Sweep b) const {
+    const int below = a.below;
+    for (int i = 0; i < 40 && b.depth / a.depth - 1.0 > options_.tolerance; ++i) {
+      // The same crossing above the depth on one side, below it on the other: false position, else halves.
+      double share = 0.5;
+      if (i % 3 != 2 && a.nearest > 0.0 && b.nearest < 0.0 && std::isfinite(a.nearest - b.nearest))
+        share = std::clamp(a.nearest / (a.nearest - b.nearest), 1e-3, 1.0 - 1e-3);
+      const Sweep middle = sweep(speed, reach, a.depth + share * (b.depth - a.depth));
+      if (std::abs(middle.nearest) < 0.1 * options_.tolerance) return middle;
+      (middle.below != below ? b : a) = middle;
+    }
+    return std::abs(a.nearest) < std::abs(b.nearest) ? a : b;
+  }
+
   /// With helix the sweep of the edge belongs to a depth d; scaled with that sweep the feedback has crossings
   /// a_i(d), and the cut itself is at a boundary where one of them is d. The first such d when d grows from
   /// zero, where all a_i lie above, is the first loss.
   Limit withHelix(double speed, double max_depth, int reach) const {
-    struct State {
-      double depth = 0.0;
-      int below = 0;         // crossings under the depth
-      double nearest = 0.0;  // log of the crossing nearest to the depth, over the depth
-      Crossing at;
-    };
-    const auto look = [&](double depth) {
-      const Balance balance(system_, axes_, speed, reach, reach - 1, depth);
-      State state;
-      state.depth = depth;
-      state.nearest = std::numeric_limits<double>::infinity();
-      for (const Crossing& c : crossings(balance, 4.0 * depth)) {
-        const double ratio = -std::log(c.value.real() * depth);
-        state.below += ratio < 0.0;
-        if (std::abs(ratio) < std::abs(state.nearest)) {
-          state.nearest = ratio;
-          state.at = c;
-        }
-      }
-      return state;
-    };
-    Limit limit;
-    // A straight edge loses stability near the same depth unless the sweep is long.
-    RegenerativeSystem straight = system_;
-    straight.helix = 0.0;
-    const Balance plain(straight, axes_, speed, reach, reach - 1);
-    double start = max_depth;
-    for (const Crossing& c : crossings(plain, 4.0 * max_depth)) start = std::min(start, 1.0 / c.value.real());
     constexpr double GROWTH = 1.12, BELOW = 0.5, CLOSE = 0.02;
-    State before = look(std::min(BELOW * start, max_depth));
+    Limit limit;
+    Sweep before = sweep(speed, reach, std::min(BELOW * straightLimit(speed, max_depth, reach), max_depth));
     // Should it chatter there already, go down.
-    for (int i = 0; i < 20 && before.below > 0; ++i) before = look(0.5 * before.depth);
+    for (int i = 0; i < 20 && before.below > 0; ++i) before = sweep(speed, reach, 0.5 * before.depth);
     while (before.depth < max_depth) {
       // Not beyond the crossing that is foretold, by more than a little.
       const double growth = before.nearest > 0.0 && std::isfinite(before.nearest)
                                 ? std::clamp(std::exp(1.1 * before.nearest), 1.0 + CLOSE, GROWTH)
                                 : GROWTH;
-      const State next = look(std::min(max_depth, growth * before.depth));
+      const Sweep next = sweep(speed, reach, std::min(max_depth, growth * before.depth));
       if (next.below != before.below) {
-        State a = before, b = next;
-        for (int i = 0; i < 40 && b.depth / a.depth - 1.0 > options_.tolerance; ++i) {
-          // The same crossing above the depth on one side, below it on the other: false position, else
-          // halves.
-          double share = 0.5;
-          if (i % 3 != 2 && a.nearest > 0.0 && b.nearest < 0.0 && std::isfinite(a.nearest - b.nearest))
-            share = std::clamp(a.nearest / (a.nearest - b.nearest), 1e-3, 1.0 - 1e-3);
-          const State middle = look(a.depth + share * (b.depth - a.depth));
-          (middle.below != before.below ? b : a) = middle;
-          if (std::abs(middle.nearest) < 0.1 * options_.tolerance) {
-            a = b = middle;
-            break;
-          }
-        }
+        const Sweep found = change(speed, reach, before, next);
         // A pair of crossings that appears below the depth all at once is no boundary at this depth.
-        const State& found = std::abs(a.nearest) < std::abs(b.nearest) ? a : b;
         if (std::abs(found.nearest) < 0.5 * CLOSE) {
           limit.depth = found.depth;
           describe(Balance(system_, axes_, speed, reach, reach - 1, found.depth), found.at, limit);

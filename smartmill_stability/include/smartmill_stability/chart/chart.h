@@ -112,6 +112,12 @@ class ChartMaker {
   void use(const std::string& tool, double stamp);
   /// Depth that the spindle carries at a speed: torque and power limit [m].
   std::array<double, 2> loadLimits(double speed) const;
+  double carried(const Chart& chart, std::size_t k) const;  // [m] by the spindle at a speed, with its reserve
+  int linesBeyond() const;
+  /// A little beyond both ends of the chart, so that the margin of speed holds there too.
+  StabilityLimit wideLimits(const Basis& given) const;
+  void recommend(Chart& chart, const StabilityLimit& wide) const;
+  void proposeUnstable(Chart& chart, const StabilityLimit& wide) const;
   ChartPoint point(double speed, double depth, double limit, double frequency) const;
   double torquePerDepth() const;  // [N]
   double friction(double speed) const;

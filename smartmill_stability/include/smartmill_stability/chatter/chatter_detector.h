@@ -79,6 +79,8 @@ class ChatterDetector {
   void evaluate();
   double angleAt(double time) const;
   double timeAt(double turned) const;
+  /// Force of an axis at times between the samples, which come at a rate [Hz].
+  std::vector<double> forceAt(const std::vector<double>& times, std::size_t axis, double rate) const;
   void judge(double from, double to);
 
   ChatterParameters parameters_;
