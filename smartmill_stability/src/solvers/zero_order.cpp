@@ -212,11 +212,4 @@ double absoluteDepthLimit(const RegenerativeProcess& process, const ToolTipRespo
   return least;
 }
 
-double turningDepthLimit(const std::vector<Complex>& receptance, double cutting_stiffness) {
-  require("cutting stiffness [N/m2]", cutting_stiffness > 0.0, cutting_stiffness);
-  double least = 0.0;
-  for (const Complex& g : receptance) least = std::min(least, g.real());
-  return least < 0.0 ? -1.0 / (2.0 * cutting_stiffness * least) : std::numeric_limits<double>::infinity();
-}
-
 }  // namespace smartmill::stability

@@ -54,13 +54,6 @@ TEST(TurningSimulation, stableBelowMerrittsLimitAndWithoutOverlap) {
               1e-3 * process.chip);  // static: y = K/K_m (a0 - y)
 }
 
-// Eq. 16 with motions over their forces lands on the measured ratio, whatever the two controllers before
-// were.
-TEST(Secant, findsTheRootOfALinearLineInOneStep) {
-  const std::complex<double> machine(0.3, -1.2), g_1(0.1, -0.4), g_2(0.5, 0.2);
-  EXPECT_LT(std::abs(secantUpdate(g_1, g_2, machine, g_1, g_2) - machine), 1e-14);
-}
-
 TEST(Guard, knowsWhatMismatchIsDangerous) {
   const SecondOrder machine{0.1, FREQUENCY, DAMPING};
   // Uncontrolled: eq. 5 scaled, -0.5 x 0.1 / 0.0408.

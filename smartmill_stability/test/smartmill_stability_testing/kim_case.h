@@ -3,7 +3,7 @@
 #include <cmath>
 #include <vector>
 
-#include "smartmill_stability/control/turning_control.h"
+#include "smartmill_stability_testing/turning_process.h"
 
 namespace smartmill::stability {
 

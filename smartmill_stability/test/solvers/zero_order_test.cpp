@@ -78,13 +78,6 @@ TEST(ZeroOrder, chartNeverFallsBelowTheAbsoluteLimit) {
   EXPECT_NEAR(least / absolute, 1.0, 1e-3);  // some speed of the grid comes this near
 }
 
-// Merritt: with one mode the minimum is 2 k zeta (1 + zeta) / k_f.
-TEST(Turning, merrittsMinimum) {
-  const ModalModel mode{{{100.0, 0.05, 1e-8}}, 0.0};
-  const ToolTipResponse tool = responseOf(mode, ModalModel{}, 1.0, 1000.0, 200000);
-  EXPECT_NEAR(turningDepthLimit(tool.xx, 1e9) / (2.0 * 1e8 * 0.05 * 1.05 / 1e9), 1.0, 1e-6);
-}
-
 TEST(ZeroOrder, rigidToolHasNoLimit) {
   const ToolTipResponse tool = responseOf(ModalModel{}, ModalModel{}, 1.0, 1000.0, 100);
   const StabilityLimit limit = zeroOrderLimit({4, 0.0, PI, 1e9, 0.3}, tool, {100.0, 200.0});

@@ -1,7 +1,7 @@
 #pragma once
 
+#include <complex>
 #include <deque>
-#include <functional>
 #include <memory>
 #include <vector>
 
@@ -11,27 +11,8 @@
 
 namespace smartmill::stability {
 
-/// Single-point turning after Kim: chip thickness a = a0 - y(t) + mu y(t - T), force K a, one mode, y = y_w -
-/// y_t the deflection y_w of the machine less the displacement y_t that an actuator gives to the tool (Kim
-/// eq. 1..4, 9).
-struct TurningProcess {
-  double stiffness_ratio = 0.1;      ///< [1] K / K_m, cutting over machine stiffness, > 0
-  double damping_ratio = 0.02;       ///< [1] 0 < value < 1
-  double natural_frequency = 350.0;  ///< [rad/s] > 0
-  double overlap = 1.0;              ///< [1] mu, 0..1
-  double period = 0.1;               ///< [s] T of a revolution, > 0
-  double chip = 1e-4;                ///< [m] a0, nominal chip thickness
-  /// @throws Error naming the quantity.
-  void validate() const;
-};
-
-/// Least K / K_m at which some speed chatters: 2 (zeta + zeta^2) (Kim eq. 7, Merritt).
-double merrittLimit(double damping_ratio);
-/// [rad/s] w_m sqrt(1 + 2 zeta), where the real part is least (Kim eq. 6).
-double criticalFrequency(double natural_frequency, double damping_ratio);
-/// [1/s] of the dominant root of the uncontrolled process; positive: chatter.
-double growthRate(const TurningProcess& process);
-
+/// Single-point turning after Kim: chip thickness a = a0 - y(t) + mu y(t - T), y = y_w - y_t the deflection
+/// y_w of the machine less the displacement y_t that an actuator gives to the tool (Kim eq. 1..4, 9).
 /// Second-order machine as the controller believes it: y_w = gain w^2 / (s^2 + 2 zeta w s + w^2) a.
 struct SecondOrder {
   double gain = 0.0;           ///< [1] K / K_m
@@ -40,6 +21,7 @@ struct SecondOrder {
   /// Of gain, frequency, damping ratio; in their units.
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
   std::complex<double> response(double w) const;  ///< [1] at w [rad/s]
+  ModalModel modal() const;
 };
 
 /// Kim's spectral estimate: blocks of a segment under a Hamming window.
@@ -69,14 +51,6 @@ struct SegmentEstimate {
 /// @param start of the search, nullptr: searched over the band. @throws Error on wrong lengths.
 SegmentEstimate estimateSegment(const std::vector<double>& chip, const std::vector<double>& deflection,
                                 const EstimatorParameters& parameters, const SecondOrder* start = nullptr);
-
-/// Secant update of the controller's transfer function at one line (Kim eq. 16 with its indices mended, and
-/// motions over the force of their segment): G_j = G_1 + (H_w - H_1) / (H_1 - H_2) (G_1 - G_2), 1 and 2 the
-/// last segment and the one before.
-/// @param h_w deflection, @param h_1, h_2 tool displacement, each over the force
-std::complex<double> secantUpdate(std::complex<double> g_1, std::complex<double> g_2,
-                                  std::complex<double> h_w, std::complex<double> h_1,
-                                  std::complex<double> h_2);
 
 /// Kim eq. 10: least real part of K/K_m (G_m - K_m K_c G_c) over all frequencies; above -0.5 every speed is
 /// stable.
@@ -131,18 +105,6 @@ class AdaptiveChatterController {
   std::vector<SecondOrder> beliefs_;
 };
 
-/// Actuator commands of the classical schemes. Each is called with deflection and tool displacement [m] and
-/// returns the tool displacement to make.
-using ControlLaw = std::function<double(double deflection, double tool)>;
-
-/// Displacement error (Mitchell and Harrison): the tool follows gain x the relative displacement through a
-/// lag of the first order. @param bandwidth [Hz]
-ControlLaw displacementErrorControl(double gain, double bandwidth, double rate);
-
-/// Cutting force (Nachtigal): a fixed model of the machine driven by the force, here the chip thickness; no
-/// learning.
-ControlLaw forceFeedbackControl(const SecondOrder& model, const TurningProcess& process, double rate);
-
 /// Integrates a headstock accelerometer to displacement above a corner frequency (the paper's own proposal
 /// for machines whose deflection cannot be measured). The ratio of deflection to chip thickness is not
 /// changed where both went through it.
@@ -155,17 +117,5 @@ class AccelerationIntegrator {
  private:
   ModalFilter filter_;
 };
-
-struct TurningRun {
-  std::vector<double> time;        ///< [s]
-  std::vector<double> motion;      ///< [m] y_w - y_t
-  std::vector<double> deflection;  ///< [m] y_w
-};
-
-/// Regenerative simulation, exact for chip thickness linear within a step. @param noise_rms [m] on both
-/// streams that the law sees
-/// @param duration [s] @param rate [Hz] @param law may be empty: no control
-TurningRun simulateTurning(const TurningProcess& process, double duration, double rate, double noise_rms,
-                           unsigned seed, const ControlLaw& law);
 
 }  // namespace smartmill::stability

@@ -59,8 +59,4 @@ StabilityLimit zeroOrderLimit(const RegenerativeProcess& process, const ToolTipR
 /// Depth below which every speed is stable in the zero-order sense [m]; +inf without a limit.
 double absoluteDepthLimit(const RegenerativeProcess& process, const ToolTipResponse& tool);
 
-/// Merritt's minimum for turning: -1 / (2 k_f min Re G) [m] for a cutting stiffness k_f [N/m2] along the
-/// receptance given; for one mode 2 k zeta (1 + zeta) / k_f. +inf when the real part is nowhere negative.
-double turningDepthLimit(const std::vector<std::complex<double>>& receptance, double cutting_stiffness);
-
 }  // namespace smartmill::stability
