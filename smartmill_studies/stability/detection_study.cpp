@@ -6,7 +6,7 @@
 #include <random>
 
 #include "smartmill_core/error.h"
-#include "smartmill_core/signal/fourier.h"
+#include "smartmill_stability_testing/cut_streams.h"
 #include "stability/twin_agreement.h"
 
 namespace smartmill::stability {
@@ -14,7 +14,8 @@ namespace {
 
 constexpr int SAMPLES = 180, REVOLUTIONS = 150, AIR = 10, LATE = 60;
 constexpr std::size_t BLOCK = 256;
-constexpr double STILL = 0.05;  // [1] of the feed per tooth: change of the motion that is none
+constexpr double FEED = 0.1e-3;  // [m] per tooth
+constexpr double STILL = 0.05;   // [1] of the feed per tooth: change of the motion that is none
 
 /// Up to three channels of a record as the detector's sensor gives them.
 std::vector<std::vector<double>> signalOf(const Record& record, const std::string& kind, double rate) {
@@ -36,53 +37,34 @@ std::vector<std::vector<double>> signalOf(const Record& record, const std::strin
   return {pressure};
 }
 
-/// Strongest line beside what repeats with a revolution (period in samples), over the last turns of the cut.
-double strongestLine(const std::vector<std::vector<double>>& signal, std::size_t end, std::size_t period,
-                     double rate) {
-  std::vector<double> power;
+/// The last turns of a record, whole periods.
+std::vector<std::vector<double>> lateOf(std::vector<std::vector<double>> signal, std::size_t period) {
   const std::size_t count = LATE * static_cast<std::size_t>(SAMPLES) / period * period;
-  for (const std::vector<double>& whole : signal) {
-    std::vector<double> part(whole.begin() + static_cast<std::ptrdiff_t>(end - count),
-                             whole.begin() + static_cast<std::ptrdiff_t>(end));
-    const double turns = static_cast<double>(count / period);
-    for (std::size_t b = 0; b < period; ++b) {
-      double mean = 0.0;
-      for (std::size_t k = b; k < count; k += period) mean += part[k] / turns;
-      for (std::size_t k = b; k < count; k += period) part[k] -= mean;
-    }
-    const auto spectrum = fourier(part);
-    power.resize(count / 2 + 1, 0.0);
-    for (std::size_t k = 0; k < power.size(); ++k) power[k] += std::norm(spectrum[k]);
-  }
-  const auto peak = std::max_element(power.begin() + 1, power.end()) - power.begin();
-  return static_cast<double>(peak) * rate / static_cast<double>(count);
+  for (std::vector<double>& channel : signal)
+    channel.erase(channel.begin(), channel.end() - static_cast<std::ptrdiff_t>(count));
+  return signal;
 }
 
-/// The record through the detector, as the streams of a machine.
+/// Of the noise of each channel. The force's is in the record already.
+std::vector<double> noiseOf(const std::vector<std::vector<double>>& signal, const DetectionOptions& options) {
+  std::vector<double> sigma;
+  for (const std::vector<double>& channel : signal) {
+    double squares = 0.0;
+    for (const double v : channel) squares += v * v / static_cast<double>(channel.size());
+    sigma.push_back(options.signal == "force" ? 0.0 : options.signal_noise * std::sqrt(squares));
+  }
+  return sigma;
+}
+
+/// The record through the detector.
 std::vector<ChatterState> verdicts(const std::vector<std::vector<double>>& signal, const DetectionCut& cut,
                                    const MachineModel& model, const DetectionOptions& options, double rate,
                                    unsigned seed) {
   std::vector<ChatterState> states;
   ChatterDetector detector(options.detector, [&](const ChatterState& state) { states.push_back(state); });
-  CuttingCondition condition;
-  condition.kind = CuttingCondition::Kind::cut;
-  condition.name = "cut";
-  condition.tool = *model.tool;
-  condition.steady_from = {{0.0, 0.0, 0.0}};
-  condition.steady_to = {{1.0, 0.0, 0.0}};
-  detector.handle(condition);
-  const double turn = units::TWO_PI / cut.speed;
   const std::size_t cutting = signal[0].size();
-  // The tool leaves the stock at once and the sensors see their noise alone.
-  const std::size_t total = cutting + static_cast<std::size_t>(AIR * SAMPLES);
-  std::vector<double> sigma;
-  for (std::size_t c = 0; c < signal.size(); ++c) {
-    double squares = 0.0;
-    for (const double v : signal[c]) squares += v * v / static_cast<double>(cutting);
-    const bool force = options.signal == "force";
-    // The force's noise is in the record already.
-    sigma.push_back(force ? 0.0 : options.signal_noise * std::sqrt(squares));
-  }
+  CutStreams streams(detector, cut.speed, *model.tool);
+  const std::vector<double> sigma = noiseOf(signal, options);
   std::mt19937_64 random(seed);
   std::normal_distribution<double> normal;
   SampleBlock block;
@@ -91,25 +73,11 @@ std::vector<ChatterState> verdicts(const std::vector<std::vector<double>>& signa
     block.channels.push_back("channel_" + std::to_string(c));
     block.units.emplace_back("1");
   }
-  double angle_due = 0.0, state_due = 0.0;
+  // Then the tool leaves the stock at once and the sensors see their noise alone.
+  const std::size_t total = cutting + static_cast<std::size_t>(AIR * SAMPLES);
   for (std::size_t i = 0; i < total; ++i) {
     const double t = static_cast<double>(i) / rate;
-    if (t >= angle_due) {
-      detector.handle(SpindleAngle{t, std::fmod(cut.speed * t, units::TWO_PI), cut.speed});
-      angle_due += 0.005;
-    }
-    if (t >= state_due) {
-      CncState state;
-      state.stamp = t;
-      state.connected = true;
-      state.axes = {"X", "Y", "Z"};
-      const bool in = t >= AIR * turn && i < cutting;
-      state.position = {in ? 0.5 : 2.0, 0.0, 0.0};
-      state.distance_to_go = {0.0, 0.0, 0.0};
-      state.feed = 0.02;
-      detector.handle(state);
-      state_due += 0.02;
-    }
+    streams.at(t, t >= AIR * units::TWO_PI / cut.speed && i < cutting);
     for (std::size_t c = 0; c < signal.size(); ++c)
       block.samples.push_back((i < cutting ? signal[c][i] : 0.0) + sigma[c] * normal(random));
     if (block.size() == BLOCK) {
@@ -122,22 +90,12 @@ std::vector<ChatterState> verdicts(const std::vector<std::vector<double>>& signa
   return states;
 }
 
-}  // namespace
-
-std::vector<DetectionCut> detectionStudy(const MachineModel& model, const RegenerativeSystem& system,
-                                         const DetectionOptions& options,
-                                         const std::function<void(double)>& progress) {
-  if (!(options.speed_low > 0.0) || !(options.speed_high > options.speed_low))
-    throw Error("speeds: 0 < low < high is due");
-  if (options.cuts < 1) throw Error("cuts: at least 1 is due");
-  if (!(options.signal_noise >= 0.0)) throw Error("signal noise: at least 0 is due");
+/// Cuts clearly below and clearly above their limit, by turns.
+std::vector<DetectionCut> drawCuts(const RegenerativeSystem& system, const DetectionOptions& options) {
   const auto solver = makeFloquetSolver(Method::collocation, system);
   std::mt19937_64 random(options.seed);
   std::uniform_real_distribution<double> unit;
   std::vector<DetectionCut> cuts;
-  std::vector<TwinCut> plan;
-  const int samples = (SAMPLES + system.teeth - 1) / system.teeth * system.teeth;
-  constexpr double FEED = 0.1e-3;
   for (int tries = 0; static_cast<int>(cuts.size()) < options.cuts; ++tries) {
     if (tries > 100 * options.cuts + 1000) throw Error("detection study: no cuts beside the limit are found");
     DetectionCut cut;
@@ -149,50 +107,77 @@ std::vector<DetectionCut> detectionStudy(const MachineModel& model, const Regene
     const auto at = solver->at(cut.speed);
     cut.radius = at->multiplier(cut.depth).radius();
     // Beyond a first loss a pocket may follow; ask for clear cases.
-    if ((at->multiplier(1.1 * cut.depth).radius() > 1.0) != (cut.radius > 1.0) ||
-        (at->multiplier(0.9 * cut.depth).radius() > 1.0) != (cut.radius > 1.0))
-      continue;
-    cuts.push_back(cut);
-    TwinCut run;
-    run.speed = cut.speed;
-    run.engagement = Engagement{system.entry, system.exit, cut.depth, FEED};
-    run.samples = samples;
-    run.revolutions = REVOLUTIONS;
-    run.air = AIR;
-    plan.push_back(run);
+    const bool clear = (at->multiplier(1.1 * cut.depth).radius() > 1.0) == cut.chattersBySolver() &&
+                       (at->multiplier(0.9 * cut.depth).radius() > 1.0) == cut.chattersBySolver();
+    if (clear) cuts.push_back(cut);
   }
-  // First without noise and effects: the truth about the motion. Runout repeats every revolution, and a flip
-  // of an even number of teeth does so too; with teeth that are alike the tooth's period shows it.
+  return cuts;
+}
+
+/// The truth about the motion, from a record without noise and effects. @param period in samples
+void observe(const Record& record, int samples, int period, const std::string& signal, DetectionCut& cut) {
+  const double rate = samples * cut.speed / units::TWO_PI;
+  cut.chatters = repeatsNoMore(record, samples, period, FEED);
+  cut.onset = std::numeric_limits<double>::quiet_NaN();
+  const int turns = static_cast<int>(record.size()) / samples;
+  for (int turn = AIR + 1; turn < turns; ++turn) {
+    double change = 0.0;
+    for (const char* axis : {"tool_x", "tool_y"}) {
+      const std::vector<double>& u = record.column(axis);
+      for (int k = turn * samples; k < (turn + 1) * samples; ++k)
+        change += std::pow(u[static_cast<std::size_t>(k)] - u[static_cast<std::size_t>(k - period)], 2);
+    }
+    if (change < samples * std::pow(STILL * FEED, 2)) {
+      cut.onset = std::numeric_limits<double>::quiet_NaN();
+    } else if (std::isnan(cut.onset)) {
+      cut.onset = turn * units::TWO_PI / cut.speed;
+    }
+  }
+  const auto turn = static_cast<std::size_t>(period);
+  cut.frequency = strongestLine(lateOf(signalOf(record, signal, rate), turn), turn, rate);
+}
+
+/// What the detector made of it.
+void take(const std::vector<ChatterState>& states, DetectionCut& cut) {
+  for (const ChatterState& s : states) {
+    if (!s.valid) continue;
+    cut.alternation = std::max(cut.alternation, s.alternation);
+    cut.energy = std::max(cut.energy, s.energy_ratio);
+  }
+  const auto seen = episodes(states);
+  if (seen.empty()) return;
+  cut.found = true;
+  cut.detected = seen.front().detected;
+  cut.found_frequency = seen.back().frequency;
+}
+
+}  // namespace
+
+std::vector<DetectionCut> detectionStudy(const MachineModel& model, const RegenerativeSystem& system,
+                                         const DetectionOptions& options,
+                                         const std::function<void(double)>& progress) {
+  options.validate();
+  if (options.cuts < 1) throw Error("cuts: at least 1 is due");
+  if (!(options.signal_noise >= 0.0)) throw Error("signal noise: at least 0 is due");
+  std::vector<DetectionCut> cuts = drawCuts(system, options);
+  const int samples = wholeTeeth(SAMPLES, system.teeth);
+  std::vector<TwinCut> plan;
+  for (const DetectionCut& cut : cuts)
+    plan.push_back({cut.speed, {system.entry, system.exit, cut.depth, FEED}, samples, REVOLUTIONS, AIR});
+  const auto half = [&progress](double done) {
+    return [&progress, done](double share) {
+      if (progress) progress(done + 0.5 * share);
+    };
+  };
+  // First without noise and effects. Runout repeats every revolution, and a flip of an even number of teeth
+  // does so too; with teeth that are alike the tooth's period shows it.
   MachineModel plain = model;
   plain.effects.clear();
+  const int period = system.evenPitch() ? samples / system.teeth : samples;
   runTwinCuts(
       {plain}, plan, {{"tool_x", "tool_y", "fx", "fy", "fz"}},
-      [&](std::size_t i, const Record& record) {
-        DetectionCut& cut = cuts[i];
-        const double rate = samples * cut.speed / units::TWO_PI;
-        const int period = system.evenPitch() ? samples / system.teeth : samples;
-        cut.chatters = repeatsNoMore(record, samples, period, FEED);
-        cut.onset = std::numeric_limits<double>::quiet_NaN();
-        const int turns = static_cast<int>(record.size()) / samples;
-        for (int turn = AIR + 1; turn < turns; ++turn) {
-          double change = 0.0;
-          for (const char* axis : {"tool_x", "tool_y"}) {
-            const std::vector<double>& u = record.column(axis);
-            for (int k = turn * samples; k < (turn + 1) * samples; ++k)
-              change += std::pow(u[static_cast<std::size_t>(k)] - u[static_cast<std::size_t>(k - period)], 2);
-          }
-          if (change < samples * std::pow(STILL * FEED, 2)) {
-            cut.onset = std::numeric_limits<double>::quiet_NaN();
-          } else if (std::isnan(cut.onset)) {
-            cut.onset = turn * units::TWO_PI / cut.speed;
-          }
-        }
-        cut.frequency = strongestLine(signalOf(record, options.signal, rate), record.size(),
-                                      static_cast<std::size_t>(period), rate);
-      },
-      [&](double share) {
-        if (progress) progress(0.5 * share);
-      });
+      [&](std::size_t i, const Record& record) { observe(record, samples, period, options.signal, cuts[i]); },
+      half(0.0));
   const bool force = options.signal == "force";
   TwinRequest request;
   request.columns =
@@ -202,25 +187,12 @@ std::vector<DetectionCut> detectionStudy(const MachineModel& model, const Regene
   runTwinCuts(
       {model}, plan, request,
       [&](std::size_t i, const Record& record) {
-        DetectionCut& cut = cuts[i];
-        const double rate = samples * cut.speed / units::TWO_PI;
-        const auto states = verdicts(signalOf(record, options.signal, rate), cut, model, options, rate,
-                                     options.seed + 100u + static_cast<unsigned>(i));
-        for (const ChatterState& s : states) {
-          if (s.valid) {
-            cut.alternation = std::max(cut.alternation, s.alternation);
-            cut.energy = std::max(cut.energy, s.energy_ratio);
-          }
-        }
-        const auto seen = episodes(states);
-        if (seen.empty()) return;
-        cut.found = true;
-        cut.detected = seen.front().detected;
-        cut.found_frequency = seen.back().frequency;
+        const double rate = samples * cuts[i].speed / units::TWO_PI;
+        take(verdicts(signalOf(record, options.signal, rate), cuts[i], model, options, rate,
+                      options.seed + 100u + static_cast<unsigned>(i)),
+             cuts[i]);
       },
-      [&](double share) {
-        if (progress) progress(0.5 + 0.5 * share);
-      });
+      half(0.5));
   return cuts;
 }
 

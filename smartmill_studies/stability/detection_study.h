@@ -7,25 +7,23 @@
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_stability/chatter/chatter_advice.h"
 #include "smartmill_stability/solvers/solver.h"
-#include "stability/twin_cuts.h"
+#include "stability/study_range.h"
 
 namespace smartmill::stability {
 
-struct DetectionOptions {
-  double speed_low = 0.0, speed_high = 0.0;  ///< [rad/s] 0 < low < high
-  double max_depth = 0.0;                    ///< [m] > 0
+struct DetectionOptions : StudyRange {
   int cuts = 300;
-  unsigned seed = 1;
   /// force: fx, fy, fz with the model's noise; vibration: acceleration of the tip; sound: pressure that goes
   /// with the tip's acceleration. Noise of the latter two: a share of the signal's rms.
   std::string signal = "force";
   double signal_noise = 0.02;  ///< [1] >= 0
-  ChatterParameters detector;
+  ChatterParameters detector{};
 };
 
 struct DetectionCut {
   double speed = 0.0, depth = 0.0;  ///< [rad/s], [m]
   double radius = 0.0;              ///< [1] of the solver's dominant multiplier
+  bool chattersBySolver() const { return radius > 1.0; }
   /// What the simulator's record of the same cut without noise and effects says of the tip's motion, sampled
   /// once per tooth (uneven pitch: per revolution): it repeats no more to the end.
   bool chatters = false;

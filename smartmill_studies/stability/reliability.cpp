@@ -46,8 +46,7 @@ std::vector<ReliabilityPoint> reliabilityStudy(const MachineModel& model, const 
                                                const std::function<void(double)>& progress) {
   if (options.machines < 1) throw Error("machines: at least 1 is due");
   if (options.draws < 1) throw Error("draws: at least 1 is due");
-  if (!(options.speed_low > 0.0) || !(options.speed_high > options.speed_low))
-    throw Error("speeds: 0 < low < high is due");
+  options.validate();
   const UncertainSystem belief = UncertainSystem::of(model, system);
   const auto nominal = makeSolver(Method::collocation, system);
   std::mt19937_64 random(options.seed);
@@ -70,12 +69,11 @@ std::vector<ReliabilityPoint> reliabilityStudy(const MachineModel& model, const 
     points.push_back(p);
     if (!options.by_twin) continue;
     machines.push_back(machineOf(model, truth));
-    TwinCut cut;
-    cut.speed = p.speed;
-    cut.engagement = Engagement{system.entry, system.exit, p.depth, 0.1e-3};
-    cut.samples = (SAMPLES + system.teeth - 1) / system.teeth * system.teeth;
-    cut.revolutions = REVOLUTIONS;
-    cuts.push_back(cut);
+    cuts.push_back({p.speed,
+                    {system.entry, system.exit, p.depth, 0.1e-3},
+                    wholeTeeth(SAMPLES, system.teeth),
+                    REVOLUTIONS,
+                    0});
     if (progress) progress(0.5 * static_cast<double>(points.size()) / options.machines);
   }
   if (options.by_twin) {

@@ -6,16 +6,13 @@
 
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_stability/chart/uncertainty.h"
-#include "stability/twin_cuts.h"
+#include "stability/study_range.h"
 
 namespace smartmill::stability {
 
-struct ReliabilityOptions {
-  double speed_low = 0.0, speed_high = 0.0;  ///< [rad/s] 0 < low < high
-  double max_depth = 0.0;                    ///< [m] > 0
+struct ReliabilityOptions : StudyRange {
   int machines = 200;
-  int draws = 200;  ///< [1] behind each prediction
-  unsigned seed = 1;
+  int draws = 200;      ///< [1] behind each prediction
   bool by_twin = true;  ///< each machine cuts once in the simulator
 };
 

@@ -21,8 +21,7 @@ void AgreementOptions::validate() const {
   const auto due = [](bool good, const char* what) {
     if (!good) throw Error(std::string("agreement: ") + what);
   };
-  due(speed_low > 0.0 && speed_high > speed_low, "0 < low speed < high speed is due");
-  due(max_depth > 0.0, "a largest depth above 0 is due");
+  StudyRange::validate();
   due(band >= 0.0 && band < 0.5, "a band of 0..50 % is due");
   due(feed > 0.0, "a feed per tooth above 0 is due");
   due(points >= 1, "at least one point is due");
@@ -61,7 +60,7 @@ std::vector<AgreementPoint> agreementWithTwin(const MachineModel& model, const R
   std::uniform_real_distribution<double> unit;
   std::vector<AgreementPoint> points;
   std::vector<TwinCut> cuts;
-  const int samples = (SAMPLES + system.teeth - 1) / system.teeth * system.teeth;
+  const int samples = wholeTeeth(SAMPLES, system.teeth);
   // Where no speed has a limit no point would ever be found.
   for (int tries = 0; static_cast<int>(points.size()) < options.points; ++tries) {
     if (tries > 100 * options.points + 1000) throw Error("agreement: no points outside the band are found");
@@ -81,12 +80,8 @@ std::vector<AgreementPoint> agreementWithTwin(const MachineModel& model, const R
       alike = alike && (at->multiplier(side * p.depth).radius() > 1.0) == p.chatters();
     if (!alike) continue;
     points.push_back(p);
-    TwinCut cut;
-    cut.speed = p.speed;
-    cut.engagement = Engagement{system.entry, system.exit, p.depth, options.feed};
-    cut.samples = samples;
-    cut.revolutions = options.revolutions;
-    cuts.push_back(cut);
+    cuts.push_back(
+        {p.speed, {system.entry, system.exit, p.depth, options.feed}, samples, options.revolutions, 0});
   }
   const int period = system.evenPitch() ? samples / system.teeth : samples;
   runTwinCuts(

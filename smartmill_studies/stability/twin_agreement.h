@@ -5,17 +5,15 @@
 
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_stability/solvers/solver.h"
+#include "stability/study_range.h"
 #include "stability/twin_cuts.h"
 
 namespace smartmill::stability {
 
-struct AgreementOptions {
-  double speed_low = 0.0, speed_high = 0.0;  ///< [rad/s] 0 < low < high
-  double max_depth = 0.0;                    ///< [m] > 0
-  double band = 0.05;                        ///< [1] of the depth around the boundary, no points there
-  double feed = 0.1e-3;                      ///< [m] per tooth
+struct AgreementOptions : StudyRange {
+  double band = 0.05;    ///< [1] of the depth around the boundary, no points there
+  double feed = 0.1e-3;  ///< [m] per tooth
   int points = 400;
-  unsigned seed = 1;
   int revolutions = 180;  ///< [1] in cut
 
   /// @throws Error naming the quantity.

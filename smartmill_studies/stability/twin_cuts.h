@@ -19,6 +19,11 @@ struct TwinCut {
   int air = 0;            ///< [1] revolutions before the tool engages
 };
 
+/// So many samples a revolution or a few more, as many for each tooth.
+inline int wholeTeeth(int samples, int teeth) {
+  return (samples + teeth - 1) / teeth * teeth;
+}
+
 /// What the simulator is asked for.
 struct TwinRequest {
   std::vector<std::string> columns;  ///< of the records besides the time, as in docs/formats.md without unit

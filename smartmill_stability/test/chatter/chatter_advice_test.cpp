@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "smartmill_core/error.h"
-#include "smartmill_core/signal/fourier.h"
+#include "smartmill_stability_testing/cut_streams.h"
 #include "smartmill_stability_testing/oracles.h"
 #include "smartmill_stability_testing/time_domain.h"
 
@@ -45,17 +45,11 @@ Study cutOnce(const RegenerativeSystem& system, double speed, double depth, unsi
   Study study;
   ChatterDetector detector(ChatterParameters(),
                            [&](const ChatterState& state) { study.states.push_back(state); });
-  CuttingCondition condition;
-  condition.kind = CuttingCondition::Kind::cut;
-  condition.name = "cut";
-  condition.steady_from = {{0.0, 0.0, 0.0}};
-  condition.steady_to = {{1.0, 0.0, 0.0}};
-  detector.handle(condition);
+  CutStreams streams(detector, speed, ToolGeometry(), 30.0 * turn);  // in full engagement after 30 turns
   ForceBlock block;
   block.sample_rate = rate;
   block.status = ForceBlock::Status::compensated;
-  double state_due = 30.0 * turn, angle_due = 0.0;  // in full engagement after 30 turns
-  std::array<std::vector<double>, 2> late;
+  std::vector<std::vector<double>> late(2);
   std::vector<std::array<double, 2>> before(STEPS, {{0.0, 0.0}});
   double change = 0.0, all = 0.0;
   for (int i = 0; i < STEPS * (TURNS + AIR); ++i) {
@@ -91,37 +85,9 @@ Study cutOnce(const RegenerativeSystem& system, double speed, double depth, unsi
       block.first_index += 256;
       for (auto& axis : block.force) axis.clear();
     }
-    if (t >= angle_due) {
-      detector.handle(SpindleAngle{t, std::fmod(speed * t, units::TWO_PI), speed});
-      angle_due += 0.005;
-    }
-    if (t >= state_due) {
-      CncState state;
-      state.stamp = t;
-      state.connected = true;
-      state.axes = {"X", "Y", "Z"};
-      // Out of the steady part where the tool leaves the stock.
-      state.position = {cutting ? 0.5 : 2.0, 0.0, 0.0};
-      state.distance_to_go = {0.0, 0.0, 0.0};
-      state.feed = 0.02;
-      detector.handle(state);
-      state_due += 0.02;
-    }
+    streams.at(t, cutting);
   }
-  std::vector<double> power;
-  for (std::vector<double>& force : late) {
-    constexpr std::size_t BINS = STEPS / KEPT;
-    for (std::size_t b = 0; b < BINS; ++b) {
-      double mean = 0.0;
-      for (std::size_t k = b; k < force.size(); k += BINS) mean += force[k] / LATE;
-      for (std::size_t k = b; k < force.size(); k += BINS) force[k] -= mean;
-    }
-    const auto spectrum = fourier(force);
-    power.resize(spectrum.size(), 0.0);
-    for (std::size_t k = 0; k < spectrum.size(); ++k) power[k] += std::norm(spectrum[k]);
-  }
-  const auto peak = std::max_element(power.begin(), power.end()) - power.begin();
-  study.frequency = static_cast<double>(peak) * rate / static_cast<double>(late[0].size());
+  study.frequency = strongestLine(late, STEPS / KEPT, rate);
   return study;
 }
 

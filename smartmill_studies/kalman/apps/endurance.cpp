@@ -52,6 +52,94 @@ long resident() {
   return pages * sysconf(_SC_PAGESIZE) / 1024;
 }
 
+constexpr std::size_t BLOCK = 256;  // 10 ms
+constexpr long BLOCKS_PER_MINUTE = 6000;
+
+/// Three axes at 25.6 kHz. Every minute another of four speeds and a new cut; every five minutes a gap of the
+/// index.
+class Machine {
+ public:
+  Machine() {
+    block_.sample_rate = 25600.0;
+    block_.channels = {"fx", "fy", "fz"};
+    block_.units = {"N", "N", "N"};
+    block_.samples.resize(3 * BLOCK);
+  }
+
+  void feed(kalman::SortedCompensation& sorted, long number) {
+    const long minute = number / BLOCKS_PER_MINUTE;
+    const double speed = units::radPerSecFromRpm(6000.0 + 3000.0 * static_cast<double>(minute % 4));
+    block_.stamp = 0.01 * static_cast<double>(number);
+    if (number % BLOCKS_PER_MINUTE == 0) {
+      CuttingCondition condition;
+      condition.stamp = block_.stamp;
+      condition.kind = minute % 2 ? CuttingCondition::Kind::air : CuttingCondition::Kind::cut;
+      sorted.push(condition);
+    }
+    if (number % (5 * BLOCKS_PER_MINUTE) == 5 * BLOCKS_PER_MINUTE - 1) block_.first_index += 1000;
+    for (std::size_t i = 0; i < BLOCK; ++i) {
+      const double phase = 4.0 * (angle_ + speed * static_cast<double>(i) / block_.sample_rate);
+      const double force = 100.0 + 50.0 * std::cos(phase);
+      block_.samples[3 * i] = force;
+      block_.samples[3 * i + 1] = -0.5 * force;
+      block_.samples[3 * i + 2] = 0.2 * force;
+    }
+    sorted.push(SpindleAngle{block_.stamp, angle_, speed});
+    sorted.push(block_);
+    angle_ = std::fmod(angle_ + 0.01 * speed, units::TWO_PI);
+    block_.first_index += BLOCK;
+  }
+
+ private:
+  SampleBlock block_;
+  double angle_ = 0.0;  // [rad]
+};
+
+/// A row every twelfth of the time: what stands in memory, what was asked for since the last row.
+class Account {
+ public:
+  explicit Account(long blocks) : every_(std::max(1L, blocks / 12)) {
+    std::printf("%8s %10s %14s %18s\n", "minute", "RSS kB", "live objects", "allocations/block");
+  }
+  void at(long number) {
+    if (number % every_ != 0) return;
+    const double span = static_cast<double>(std::max(1L, number - first_));
+    std::printf("%8.1f %10ld %14lld %18.1f\n", static_cast<double>(number) / BLOCKS_PER_MINUTE, resident(),
+                live.load(), static_cast<double>(made - made_before_) / span);
+    std::fflush(stdout);
+    made_before_ = made;
+    first_ = number;
+  }
+
+ private:
+  long every_, first_ = 0;
+  long long made_before_ = made;
+};
+
+void run(double minutes) {
+  ForceSensor sensor;
+  for (ModalModel& axis : sensor.axis) axis = kalman::ReferenceCase::exactSensor();
+  std::size_t blocks_out = 0;
+  double sum = 0.0;
+  const auto receive = [&](const ForceBlock&, const ForceBlock& compensated) {
+    ++blocks_out;
+    sum += compensated.force[0].back();
+  };
+  kalman::SortedCompensation sorted({}, {}, sensor, 0.05, {receive, {}, {}, {}});
+  const auto blocks = static_cast<long>(minutes * BLOCKS_PER_MINUTE);
+  const auto begin = std::chrono::steady_clock::now();
+  Machine machine;
+  Account account(blocks);
+  for (long b = 0; b <= blocks; ++b) {
+    account.at(b);
+    machine.feed(sorted, b);
+  }
+  sorted.flush();
+  const double wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  std::printf("%zu blocks out, %.1f minutes of data in %.1f s, %.0f x real time%s\n", blocks_out, minutes,
+              wall, 60.0 * minutes / wall, std::isfinite(sum) ? "" : ", NOT A NUMBER");
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -60,67 +148,5 @@ int main(int argc, char** argv) {
       "Feeds an hour of samples (three axes, 25.6 kHz, with speed changes, gaps and cuts) through the node's "
       "estimator and prints its memory."};
   line.option("--minutes", minutes, "of data").showDefault().within(0.1, 1e5);
-  return runProgram(line, argc, argv, [&] {
-    ForceSensor sensor;
-    for (ModalModel& axis : sensor.axis) axis = kalman::ReferenceCase::exactSensor();
-    std::size_t blocks_out = 0;
-    double sum = 0.0;
-    kalman::SortedCompensation sorted({}, {}, sensor, 0.05,
-                                      {[&](const ForceBlock&, const ForceBlock& c) {
-                                         ++blocks_out;
-                                         sum += c.force[0].back();
-                                       },
-                                       {},
-                                       {},
-                                       {}});
-    SampleBlock block;
-    block.sample_rate = 25600.0;
-    block.channels = {"fx", "fy", "fz"};
-    block.units = {"N", "N", "N"};
-    block.samples.resize(3 * 256);
-    const auto blocks = static_cast<long>(minutes * 6000.0);
-    const auto begin = std::chrono::steady_clock::now();
-    std::printf("%8s %10s %14s %18s\n", "minute", "RSS kB", "live objects", "allocations/block");
-    long long made_before = made;
-    long first = 0;
-    std::uint64_t index = 0;
-    double angle = 0.0;
-    for (long b = 0; b <= blocks; ++b) {
-      if (b % std::max(1L, blocks / 12) == 0) {
-        const double span = static_cast<double>(std::max(1L, b - first));
-        std::printf("%8.1f %10ld %14lld %18.1f\n", static_cast<double>(b) / 6000.0, resident(), live.load(),
-                    static_cast<double>(made - made_before) / span);
-        std::fflush(stdout);
-        made_before = made;
-        first = b;
-      }
-      // Every minute another of four speeds and a new cut; every five minutes a gap of the index.
-      const long minute = b / 6000;
-      const double speed = units::radPerSecFromRpm(6000.0 + 3000.0 * static_cast<double>(minute % 4));
-      block.stamp = 0.01 * static_cast<double>(b);
-      if (b % 6000 == 0) {
-        CuttingCondition condition;
-        condition.stamp = block.stamp;
-        condition.kind = minute % 2 ? CuttingCondition::Kind::air : CuttingCondition::Kind::cut;
-        sorted.push(condition);
-      }
-      if (b % 30000 == 29999) index += 1000;
-      block.first_index = index;
-      for (std::size_t i = 0; i < 256; ++i) {
-        const double phase = 4.0 * (angle + speed * static_cast<double>(i) / block.sample_rate);
-        const double force = 100.0 + 50.0 * std::cos(phase);
-        block.samples[3 * i] = force;
-        block.samples[3 * i + 1] = -0.5 * force;
-        block.samples[3 * i + 2] = 0.2 * force;
-      }
-      sorted.push(SpindleAngle{block.stamp, angle, speed});
-      sorted.push(block);
-      angle = std::fmod(angle + 0.01 * speed, units::TWO_PI);
-      index += 256;
-    }
-    sorted.flush();
-    const double wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    std::printf("%zu blocks out, %.1f minutes of data in %.1f s, %.0f x real time%s\n", blocks_out, minutes,
-                wall, 60.0 * minutes / wall, std::isfinite(sum) ? "" : ", NOT A NUMBER");
-  });
+  return runProgram(line, argc, argv, [&] { run(minutes); });
 }

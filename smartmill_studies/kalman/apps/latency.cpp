@@ -77,6 +77,84 @@ Took run(int blocks, Handle handle) {
   return took;
 }
 
+/// Threads that keep cores busy while it lives.
+class Load {
+ public:
+  explicit Load(int threads) {
+    for (int i = 0; i < threads; ++i) threads_.emplace_back([this] { work(); });
+  }
+  ~Load() {
+    stop_ = true;
+    for (std::thread& thread : threads_) thread.join();
+  }
+  Load(const Load&) = delete;
+  Load& operator=(const Load&) = delete;
+
+ private:
+  void work() {
+    double x = 1.0;
+    while (!stop_.load(std::memory_order_relaxed)) {
+      for (int k = 0; k < 1000; ++k) x = std::sqrt(x + 1.0);
+    }
+    if (x < 0.0) std::printf("%f", x);
+  }
+  std::atomic<bool> stop_{false};
+  std::vector<std::thread> threads_;
+};
+
+Took runEstimator(int blocks, double& sum) {
+  std::size_t out = 0;
+  kalman::ForceCompensation estimator({}, false, [&](const ForceBlock&, const ForceBlock& compensated) {
+    ++out;
+    sum += compensated.force[0].back();
+  });
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    estimator.setSensor(axis, kalman::ReferenceCase::exactSensor());
+  const Took took = run(blocks, [&](const SampleBlock& block) {
+    estimator.handle(SpindleAngle{block.stamp, SPEED * block.stamp, SPEED});
+    estimator.handle(block);
+  });
+  if (out != static_cast<std::size_t>(blocks) + 1) throw Error("blocks were lost");
+  return took;
+}
+
+Took runDense(int blocks, double& sum) {
+  using Matrix = Eigen::Matrix<double, STATES, STATES>;
+  using Vector = Eigen::Matrix<double, STATES, 1>;
+  struct Dense {
+    Matrix transition = 0.02 * Matrix::Random();  // the numbers do not matter for the cost
+    Vector gain = 0.1 * Vector::Random(), output = Vector::Random(), force = Vector::Random(),
+           x = Vector::Zero();
+  };
+  std::vector<Dense> dense(3);
+  return run(blocks, [&](const SampleBlock& block) {
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        Dense& d = dense[axis];
+        const Vector filtered = d.x + d.gain * (block.at(i, axis) - d.output.dot(d.x));
+        sum += d.force.dot(filtered);
+        d.x.noalias() = d.transition * filtered;
+      }
+    }
+  });
+}
+
+void compare(double seconds, int loads) {
+  const int blocks = static_cast<int>(100.0 * seconds);
+  double sum = 0.0;
+  Took own, baseline;
+  {
+    const Load load(loads);
+    own = runEstimator(blocks, sum);
+    baseline = runDense(blocks, sum);
+  }
+  std::printf(
+      "%d blocks of 10 ms, 3 axes at 50 kHz, 3 modes and 33 harmonics, %d busy threads on %u cores (%.0f)\n",
+      blocks, loads, std::thread::hardware_concurrency(), std::isfinite(sum) ? 0.0 : 1.0);
+  print("ForceCompensation", own);
+  print("dense fixed-size Eigen (baseline)", baseline);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -84,65 +162,8 @@ int main(int argc, char** argv) {
   int loads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   CommandLine line{
       "Latency of three axes at 50 kHz in 10 ms blocks with every core busy; baseline: the same filters as "
-      "dense "
-      "fixed-size products."};
+      "dense fixed-size products."};
   line.option("--seconds", seconds, "of each run").showDefault().within(0.1, 1000.0);
   line.option("--loads", loads, "busy threads beside it").showDefault().within(0, 256);
-  return runProgram(line, argc, argv, [&] {
-    std::atomic<bool> stop{false};
-    std::vector<std::thread> busy;
-    for (int i = 0; i < loads; ++i) {
-      busy.emplace_back([&stop] {
-        double x = 1.0;
-        while (!stop.load(std::memory_order_relaxed)) {
-          for (int k = 0; k < 1000; ++k) x = std::sqrt(x + 1.0);
-        }
-        if (x < 0.0) std::printf("%f", x);
-      });
-    }
-    const int blocks = static_cast<int>(100.0 * seconds);
-    std::size_t out = 0;
-    double sum = 0.0;
-    kalman::CompensationParameters parameters;
-    ForceSensor sensor;
-    for (ModalModel& axis : sensor.axis) axis = kalman::ReferenceCase::exactSensor();
-    const auto receive = [&](const ForceBlock&, const ForceBlock& c) {
-      ++out;
-      sum += c.force[0].back();
-    };
-    kalman::ForceCompensation estimator(parameters, false, receive);
-    for (std::size_t axis = 0; axis < 3; ++axis) estimator.setSensor(axis, sensor.axis[axis]);
-    const Took own = run(blocks, [&](const SampleBlock& block) {
-      estimator.handle(SpindleAngle{block.stamp, SPEED * block.stamp, SPEED});
-      estimator.handle(block);
-    });
-    if (out != static_cast<std::size_t>(blocks) + 1) throw Error("blocks were lost");
-
-    using Matrix = Eigen::Matrix<double, STATES, STATES>;
-    using Vector = Eigen::Matrix<double, STATES, 1>;
-    struct Dense {
-      Matrix transition = 0.02 * Matrix::Random();  // the numbers do not matter for the cost
-      Vector gain = 0.1 * Vector::Random(), output = Vector::Random(), force = Vector::Random(),
-             x = Vector::Zero();
-    };
-    std::vector<Dense> dense(3);
-    const Took baseline = run(blocks, [&](const SampleBlock& block) {
-      for (std::size_t i = 0; i < block.size(); ++i) {
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-          Dense& d = dense[axis];
-          const Vector filtered = d.x + d.gain * (block.at(i, axis) - d.output.dot(d.x));
-          sum += d.force.dot(filtered);
-          d.x.noalias() = d.transition * filtered;
-        }
-      }
-    });
-    stop = true;
-    for (std::thread& thread : busy) thread.join();
-    std::printf(
-        "%d blocks of 10 ms, 3 axes at 50 kHz, 3 modes and 33 harmonics, %d busy threads on %u cores "
-        "(%.0f)\n",
-        blocks, loads, std::thread::hardware_concurrency(), std::isfinite(sum) ? 0.0 : 1.0);
-    print("ForceCompensation", own);
-    print("dense fixed-size Eigen (baseline)", baseline);
-  });
+  return runProgram(line, argc, argv, [&] { compare(seconds, loads); });
 }

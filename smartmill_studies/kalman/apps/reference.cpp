@@ -47,6 +47,39 @@ Errors errorsOf(const ReferenceCase& reference, const ReferenceRecord& record, c
   return worst;
 }
 
+template <class Filter>
+std::vector<double> causal(Filter& filter, const std::vector<double>& measured) {
+  filter.reset();
+  std::vector<double> force;
+  force.reserve(measured.size());
+  for (const double sample : measured) force.push_back(filter.step(sample));
+  return force;
+}
+
+ReferenceCase caseAt(double rpm, double duration) {
+  ReferenceCase reference;
+  reference.spindle_speed = units::radPerSecFromRpm(rpm);
+  reference.duration = duration;
+  return reference;
+}
+
+/// Harmonics up to the limit of the sample rate.
+CompensationParameters allHarmonics() {
+  CompensationParameters parameters;
+  parameters.filter.max_harmonics = 200;
+  return parameters;
+}
+
+/// [%] worst of x and y from a sample on.
+double worstError(const std::array<std::vector<double>, 2>& force, const ReferenceCase& reference,
+                  const ReferenceRecord& record, std::size_t from, std::size_t to, double band) {
+  double worst = 0.0;
+  for (std::size_t axis = 0; axis < 2; ++axis)
+    worst =
+        std::max(worst, bandError(force[axis], record.truth[axis], reference.sample_rate, from, to, band));
+  return 100.0 * worst;
+}
+
 void row(double rpm, const char* name, const Errors& e, const char* target) {
   std::printf("%6.0f  %-30s %8.2f %8.2f %10.2f %8.2f   %s\n", rpm, name, 100.0 * e.to_3k, 100.0 * e.to_5k,
               100.0 * e.entry_3k, 100.0 * e.entry_5k, target);
@@ -64,11 +97,9 @@ Errors randomWalk(const ReferenceCase& reference, const ReferenceRecord& record,
         tau * reference.spindle_speed / units::TWO_PI;
     HarmonicFilter filter(reference.sensor, reference.spindle_speed, reference.sample_rate, parameters);
     const Errors errors = errorsOf(reference, record, [&](const std::vector<double>& measured) {
+      if (!smooth) return causal(filter, measured);
       filter.reset();
-      if (smooth) return filter.smooth(measured);
-      std::vector<double> force;
-      for (const double sample : measured) force.push_back(filter.step(sample));
-      return force;
+      return filter.smooth(measured);
     });
     if (errors.to_5k < best.to_5k) best = errors;
   }
@@ -79,9 +110,7 @@ void run(const std::vector<double>& speeds, double duration) {
   std::printf("reference cut: error of the force [%%], worst of x and y; targets to 3 / 5 kHz\n");
   std::printf("   rpm  method                          to 3 kHz to 5 kHz   rev 3-8 (3k)   (5k)   target\n");
   for (const double rpm : speeds) {
-    ReferenceCase reference;
-    reference.spindle_speed = units::radPerSecFromRpm(rpm);
-    reference.duration = duration;
+    ReferenceCase reference = caseAt(rpm, duration);
     std::fprintf(stderr, "%.0f rpm\n", rpm);
     const ReferenceRecord record = simulate(reference);
     HarmonicFilterParameters parameters;
@@ -115,9 +144,7 @@ void runForceModels(const std::vector<double>& speeds, double duration) {
       "   rpm  T [samples]  force model         to 3 kHz to 5 kHz   rev 3-8 (3k)   (5k)  states  ns a sample"
       "  layout [s]\n");
   for (const double rpm : speeds) {
-    ReferenceCase reference;
-    reference.spindle_speed = units::radPerSecFromRpm(rpm);
-    reference.duration = duration;
+    ReferenceCase reference = caseAt(rpm, duration);
     const ReferenceRecord record = simulate(reference);
     const auto show = [&](const char* name, auto make) {
       const std::clock_t began = std::clock();
@@ -125,11 +152,8 @@ void runForceModels(const std::vector<double>& speeds, double duration) {
       const double layout = seconds(began);
       double cost = 0.0;
       const Errors e = errorsOf(reference, record, [&](const std::vector<double>& measured) {
-        filter.reset();
-        std::vector<double> force;
-        force.reserve(measured.size());
         const std::clock_t start = std::clock();
-        for (const double sample : measured) force.push_back(filter.step(sample));
+        const std::vector<double> force = causal(filter, measured);
         cost = 1e9 * seconds(start) / static_cast<double>(measured.size());
         return force;
       });
@@ -158,28 +182,18 @@ void runSpeeds(const std::vector<double>& speeds, double duration) {
   for (const double rpm : speeds) {
     for (const auto& [off, drop] : {std::pair(0.0, 0.0), std::pair(0.01, 0.0), std::pair(-0.01, 0.0),
                                     std::pair(0.0, 0.01), std::pair(0.01, 0.01)}) {
-      ReferenceCase reference;
-      reference.spindle_speed = units::radPerSecFromRpm(rpm);
-      reference.duration = duration;
+      ReferenceCase reference = caseAt(rpm, duration);
       reference.nominal_off = off;
       reference.speed_drop = drop;
       const ReferenceRecord record = simulate(reference);
       const auto error = [&](const ReferenceCase& told, bool track) {
-        CompensationParameters parameters;
-        parameters.filter.max_harmonics = 200;
+        CompensationParameters parameters = allHarmonics();
         parameters.track_speed = track;
         const auto force = runCompensation(told, record, reference.sensor, parameters);
         const std::size_t to = force[0].size();
         const auto from = to - static_cast<std::size_t>(0.3 * reference.sample_rate);
-        std::array<double, 2> worst{};
-        for (std::size_t axis = 0; axis < 2; ++axis) {
-          for (std::size_t band = 0; band < 2; ++band) {
-            worst[band] = std::max(
-                worst[band], 100.0 * bandError(force[axis], record.truth[axis], reference.sample_rate, from,
-                                               to, band == 0 ? 3000.0 : 5000.0));
-          }
-        }
-        return worst;
+        return std::array<double, 2>{{worstError(force, reference, record, from, to, 3000.0),
+                                      worstError(force, reference, record, from, to, 5000.0)}};
       };
       ReferenceCase blind = reference;
       blind.spindle_speed *= 1.0 + off;
@@ -199,26 +213,17 @@ void runLags(const std::vector<double>& speeds, double duration) {
       "fixed lag: error of the force to 3 / 5 kHz [%%] from 0.1 s after engagement, worst of x and y\n");
   std::printf("   rpm      lag [ms]  to 3 kHz to 5 kHz\n");
   for (const double rpm : speeds) {
-    ReferenceCase reference;
-    reference.spindle_speed = units::radPerSecFromRpm(rpm);
-    reference.duration = duration;
+    ReferenceCase reference = caseAt(rpm, duration);
     const ReferenceRecord record = simulate(reference);
     const auto from = static_cast<std::size_t>((reference.engage_time + 0.1) * reference.sample_rate);
     for (const double lag : {0.0, 0.002, 0.005, 0.01, 0.02, 0.04, 0.08, 0.16}) {
-      CompensationParameters parameters;
-      parameters.filter.max_harmonics = 200;
+      CompensationParameters parameters = allHarmonics();
       parameters.lag = lag;
       const auto force = runCompensation(reference, record, reference.sensor, parameters);
-      double to_3k = 0.0, to_5k = 0.0;
-      for (std::size_t axis = 0; axis < 2; ++axis) {
-        const auto error = [&](double band) {
-          return 100.0 * bandError(force[axis], record.truth[axis], reference.sample_rate, from,
-                                   force[axis].size(), band);
-        };
-        to_3k = std::max(to_3k, error(3000.0));
-        to_5k = std::max(to_5k, error(5000.0));
-      }
-      std::printf("%6.0f  %12.0f %9.3f %8.3f\n", rpm, 1000.0 * lag, to_3k, to_5k);
+      const auto error = [&](double band) {
+        return worstError(force, reference, record, from, force[0].size(), band);
+      };
+      std::printf("%6.0f  %12.0f %9.3f %8.3f\n", rpm, 1000.0 * lag, error(3000.0), error(5000.0));
     }
   }
 }
@@ -273,9 +278,7 @@ void runErrors(const std::vector<double>& speeds, double duration) {
   std::printf("   rpm  the sensor is                        measured   frozen  following  moves\n");
   for (const double rpm : speeds) {
     for (const Wrong& wrong : wrongs()) {
-      ReferenceCase reference;
-      reference.spindle_speed = units::radPerSecFromRpm(rpm);
-      reference.duration = duration;
+      ReferenceCase reference = caseAt(rpm, duration);
       const ModalModel believed = reference.sensor;
       reference.later = wrong.change(reference.sensor);
       if (wrong.drifts) {
@@ -285,8 +288,7 @@ void runErrors(const std::vector<double>& speeds, double duration) {
         reference.sensor = reference.later;
       }
       const ReferenceRecord record = simulate(reference);
-      CompensationParameters parameters;
-      parameters.filter.max_harmonics = 200;
+      CompensationParameters parameters = allHarmonics();
       const auto frozen = runCompensation(reference, record, believed, parameters);
       parameters.follow = true;
       std::size_t moves = 0;
@@ -294,12 +296,7 @@ void runErrors(const std::vector<double>& speeds, double duration) {
       const auto error = [&](const std::array<std::vector<double>, 2>& force) {
         const std::size_t to = following[0].size();
         const auto from = to - static_cast<std::size_t>(0.3 * reference.sample_rate);
-        double worst = 0.0;
-        for (std::size_t axis = 0; axis < 2; ++axis) {
-          worst = std::max(
-              worst, bandError(force[axis], record.truth[axis], reference.sample_rate, from, to, 5000.0));
-        }
-        return 100.0 * worst;
+        return worstError(force, reference, record, from, to, 5000.0);
       };
       std::printf("%6.0f  %-36s %8.2f %8.2f %10.2f %6zu\n", rpm, wrong.name, error(record.measured),
                   error(frozen), error(following), moves);
@@ -310,81 +307,105 @@ void runErrors(const std::vector<double>& speeds, double duration) {
 /// Burzoni's tables 8..15 and his maps: what a q from the taps alone loses against the best q of the cut,
 /// told by the truth of the cut; and the harmonic form, as laid out and with a memory a band from the
 /// likelihood.
-void runTuning(double duration, const std::string& picture) {
-  constexpr double BAND = 5000.0, AMPLITUDES = 3000.0;
-  constexpr int FLUTES = 4, HARMONICS = 60;
-  const std::vector<double> edges{1000.0, 3000.0};  // [Hz]
-  ReferenceCase reference;
-  reference.duration = duration;
-  const double rate = reference.sample_rate;
-  const ReferenceTaps taps = simulateTaps(reference, 9);
-  const ModalModel sensor = identifySensor(taps.hammer, taps.response, rate, {100.0, 5000.0, 4}).model;
-  const FrequencyResponse frf = averaged(taps.hammer, taps.response, rate);
-  const double r_taps = noiseBefore(taps, rate, 0.009);
-  std::vector<double> speeds;
-  for (double rpm = 1000.0; rpm <= 20000.0; rpm += 200.0) speeds.push_back(units::radPerSecFromRpm(rpm));
-  const TuningMap map = tapMap(taps, sensor, rate, r_taps, speeds, BAND);
-  std::printf(
-      "sensor from nine taps; R from before the blows %.3f N2; RMSE of the harmonics' amplitudes [N], "
-      "amplitude error of the tooth harmonics to 3 kHz [%%], worst of x and y\n",
-      r_taps);
-  std::printf(
-      "        |        random walk (Burzoni)                     |   harmonics, as laid out  |  "
-      "memory a band from the likelihood\n");
-  std::printf(
-      "    rpm | R of air   q of taps  RMSE   ampl.  best q  RMSE |      RMSE   ampl.         |  "
-      "RMSE   ampl.   revolutions\n");
-  std::vector<std::pair<double, int>> cuts;
-  for (const double rpm : {1000.0, 3700.0, 6500.0, 9300.0, 12000.0, 14800.0, 17600.0}) {
-    reference.spindle_speed = units::radPerSecFromRpm(rpm);
-    const ReferenceRecord record = simulate(reference);
+class TuningStudy {
+ public:
+  explicit TuningStudy(double duration) {
+    reference_.duration = duration;
+    taps_ = simulateTaps(reference_, 9);
+    sensor_ = identifySensor(taps_.hammer, taps_.response, rate(), {100.0, BAND, 4}).model;
+    frf_ = averaged(taps_.hammer, taps_.response, rate());
+    r_taps_ = noiseBefore(taps_, rate(), 0.009);
+    for (double rpm = 1000.0; rpm <= 20000.0; rpm += 200.0) speeds_.push_back(units::radPerSecFromRpm(rpm));
+    map_ = tapMap(taps_, sensor_, rate(), r_taps_, speeds_, BAND);
+  }
+
+  void run() {
+    std::printf(
+        "sensor from nine taps; R from before the blows %.3f N2; RMSE of the harmonics' amplitudes [N], "
+        "amplitude error of the tooth harmonics to 3 kHz [%%], worst of x and y\n",
+        r_taps_);
+    std::printf(
+        "        |        random walk (Burzoni)                     |   harmonics, as laid out  |  "
+        "memory a band from the likelihood\n");
+    std::printf(
+        "    rpm | R of air   q of taps  RMSE   ampl.  best q  RMSE |      RMSE   ampl.         |  "
+        "RMSE   ampl.   revolutions\n");
+    for (const double rpm : {1000.0, 3700.0, 6500.0, 9300.0, 12000.0, 14800.0, 17600.0}) runSpeed(rpm);
+  }
+
+  void draw(const std::string& picture) const {
+    std::vector<std::pair<std::string, TuningMap>> maps{{"sensor as measured", map_}};
+    for (const double k : {-3.0, -2.0, 2.0, 3.0}) {
+      char name[64];
+      std::snprintf(name, sizeof name, "%+.0f standard deviations", k);
+      maps.emplace_back(name,
+                        tapMap(plantAt(taps_, frf_, rate(), k), sensor_, rate(), r_taps_, speeds_, BAND));
+      std::printf("plant at %s: best q at 9300 rpm 2^%d, at 17600 rpm 2^%d\n", name,
+                  maps.back().second.best(units::radPerSecFromRpm(9300.0)),
+                  maps.back().second.best(units::radPerSecFromRpm(17600.0)));
+    }
+    drawMaps(maps, cuts_, picture);
+    std::printf("maps drawn to %s\n", picture.c_str());
+  }
+
+ private:
+  static constexpr double BAND = 5000.0, AMPLITUDES = 3000.0;  // [Hz]
+  static constexpr int FLUTES = 4, HARMONICS = 60;
+  double rate() const { return reference_.sample_rate; }
+
+  /// Worst of x and y.
+  CutScore scored(const ReferenceRecord& record, const Estimator& estimate) const {
+    const auto from = static_cast<std::size_t>(0.4 * reference_.duration * rate());
+    CutScore worst;
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      const CutScore score = scoreCut(estimate(record.measured[axis]), record.truth[axis], rate(),
+                                      reference_.spindle_speed, FLUTES, from, BAND, AMPLITUDES);
+      worst.rmse = std::max(worst.rmse, score.rmse);
+      worst.amplitude = std::max(worst.amplitude, score.amplitude);
+    }
+    return worst;
+  }
+
+  CutScore walk(const ReferenceRecord& record, double r, int exponent) const {
+    return scored(record, [&](const std::vector<double>& measured) {
+      return randomWalkForce(measured, sensor_, rate(), std::pow(2.0, exponent), r);
+    });
+  }
+
+  CutScore laidOut(const ReferenceRecord& record) const {
+    HarmonicFilterParameters parameters;
+    parameters.max_harmonics = HARMONICS;
+    HarmonicFilter filter(sensor_, reference_.spindle_speed, rate(), parameters);
+    return scored(record, [&](const std::vector<double>& measured) { return causal(filter, measured); });
+  }
+
+  void runSpeed(double rpm) {
+    const std::vector<double> edges{1000.0, 3000.0};  // [Hz]
+    const double speed = reference_.spindle_speed = units::radPerSecFromRpm(rpm);
+    const ReferenceRecord record = simulate(reference_);
     // Air cutting: the tool is not in the cut before engage_time.
     double r_air = 0.0;
-    const auto air = static_cast<std::size_t>(0.9 * reference.engage_time * rate);
+    const auto air = static_cast<std::size_t>(0.9 * reference_.engage_time * rate());
     for (std::size_t i = 0; i < air; ++i)
       r_air += std::pow(record.measured[0][i], 2) / static_cast<double>(air);
-    const auto from = static_cast<std::size_t>(0.4 * duration * rate);
-    const auto scored = [&](const std::function<std::vector<double>(const std::vector<double>&)>& estimate) {
-      CutScore worst;
-      for (std::size_t axis = 0; axis < 2; ++axis) {
-        const CutScore score = scoreCut(estimate(record.measured[axis]), record.truth[axis], rate,
-                                        reference.spindle_speed, FLUTES, from, BAND, AMPLITUDES);
-        worst.rmse = std::max(worst.rmse, score.rmse);
-        worst.amplitude = std::max(worst.amplitude, score.amplitude);
-      }
-      return worst;
-    };
-    const auto walk = [&](int exponent) {
-      return scored([&](const std::vector<double>& measured) {
-        return randomWalkForce(measured, sensor, rate, std::pow(2.0, exponent), r_air);
-      });
-    };
-    const int told = map.best(reference.spindle_speed);
-    const CutScore own = walk(told);
+    const int told = map_.best(speed);
+    const CutScore own = walk(record, r_air, told);
     CutScore best;
     best.rmse = 1e9;
     int best_exponent = 0;
     for (int exponent = LEAST_EXPONENT; exponent <= MOST_EXPONENT; ++exponent) {
-      const CutScore score = walk(exponent);
+      const CutScore score = walk(record, r_air, exponent);
       if (score.rmse >= best.rmse) continue;
       best = score;
       best_exponent = exponent;
     }
-    cuts.emplace_back(reference.spindle_speed, best_exponent);
-    HarmonicFilterParameters parameters;
-    parameters.max_harmonics = HARMONICS;
-    HarmonicFilter filter(sensor, reference.spindle_speed, rate, parameters);
-    const CutScore laid_out = scored([&](const std::vector<double>& measured) {
-      filter.reset();
-      std::vector<double> force;
-      for (const double sample : measured) force.push_back(filter.step(sample));
-      return force;
-    });
-    const BandTuning tuned = tuneBands(record.measured[0], sensor, reference.spindle_speed, rate,
-                                       std::sqrt(r_air), edges, frf, HARMONICS);
-    const CutScore bands = scored([&](const std::vector<double>& measured) {
-      return bandForce(measured, sensor, reference.spindle_speed, rate, std::sqrt(r_air), edges, tuned.memory,
-                       HARMONICS);
+    cuts_.emplace_back(speed, best_exponent);
+    const CutScore laid_out = laidOut(record);
+    const double noise = std::sqrt(r_air);
+    const BandTuning tuned =
+        tuneBands(record.measured[0], sensor_, speed, rate(), noise, edges, frf_, HARMONICS);
+    const CutScore bands = scored(record, [&](const std::vector<double>& measured) {
+      return bandForce(measured, sensor_, speed, rate(), noise, edges, tuned.memory, HARMONICS);
     });
     std::printf("%7.0f | %8.3f %8s%-2d %6.3f %6.2f %5s%-2d %6.3f | %9.3f %7.2f         | %6.3f %6.2f  ", rpm,
                 r_air, "2^", told, own.rmse, 100.0 * own.amplitude, "2^", best_exponent, best.rmse,
@@ -392,18 +413,21 @@ void runTuning(double duration, const std::string& picture) {
     for (const double memory : tuned.memory) std::printf(" %g", memory);
     std::printf("\n");
   }
-  if (picture.empty()) return;
-  std::vector<std::pair<std::string, TuningMap>> maps{{"sensor as measured", map}};
-  for (const double k : {-3.0, -2.0, 2.0, 3.0}) {
-    char name[64];
-    std::snprintf(name, sizeof name, "%+.0f standard deviations", k);
-    maps.emplace_back(name, tapMap(plantAt(taps, frf, rate, k), sensor, rate, r_taps, speeds, BAND));
-    std::printf("plant at %s: best q at 9300 rpm 2^%d, at 17600 rpm 2^%d\n", name,
-                maps.back().second.best(units::radPerSecFromRpm(9300.0)),
-                maps.back().second.best(units::radPerSecFromRpm(17600.0)));
-  }
-  drawMaps(maps, cuts, picture);
-  std::printf("maps drawn to %s\n", picture.c_str());
+
+  ReferenceCase reference_;
+  ReferenceTaps taps_;
+  ModalModel sensor_;
+  FrequencyResponse frf_;
+  double r_taps_ = 0.0;  // [N2]
+  std::vector<double> speeds_;
+  TuningMap map_;
+  std::vector<std::pair<double, int>> cuts_;  // [rad/s], best exponent
+};
+
+void runTuning(double duration, const std::string& picture) {
+  TuningStudy study(duration);
+  study.run();
+  if (!picture.empty()) study.draw(picture);
 }
 
 }  // namespace

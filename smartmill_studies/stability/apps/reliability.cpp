@@ -9,40 +9,28 @@
 #include "smartmill_core/program.h"
 #include "smartmill_core/units.h"
 #include "smartmill_stability/chart/picture.h"
-#include "smartmill_stability/solvers/model_system.h"
 #include "stability/reliability.h"
+#include "stability/study_request.h"
 
 namespace {
 
 using namespace smartmill;
 
-struct Request {
-  std::string model, speeds, out;
-  double entry_deg = 0.0, exit_deg = 180.0, max_depth_mm = 0.0;
+struct Request : stability::StudyRequest {
   int machines = 200, draws = 200, bins = 4;
-  unsigned seed = 1;
   bool solver_only = false;
 };
 
 void run(const Request& request) {
-  const MachineModel model = readMachineModel(request.model);
-  const stability::RegenerativeSystem system =
-      stability::systemOf(model, request.entry_deg, request.exit_deg);
-  stability::ReliabilityOptions options;
-  double low = 0.0, high = 0.0;
-  char rest = 0;
-  if (std::sscanf(request.speeds.c_str(), "%lf:%lf%c", &low, &high, &rest) != 2)
-    throw Error("--speeds " + request.speeds + ": LO:HI is due");
+  const MachineModel model = request.machine();
+  stability::ReliabilityOptions options{request.range()};
   if (request.bins < 1 || request.bins > 100) throw Error("--bins: 1..100 is due");
-  options.speed_low = units::radPerSecFromRpm(low);
-  options.speed_high = units::radPerSecFromRpm(high);
-  options.max_depth = request.max_depth_mm * units::MM;
   options.machines = request.machines;
   options.draws = request.draws;
-  options.seed = request.seed;
   options.by_twin = !request.solver_only;
-  const auto points = reliabilityStudy(
-      model, system, options, [](double share) { std::fprintf(stderr, "\r%3.0f %%", 100.0 * share); });
+  const auto points = reliabilityStudy(model, request.system(model), options, [](double share) {
+    std::fprintf(stderr, "\r%3.0f %%", 100.0 * share);
+  });
   std::fprintf(stderr, "\n");
   const auto bins = reliabilityBins(points, request.bins, options.by_twin);
   std::ofstream csv(request.out);
@@ -66,8 +54,7 @@ void run(const Request& request) {
   stability::drawBeside(
       request.out,
       "set xlabel 'Predicted probability of chatter'\nset ylabel 'Observed share'\nset xrange [0:1]\nset "
-      "yrange "
-      "[0:1]\nset size square\nplot x with lines dt 2 lc 'gray' title 'as predicted', %FILE skip 1 using "
+      "yrange [0:1]\nset size square\nplot x with lines dt 2 lc 'gray' title 'as predicted', %FILE skip 1 using "
       "1:2:3:4 with yerrorbars pt 7 lw 2 title 'observed, 95 % of the binomial'");
 }
 
@@ -77,17 +64,11 @@ int main(int argc, char** argv) {
   Request request;
   CommandLine line{
       "Reliability diagram of the probability of chatter: machines drawn from the model's standard "
-      "deviations, "
-      "each cut once in the simulator."};
-  line.option("model", request.model, "machine model file with tool, cutting and tool_tip").required();
-  line.option("--entry-deg", request.entry_deg, "immersion angle at which a tooth enters [deg]").required();
-  line.option("--exit-deg", request.exit_deg, "immersion angle at which a tooth leaves [deg]").required();
-  line.option("--speeds", request.speeds, "LO:HI [rpm]").required();
-  line.option("--max-depth-mm", request.max_depth_mm, "limits are looked for up to here [mm]").required();
+      "deviations, each cut once in the simulator."};
+  request.addTo(line);
   line.option("--machines", request.machines, "drawn (200)");
   line.option("--draws", request.draws, "behind each prediction (200)");
   line.option("--bins", request.bins, "of the predicted probability (4)");
-  line.option("--seed", request.seed, "(1)");
   line.flag("--solver-only", request.solver_only, "the solver is the observer too, no simulator");
   line.option("-o,--out", request.out, "CSV file; the diagram of the same name with .png stands beside it")
       .required();

@@ -10,46 +10,35 @@
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/program.h"
 #include "smartmill_core/units.h"
-#include "smartmill_stability/solvers/model_system.h"
+#include "stability/study_request.h"
 #include "stability/twin_agreement.h"
 
 namespace {
 
 using namespace smartmill;
 
-struct Request {
-  std::string model, speeds, out;
-  double entry_deg = 0.0, exit_deg = 180.0, max_depth_mm = 0.0, band_percent = 5.0, least_percent = 98.0;
+struct Request : stability::StudyRequest {
+  double band_percent = 5.0, least_percent = 98.0;
   double helix_deg = -1.0, feed_mm = 0.1;
   std::vector<double> pitch_deg;
   int points = 400, revolutions = 180;
-  unsigned seed = 1;
   bool linear = false;
 };
 
 /// @return whether the target is met.
 bool run(const Request& request) {
-  MachineModel model = readMachineModel(request.model);
-  model.needTool("simulate cuts");
+  MachineModel model = request.machine();
   if (request.helix_deg >= 0.0) model.tool->helix = units::radFromDeg(request.helix_deg);
   if (!request.pitch_deg.empty()) {
     model.tool->pitch.clear();
     for (const double p : request.pitch_deg) model.tool->pitch.push_back(units::radFromDeg(p));
   }
-  stability::AgreementOptions options;
-  double low = 0.0, high = 0.0;
-  char rest = 0;
-  if (std::sscanf(request.speeds.c_str(), "%lf:%lf%c", &low, &high, &rest) != 2)
-    throw Error("--speeds " + request.speeds + ": LO:HI is due");
-  options.speed_low = units::radPerSecFromRpm(low);
-  options.speed_high = units::radPerSecFromRpm(high);
-  options.max_depth = request.max_depth_mm * units::MM;
+  stability::AgreementOptions options{request.range()};
   options.band = 0.01 * request.band_percent;
   options.feed = request.feed_mm * units::MM;
   options.points = request.points;
-  options.seed = request.seed;
   options.revolutions = request.revolutions;
-  stability::RegenerativeSystem system = stability::systemOf(model, request.entry_deg, request.exit_deg);
+  stability::RegenerativeSystem system = request.system(model);
   if (!system.evenPitch() && !request.linear) {
     system.chip.emplace();
     system.chip->feed = options.feed;
@@ -92,13 +81,8 @@ int main(int argc, char** argv) {
   CommandLine line{
       "Compares the solver with the simulator in time at random speeds and depths outside a band around the "
       "boundary. Exit code 0: they agree often enough, 3: they do not."};
-  line.option("model", request.model, "machine model file with tool, cutting and tool_tip").required();
-  line.option("--entry-deg", request.entry_deg, "immersion angle at which a tooth enters [deg]").required();
-  line.option("--exit-deg", request.exit_deg, "immersion angle at which a tooth leaves [deg]").required();
-  line.option("--speeds", request.speeds, "LO:HI [rpm]").required();
-  line.option("--max-depth-mm", request.max_depth_mm, "limits are looked for up to here [mm]").required();
+  request.addTo(line);
   line.option("--points", request.points, "how many (400)");
-  line.option("--seed", request.seed, "of the points (1)");
   line.option("--band", request.band_percent, "around the boundary, without points [% of the depth] (5)");
   line.option("--least", request.least_percent, "agreement due [%] (98)");
   line.option("--helix-deg", request.helix_deg, "instead of the model's [deg]");
