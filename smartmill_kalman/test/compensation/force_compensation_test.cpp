@@ -10,6 +10,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/modal/modal_filter.h"
 #include "smartmill_core/units.h"
+#include "smartmill_kalman_testing/tap_rig.h"
 
 namespace smartmill::kalman {
 namespace {
@@ -18,11 +19,15 @@ constexpr double RATE = 25600.0;    // [Hz]
 constexpr std::size_t BLOCK = 256;  // samples
 constexpr double START = 1.75e9;    // [s]
 
-ModalModel sensor() {
-  ModalModel model;
-  model.modes = {{930.0, 0.03, 0.9}};
-  model.direct = 0.1;
-  return model;
+/// Without its samples. @param start [s] of block 0
+SampleBlock blockAt(double start, std::size_t number) {
+  SampleBlock block;
+  block.first_index = number * BLOCK;
+  block.stamp = start + static_cast<double>(block.first_index) / RATE;
+  block.sample_rate = RATE;
+  block.channels = {"fx", "fy", "fz"};
+  block.units = {"N", "N", "N"};
+  return block;
 }
 
 struct Session {
@@ -37,25 +42,20 @@ Session session(std::size_t blocks) {
   const double speed = units::radPerSecFromRpm(9000.0);
   const MechanisticForce process({4, 19.05e-3, units::radFromDeg(30.0), {}},
                                  {796e6, 168e6, 222e6, 27.7e3, 30.8e3, 1.4e3}, {0.0, units::PI, 2e-3, 6e-5});
-  std::vector<ModalFilter> dynamometer(3, ModalFilter(sensor(), RATE, Hold::first_order));
+  std::vector<ModalFilter> filters(3, ModalFilter(dynamometer(), RATE, Hold::first_order));
   std::mt19937 random(5);
   std::normal_distribution<double> noise(0.0, 1.0);
   Session result;
   result.condition.stamp = START;
   result.condition.kind = CuttingCondition::Kind::cut;
   for (std::size_t b = 0; b < blocks; ++b) {
-    SampleBlock block;
-    block.first_index = b * BLOCK;
-    block.stamp = START + static_cast<double>(block.first_index) / RATE;
-    block.sample_rate = RATE;
-    block.channels = {"fx", "fy", "fz"};
-    block.units = {"N", "N", "N"};
+    SampleBlock block = blockAt(START, b);
     for (std::size_t i = 0; i < BLOCK; ++i) {
       const CuttingForce force = process.at(speed * static_cast<double>(block.first_index + i) / RATE);
       result.truth_x.push_back(force.fx);
-      block.samples.push_back(dynamometer[0].step(force.fx) + noise(random));
-      block.samples.push_back(dynamometer[1].step(force.fy) + noise(random));
-      block.samples.push_back(dynamometer[2].step(force.fz) + noise(random));
+      block.samples.push_back(filters[0].step(force.fx) + noise(random));
+      block.samples.push_back(filters[1].step(force.fy) + noise(random));
+      block.samples.push_back(filters[2].step(force.fz) + noise(random));
     }
     result.blocks.push_back(block);
     result.angles.push_back({block.stamp,
@@ -67,7 +67,7 @@ Session session(std::size_t blocks) {
 
 ForceSensor forceSensor(bool workpiece) {
   ForceSensor result;
-  result.axis.fill(sensor());
+  result.axis.fill(dynamometer());
   result.measures_workpiece = workpiece;
   return result;
 }
@@ -155,7 +155,7 @@ TEST(ForceCompensation, restartsAtAGapAndMarksIt) {
 
 // A spindle that gains 4 % in 2 s: the harmonics follow it, the gains change at the points of their grid.
 TEST(ForceCompensation, followsASlowChangeOfSpeedWithoutAJump) {
-  const ModalModel model = sensor();
+  const ModalModel model = dynamometer();
   ModalFilter dynamometer(model, 4.0 * RATE, Hold::first_order);
   std::vector<double> truth, found;
   ForceCompensation compensation({}, false, [&](const ForceBlock&, const ForceBlock& c) {
@@ -165,12 +165,7 @@ TEST(ForceCompensation, followsASlowChangeOfSpeedWithoutAJump) {
   double angle = 0.0;
   for (std::size_t b = 0; b < 200; ++b) {
     const auto speedAt = [](double t) { return 900.0 * (1.0 + 0.02 * t); };
-    SampleBlock block;
-    block.stamp = 0.01 * static_cast<double>(b);
-    block.sample_rate = RATE;
-    block.first_index = 256 * b;
-    block.channels = {"fx", "fy", "fz"};
-    block.units = {"N", "N", "N"};
+    SampleBlock block = blockAt(0.0, b);
     compensation.handle(SpindleAngle{block.stamp, std::fmod(angle, units::TWO_PI), speedAt(block.stamp)});
     for (std::size_t i = 0; i < 256; ++i) {
       double measured = 0.0, force = 0.0;
@@ -193,7 +188,7 @@ TEST(ForceCompensation, followsASlowChangeOfSpeedWithoutAJump) {
 
 TEST(ForceCompensation, tellsTheZeroOfTheSensorAndTheColourOfTheInnovations) {
   ForceCompensation compensation({}, false, [](const ForceBlock&, const ForceBlock&) {});
-  for (std::size_t axis = 0; axis < 3; ++axis) compensation.setSensor(axis, sensor());
+  for (std::size_t axis = 0; axis < 3; ++axis) compensation.setSensor(axis, dynamometer());
   std::mt19937 random(4);
   std::normal_distribution<double> noise;
   CuttingCondition air;
@@ -202,12 +197,7 @@ TEST(ForceCompensation, tellsTheZeroOfTheSensorAndTheColourOfTheInnovations) {
   const auto feed = [&](std::size_t from, double colour) {
     double last = 0.0;
     for (std::size_t b = from; b < from + 1000; ++b) {
-      SampleBlock block;
-      block.stamp = 0.01 * static_cast<double>(b);
-      block.sample_rate = RATE;
-      block.first_index = 256 * b;
-      block.channels = {"fx", "fy", "fz"};
-      block.units = {"N", "N", "N"};
+      SampleBlock block = blockAt(0.0, b);
       compensation.handle(SpindleAngle{block.stamp, 0.0, 1200.0});
       for (std::size_t i = 0; i < 256; ++i) {
         last = colour * last + std::sqrt(1.0 - colour * colour) * noise(random);

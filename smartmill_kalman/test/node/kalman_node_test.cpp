@@ -28,18 +28,21 @@ bool waitUntil(const std::function<bool()>& done) {
   return done();
 }
 
+using Blocks = std::map<std::uint64_t, smartmill_msgs::ForceBlock>;  // by first index
+
+ros::Subscriber collect(ros::NodeHandle& nh, const std::string& topic, Blocks& blocks) {
+  return nh.subscribe<smartmill_msgs::ForceBlock>(
+      topic, 2000, [&blocks](const smartmill_msgs::ForceBlock::ConstPtr& m) { blocks[m->first_index] = *m; });
+}
+
 // A sine at the sensor's first mode of 930 Hz, four times the spindle's frequency; amplitude in the sensor 15
 // times too large.
 TEST(KalmanNode, compensatesInTheMachinesFrame) {
   ros::NodeHandle nh;
-  std::map<std::uint64_t, smartmill_msgs::ForceBlock> compensated, measured;
+  Blocks compensated, measured;
   std::vector<geometry_msgs::WrenchStamped> wrenches;
-  const auto sub1 = nh.subscribe<smartmill_msgs::ForceBlock>(
-      "force/compensated", 2000,
-      [&](const smartmill_msgs::ForceBlock::ConstPtr& m) { compensated[m->first_index] = *m; });
-  const auto sub2 = nh.subscribe<smartmill_msgs::ForceBlock>(
-      "force/measured", 2000,
-      [&](const smartmill_msgs::ForceBlock::ConstPtr& m) { measured[m->first_index] = *m; });
+  const auto sub1 = collect(nh, "force/compensated", compensated),
+             sub2 = collect(nh, "force/measured", measured);
   const auto sub3 = nh.subscribe<geometry_msgs::WrenchStamped>(
       "force/wrench", 2000, [&](const geometry_msgs::WrenchStamped::ConstPtr& m) { wrenches.push_back(*m); });
   auto blocks = nh.advertise<smartmill_msgs::SampleBlock>("daq/dynamometer", 2000);
@@ -94,14 +97,10 @@ TEST(KalmanNode, compensatesInTheMachinesFrame) {
 // is unloaded comes out as NaN, and the diagnostics say so.
 TEST(KalmanNode, takesSixSensorsInTheSpindle) {
   ros::NodeHandle nh("/spindle_sensor");
-  std::map<std::uint64_t, smartmill_msgs::ForceBlock> compensated, measured;
+  Blocks compensated, measured;
   bool told = false;
-  const auto sub1 = nh.subscribe<smartmill_msgs::ForceBlock>(
-      "force/compensated", 2000,
-      [&](const smartmill_msgs::ForceBlock::ConstPtr& m) { compensated[m->first_index] = *m; });
-  const auto sub2 = nh.subscribe<smartmill_msgs::ForceBlock>(
-      "force/measured", 2000,
-      [&](const smartmill_msgs::ForceBlock::ConstPtr& m) { measured[m->first_index] = *m; });
+  const auto sub1 = collect(nh, "force/compensated", compensated),
+             sub2 = collect(nh, "force/measured", measured);
   const auto sub3 = nh.subscribe<diagnostic_msgs::DiagnosticArray>(
       "/diagnostics", 100, [&](const diagnostic_msgs::DiagnosticArray::ConstPtr& m) {
         for (const auto& status : m->status)

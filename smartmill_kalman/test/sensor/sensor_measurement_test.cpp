@@ -14,13 +14,6 @@ namespace {
 
 constexpr double START = 1.75e9;  // [s]
 
-ModalModel sensor() {
-  ModalModel model;
-  model.modes = {{930.0, 0.03, 0.9}};
-  model.direct = 0.1;
-  return model;
-}
-
 MeasureFrfGoal goal(const std::string& direction, int hits, int modes) {
   MeasureFrfGoal g;
   g.stamp = START + 0.1;
@@ -34,7 +27,7 @@ MeasureFrfGoal goal(const std::string& direction, int hits, int modes) {
 /// Rig and class in a loop: the rig's hammer strikes when it is told to.
 class Loop {
  public:
-  explicit Loop(const ModalModel& truth = sensor(), std::uint32_t seed = 1, TapParameters taps = {})
+  explicit Loop(const ModalModel& truth = dynamometer(), std::uint32_t seed = 1, TapParameters taps = {})
       : rig(TapRig::diagonal(truth), START, seed),
         sorted({}, taps, ForceSensor(), 0.05,
                {[this](const ForceBlock&, const ForceBlock& c) { forces.push_back(c); },
@@ -116,7 +109,7 @@ TEST(SensorMeasurement, StandardDeviationsAreHonest) {
   taps.record_length = 0.1;
   taps.rest_time = 0.02;
   for (std::uint32_t run = 0; run < 100; ++run) {
-    Loop loop(sensor(), 100 + run, taps);
+    Loop loop(dynamometer(), 100 + run, taps);
     loop.rig.noise = 3.0;
     const SensorResult r = loop.measure(goal("x", 4, 1));
     ASSERT_EQ(r.code, FrfCode::ok) << r.message;
@@ -139,24 +132,24 @@ TEST(SensorMeasurement, NamesWhatIsWrong) {
   taps.max_bad_hits = 1;
   taps.strike_timeout = 0.5;
   {
-    Loop loop(sensor(), 1, taps);
+    Loop loop(dynamometer(), 1, taps);
     loop.strike = false;
     const SensorResult r = loop.measure(goal("x", 3, 0));
     EXPECT_EQ(r.code, FrfCode::no_hit);
     EXPECT_EQ(loop.strikes, 2);
   }
   {
-    Loop loop(sensor(), 1, taps);
+    Loop loop(dynamometer(), 1, taps);
     loop.rig.peak = 14.0;
     EXPECT_EQ(loop.measure(goal("x", 3, 0)).code, FrfCode::no_hit);  // weak
   }
   {
-    Loop loop(sensor(), 1, taps);
+    Loop loop(dynamometer(), 1, taps);
     loop.spoil = [](TapRig::Blocks& b) { b.sensor.samples[300] = NAN; };
     EXPECT_EQ(loop.measure(goal("x", 3, 0)).code, FrfCode::bad_data);
   }
   {
-    Loop loop(sensor(), 1, taps);
+    Loop loop(dynamometer(), 1, taps);
     loop.spoil = [](TapRig::Blocks& b) {
       for (double& f : b.sensor.samples) f = std::min(f, 50.0);
     };
@@ -165,7 +158,7 @@ TEST(SensorMeasurement, NamesWhatIsWrong) {
     EXPECT_NE(r.message.find("clipped"), std::string::npos) << r.message;
   }
   {
-    Loop loop(sensor(), 1, taps);  // a hammer whose sensitivity is half of what is set
+    Loop loop(dynamometer(), 1, taps);  // a hammer whose sensitivity is half of what is set
     loop.spoil = [](TapRig::Blocks& b) {
       for (double& f : b.hammer.samples) f *= 0.5;
     };
@@ -174,7 +167,7 @@ TEST(SensorMeasurement, NamesWhatIsWrong) {
     EXPECT_NE(r.message.find("static gain 2.0"), std::string::npos) << r.message;
   }
   {
-    Loop loop(sensor(), 1, taps);  // lost blocks of the hammer
+    Loop loop(dynamometer(), 1, taps);  // lost blocks of the hammer
     loop.spoil = [](TapRig::Blocks& b) { b.hammer.first_index += 1000000; };
     EXPECT_EQ(loop.measure(goal("x", 3, 0)).code, FrfCode::bad_data);
   }

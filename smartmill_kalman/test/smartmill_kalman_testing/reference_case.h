@@ -1,8 +1,10 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <random>
 #include <vector>
 
 #include "smartmill_core/modal/modal_model.h"
@@ -63,5 +65,18 @@ ReferenceTaps simulateTaps(const ReferenceCase& reference, int taps);
 /// @param from, to samples @param band [Hz]
 double bandError(const std::vector<double>& estimate, const std::vector<double>& truth, double sample_rate,
                  std::size_t from, std::size_t to, double band);
+
+/// RMS innovation of a filter that is shown noise of 1 N rms alone [N]. @param from first sample that counts
+template <class Filter>
+double innovationUnderNoise(Filter& filter, int count, int from) {
+  std::mt19937 random(3);
+  std::normal_distribution<double> noise(0.0, 1.0);
+  double squares = 0.0;
+  for (int i = 0; i < count; ++i) {
+    filter.step(noise(random));
+    if (i >= from) squares += filter.innovation() * filter.innovation();
+  }
+  return std::sqrt(squares / (count - from));
+}
 
 }  // namespace smartmill::kalman

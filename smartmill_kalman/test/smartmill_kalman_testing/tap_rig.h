@@ -14,6 +14,14 @@
 
 namespace smartmill::kalman {
 
+/// A dynamometer of one mode, static gain 1.
+inline ModalModel dynamometer() {
+  ModalModel model;
+  model.modes = {{930.0, 0.03, 0.9}};
+  model.direct = 0.1;
+  return model;
+}
+
 /// A workpiece on a force sensor with known modes, an automatic hammer, and a spindle: samples as one
 /// synchronous device delivers them. Blows are sin^2 pulses, whose spectrum is gone
 /// above half the sample rate; forces run through the exact response of the sensor at

@@ -1,6 +1,7 @@
 #include "smartmill_stability/chatter/chatter_advice.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <iostream>
@@ -186,8 +187,8 @@ TEST(ChatterSpeeds, liesInAPocket) {
   EXPECT_GT(solver->limit(speeds.front(), 10e-3).depth, 3.0 * limit.depth);
 }
 
-// A belief whose y mode is 3 % low: the frequency of one chattering cut tells which mode and how far.
-TEST(Correction, findsTheModeAndItsError) {
+/// A machine, and a belief about it whose y mode is 3 % low.
+std::array<RegenerativeSystem, 2> truthAndBelief() {
   const ModalModel x{{{700.0, 0.03, 4e-8}}, 0.0};
   ModalModel y = benchmark();
   RegenerativeSystem truth = benchmarkSystem(0.5, true, true);
@@ -195,6 +196,13 @@ TEST(Correction, findsTheModeAndItsError) {
   RegenerativeSystem belief = truth;
   y.modes[0].frequency /= 1.03;
   belief.modes = systemModes(x, y);
+  return {truth, belief};
+}
+
+// A belief whose y mode is 3 % low: the frequency of one chattering cut tells which mode and how far.
+TEST(Correction, findsTheModeAndItsError) {
+  const auto systems = truthAndBelief();
+  const RegenerativeSystem &truth = systems[0], &belief = systems[1];
   for (const double rpm : {9000.0, 13000.0, 17000.0}) {
     const double speed = radPerSecFromRpm(rpm);
     const double limit = makeSolver(Method::collocation, truth)->limit(speed, 10e-3).depth;
@@ -222,13 +230,8 @@ TEST(Correction, nothingFitsIsSaid) {
 // A belief 3 % low in one mode, and verdicts with the true frequency: advice once, with mode, factor and
 // speeds whose limit is several times that of the cut.
 TEST(Advisor, advisesOnceAnEpisode) {
-  const ModalModel x{{{700.0, 0.03, 4e-8}}, 0.0};
-  ModalModel y = benchmark();
-  RegenerativeSystem truth = benchmarkSystem(0.5, true, true);
-  truth.modes = systemModes(x, y);
-  RegenerativeSystem belief = truth;
-  y.modes[0].frequency /= 1.03;
-  belief.modes = systemModes(x, y);
+  const auto systems = truthAndBelief();
+  const RegenerativeSystem &truth = systems[0], &belief = systems[1];
   const double speed = radPerSecFromRpm(13000.0);
   CuttingCondition condition;
   condition.name = "cut";

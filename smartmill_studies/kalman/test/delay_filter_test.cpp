@@ -106,15 +106,7 @@ TEST(DelayFilter, RecoversHarmonicsThroughTheSensor) {
 
 TEST(DelayFilter, InnovationHasTheExpectedSize) {
   DelayFilter filter(ReferenceCase::exactSensor(), units::radPerSecFromRpm(9000.0), RATE, {});
-  std::mt19937 random(3);
-  std::normal_distribution<double> noise(0.0, 1.0);
-  double squares = 0.0;
-  const int count = 51200;
-  for (int i = 0; i < count; ++i) {
-    filter.step(noise(random));
-    if (i >= count / 2) squares += filter.innovation() * filter.innovation();
-  }
-  const double rms = std::sqrt(squares / (count / 2));
+  const double rms = innovationUnderNoise(filter, 51200, 25600);
   EXPECT_GT(rms, 0.98);
   EXPECT_LT(rms, 1.02 * filter.innovationStd());
 }
