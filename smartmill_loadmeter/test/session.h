@@ -1,9 +1,11 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <random>
 #include <string>
+#include <vector>
 
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/model/machine_model.h"
@@ -57,7 +59,9 @@ class Session {
     const Engagement e{0.0, units::PI, 0.002, feed};
     const CuttingForce force = MechanisticForce(TOOL, cutting, e).mean();
     x_force_ = force.fx;
+    if (runout > 0.0) ripple_ = torqueOverARevolution(e);
     run(seconds, speed, force.torque);
+    ripple_.clear();
     x_force_ = 0.0;
     run(0.3, speed, 0.0);
     announce(CuttingCondition::Kind::none, 0.0, 0.0, "");
@@ -78,6 +82,10 @@ class Session {
   std::function<void(const SampleBlock&)> currents;
   CuttingCoefficients cutting = TRUTH;
   static constexpr double X_NEWTON_PER_AMPERE = 200.0, X_AIR = 1.5, PHASE_PER_METRE = 400.0;
+
+  /// Offset of the cutter axis [m] and its angle [rad]; the load meter then shows the ripple of each
+  /// revolution.
+  double runout = 0.0, runout_angle = 0.0;
 
   double now() const { return time_; }
   std::string tool = "endmill", material = "aluminium";
@@ -111,12 +119,49 @@ class Session {
     for (int i = 0; i < std::lround(seconds * RATE); ++i) tick(feed_speed, torque);
   }
 
+  // The rule of the file formats, angle by angle and slice by slice: h is the least distance to the surface
+  // of any earlier pass, with the roundness of the tool.
+  std::vector<double> torqueOverARevolution(const Engagement& e) const {
+    constexpr int ANGLES = 720, SLICES = 8, PASSES = 8;
+    std::vector<double> torque(ANGLES, 0.0);
+    const auto radius = [&](int tooth) {
+      return runout * std::cos(runout_angle - TOOL.toothAngle(tooth % TOOL.teeth));
+    };
+    const double dz = e.axial_depth / SLICES, c = e.feed_per_tooth;
+    for (int i = 0; i < ANGLES * SLICES * TOOL.teeth; ++i) {
+      const int angle = i % ANGLES, slice = i / ANGLES % SLICES, tooth = i / ANGLES / SLICES;
+      double phi = units::TWO_PI * angle / ANGLES + TOOL.toothAngle(tooth) - TOOL.lag() * (slice + 0.5) * dz;
+      phi -= units::TWO_PI * std::floor(phi / units::TWO_PI);
+      if (phi > units::PI) continue;
+      double h = 1.0;
+      for (int n = 1; n <= PASSES; ++n) {
+        h = std::min(h, n * c * std::sin(phi) +
+                            (n * n - 1) * c * c * std::pow(std::cos(phi), 2) / TOOL.diameter + radius(tooth) -
+                            radius(tooth + n));
+      }
+      if (h > 0.0)
+        torque[static_cast<std::size_t>(angle)] += (cutting.ktc * h + cutting.kte) * dz * TOOL.radius();
+    }
+    return torque;
+  }
+
+  // Torque at the spindle's angle; its mean where the ripple does not matter.
+  double torqueNow(double mean) const {
+    if (ripple_.empty()) return mean;
+    const double turn = angle_ / units::TWO_PI;
+    return ripple_[static_cast<std::size_t>((turn - std::floor(turn)) * static_cast<double>(ripple_.size()))];
+  }
+
   void tick(double feed_speed, double torque) {
     time_ += 1.0 / RATE;
     position_ += feed_speed / RATE;
-    const double power = (torque + VISCOUS * speed_ + COULOMB) * speed_;
-    const double a = std::exp(-1.0 / RATE / timeConstant(7.0));
-    lagged_ = a * lagged_ + (1.0 - a) * 3.88e-4 * power;
+    const int steps = ripple_.empty() ? 1 : 200;
+    const double dt = 1.0 / RATE / steps, a = std::exp(-dt / timeConstant(7.0));
+    for (int i = 0; i < steps; ++i) {
+      angle_ += speed_ * dt;
+      const double power = (torqueNow(torque) + VISCOUS * speed_ + COULOMB) * speed_;
+      lagged_ = a * lagged_ + (1.0 - a) * 3.88e-4 * power;
+    }
     if (currents) {
       SampleBlock block;
       block.sample_rate = 1000.0;
@@ -155,7 +200,8 @@ class Session {
   std::normal_distribution<double> normal_;
   double noise_;
   double time_ = 1000.0, position_ = 0.0, speed_ = 0.0, lagged_ = 0.0;
-  double x_force_ = 0.0, phase_ = 0.0;
+  double x_force_ = 0.0, phase_ = 0.0, angle_ = 0.0;
+  std::vector<double> ripple_;  // [N m] over a revolution, in a cut with runout
   std::uint64_t index_ = 0;
   std::mt19937 hall_random_{9};
   std::normal_distribution<double> hall_;

@@ -4,12 +4,10 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <limits>
 
-#include "smartmill_core/cutting/regression.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/signal/steady_path.h"
 #include "smartmill_core/units.h"
-#include "smartmill_loadmeter/calibration/friction_law.h"
 
 namespace smartmill::loadmeter {
 
@@ -20,19 +18,6 @@ void require(bool good, const char* key, double value, const char* due) {
   char text[160];
   std::snprintf(text, sizeof text, "%s: %g is out of range (%s)", key, value, due);
   throw Error(text);
-}
-
-// Step of the readings: the model's resolution, or a coarser one that the readings show (a controller may
-// round again).
-double stepOf(const std::vector<double>& readings, double resolution) {
-  std::vector<double> sorted = readings;
-  std::sort(sorted.begin(), sorted.end());
-  double smallest = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 1; i < sorted.size(); ++i) {
-    const double difference = sorted[i] - sorted[i - 1];
-    if (difference > 1e-9 * std::abs(sorted[i])) smallest = std::min(smallest, difference);
-  }
-  return std::isfinite(smallest) ? std::max(smallest, resolution) : resolution;
 }
 
 std::string countOf(std::size_t n, const char* what) {
@@ -51,6 +36,8 @@ void IdentificationParameters::validate() const {
   require(minimum_readings >= 2, "minimum_readings", minimum_readings, ">= 2");
   require(production_memory > 0.0 && production_memory <= 1e7, "production_memory", production_memory,
           "0 < value <= 1e7");
+  require(largest_runout >= 0.0 && largest_runout <= 1e-3, "largest_runout", largest_runout,
+          "0 <= value <= 0.001");
   motor.validate();
   require(maximum_gap > 0.0 && maximum_gap <= 60.0, "maximum_gap", maximum_gap, "0 < value <= 60");
 }
@@ -84,21 +71,8 @@ void LoadMeterIdentification::reset() {
 }
 
 bool LoadMeterIdentification::onPath(const CncState& state) const {
-  if (!condition_ || !state.connected || !state.motion) return false;
-  const std::array<const char*, 3> names{"X", "Y", "Z"};
-  double length2 = 0.0, along = 0.0, distance2 = 0.0;
-  for (std::size_t a = 0; a < 3; ++a) {
-    const auto axis = std::find(state.axes.begin(), state.axes.end(), names[a]);
-    const auto index = static_cast<std::size_t>(axis - state.axes.begin());
-    if (index >= state.position.size()) return false;
-    const double step = condition_->steady_to[a] - condition_->steady_from[a];
-    const double at = state.position[index] - condition_->steady_from[a];
-    length2 += step * step;
-    along += step * at;
-    distance2 += at * at;
-  }
-  if (!(length2 > 0.0) || along < 0.0 || along > length2) return false;
-  return distance2 - along * along / length2 <= parameters_.path_tolerance * parameters_.path_tolerance;
+  return condition_ && state.connected && state.motion &&
+         onSteadyPath(*condition_, state, parameters_.path_tolerance);
 }
 
 void LoadMeterIdentification::handle(const CncState& state) {
@@ -210,38 +184,45 @@ void LoadMeterIdentification::closeTest() {
   if (condition_ && condition_->kind != CuttingCondition::Kind::none) {
     dropAfter(last_reading_ - parameters_.guard_time);
     motor_record_.dropAfter(last_reading_ - parameters_.guard_time);
-    const std::size_t n = readings_.size();
-    if (n < static_cast<std::size_t>(parameters_.minimum_readings)) {
-      dropped_.push_back("'" + condition_->name + "' has " + countOf(n, "steady reading") + ", " +
-                         std::to_string(parameters_.minimum_readings) + " are due");
+    if (readings_.size() < static_cast<std::size_t>(parameters_.minimum_readings)) {
+      dropped_.push_back("'" + condition_->name + "' has " + countOf(readings_.size(), "steady reading") +
+                         ", " + std::to_string(parameters_.minimum_readings) + " are due");
     } else {
-      LoadTest test;
-      test.condition = *condition_;
-      std::vector<double> voltages;
-      for (const Reading& r : readings_) {
-        voltages.push_back(r.voltage);
-        test.speed += r.speed / static_cast<double>(n);
-      }
-      double speed2 = 0.0;
-      for (const Reading& r : readings_) speed2 += (r.speed - test.speed) * (r.speed - test.speed);
-      test.speed_std = std::sqrt(speed2 / static_cast<double>(n * (n - 1)));
-      const double interval = (readings_.back().stamp - readings_.front().stamp) / static_cast<double>(n - 1);
-      test.voltage = meanVoltage(voltages, interval, timeConstant(spindle_.load_meter_bandwidth),
-                                 stepOf(voltages, spindle_.load_meter_resolution));
-      test.readings = static_cast<int>(n);
-      test.stamp = readings_.back().stamp;
-      test.duration = readings_.back().stamp - readings_.front().stamp;
-      readMotorsOf(&test);
-      (condition_->kind == CuttingCondition::Kind::air ? air_cuts_ : cuts_).push_back(test);
-      if (condition_->kind == CuttingCondition::Kind::cut) follow(test);
-      if (test_) test_(test);
-      if (motor_force_ && test.force) motor_force_(*test.force);
+      keep(steadyTest());
     }
   }
   readings_.clear();
   motor_record_.clear();
   path_first_.reset();
   path_last_.reset();
+}
+
+LoadTest LoadMeterIdentification::steadyTest() const {
+  LoadTest test;
+  test.condition = *condition_;
+  const double n = static_cast<double>(readings_.size());
+  for (const Reading& r : readings_) {
+    test.voltages.push_back(r.voltage);
+    test.times.push_back(r.stamp - readings_.front().stamp);
+    test.speed += r.speed / n;
+  }
+  double speed2 = 0.0;
+  for (const Reading& r : readings_) speed2 += (r.speed - test.speed) * (r.speed - test.speed);
+  test.speed_std = std::sqrt(speed2 / (n * (n - 1.0)));
+  test.readings = static_cast<int>(readings_.size());
+  test.stamp = readings_.back().stamp;
+  test.duration = readings_.back().stamp - readings_.front().stamp;
+  test.takeMean(spindle_, stepOf(test.voltages, spindle_.load_meter_resolution));
+  return test;
+}
+
+void LoadMeterIdentification::keep(LoadTest test) {
+  readMotorsOf(&test);
+  const bool cut = test.condition.kind == CuttingCondition::Kind::cut;
+  (cut ? cuts_ : air_cuts_).push_back(test);
+  if (cut) follow(test);
+  if (test_) test_(test);
+  if (motor_force_ && test.force) motor_force_(*test.force);
 }
 
 void LoadMeterIdentification::follow(const LoadTest& cut) {
@@ -313,19 +294,21 @@ IdentifyResult LoadMeterIdentification::identify(const IdentifyGoal& goal) const
       cuts.push_back(test);
     }
   }
+  SessionResult found;
   std::string aside;
   if (cuts.size() < cuts_.size()) {
     aside += "; " + countOf(cuts_.size() - cuts.size(), "cut") + " with another tool or material left out";
   }
   for (const std::string& reason : dropped_) aside += "; " + reason;
   try {
-    result.record = identifyFromTests(air_cuts_, cuts, spindle_, spindle_uncertainty_);
+    found = identifyFromTests(air_cuts_, cuts, spindle_, spindle_uncertainty_, parameters_.largest_runout);
   } catch (const Error& error) {
     result.code = IdentifyResult::Code::too_few_tests;
     result.message = error.what() + aside;
     return result;
   }
-  aside = addFromMotors(cuts, &result.record) + aside;
+  result.record = found.record;
+  aside = found.found + addFromMotors(cuts, &result.record) + aside;
   CoefficientSet& k = result.record.set;
   if (!goal.tool.empty()) k.tool = goal.tool;
   if (!goal.material.empty()) k.material = goal.material;
@@ -384,137 +367,6 @@ std::string LoadMeterIdentification::addFromMotors(const std::vector<LoadTest>& 
   record->set.source = "load_meter and motor_current";
   return text.empty() ? "; motor currents give all six"
                       : "; not observable from the axes that moved: " + text;
-}
-
-// T = V / (K omega): the shares of both add up.
-double LoadTest::torqueStdAsVoltage() const {
-  return std::hypot(voltage.std_dev, voltage.mean * speed_std / speed);
-}
-
-IdleTorque idleTorque(const std::vector<LoadTest>& air_cuts, const Spindle& spindle,
-                      double spindle_uncertainty_percent) {
-  IdleTorque idle;
-  Friction friction = modelFriction(spindle, spindle_uncertainty_percent);
-  if (!air_cuts.empty()) {
-    std::vector<AirCut> air;
-    std::vector<TimedAirCut> timed;
-    double first = air_cuts.front().stamp;
-    for (const LoadTest& test : air_cuts) first = std::min(first, test.stamp);
-    bool weighted = true;
-    for (const LoadTest& test : air_cuts) {
-      air.push_back({test.speed, test.voltage.mean, test.torqueStdAsVoltage()});
-      timed.push_back({air.back(), test.stamp - first});
-      weighted = weighted && air.back().voltage_std > 0.0;
-    }
-    friction = fitFriction(air, spindle.load_meter_gain, spindle.friction_zero_below);
-    idle.viscous = friction.viscous;
-    idle.coulomb = friction.coulomb;
-    if (weighted && air.size() > FrictionShape{true, false}.unknowns()) {
-      const FittedFriction best =
-          fitFrictionLaws(timed, spindle.load_meter_gain, spindle.friction_zero_below).front();
-      if (best.shape.unknowns() > 2) {
-        idle.viscous = best.law.viscous;
-        idle.coulomb = best.law.coulomb;
-        idle.unknowns = best.shape.unknowns();
-        idle.covariance = best.covariance;
-        idle.torque = [best, first](const LoadTest& t) { return best.law.torque(t.speed, t.stamp - first); };
-        idle.gradient = [best, first](const LoadTest& t) {
-          std::vector<double> slope;
-          for (std::size_t i = 0; i < best.value.size(); ++i) {
-            std::vector<double> v = best.value;
-            const double step = 1e-5 * (std::abs(v[i]) + 1e-6);
-            const auto at = [&](double value) {
-              v[i] = value;
-              return FrictionLaw::fromValues(best.shape, v.data(), best.law.zero_below)
-                  .torque(t.speed, t.stamp - first);
-            };
-            slope.push_back((at(best.value[i] + step) - at(best.value[i] - step)) / (2.0 * step));
-          }
-          return slope;
-        };
-        return idle;
-      }
-    }
-  }
-  idle.unknowns = 2;
-  idle.covariance.assign(friction.covariance.begin(), friction.covariance.end());
-  idle.torque = [friction](const LoadTest& t) { return friction.torque(t.speed); };
-  idle.gradient = [friction](const LoadTest& t) {
-    const std::array<double, 2> g = friction.gradient(t.speed);
-    return std::vector<double>{g[0], g[1]};
-  };
-  return idle;
-}
-
-CoefficientRecord identifyFromTests(const std::vector<LoadTest>& air_cuts, const std::vector<LoadTest>& cuts,
-                                    const Spindle& spindle, double spindle_uncertainty_percent) {
-  CoefficientRecord record;
-  CoefficientSet& result = record.set;
-  const IdleTorque idle = idleTorque(air_cuts, spindle, spindle_uncertainty_percent);
-  result.friction_viscous = idle.viscous;
-  result.friction_coulomb = idle.coulomb;
-  const std::size_t n = idle.unknowns;
-  std::vector<MeanTorqueTest> torques;
-  std::vector<std::vector<MeanTorqueTest>> by_friction(
-      n);  // torque that one unit of each friction term takes
-  for (const LoadTest& test : cuts) {
-    MeanTorqueTest t;
-    t.tool = test.condition.tool;
-    t.engagement = test.condition.engagement;
-    t.torque = test.voltage.mean / (spindle.load_meter_gain * test.speed) - idle.torque(test);
-    t.torque_std = test.torqueStdAsVoltage() / (spindle.load_meter_gain * test.speed);
-    torques.push_back(t);
-    const std::vector<double> gradient = idle.gradient(test);
-    for (std::size_t i = 0; i < n; ++i) {
-      t.torque = -gradient[i];
-      by_friction[i].push_back(t);
-    }
-    result.stamp = std::max(result.stamp, test.stamp);
-    result.tool = test.condition.tool_name;
-    result.material = test.condition.material;
-  }
-  const IdentifiedCoefficients found = identifyFromTorque(torques);
-  result.value = found.value;
-  result.std_dev = found.std_dev;
-  // The estimate is linear in the torques: the regression of a friction term's torque is how the coefficients
-  // follow it.
-  std::vector<CuttingCoefficients> per_unit;
-  for (const auto& tests : by_friction) per_unit.push_back(identifyFromTorque(tests).value);
-  const auto shared = [&](double CuttingCoefficients::*a, double CuttingCoefficients::*b) {
-    double sum = 0.0;
-    for (std::size_t i = 0; i < n; ++i) {
-      for (std::size_t j = 0; j < n; ++j)
-        sum += per_unit[i].*a * idle.covariance[i * n + j] * (per_unit[j].*b);
-    }
-    return sum;
-  };
-  const auto covariance = [&](std::size_t i, std::size_t j) -> double& {
-    return record.covariance[CoefficientRecord::covarianceIndex(i, j)];
-  };
-  constexpr auto KTC = &CuttingCoefficients::ktc, KTE = &CuttingCoefficients::kte;
-  covariance(0, 0) = found.covariance(0, 0) + shared(KTC, KTC);
-  covariance(0, 3) = found.covariance(0, 3) + shared(KTC, KTE);
-  covariance(3, 3) = found.covariance(3, 3) + shared(KTE, KTE);
-  result.std_dev.ktc = std::sqrt(covariance(0, 0));
-  result.std_dev.kte = std::sqrt(covariance(3, 3));
-  result.source = "load_meter";
-  result.tests = static_cast<int>(cuts.size());
-  // Means of what was tried; the database measures distances from them.
-  const CuttingCondition& first = cuts.front().condition;
-  record.teeth = first.tool.teeth;
-  record.diameter = first.tool.diameter;
-  record.helix = first.tool.helix;
-  record.cutting_speed = record.feed_per_tooth = record.axial_depth = record.entry = record.exit = 0.0;
-  const double share = 1.0 / static_cast<double>(cuts.size());
-  for (const LoadTest& test : cuts) {
-    const Engagement& e = test.condition.engagement;
-    record.cutting_speed += share * test.speed * test.condition.tool.radius();
-    record.feed_per_tooth += share * e.feed_per_tooth;
-    record.axial_depth += share * e.axial_depth;
-    record.entry += share * e.entry;
-    record.exit += share * e.exit;
-  }
-  return record;
 }
 
 }  // namespace smartmill::loadmeter

@@ -19,6 +19,7 @@ NodeParameters readParameters(ParameterReader& reader) {
   reader.read("minimum_readings", identification.minimum_readings);
   reader.read("maximum_gap", identification.maximum_gap);
   reader.read("production_memory", identification.production_memory);
+  reader.read("largest_runout", identification.largest_runout);
   reader.read("motor_calibration", parameters.motor_calibration);
   MotorParameters& motor = identification.motor;
   std::vector<double> per_metre(motor.phase_per_metre.begin(), motor.phase_per_metre.end());

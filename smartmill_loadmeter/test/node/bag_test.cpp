@@ -93,6 +93,28 @@ TEST(Bag, withoutAGoalIsAskedAtItsEnd) {
   EXPECT_NEAR(found[0].coefficients.value.ktc, TRUTH.ktc, 0.01 * TRUTH.ktc);
 }
 
+TEST(Bag, aRunoutIsToldAsOnTheRunningMachine) {
+  const TemporaryFolder folder;
+  std::vector<IdentifyResult> live;
+  {
+    Recorder recorder(folder.file("run.bag"));
+    recorder.session.runout = 9e-6;
+    recorder.session.runout_angle = 0.7;
+    for (const double rpm : {3000.0, 6000.0, 9000.0, 12000.0}) recorder.session.air(rpm, 2.0);
+    for (const double feed : {5e-5, 1e-4, 1.5e-4, 2e-4}) recorder.session.slot(4100.0, feed, 4.0);
+    recorder.goal(false);
+    live = recorder.results;
+  }
+  const auto found = identifyFromBag(folder.file("run.bag"), model(), {}, [](double) {});
+  ASSERT_EQ(found.size(), 1u);
+  ASSERT_EQ(live.size(), 1u);
+  EXPECT_EQ(found[0].message, live[0].message);
+  const CoefficientSet& k = found[0].coefficients;
+  EXPECT_NEAR(k.value.ktc, TRUTH.ktc, 0.005 * TRUTH.ktc);
+  EXPECT_NEAR(k.value.ktc, TRUTH.ktc, 2.0 * k.std_dev.ktc);
+  EXPECT_THAT(found[0].message, HasSubstr("; runout of "));
+}
+
 TEST(Parameters, theShippedFileIsTheDefaultsAndWrongOnesAreNamed) {
   ParameterReader reader = ParameterReader::fromFile(std::string(LAUNCH_CONFIG_FOLDER) + "/loadmeter.yaml");
   const NodeParameters p = readParameters(reader);
@@ -102,6 +124,7 @@ TEST(Parameters, theShippedFileIsTheDefaultsAndWrongOnesAreNamed) {
   EXPECT_EQ(p.identification.guard_time, defaults.guard_time);
   EXPECT_EQ(p.identification.path_tolerance, defaults.path_tolerance);
   EXPECT_EQ(p.identification.minimum_readings, defaults.minimum_readings);
+  EXPECT_EQ(p.identification.largest_runout, defaults.largest_runout);
   EXPECT_EQ(p.identification.maximum_gap, defaults.maximum_gap);
   EXPECT_EQ(p.identification.production_memory, defaults.production_memory);
   EXPECT_EQ(p.hold_back, NodeParameters().hold_back);

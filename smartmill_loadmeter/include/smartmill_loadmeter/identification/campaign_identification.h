@@ -31,7 +31,7 @@ struct LoadRecordOptions {
   double depth_uncertainty = 0.0;
   /// [m] RMS of the cutter axis' offset (runout) that is to be expected. With the spindle angle the offset is
   /// then found from the ripple; without it the coefficients are averaged over offsets up to sqrt(3) times as
-  /// large, each as likely as the records make it.
+  /// large, each as likely as means and scatter of the records make it.
   double runout_uncertainty = 0.0;
   /// Stribeck, warm-up, edge growth, runout and a slower load meter are tried where the records disagree.
   bool choose_terms = true;
@@ -39,15 +39,15 @@ struct LoadRecordOptions {
 
 struct LoadRecordResult {
   CoefficientSet set;
-  double covariance_tc_te = 0.0;   ///< [N2/m3] of Ktc and Kte
-  FrictionLaw friction;            ///< as found
-  double bandwidth = 0.0;          ///< [Hz] of the load meter: the model's, or found
-  double edge_growth = 0.0;        ///< [1/s] of Kte with the cutting time of the edge
-  double runout = 0.0;             ///< [m] offset of the cutter axis
-  double runout_angle = 0.0;       ///< [rad] of the offset, 0..2 pi, as effects.md
-  double noise = 0.0;              ///< [V] RMS of the load meter about each record's own best fit
-  double misfit = 0.0;             ///< [1] chi2 per degree of freedom between the records; 1: they agree
-  double disagreement = 0.0;       ///< [1] RMS of it, as a share of the records' voltage
+  double covariance_tc_te = 0.0;  ///< [N2/m3] of Ktc and Kte
+  FrictionLaw friction;           ///< as found
+  double bandwidth = 0.0;         ///< [Hz] of the load meter: the model's, or found
+  double edge_growth = 0.0;       ///< [1/s] of Kte with the cutting time of the edge
+  double runout = 0.0;            ///< [m] offset of the cutter axis
+  double runout_angle = 0.0;  ///< [rad] of the offset, 0..2 pi, as effects.md; NaN: the records do not tell
+  double noise = 0.0;         ///< [V] RMS of the load meter about each record's own best fit
+  double misfit = 0.0;        ///< [1] chi2 per degree of freedom between the records; 1: they agree
+  double disagreement = 0.0;  ///< [1] RMS of it, as a share of the records' voltage
   std::vector<std::string> terms;  ///< chosen by evidence beyond Coulomb and viscous friction
   std::vector<std::string> notes;  ///< lines for the user
 };

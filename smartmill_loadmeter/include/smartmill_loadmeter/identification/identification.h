@@ -25,6 +25,7 @@ struct IdentificationParameters {
   double path_tolerance = 1.0e-3;     ///< [m] distance from the line of the steady cut
   int minimum_readings = 10;          ///< [1] >= 2, of a test
   double production_memory = 1800.0;  ///< [s] > 0 of cutting after which a production cut counts 1/e
+  double largest_runout = 3.0e-5;     ///< [m] >= 0, offset of the cutter axis that may be; 0: none
   MotorParameters motor;              ///< of daq/motor_current
   double maximum_gap = 0.5;           ///< [s] > 0, without controller state or load: steadiness is lost
 
@@ -57,12 +58,17 @@ struct LoadTest {
   double speed = 0.0;      ///< [rad/s] mean
   double speed_std = 0.0;  ///< [rad/s] of the mean
   MeanVoltage voltage;
+  std::vector<double> voltages;  ///< [V] steady readings
+  std::vector<double> times;     ///< [s] of them, since the first
   int readings = 0;
   double stamp = 0.0;     ///< [s] of its last reading
   double duration = 0.0;  ///< [s] steady
   std::optional<MotorReading> motor;
   std::optional<MotorForce> force;  ///< of a cut, where motors are calibrated
 
+  /// Mean of the readings. @param step [V] of the load meter.
+  void takeMean(const Spindle& spindle, double step);
+  double variance() const;  ///< [V2] of the readings; 0 without any
   /// Standard deviation of the mean torque at the motor as one of the voltage: meter and speed [V].
   double torqueStdAsVoltage() const;
 };
@@ -109,6 +115,8 @@ class LoadMeterIdentification {
   bool onPath(const CncState& state) const;
   void dropAfter(double stamp);
   void closeTest();
+  LoadTest steadyTest() const;
+  void keep(LoadTest test);
   void follow(const LoadTest& cut);
   IdentifyResult identify(const IdentifyGoal& goal) const;
   std::string addFromMotors(const std::vector<LoadTest>& cuts, CoefficientRecord* record) const;
@@ -140,6 +148,10 @@ class LoadMeterIdentification {
   std::string bad_data_;
 };
 
+/// Step of readings [V]: the model's resolution, or a coarser one that they show (a controller may round
+/// again).
+double stepOf(const std::vector<double>& readings, double resolution);
+
 /// Friction torque in a test, and how it hangs on what was found in the air cuts.
 struct IdleTorque {
   std::function<double(const LoadTest&)> torque;                 ///< [N m]
@@ -154,11 +166,18 @@ struct IdleTorque {
 IdleTorque idleTorque(const std::vector<LoadTest>& air_cuts, const Spindle& spindle,
                       double spindle_uncertainty_percent);
 
-/// Coefficients and their standard deviations from means: friction from the air cuts (the model's without
-/// any), torque (eq. 3.5), regression (eq. 3.19 generalised); the standard deviations carry the friction's
-/// covariance, which all cuts share. With the means of tool and engagement. @throws Error naming what is
-/// missing.
-CoefficientRecord identifyFromTests(const std::vector<LoadTest>& air_cuts, const std::vector<LoadTest>& cuts,
-                                    const Spindle& spindle, double spindle_uncertainty_percent);
+/// What the tests of a session say.
+struct SessionResult {
+  CoefficientRecord record;  ///< with covariance, and means of tool and engagement
+  std::string found;         ///< runout, wear and friction that the evidence added; empty: nothing
+};
+/// Coefficients and their standard deviations by the estimator of campaign_identification.h, each test a mean
+/// of steady readings: friction from the air cuts (the model's without any), mean torque (eq. 3.5, 3.19 for
+/// any engagement), and the runout from the cuts' means and the ripple their readings show. @param
+/// largest_runout [m]; 0: none.
+/// @throws Error naming what is missing.
+SessionResult identifyFromTests(std::vector<LoadTest> air_cuts, std::vector<LoadTest> cuts,
+                                const Spindle& spindle, double spindle_uncertainty_percent,
+                                double largest_runout = 0.0);
 
 }  // namespace smartmill::loadmeter
