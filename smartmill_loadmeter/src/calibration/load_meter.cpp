@@ -81,14 +81,6 @@ Friction modelFriction(const Spindle& spindle, double uncertainty_percent) {
   return friction;
 }
 
-double cuttingTorque(double voltage, double speed, double load_meter_gain, const Friction& friction) {
-  return voltage / (load_meter_gain * speed) - friction.torque(speed);
-}
-
-double torqueResolution(double load_meter_resolution, double speed, double load_meter_gain) {
-  return load_meter_resolution / (load_meter_gain * speed);
-}
-
 double timeConstant(double bandwidth) {
   return 1.0 / (units::TWO_PI * bandwidth);
 }

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <numeric>
+#include <utility>
 
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/error.h"
@@ -264,168 +267,219 @@ std::size_t lowOrders(const std::array<std::array<double, ANGLES>, 3>& force, in
   return written;
 }
 
-}  // namespace
+// Terms of a fit beyond linear edge forces.
+struct SlotTerms {
+  bool size, runout, unbalance;
 
-std::vector<SlotFit> fitSlots(const Campaign& campaign, const MachineModel& model) {
-  const ToolGeometry& tool = model.needTool("fit forces over a revolution");
-  std::vector<Revolution> cuts;
-  bool angle = true;
-  for (const CampaignTest& test : campaign.tests) {
-    if (test.kind != TestKind::cut) continue;
-    const Record record = readRecord(campaign, test, model);
-    angle = angle && record.has("spindle_angle");
-    cuts.push_back(revolutionOf(test, record));
+  bool within(const SlotTerms& other) const {
+    return size <= other.size && runout <= other.runout && unbalance <= other.unbalance;
   }
-  if (cuts.size() < 2) throw Error(campaign.folder + ": two cuts are due");
-  const CuttingCoefficients mean = identifyFromForceRecords(campaign, model, Means::revolutions).value;
-  const int orders = tool.teeth + 1;
-  const std::size_t numbers = 3 * (1 + 2 * static_cast<std::size_t>(orders)), count = numbers * cuts.size();
-  std::vector<std::vector<double>> measured;
-  for (const Revolution& cut : cuts) {
-    measured.emplace_back(numbers);
-    lowOrders(cut.force, orders, measured.back().data());
+  std::string name() const {
+    return std::string("linear edge forces") + (size ? ", size effect" : "") + (runout ? ", runout" : "") +
+           (unbalance ? ", unbalance" : "");
+  }
+  std::size_t unknowns() const { return 6 + (size ? 1 : 0) + (runout ? 2 : 0) + (unbalance ? 2 : 0); }
+};
+
+// Fits of one campaign's mean revolutions, each from the values of a poorer one.
+class SlotFitter {
+ public:
+  SlotFitter(const Campaign& campaign, const MachineModel& model)
+      : tool_(model.needTool("fit forces over a revolution")) {
+    for (const CampaignTest& test : campaign.tests) {
+      if (test.kind != TestKind::cut) continue;
+      const Record record = readRecord(campaign, test, model);
+      angle_ = angle_ && record.has("spindle_angle");
+      cuts_.push_back(revolutionOf(test, record));
+    }
+    if (cuts_.size() < 2) throw Error(campaign.folder + ": two cuts are due");
+    mean_ = identifyFromForceRecords(campaign, model, Means::revolutions).value;
+    orders_ = tool_.teeth + 1;
+    numbers_ = 3 * (1 + 2 * static_cast<std::size_t>(orders_));
+    for (const Revolution& cut : cuts_) {
+      measured_.emplace_back(numbers_);
+      lowOrders(cut.force, orders_, measured_.back().data());
+    }
+    phases_.assign(cuts_.size(), 0.0);
+    if (!angle_) searchPhases();
   }
 
-  std::vector<SlotFit> found;
-  // Phases found without runout start the fits with it.
-  std::vector<double> phases(cuts.size(), 0.0);
-  struct Variant {
-    bool size, runout, unbalance;
-  };
-  std::vector<std::pair<Variant, std::vector<double>>> solved;
-  for (const auto& [size, runout, unbalance] :
-       {Variant{false, false, false}, Variant{false, false, true}, Variant{false, true, false},
-        Variant{true, false, false}, Variant{false, true, true}, Variant{true, true, false},
-        Variant{true, true, true}}) {
-    // From the values of the richest fit that has no more terms.
+  SlotFit add(const SlotTerms& terms) {
+    std::vector<FitParameter> start = startOf(terms);
+    FitResult best = descend(terms, start);
+    if (!angle_ && (terms.runout || terms.unbalance)) best = turnByPitches(start, best);
+    // Phases found without runout start the fits with it.
+    if (!angle_) phases_.assign(best.value.begin() + PHASES, best.value.end());
+    solved_.emplace_back(terms, best.value);
+    return resultOf(terms, best);
+  }
+
+ private:
+  enum Unknown : std::size_t { SIZE = 6, OFFSET_X, OFFSET_Y, HEAVY_X, HEAVY_Y, PHASES };
+  std::size_t count() const { return numbers_ * cuts_.size(); }
+
+  void residuals(const std::vector<double>& v, double* out) const {
+    const CuttingCoefficients k{v[0], v[1], v[2], v[3], v[4], v[5]};
+    std::array<std::array<double, ANGLES>, 3> f{};
+    for (std::size_t c = 0; c < cuts_.size(); ++c) {
+      const double phase = angle_ ? 0.0 : v[PHASES + c];
+      forces(tool_, cuts_[c].engagement, k, v[SIZE], std::hypot(v[OFFSET_X], v[OFFSET_Y]),
+             std::atan2(v[OFFSET_Y], v[OFFSET_X]), phase, &f);
+      addRotating(v[HEAVY_X], v[HEAVY_Y], phase, &f);
+      lowOrders(f, orders_, out);
+      for (std::size_t i = 0; i < numbers_; ++i) *out++ -= measured_[c][i];
+    }
+  }
+
+  double squaresAt(const std::vector<double>& value) const {
+    std::vector<double> rest(count());
+    residuals(value, rest.data());
+    return std::inner_product(rest.begin(), rest.end(), rest.begin(), 0.0);
+  }
+
+  FitResult solve(const std::vector<FitParameter>& start) const {
+    return fit([this](const std::vector<double>& v, double* out) { residuals(v, out); }, count(), start,
+               FIT_TOLERANCE);
+  }
+
+  // Each cut for itself, from the coefficients of the mean forces.
+  void searchPhases() {
+    std::array<std::array<double, ANGLES>, 3> f{};
+    std::vector<double> rest(numbers_);
+    for (std::size_t c = 0; c < cuts_.size(); ++c) {
+      double best = std::numeric_limits<double>::infinity();
+      for (std::size_t p = 0; p < 2 * ANGLES; ++p) {
+        const double phase = TWO_PI * static_cast<double>(p) / (2.0 * ANGLES);
+        forces(tool_, cuts_[c].engagement, mean_, 0.0, 0.0, 0.0, phase, &f);
+        lowOrders(f, orders_, rest.data());
+        double squares = 0.0;
+        for (std::size_t i = 0; i < numbers_; ++i) squares += std::pow(rest[i] - measured_[c][i], 2);
+        if (squares < best) best = squares, phases_[c] = phase;
+      }
+    }
+  }
+
+  // From the values of the richest fit that has no more terms.
+  std::vector<FitParameter> startOf(const SlotTerms& terms) const {
     const std::vector<double>* parent = nullptr;
-    for (const auto& [has, value] : solved) {
-      if (has.size <= size && has.runout <= runout && has.unbalance <= unbalance) parent = &value;
+    for (const auto& [has, value] : solved_) {
+      if (has.within(terms)) parent = &value;
     }
     const auto from = [&](std::size_t i, double otherwise) {
       return parent && (*parent)[i] != 0.0 ? (*parent)[i] : otherwise;
     };
     std::vector<FitParameter> start;
-    for (std::size_t i = 0; i < 6; ++i) {
+    for (std::size_t i = 0; i < SIZE; ++i) {
       const CuttingKey& key = cuttingKeys()[i];
       const double unit = key.unit * (key.unit == units::N_PER_MM2 ? 300.0 : 20.0);
-      start.push_back({from(i, mean.*key.coefficient), -30.0 * unit, 30.0 * unit, unit});
+      start.push_back({from(i, mean_.*key.coefficient), -30.0 * unit, 30.0 * unit, unit});
     }
-    start.push_back({size ? from(6, 0.1) : 0.0, size ? -0.3 : 0.0, size ? 0.95 : 0.0, 0.2});
-    // Offset as two components towards tooth 1 and square to it.
-    const double far = runout ? LARGEST_OFFSET : 0.0;
-    const double offset_x = from(7, 0.0), offset_y = from(8, 0.0);
-    start.push_back({runout ? offset_x : 0.0, -far, far, 1e-5});
-    start.push_back({runout ? offset_y : 0.0, -far, far, 1e-5});
-    // Force that turns with the tool, in the same two directions.
-    const double heavy = unbalance ? LARGEST_UNBALANCE : 0.0;
-    start.push_back({unbalance ? from(9, 20.0) : 0.0, -heavy, heavy, 30.0});
-    start.push_back({unbalance ? from(10, 20.0) : 0.0, -heavy, heavy, 30.0});
-    const std::size_t phase_at = start.size();
-    const auto residuals = [&](const std::vector<double>& v, double* out) {
-      const CuttingCoefficients k{v[0], v[1], v[2], v[3], v[4], v[5]};
-      std::array<std::array<double, ANGLES>, 3> f{};
-      for (std::size_t c = 0; c < cuts.size(); ++c) {
-        forces(tool, cuts[c].engagement, k, v[6], std::hypot(v[7], v[8]), std::atan2(v[8], v[7]),
-               angle ? 0.0 : v[phase_at + c], &f);
-        addRotating(v[9], v[10], angle ? 0.0 : v[phase_at + c], &f);
-        lowOrders(f, orders, out);
-        for (std::size_t i = 0; i < numbers; ++i) *out++ -= measured[c][i];
+    start.push_back(
+        {terms.size ? from(SIZE, 0.1) : 0.0, terms.size ? -0.3 : 0.0, terms.size ? 0.95 : 0.0, 0.2});
+    // Two components, towards tooth 1 and square to it; held at 0 where they take no part.
+    const auto pair = [&](bool in, std::size_t first, double otherwise, double far, double scale) {
+      for (const std::size_t i : {first, first + 1}) {
+        start.push_back({in ? from(i, otherwise) : 0.0, in ? -far : 0.0, in ? far : 0.0, scale});
       }
     };
-    if (!angle && !parent) {
-      // Phase by search, each cut for itself.
-      std::array<std::array<double, ANGLES>, 3> f{};
-      for (std::size_t c = 0; c < cuts.size(); ++c) {
-        double best = 1e300;
-        for (std::size_t p = 0; p < 2 * ANGLES; ++p) {
-          const double phase = TWO_PI * static_cast<double>(p) / (2.0 * ANGLES);
-          forces(tool, cuts[c].engagement, mean, 0.0, 0.0, 0.0, phase, &f);
-          std::vector<double> rest(numbers);
-          lowOrders(f, orders, rest.data());
-          double squares = 0.0;
-          for (std::size_t i = 0; i < numbers; ++i) squares += std::pow(rest[i] - measured[c][i], 2);
-          if (squares < best) best = squares, phases[c] = phase;
-        }
-      }
+    pair(terms.runout, OFFSET_X, 0.0, LARGEST_OFFSET, 1e-5);
+    pair(terms.unbalance, HEAVY_X, 20.0, LARGEST_UNBALANCE, 30.0);
+    for (const double phase : phases_) {
+      start.push_back({phase, angle_ ? 0.0 : phase - 0.5, angle_ ? 0.0 : phase + 0.5, 0.1});
     }
-    for (std::size_t c = 0; c < cuts.size(); ++c) {
-      start.push_back({phases[c], angle ? 0.0 : phases[c] - 0.5, angle ? 0.0 : phases[c] + 0.5, 0.1});
-    }
+    return start;
+  }
+
+  // A first offset is searched from two directions.
+  FitResult descend(const SlotTerms& terms, std::vector<FitParameter>& start) const {
+    const bool search = terms.runout && start[OFFSET_X].start == 0.0 && start[OFFSET_Y].start == 0.0;
+    if (!search) return solve(start);
     FitResult best;
     for (const double direction : {0.5, 2.6}) {
-      const bool search = runout && offset_x == 0.0 && offset_y == 0.0;
-      if (search) {
-        start[7].start = 1e-5 * std::cos(direction);
-        start[8].start = 1e-5 * std::sin(direction);
-      }
-      const FitResult tried = fit(residuals, count, start, FIT_TOLERANCE);
+      start[OFFSET_X].start = 1e-5 * std::cos(direction);
+      start[OFFSET_Y].start = 1e-5 * std::sin(direction);
+      const FitResult tried = solve(start);
       if (best.value.empty() || tried.squares < best.squares) best = tried;
-      if (!search) break;
     }
-    // Equal teeth: which of them is tooth 1 in a cut shows only by what turns. Each cut may be off by a
-    // pitch.
-    for (bool moved = !angle && (runout || unbalance); moved;) {
-      moved = false;
-      std::vector<double> rest(count), value = best.value;
-      const auto squaresAt = [&] {
-        residuals(value, rest.data());
-        double sum = 0.0;
-        for (const double r : rest) sum += r * r;
-        return sum;
-      };
-      for (std::size_t c = 1; c < cuts.size(); ++c) {
-        const double own = value[phase_at + c];
-        double least = squaresAt(), chosen = own;
-        for (int shift = 1; shift < tool.teeth; ++shift) {
-          value[phase_at + c] = own + TWO_PI * shift / tool.teeth;
-          const double squares = squaresAt();
-          if (squares < least * (1.0 - 1e-9)) least = squares, chosen = value[phase_at + c], moved = true;
+    return best;
+  }
+
+  // Equal teeth: which of them is tooth 1 in a cut shows only by what turns. Each cut may be off by a pitch.
+  FitResult turnByPitches(std::vector<FitParameter> start, FitResult best) const {
+    for (;;) {
+      std::vector<double> value = best.value;
+      bool moved = false;
+      for (std::size_t c = 1; c < cuts_.size(); ++c) {
+        const double own = value[PHASES + c];
+        double least = squaresAt(value), chosen = own;
+        for (int shift = 1; shift < tool_.teeth; ++shift) {
+          value[PHASES + c] = own + TWO_PI * shift / tool_.teeth;
+          const double squares = squaresAt(value);
+          if (squares < least * (1.0 - 1e-9)) least = squares, chosen = value[PHASES + c], moved = true;
         }
-        value[phase_at + c] = chosen;
+        value[PHASES + c] = chosen;
       }
-      if (!moved) break;
-      std::vector<FitParameter> other = start;
+      if (!moved) return best;
       for (std::size_t i = 0; i < value.size(); ++i) {
-        other[i].start = value[i];
-        if (i >= phase_at) other[i].low = value[i] - 0.5, other[i].high = value[i] + 0.5;
+        start[i].start = value[i];
+        if (i >= PHASES) start[i].low = value[i] - 0.5, start[i].high = value[i] + 0.5;
       }
-      const FitResult tried = fit(residuals, count, other, FIT_TOLERANCE);
-      if (tried.squares >= best.squares) break;
+      const FitResult tried = solve(start);
+      if (tried.squares >= best.squares) return best;
       best = tried;
-      start = other;
     }
-    if (!angle) {
-      for (std::size_t c = 0; c < cuts.size(); ++c) phases[c] = best.value[phase_at + c];
-    }
-    solved.push_back({{size, runout, unbalance}, best.value});
+  }
+
+  SlotFit resultOf(const SlotTerms& terms, const FitResult& best) const {
     SlotFit result;
-    result.name = std::string("linear edge forces") + (size ? ", size effect" : "") +
-                  (runout ? ", runout" : "") + (unbalance ? ", unbalance" : "");
-    const std::size_t unknowns =
-        6 + (size ? 1 : 0) + (runout ? 2 : 0) + (unbalance ? 2 : 0) + (angle ? 0 : cuts.size());
-    const double variance = best.squares / (static_cast<double>(count) - static_cast<double>(unknowns));
-    for (std::size_t i = 0; i < 6; ++i) {
+    result.name = terms.name();
+    const std::size_t unknowns = terms.unknowns() + (angle_ ? 0 : cuts_.size());
+    const double variance = best.squares / (static_cast<double>(count()) - static_cast<double>(unknowns));
+    for (std::size_t i = 0; i < SIZE; ++i) {
       result.value.*cuttingKeys()[i].coefficient = best.value[i];
       result.std_dev.*cuttingKeys()[i].coefficient = std::sqrt(variance * best.covarianceOf(i, i));
     }
-    result.size_exponent = best.value[6];
-    result.size_exponent_std = std::sqrt(variance * best.covarianceOf(6, 6));
-    const double x = best.value[7], y = best.value[8];
+    result.size_exponent = best.value[SIZE];
+    result.size_exponent_std = std::sqrt(variance * best.covarianceOf(SIZE, SIZE));
+    const double x = best.value[OFFSET_X], y = best.value[OFFSET_Y];
     result.offset = std::hypot(x, y);
     result.offset_angle = std::atan2(y, x);
     if (result.offset > 0.0) {
-      const double own = x * x * best.covarianceOf(7, 7) + 2.0 * x * y * best.covarianceOf(7, 8) +
-                         y * y * best.covarianceOf(8, 8);
+      const double own = x * x * best.covarianceOf(OFFSET_X, OFFSET_X) +
+                         2.0 * x * y * best.covarianceOf(OFFSET_X, OFFSET_Y) +
+                         y * y * best.covarianceOf(OFFSET_Y, OFFSET_Y);
       result.offset_std = std::sqrt(variance * own) / result.offset;
     }
-    for (std::size_t c = 0; c < cuts.size(); ++c) {
-      result.phase.push_back(angle ? 0.0 : wrapped(best.value[phase_at + c]));
+    for (std::size_t c = 0; c < cuts_.size(); ++c) {
+      result.phase.push_back(angle_ ? 0.0 : wrapped(best.value[PHASES + c]));
     }
-    result.unbalance = std::hypot(best.value[9], best.value[10]);
-    result.bic = informationCriterion(best.squares, count, unknowns, false);
-    result.rms = std::sqrt(best.squares / static_cast<double>(3 * cuts.size()));
-    found.push_back(result);
+    result.unbalance = std::hypot(best.value[HEAVY_X], best.value[HEAVY_Y]);
+    result.bic = informationCriterion(best.squares, count(), unknowns, false);
+    result.rms = std::sqrt(best.squares / static_cast<double>(3 * cuts_.size()));
+    return result;
+  }
+
+  const ToolGeometry tool_;
+  std::vector<Revolution> cuts_;
+  bool angle_ = true;
+  CuttingCoefficients mean_;
+  int orders_ = 0;
+  std::size_t numbers_ = 0;  // of one cut that are fitted
+  std::vector<std::vector<double>> measured_;
+  std::vector<double> phases_;
+  std::vector<std::pair<SlotTerms, std::vector<double>>> solved_;
+};
+
+}  // namespace
+
+std::vector<SlotFit> fitSlots(const Campaign& campaign, const MachineModel& model) {
+  SlotFitter fitter(campaign, model);
+  std::vector<SlotFit> found;
+  for (const SlotTerms& terms :
+       {SlotTerms{false, false, false}, SlotTerms{false, false, true}, SlotTerms{false, true, false},
+        SlotTerms{true, false, false}, SlotTerms{false, true, true}, SlotTerms{true, true, false},
+        SlotTerms{true, true, true}}) {
+    found.push_back(fitter.add(terms));
   }
   std::stable_sort(found.begin(), found.end(),
                    [](const SlotFit& a, const SlotFit& b) { return a.bic < b.bic; });

@@ -36,22 +36,6 @@ TEST(Friction, thesisFigures) {
   EXPECT_NEAR(f.torque(radPerSecFromRpm(10000.0)), f.viscous * 1047.2 + f.coulomb, 1e-6);
 }
 
-TEST(Torque, quantisationOfEquation312) {
-  // Thesis: 2-3 Nm; below 10 % above 35 rpm, below 1 % above 350 rpm.
-  const double at_35 = torqueResolution(RESOLUTION, radPerSecFromRpm(35.0), K);
-  EXPECT_NEAR(at_35 / 2.1, 0.1, 0.005);
-  EXPECT_NEAR(torqueResolution(RESOLUTION, radPerSecFromRpm(350.0), K), at_35 / 10.0, 1e-12);
-}
-
-TEST(Torque, isTheInverseOfEquation34) {
-  Friction f;
-  f.viscous = 3.7e-4;
-  f.coulomb = -0.0647;
-  const double omega = 900.0, torque = 2.4;
-  EXPECT_NEAR(cuttingTorque(K * omega * (torque + f.viscous * omega + f.coulomb), omega, K, f), torque,
-              1e-12);
-}
-
 TEST(Friction, refusesTooFewSpeeds) {
   EXPECT_THROW(fitFriction({}, K, 0.0), Error);
   EXPECT_THROW(fitFriction({{100.0, 0.01, 1e-4}}, K, 0.0), Error);

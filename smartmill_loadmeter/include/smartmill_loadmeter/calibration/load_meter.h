@@ -35,12 +35,6 @@ Friction fitFriction(const std::vector<AirCut>& air_cuts, double load_meter_gain
 /// What the model file states, with its uncertainty as standard deviation of each term.
 Friction modelFriction(const Spindle& spindle, double uncertainty_percent);
 
-/// Cutting torque from the load meter, eq. 3.5 [N m].
-double cuttingTorque(double voltage, double speed, double load_meter_gain, const Friction& friction);
-
-/// Step of the torque that one step of the load meter stands for, eq. 3.12 [N m].
-double torqueResolution(double load_meter_resolution, double speed, double load_meter_gain);
-
 /// Time constant of a first-order lag of this bandwidth [Hz], in s.
 double timeConstant(double bandwidth);
 
