@@ -1,26 +1,37 @@
 #!/usr/bin/env python3
-"""Counts the test cases in a folder of JUnit files and prints `N passed, N failed`."""
+"""Counts the test cases in a folder of JUnit files; the last line is `N passed, N failed, N skipped`.
+
+usage: count_tests.py RESULTS CTEST_EXIT_CODE [--refuse-skipped]
+"""
 import pathlib
 import sys
 import xml.etree.ElementTree as ElementTree
 
 
+def verdict(case):
+    """failed, skipped or passed: of one testcase element as GoogleTest or rosunit writes it."""
+    if case.find("failure") is not None or case.find("error") is not None:
+        return "failed"
+    if case.find("skipped") is not None or case.get("result") in ("skipped", "suppressed"):
+        return "skipped"
+    return "passed"
+
+
 def main():
-    passed = failed = 0
+    count = {"passed": 0, "failed": 0, "skipped": 0}
     for path in sorted(pathlib.Path(sys.argv[1]).rglob("*.xml")):
         if path.name.startswith("rostest-"):  # wraps the gtest that writes a file of its own
             continue
         for case in ElementTree.parse(path).getroot().iter("testcase"):
-            if case.find("failure") is not None or case.find("error") is not None:
-                failed += 1
-                print(f"failed: {case.get('classname')}.{case.get('name')}")
-            else:
-                passed += 1
-    ctest_exit = int(sys.argv[2])
-    if ctest_exit != 0 and failed == 0:
-        failed = 1  # a test program that ended without a report
-    print(f"{passed} passed, {failed} failed")
-    return 1 if failed or passed == 0 else 0
+            count[verdict(case)] += 1
+            if verdict(case) != "passed":
+                print(f"{verdict(case)}: {case.get('classname')}.{case.get('name')}")
+    if int(sys.argv[2]) != 0 and count["failed"] == 0:
+        print("failed: a test program that ended without a report")
+        count["failed"] = 1
+    refused = "--refuse-skipped" in sys.argv and count["skipped"]
+    print(", ".join(f"{number} {name}" for name, number in count.items()))
+    return 1 if count["failed"] or count["passed"] == 0 or refused else 0
 
 
 sys.exit(main())

@@ -3,6 +3,10 @@
 
 include(GNUInstallDirs)
 
+# A test's own code need not be fast; what it does wrong with the standard library's containers ends it with a line
+# that says so.
+set(SMARTMILL_TEST_OPTIONS $<$<CONFIG:Release>:-O1> -D_GLIBCXX_ASSERTIONS)
+
 # smartmill_compile_options(TARGET): C++17, the project's warnings, headers in include/ and (private ones) in src/.
 function(smartmill_compile_options target)
   target_compile_features(${target} PUBLIC cxx_std_17)
@@ -46,6 +50,15 @@ function(smartmill_executable name)
   install(TARGETS ${arg_TARGET} RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
 endfunction()
 
+# smartmill_test_options(TARGET): what the programs of all tests share.
+function(smartmill_test_options target)
+  smartmill_compile_options(${target})
+  target_compile_options(${target} PRIVATE ${SMARTMILL_TEST_OPTIONS})
+  if(smartmill_core_FOUND OR PROJECT_NAME STREQUAL smartmill_core)
+    target_link_libraries(${target} smartmill_core_testing)
+  endif()
+endfunction()
+
 # smartmill_gtest(NAME SOURCES a.cpp ... LIBRARIES x ...): a unit test without ROS master.
 function(smartmill_gtest name)
   if(NOT CATKIN_ENABLE_TESTING)
@@ -54,7 +67,7 @@ function(smartmill_gtest name)
   cmake_parse_arguments(arg "" "" "SOURCES;LIBRARIES" ${ARGN})
   find_package(GTest REQUIRED)
   catkin_add_gtest(${PROJECT_NAME}_${name} ${arg_SOURCES} WORKING_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR})
-  smartmill_compile_options(${PROJECT_NAME}_${name})
+  smartmill_test_options(${PROJECT_NAME}_${name})
   target_link_libraries(${PROJECT_NAME}_${name} ${catkin_LIBRARIES} ${arg_LIBRARIES} GTest::gtest_main)
 endfunction()
 
@@ -68,7 +81,7 @@ function(smartmill_rostest launch name)
   find_package(rostest REQUIRED)
   find_package(GTest REQUIRED)
   add_rostest_gtest(${PROJECT_NAME}_${name} ${launch} ${arg_SOURCES})
-  smartmill_compile_options(${PROJECT_NAME}_${name})
+  smartmill_test_options(${PROJECT_NAME}_${name})
   target_link_libraries(${PROJECT_NAME}_${name} ${catkin_LIBRARIES} ${arg_LIBRARIES} GTest::gtest)
   add_dependencies(tests ${PROJECT_NAME}_${name})
   if(arg_NODES)

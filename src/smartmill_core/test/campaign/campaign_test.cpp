@@ -1,8 +1,7 @@
 #include "smartmill_core/campaign/campaign.h"
 
 #include <cmath>
-#include <cstdlib>
-#include <iostream>
+#include <filesystem>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,6 +9,7 @@
 #include "smartmill_core/campaign/record.h"
 #include "smartmill_core/cutting/regression.h"
 #include "smartmill_core/signal/statistics.h"
+#include "smartmill_core/testing/shared_data.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_core/units.h"
 
@@ -191,19 +191,10 @@ TEST(Record, readsADynowareExport) {
               HasSubstr("n.csv: line 1: not a DynoWare export"));
 }
 
-std::string sharedFolder() {
-  const char* folder = std::getenv("SMARTMILL_SHARED");
-  return folder ? folder : SMARTMILL_SHARED_FOLDER;
-}
-
 // The published coefficients of the same records, to every printed digit: the mean over all samples,
 // unweighted.
 TEST(MeasuredSlots, regressionGivesThePublishedCoefficients) {
-  const std::string folder = sharedFolder() + "/measured/slot_6000";
-  if (!std::filesystem::exists(folder)) {
-    std::cout << folder << " absent, not checked\n";
-    return;
-  }
+  SMARTMILL_SHARED_DATA(folder, "measured/slot_6000");
   const Campaign campaign = readCampaign(folder);
   const MachineModel model = readMachineModel(campaign.modelPath());
   std::vector<MeanForceTest> tests;
@@ -226,11 +217,7 @@ TEST(MeasuredSlots, regressionGivesThePublishedCoefficients) {
 }
 
 TEST(ExampleCampaigns, areAllRead) {
-  const std::string folder = sharedFolder() + "/campaigns";
-  if (!std::filesystem::exists(folder)) {
-    std::cout << folder << " absent, not checked\n";
-    return;
-  }
+  SMARTMILL_SHARED_DATA(folder, "campaigns");
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
     if (!entry.is_directory()) continue;
     const Campaign campaign = readCampaign(entry.path().string());

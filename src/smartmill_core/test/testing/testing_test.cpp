@@ -1,0 +1,81 @@
+// The helpers of the tests: an evidence that cannot fail is none.
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "smartmill_core/testing/coverage.h"
+#include "smartmill_core/testing/shared_data.h"
+#include "smartmill_core/testing/temporary_folder.h"
+
+namespace smartmill {
+namespace {
+
+/// @param stated what an estimate says of itself over its true standard deviation
+Coverage estimates(int count, double stated) {
+  std::mt19937 random(7);
+  std::normal_distribution<double> normal;
+  Coverage coverage;
+  for (int i = 0; i < count; ++i) coverage.add(3.0 * normal(random), 3.0 * stated);
+  return coverage;
+}
+
+TEST(Coverage, holdsHonestDeviationsOnly) {
+  for (const int count : {20, 40, 200, 2000}) {
+    EXPECT_TRUE(estimates(count, 1.0).honest()) << count;
+    EXPECT_FALSE(estimates(count, 0.5).honest()) << count;
+    EXPECT_FALSE(estimates(count, 2.0).honest()) << count;
+  }
+  EXPECT_FALSE(estimates(2000, 1.1).honest());
+  EXPECT_FALSE(estimates(2000, 0.9).honest());
+  EXPECT_TRUE(estimates(2000, 1.1).honest(0, 0.1));
+  EXPECT_TRUE(estimates(2000, 1.1).honest(200));
+}
+
+TEST(Coverage, refusesNothingAndNoDeviation) {
+  EXPECT_FALSE(Coverage().honest());
+  Coverage coverage = estimates(40, 1.0);
+  coverage.add(0.0, 0.0);
+  EXPECT_FALSE(coverage.honest());
+}
+
+// Tables of chi-square: 5 degrees of freedom, 0.0005 and 0.9995: 0.158 and 22.105; 100: 59.896 and 153.167. A
+// mean square just inside is honest, one just outside is not.
+TEST(Coverage, hasTheLimitsOfTheTables) {
+  const auto of = [](int count, double sum) {
+    Coverage coverage;
+    for (int i = 0; i < count; ++i) coverage.add(std::sqrt(sum / count), 1.0);
+    return static_cast<bool>(coverage.honest());
+  };
+  EXPECT_TRUE(of(5, 22.105 * 0.97));
+  EXPECT_FALSE(of(5, 22.105 * 1.03));
+  EXPECT_TRUE(of(100, 59.896 * 1.01));
+  EXPECT_FALSE(of(100, 59.896 * 0.99));
+  EXPECT_TRUE(of(100, 153.167 * 0.99));
+  EXPECT_FALSE(of(100, 153.167 * 1.01));
+}
+
+void testThatNeedsData(std::string& found) {
+  SMARTMILL_SHARED_DATA(file, "inner/data.csv");
+  found = file;
+}
+
+TEST(SharedData, isFoundWhereTheEnvironmentSays) {
+  const char* const before = std::getenv("SMARTMILL_SHARED");
+  const std::string kept = before ? before : "";
+  const TemporaryFolder folder;
+  setenv("SMARTMILL_SHARED", folder.file(".").c_str(), 1);
+  EXPECT_EQ(sharedData("inner/data.csv"), "");
+  std::filesystem::create_directory(folder.file("inner"));
+  folder.write("inner/data.csv", "1\n");
+  std::string found;
+  testThatNeedsData(found);
+  EXPECT_EQ(found, folder.file(".") + "/inner/data.csv");
+  before ? setenv("SMARTMILL_SHARED", kept.c_str(), 1) : unsetenv("SMARTMILL_SHARED");
+  EXPECT_NE(sharedFolder(), folder.file("."));
+}
+
+}  // namespace
+}  // namespace smartmill

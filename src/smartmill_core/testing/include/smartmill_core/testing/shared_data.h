@@ -1,0 +1,22 @@
+#pragma once
+
+#include <string>
+
+#include <gtest/gtest.h>
+
+namespace smartmill {
+
+/// The folder of data that stand beside the repository and are no part of it: $SMARTMILL_SHARED, else
+/// ../shared.
+std::string sharedFolder();
+
+/// Path of a file or folder of it, empty where it is absent.
+std::string sharedData(const std::string& name);
+
+}  // namespace smartmill
+
+/// In a test: declares the path of shared data, or ends the test as SKIPPED where they are absent.
+///     SMARTMILL_SHARED_DATA(folder, "measured/slot_6000");
+#define SMARTMILL_SHARED_DATA(variable, name)                 \
+  const std::string variable = ::smartmill::sharedData(name); \
+  if (variable.empty()) GTEST_SKIP() << ::smartmill::sharedFolder() << "/" << (name) << " is absent"
