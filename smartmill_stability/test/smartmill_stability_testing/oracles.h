@@ -1,8 +1,7 @@
 #pragma once
 
-#include <cstdlib>
 #include <fstream>
-#include <iostream>
+#include <limits>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -27,25 +26,15 @@ inline RegenerativeSystem benchmarkSystem(double immersion, bool down, bool two_
   return system;
 }
 
-inline std::string sharedFile(const std::string& name) {
-  const char* folder = std::getenv("SMARTMILL_SHARED");
-  return std::string(folder ? folder : SHARED_FOLDER) + "/" + name;
-}
-
 struct OracleRow {
   double immersion, rpm, limit_mm;  ///< +inf: stable to 10 mm
   bool down;
 };
 
-/// Rows of oracles/insperger_1dof_first_limit.csv; empty, with a line on stdout, where it is absent.
-inline std::vector<OracleRow> oracleRows() {
-  const std::string name = sharedFile("oracles/insperger_1dof_first_limit.csv");
+/// Rows of a file like the shared oracles/insperger_1dof_first_limit.csv.
+inline std::vector<OracleRow> oracleRows(const std::string& name) {
   std::ifstream file(name);
   std::vector<OracleRow> rows;
-  if (!file) {
-    std::cout << name << " absent, not checked\n";
-    return rows;
-  }
   std::string line;
   std::getline(file, line);
   while (std::getline(file, line)) {
