@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <filesystem>
-#include <iostream>
 #include <map>
 #include <string>
 #include <vector>
@@ -14,17 +12,13 @@
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/signal/statistics.h"
+#include "smartmill_core/testing/shared_data.h"
 #include "smartmill_core/units.h"
 #include "smartmill_sim/effects/effect.h"
 #include "smartmill_sim/twin/spindle_drive.h"
 
 namespace smartmill::sim {
 namespace {
-
-std::string sharedFolder() {
-  const char* folder = std::getenv("SMARTMILL_SHARED");
-  return folder ? folder : SMARTMILL_SHARED_FOLDER;
-}
 
 MachineModel machine() {
   MachineModel model;
@@ -260,13 +254,9 @@ bool nearItsLimit(const std::string& campaign, const CampaignTest& test) {
 // Campaigns made by another program, its models and effects exact: what is left must be its noise, on every
 // channel of every test, from the first revolutions after the engagement on.
 TEST(Twin, leavesOnlyTheNoiseOfIndependentCampaigns) {
+  SMARTMILL_SHARED_DATA(folder, "campaigns");
   for (const auto& [name, effects] : hiddenEffects()) {
-    const std::string folder = sharedFolder() + "/campaigns/" + name;
-    if (!std::filesystem::exists(folder)) {
-      std::cout << folder << " is absent, not checked\n";
-      continue;
-    }
-    const Campaign campaign = readCampaign(folder);
+    const Campaign campaign = readCampaign(folder + "/" + name);
     MachineModel model = readMachineModel(campaign.modelPath());
     model.effects = effects;
     SimulationOptions options;

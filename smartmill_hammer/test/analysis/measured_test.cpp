@@ -1,28 +1,16 @@
 #include <cmath>
-#include <cstdlib>
 #include <fstream>
 #include <functional>
-#include <iostream>
 
 #include <gtest/gtest.h>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/testing/shared_data.h"
 #include "smartmill_hammer/analysis/tap_records.h"
 
 namespace smartmill {
 namespace hammer {
 namespace {
-
-/// Folder of measured data, empty when it is not there. It stands beside the repository and is not part of
-/// it.
-std::string measured(const std::string& name) {
-  const char* set = std::getenv("SMARTMILL_SHARED");
-  const std::string folder =
-      (set ? std::string(set) : std::string(SMARTMILL_SHARED_FOLDER)) + "/measured/" + name;
-  if (std::ifstream(folder)) return folder;
-  std::cout << folder << " absent, not checked\n";
-  return {};
-}
 
 // Published: modes at 1074, 1961, 2617 Hz; Im of the averaged receptance there -.6433, -.2138, -.2180 um/N.
 void expectPublished(const std::vector<ModeReading>& rows) {
@@ -41,8 +29,7 @@ void expectPublished(const std::vector<ModeReading>& rows) {
 }
 
 TEST(MeasuredToolTip, ShowsThePublishedModes) {
-  const std::string file = measured("tool_tip_tap/EMA_Point_1_Channel_1_CH1.txt");
-  if (file.empty()) return;
+  SMARTMILL_SHARED_DATA(file, "measured/tool_tip_tap/EMA_Point_1_Channel_1_CH1.txt");
   ASSERT_EQ(detectFormat(file), TapFormat::frf);
   const FrequencyResponse frf = readFrfText(file);
   EXPECT_TRUE(looksDirect(frf, 500.0, 3500.0));
@@ -51,8 +38,7 @@ TEST(MeasuredToolTip, ShowsThePublishedModes) {
 
 // The single hit of the same point: within 5 % of the averaged receptance's Im at the published modes.
 TEST(MeasuredToolTip, SingleHitAgreesWithTheAverage) {
-  const std::string file = measured("tool_tip_tap/ImpactTesting_Point1_Channel1_CH1.txt");
-  if (file.empty()) return;
+  SMARTMILL_SHARED_DATA(file, "measured/tool_tip_tap/ImpactTesting_Point1_Channel1_CH1.txt");
   ASSERT_EQ(detectFormat(file), TapFormat::text);
   const TapFrf frf = averageTaps({readTapText(file)}, {20.0, 0.1, 0.0}, 0.0);
   EXPECT_NEAR(frf.receptance.at(1074.0).imag(), -0.6433e-6, 0.05 * 0.6433e-6);
@@ -61,8 +47,7 @@ TEST(MeasuredToolTip, SingleHitAgreesWithTheAverage) {
 }
 
 TEST(MeasuredFiveHits, ShowThePublishedPeaks) {
-  const std::string folder = measured("five_hits/hit_1.csv").empty() ? "" : measured("five_hits");
-  if (folder.empty()) return;
+  SMARTMILL_SHARED_DATA(folder, "measured/five_hits");
   std::vector<TapRecord> taps;
   for (int i = 1; i <= 5; ++i) taps.push_back(readTapCsv(folder + "/hit_" + std::to_string(i) + ".csv"));
   EXPECT_EQ(detectFormat(taps[0].file), TapFormat::csv);

@@ -1,10 +1,11 @@
 #include "smartmill_hammer/search/sensor_calibration.h"
 
 #include <cmath>
-#include <iostream>
 #include <random>
 
 #include <gtest/gtest.h>
+
+#include "smartmill_core/testing/coverage.h"
 
 namespace smartmill {
 namespace hammer {
@@ -69,19 +70,17 @@ TEST(SensorCalibration, JogsAsTheThesisDoes) {
   EXPECT_NEAR(near.next(), 0.5 * -sensor.volt(300e-6) / slope, 0.5e-6);
 }
 
-// Coverage of the stated standard deviation over 200 runs: 95 % with a binomial spread of 1.5 %.
 TEST(SensorCalibration, StandardDeviationIsHonest) {
   const SensorCalibrationOptions options;
-  int within = 0;
+  Coverage sensitivity;
   const int runs = 200;
   for (int i = 0; i < runs; ++i) {
     const Outcome o = run(options, 700e-6, 1e-3, 100u + static_cast<std::uint32_t>(i));
     ASSERT_EQ(o.calibration.state(), SensorCalibration::State::done) << o.calibration.reason();
     const double truth = Sensor().sensitivity(o.gap + 0.0);
-    within += std::abs(o.calibration.sensitivity() - truth) < 1.96 * o.calibration.sensitivityStd();
+    sensitivity.add(o.calibration.sensitivity() - truth, o.calibration.sensitivityStd());
   }
-  EXPECT_GE(within, 180);
-  EXPECT_LE(within, 199);
+  EXPECT_TRUE(sensitivity.honest());
 }
 
 TEST(SensorCalibration, RefusesWhatIsNoSensor) {

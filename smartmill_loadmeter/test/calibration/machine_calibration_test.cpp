@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/testing/coverage.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_core/units.h"
 
@@ -46,17 +47,15 @@ TEST(IdleVoltage, reproducesTheFiguresOfTheThesis) {
 }
 
 TEST(IdleVoltage, standardDeviationsAreHonest) {
-  int kb = 0, ktcf = 0;
+  Coverage kb, ktcf;
   const int runs = 200;
   for (int run = 0; run < runs; ++run) {
     const IdleVoltage idle = fitIdleVoltage(thesisAirCuts(static_cast<unsigned>(run) + 10), ZERO_BELOW, STEP);
-    kb += std::abs(idle.kb.value - KB) < 1.96 * idle.kb.std_dev;
-    ktcf += std::abs(idle.ktcf.value - KTCF) < 1.96 * idle.ktcf.std_dev;
+    kb.add(idle.kb.value - KB, idle.kb.std_dev);
+    ktcf.add(idle.ktcf.value - KTCF, idle.ktcf.std_dev);
   }
-  for (const int inside : {kb, ktcf}) {
-    EXPECT_GE(inside, 0.90 * runs);
-    EXPECT_LE(inside, 0.995 * runs);
-  }
+  EXPECT_TRUE(kb.honest());
+  EXPECT_TRUE(ktcf.honest());
 }
 
 TEST(IdleVoltage, saysWhatIsMissing) {

@@ -1,9 +1,6 @@
 #include "smartmill_loadmeter/identification/campaign_identification.h"
 
 #include <cmath>
-#include <cstdlib>
-#include <filesystem>
-#include <iostream>
 #include <random>
 
 #include <gmock/gmock.h>
@@ -12,6 +9,8 @@
 #include "smartmill_core/campaign/record.h"
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/testing/coverage.h"
+#include "smartmill_core/testing/shared_data.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_core/units.h"
 
@@ -22,14 +21,6 @@ using ::testing::HasSubstr;
 using units::radPerSecFromRpm;
 
 const CuttingCoefficients TRUTH{953e6, 357e6, 188e6, 17.3e3, 17.7e3, 0.72e3};
-
-std::string shared(const std::string& name) {
-  const char* folder = std::getenv("SMARTMILL_SHARED");
-  const std::string path = std::string(folder ? folder : SMARTMILL_SHARED_FOLDER) + "/" + name;
-  if (std::filesystem::exists(path)) return path;
-  std::cout << path << " absent, not checked\n";
-  return {};
-}
 
 // A load meter's records by small steps of the differential equation; rounding and noise as a real one has.
 struct Plant {
@@ -99,7 +90,7 @@ struct Plant {
 TEST(LoadRecords, shortRecordsGiveTheTruthWithHonestStandardDeviations) {
   const TemporaryFolder folder;
   const int runs = 60;
-  int inside_c = 0, inside_e = 0;
+  Coverage ktc, kte;
   for (int run = 0; run < runs; ++run) {
     const Plant plant(folder.file(""), static_cast<unsigned>(run + 1), true);
     const CoefficientSet k = identifyFromLoadRecords(plant.campaign, plant.model, {}).set;
@@ -108,12 +99,11 @@ TEST(LoadRecords, shortRecordsGiveTheTruthWithHonestStandardDeviations) {
     EXPECT_NEAR(k.friction_viscous, 4.743e-4, 0.01 * 4.743e-4);
     EXPECT_NEAR(k.friction_coulomb, 0.0671, 0.01);
     EXPECT_TRUE(std::isnan(k.value.kac));
-    inside_c += std::abs(k.value.ktc - TRUTH.ktc) < 1.96 * k.std_dev.ktc;
-    inside_e += std::abs(k.value.kte - TRUTH.kte) < 1.96 * k.std_dev.kte;
+    ktc.add(k.value.ktc - TRUTH.ktc, k.std_dev.ktc);
+    kte.add(k.value.kte - TRUTH.kte, k.std_dev.kte);
   }
-  // 95 % of 60 runs less three sigma of the count.
-  EXPECT_GE(inside_c, 52);
-  EXPECT_GE(inside_e, 52);
+  EXPECT_TRUE(ktc.honest());
+  EXPECT_TRUE(kte.honest());
 }
 
 TEST(LoadRecords, withoutAirCutsTheIdleOfTheCutsAndTheModelsFrictionStand) {
@@ -178,8 +168,7 @@ TEST(LoadRecords, sayWhatIsMissing) {
 }
 
 TEST(MeasuredSlots, bothPracticesGiveTheirFigures) {
-  const std::string folder = shared("measured/slot_6000");
-  if (folder.empty()) return;
+  SMARTMILL_SHARED_DATA(folder, "measured/slot_6000");
   const Campaign campaign = readCampaign(folder);
   const MachineModel model = readMachineModel(campaign.modelPath());
   const CuttingCoefficients all = identifyFromForceRecords(campaign, model, Means::all).value;
@@ -196,8 +185,7 @@ TEST(MeasuredSlots, bothPracticesGiveTheirFigures) {
 }
 
 TEST(ExampleCampaign, forceAndLoadMeterFindTheModelsCoefficients) {
-  const std::string folder = shared("campaigns/none");
-  if (folder.empty()) return;
+  SMARTMILL_SHARED_DATA(folder, "campaigns/none");
   const Campaign campaign = readCampaign(folder);
   MachineModel model = readMachineModel(campaign.modelPath());
   const CuttingCoefficients truth = *model.cutting;
@@ -228,10 +216,9 @@ TEST(ExampleCampaigns, hiddenFrictionWearAndRunoutAreFound) {
                                         {"runout", {"runout"}},
                                         {"stribeck_friction", {"Stribeck friction"}},
                                         {"tool_wear_and_unbalance", {"edge growth"}}};
+  SMARTMILL_SHARED_DATA(folder, "campaigns");
   for (const CampaignCase& c : cases) {
-    const std::string folder = shared(std::string("campaigns/") + c.name);
-    if (folder.empty()) return;
-    const Campaign campaign = readCampaign(folder);
+    const Campaign campaign = readCampaign(folder + "/" + c.name);
     const MachineModel model = readMachineModel(campaign.modelPath());
     const LoadRecordResult k = identifyFromLoadRecords(campaign, model, {});
     EXPECT_EQ(k.terms, c.terms) << c.name;
@@ -246,11 +233,11 @@ TEST(ExampleCampaigns, hiddenFrictionWearAndRunoutAreFound) {
     }
     EXPECT_NEAR(k.set.value.ktc, model.cutting->ktc, 4.0 * k.set.std_dev.ktc) << c.name;
   }
-  const Campaign stribeck = readCampaign(shared("campaigns/stribeck_friction"));
+  const Campaign stribeck = readCampaign(folder + "/stribeck_friction");
   const LoadRecordResult s = identifyFromLoadRecords(stribeck, readMachineModel(stribeck.modelPath()), {});
   EXPECT_NEAR(s.friction.breakaway, 0.4557, 1e-3);
   EXPECT_NEAR(units::rpmFromRadPerSec(s.friction.stribeck_speed), 2775.2, 5.0);
-  const Campaign wear = readCampaign(shared("campaigns/tool_wear_and_unbalance"));
+  const Campaign wear = readCampaign(folder + "/tool_wear_and_unbalance");
   const LoadRecordResult w = identifyFromLoadRecords(wear, readMachineModel(wear.modelPath()), {});
   EXPECT_NEAR(60.0 * w.edge_growth, 0.4194, 0.002);
 }

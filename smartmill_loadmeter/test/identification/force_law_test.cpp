@@ -1,9 +1,6 @@
 #include "smartmill_loadmeter/identification/force_law.h"
 
 #include <cmath>
-#include <cstdlib>
-#include <filesystem>
-#include <iostream>
 #include <random>
 
 #include <gmock/gmock.h>
@@ -11,6 +8,7 @@
 
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/testing/shared_data.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_core/units.h"
 
@@ -18,14 +16,6 @@ namespace smartmill::loadmeter {
 namespace {
 
 using ::testing::HasSubstr;
-
-std::string shared(const std::string& name) {
-  const char* folder = std::getenv("SMARTMILL_SHARED");
-  const std::string path = std::string(folder ? folder : SMARTMILL_SHARED_FOLDER) + "/" + name;
-  if (std::filesystem::exists(path)) return path;
-  std::cout << path << " absent, not checked\n";
-  return {};
-}
 
 TEST(ForcePoints, turnMeasuredForcesBackIntoTheLawThatMadeThem) {
   // Down milling with one tooth in cut, as Bachrathy & Stepan: 12 mm, 2 teeth, 6 mm wide.
@@ -83,8 +73,7 @@ TEST(ForceLaws, theEvidenceChoosesTheLawThatMadeTheData) {
 }
 
 TEST(Slots, runoutIsFoundInTheExampleCampaign) {
-  const std::string folder = shared("campaigns/runout");
-  if (folder.empty()) return;
+  SMARTMILL_SHARED_DATA(folder, "campaigns/runout");
   Campaign campaign = readCampaign(folder);
   std::vector<CampaignTest> few;
   for (const CampaignTest& t : campaign.tests) {
@@ -99,8 +88,7 @@ TEST(Slots, runoutIsFoundInTheExampleCampaign) {
 }
 
 TEST(Slots, measuredOnesPreferSomethingThatTurns) {
-  const std::string folder = shared("measured/slot_6000");
-  if (folder.empty()) return;
+  SMARTMILL_SHARED_DATA(folder, "measured/slot_6000");
   Campaign campaign = readCampaign(folder);
   campaign.tests.erase(campaign.tests.begin() + 1, campaign.tests.begin() + 3);
   const std::vector<SlotFit> fits = fitSlots(campaign, readMachineModel(campaign.modelPath()));

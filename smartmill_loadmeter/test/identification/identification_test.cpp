@@ -11,6 +11,7 @@
 #include "../session.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/signal/stream_sorter.h"
+#include "smartmill_core/testing/coverage.h"
 #include "smartmill_loadmeter/calibration/friction_law.h"
 
 namespace smartmill::loadmeter {
@@ -32,7 +33,7 @@ IdentifyResult ask(LoadMeterIdentification& identification, const IdentifyGoal& 
 
 TEST(LoadMeterIdentification, findsTheTruthWithHonestStandardDeviations) {
   const int runs = 100;
-  int inside_c = 0, inside_e = 0;
+  Coverage ktc, kte;
   for (int run = 0; run < runs; ++run) {
     Session session(static_cast<unsigned>(run + 1), 2e-4);
     LoadMeterIdentification identification(model(), {});
@@ -50,11 +51,11 @@ TEST(LoadMeterIdentification, findsTheTruthWithHonestStandardDeviations) {
     EXPECT_NEAR(k.friction_viscous, VISCOUS, 0.02 * VISCOUS);
     EXPECT_EQ(k.source, "load_meter");
     EXPECT_EQ(k.tool, "endmill");
-    inside_c += std::abs(k.value.ktc - TRUTH.ktc) < 1.96 * k.std_dev.ktc;
-    inside_e += std::abs(k.value.kte - TRUTH.kte) < 1.96 * k.std_dev.kte;
+    ktc.add(k.value.ktc - TRUTH.ktc, k.std_dev.ktc);
+    kte.add(k.value.kte - TRUTH.kte, k.std_dev.kte);
   }
-  EXPECT_GE(inside_c, 90);
-  EXPECT_GE(inside_e, 90);
+  EXPECT_TRUE(ktc.honest());
+  EXPECT_TRUE(kte.honest());
 }
 
 // Readings are taken every 20 ms without the spindle's angle: they meet three phases of a revolution at 4000 rpm, many at

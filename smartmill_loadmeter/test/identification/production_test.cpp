@@ -10,6 +10,7 @@
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/cutting/regression.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/testing/coverage.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_core/units.h"
 
@@ -57,17 +58,18 @@ TEST(Recursive, withoutForgettingIsTheBatchRegression) {
 }
 
 TEST(Recursive, isHonest) {
-  int ktc = 0, kte = 0;
+  Coverage ktc, kte;
   const int runs = 200;
   for (int run = 0; run < runs; ++run) {
     std::mt19937 random(static_cast<unsigned>(run) + 1);
     RecursiveCoefficients recursive({}, 300.0);
     for (int i = 0; i < 60; ++i) recursive.update(reading(random, 953e6, 17.3e3, 0.01));
-    ktc += std::abs(recursive.ktc() - 953e6) < 1.96 * recursive.ktcStd();
-    kte += std::abs(recursive.kte() - 17.3e3) < 1.96 * recursive.kteStd();
+    ktc.add(recursive.ktc() - 953e6, recursive.ktcStd());
+    kte.add(recursive.kte() - 17.3e3, recursive.kteStd());
   }
   // Exponential weights make the stated variance at most twice the true one.
-  for (const int inside : {ktc, kte}) EXPECT_GE(inside, 0.93 * runs);
+  EXPECT_TRUE(ktc.honest(0, std::sqrt(2.0) - 1.0));
+  EXPECT_TRUE(kte.honest(0, std::sqrt(2.0) - 1.0));
 }
 
 TEST(Recursive, watchesTheEdgeWear) {

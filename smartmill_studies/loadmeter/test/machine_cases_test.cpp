@@ -6,6 +6,7 @@
 
 #include "loadmeter/machine_cases.h"
 #include "smartmill_core/cutting/mechanistic.h"
+#include "smartmill_core/testing/coverage.h"
 #include "smartmill_core/units.h"
 #include "smartmill_loadmeter/identification/runout_torque.h"
 
@@ -66,17 +67,17 @@ TEST(RunoutTorque, isTheTorqueOfTheSlicesInClosedForm) {
 TEST(Cases, ktcIsWithinThreeAndSixPercentAndHonest) {
   const Faults faults;
   std::vector<double> errors;
-  int inside = 0;
+  Coverage ktc;
   const int count = 30;
   for (int i = 0; i < count; ++i) {
     const CaseErrors e = judge(drawCase(static_cast<unsigned>(1000 + i), faults), faults);
     errors.push_back(std::abs(e.ktc));
-    inside += std::abs(e.z_ktc) < 1.96;
+    ktc.add(e.z_ktc, 1.0);
   }
   std::sort(errors.begin(), errors.end());
   EXPECT_LT(errors[count / 2], 0.03);
   EXPECT_LT(errors[static_cast<std::size_t>(0.95 * count)], 0.06);
-  EXPECT_GE(inside, 24);  // 95 % of 30 less three sigma of the count
+  EXPECT_TRUE(ktc.honest());
 }
 
 }  // namespace
