@@ -1,0 +1,81 @@
+#!/usr/bin/env python3
+"""Every package that sources include, CMake finds or links, and launch files start is declared in package.xml."""
+import re
+import sys
+
+from packages import includes, packages, report, text
+
+# First folder of a header, or name that CMake finds: name in package.xml. None: no package has to be declared.
+HEADERS = {
+    "Eigen": "eigen", "ceres": "libceres-dev", "fftw3.h": "fftw3", "gsl": "libgsl", "yaml-cpp": "yaml-cpp",
+    "nlohmann": "nlohmann-json-dev", "CLI": "cli11", "sqlite3.h": "sqlite3", "benchmark": "benchmark",
+    "rapidcheck": "rapidcheck", "rapidcheck.h": "rapidcheck", "ros": "roscpp",
+}
+FOUND = {
+    "Eigen3": "eigen", "Ceres": "libceres-dev", "GSL": "libgsl", "SQLite3": "sqlite3", "CLI11": "cli11",
+    "nlohmann_json": "nlohmann-json-dev", "PkgConfig": None, "Threads": None, "GTest": None, "catkin": None,
+}
+ROS_PACKAGES = {"actionlib", "tf2", "tf2_ros", "roslib", "rosbag", "rosbag_storage", "diagnostic_updater", "topic_tools",
+                "rostest", "roslaunch", "roscpp", "rospy"}
+# A header of rosbag's storage is found through either.
+SAME = {"rosbag": {"rosbag", "rosbag_storage"}, "topic_tools": {"topic_tools", "rosbag"}}
+BUILD = ("depend", "build_depend", "buildtool_depend", "build_export_depend")
+TEST = BUILD + ("test_depend", "exec_depend")
+RUN = ("depend", "exec_depend", "test_depend")
+
+
+def package_of_header(header, ours):
+    first = header.split("/")[0]
+    if first in HEADERS:
+        return HEADERS[first]
+    if "/" in header and (first in ROS_PACKAGES or first in ours or first.endswith("_msgs")):
+        return first
+    return None
+
+
+def packages_found(cmake):
+    cmake = re.sub(r"#.*", "", cmake)
+    for call in re.findall(r"find_package\(([^)]*)\)", cmake):
+        words = call.split()
+        yield words[0]
+        if "COMPONENTS" in words:
+            yield from words[words.index("COMPONENTS") + 1:]
+    for call in re.findall(r"pkg_check_modules\(([^)]*)\)", cmake):
+        yield call.split()[-1]
+
+
+def packages_launched(launch):
+    launch = re.sub(r"<!--.*?-->", "", launch, flags=re.DOTALL)
+    yield from re.findall(r'\bpkg="([^"$]+)"', launch)
+    yield from re.findall(r"\$\(find ([\w-]+)\)", launch)
+
+
+def asked(package, ours):
+    """(file, package asked for, kinds of dependency that do)"""
+    for path in package.files:
+        test = "test" in path.relative_to(package.folder).parts
+        if path.suffix in (".cpp", ".h"):
+            for header in includes(path):
+                yield path, package_of_header(header, ours), TEST if test else BUILD
+        elif path.name == "CMakeLists.txt":
+            for name in packages_found(text(path)):
+                yield path, FOUND.get(name, name), TEST
+        elif path.suffix in (".launch", ".test"):
+            for name in packages_launched(text(path)):
+                yield path, name, TEST if path.suffix == ".test" else RUN
+
+
+def main():
+    everything = packages()
+    ours = {p.name for p in everything}
+    faults = set()
+    for package in everything:
+        for path, name, kinds in asked(package, ours):
+            if name is None or name == package.name:
+                continue
+            if not SAME.get(name, {name}) & package.declares(*kinds):
+                faults.add(f"{path}: {name} is not declared in {package.folder}/package.xml as {' or '.join(kinds)}")
+    return report("dependencies", sorted(faults))
+
+
+sys.exit(main())

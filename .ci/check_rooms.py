@@ -1,0 +1,49 @@
+#!/usr/bin/env python3
+"""Who may know whom: no ROS under the core, the FOCAS wire and in the libraries of the node packages; no node package
+knows another's headers. Exceptions stand here and nowhere else."""
+import re
+import sys
+
+from packages import includes, packages, report
+
+ROS = re.compile(r"(ros|rosbag|roslib|actionlib|tf2|tf2_\w+|diagnostic_updater|topic_tools|smartmill_ros|\w+_msgs)/")
+ROS_FREE = {"smartmill_core", "smartmill_focas"}
+SHELLS = {"smartmill_ros", "smartmill_msgs"}  # ROS everywhere
+COMMON = {"smartmill_core", "smartmill_focas", "smartmill_ros", "smartmill_msgs"}
+KNOWS = {
+    "smartmill_core": set(),
+    "smartmill_focas": set(),
+    "smartmill_ros": {"smartmill_core", "smartmill_msgs"},
+    "smartmill_discrepancy": COMMON | {"smartmill_sim"},  # runs the twin
+    "smartmill_studies": None,  # every library
+}
+ROS_ROOMS = {"node", "apps", "test"}
+ROS_SOURCES = ("launch/src/session/", "launch/src/report/session_bag.")  # of programs, in no library
+
+
+def may_use_ros(package, path):
+    if package.name in ROS_FREE:
+        return False
+    if package.name in SHELLS or str(path).startswith(ROS_SOURCES):
+        return True
+    parts = path.relative_to(package.folder).parts
+    return parts[0] != "include" and bool(ROS_ROOMS.intersection(parts[:-1]))
+
+
+def main():
+    faults = []
+    everything = packages()
+    names = {p.name for p in everything}
+    for package in everything:
+        knows = KNOWS.get(package.name, COMMON)
+        for path in package.code():
+            for header in includes(path):
+                owner = header.split("/")[0]
+                if ROS.match(header) and not may_use_ros(package, path):
+                    faults.append(f"{path}: {header}: ROS has no place here")
+                if owner in names and owner != package.name and knows is not None and owner not in knows:
+                    faults.append(f"{path}: {header}: {package.name} does not know {owner}")
+    return report("rooms", faults)
+
+
+sys.exit(main())
