@@ -69,6 +69,10 @@ function(smartmill_gtest name)
   catkin_add_gtest(${PROJECT_NAME}_${name} ${arg_SOURCES} WORKING_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR})
   smartmill_test_options(${PROJECT_NAME}_${name})
   target_link_libraries(${PROJECT_NAME}_${name} ${catkin_LIBRARIES} ${arg_LIBRARIES} GTest::gtest_main)
+  if(NOT TARGET ${PROJECT_NAME}_gtests)
+    add_custom_target(${PROJECT_NAME}_gtests)  # the package's tests that need no ROS master
+  endif()
+  add_dependencies(${PROJECT_NAME}_gtests ${PROJECT_NAME}_${name})
 endfunction()
 
 # smartmill_rostest(LAUNCH_FILE NAME SOURCES a.cpp ... LIBRARIES x ... NODES t ...): a gtest node run by rostest.
