@@ -71,53 +71,54 @@ void write(const Options& options, const std::string& suffix, const std::string&
   std::printf("\n");
 }
 
-void runTaps(const Options& options, TapFormat format) {
+/// What the files hold: the receptance, and the response in which peaks are read.
+struct Response {
   FrequencyResponse receptance, peaks_of;
   std::string title;
+};
+
+Response readResponse(const Options& options, TapFormat format) {
   if (format == TapFormat::frf) {
     if (options.inputs.size() != 1) throw Error(options.inputs[1] + ": one FRF file at a time");
-    receptance = peaks_of = readFrfText(options.inputs[0]);
-    title = std::filesystem::path(options.inputs[0]).filename().string();
-  } else {
-    std::vector<TapRecord> taps;
-    for (const std::string& file : options.inputs) {
-      std::cerr << "reading " << file << "\n";
-      taps.push_back(format == TapFormat::csv ? readTapCsv(file) : readTapText(file));
-    }
-    const HammerParameters& parameters = options.parameters.measurement;
-    const TapFrf frf = averageTaps(taps, {parameters.weak_force, parameters.second_hit_share, 0.0},
-                                   parameters.exponential_time);
-    for (const std::string& note : frf.notes) std::cerr << "frf: " << note << "\n";
-    receptance = frf.receptance;
-    peaks_of = frf.measured;
-    title = std::to_string(receptance.averages) + (receptance.averages == 1 ? " hit" : " hits");
+    const FrequencyResponse read = readFrfText(options.inputs[0]);
+    return {read, read, std::filesystem::path(options.inputs[0]).filename().string()};
   }
-  std::printf("%s\n", title.c_str());
+  std::vector<TapRecord> taps;
+  for (const std::string& file : options.inputs) {
+    std::cerr << "reading " << file << "\n";
+    taps.push_back(format == TapFormat::csv ? readTapCsv(file) : readTapText(file));
+  }
+  const HammerParameters& parameters = options.parameters.measurement;
+  const TapFrf frf = averageTaps(taps, {parameters.weak_force, parameters.second_hit_share, 0.0},
+                                 parameters.exponential_time);
+  for (const std::string& note : frf.notes) std::cerr << "frf: " << note << "\n";
+  const int hits = frf.receptance.averages;
+  return {frf.receptance, frf.measured, std::to_string(hits) + (hits == 1 ? " hit" : " hits")};
+}
+
+void printPeaks(const Options& options, const FrequencyResponse& response) {
   std::printf("peaks of %s, %g..%g Hz (prominence above %g of the largest):\n",
-              peaks_of.unit == "m/N" ? "the receptance" : "the accelerance", options.low, options.high,
+              response.unit == "m/N" ? "the receptance" : "the accelerance", options.low, options.high,
               options.peak_share);
   std::vector<double> peaks =
-      findPeaks(peaks_of, options.low, options.high, options.peak_share);  // strongest first
+      findPeaks(response, options.low, options.high, options.peak_share);  // strongest first
   if (peaks.size() > static_cast<std::size_t>(options.max_peaks))
     peaks.resize(static_cast<std::size_t>(options.max_peaks));
   std::sort(peaks.begin(), peaks.end());
   for (const double f : peaks) {
-    std::printf("  %9.2f Hz  |H| %11.5g %s\n", f, std::abs(peaks_of.at(f)), peaks_of.unit.c_str());
+    std::printf("  %9.2f Hz  |H| %11.5g %s\n", f, std::abs(response.at(f)), response.unit.c_str());
   }
-  std::cerr << "fitting modes\n";
-  std::printf(
-      "modes at the peaks of |Im| of the receptance, each fitted alone above its half-power height:\n");
-  const std::vector<ModeReading> peak_modes = peakModes(
-      receptance, options.low, options.high, options.peak_share, static_cast<std::size_t>(options.max_peaks));
-  printModes(peak_modes);
-  const bool direct = looksDirect(receptance, options.low, options.high);
+}
+
+// All modes at once, without the damping of the exponential window.
+ModalFit fitTogether(const Options& options, const FrequencyResponse& receptance) {
   ModalFitOptions fit_options;
   fit_options.low = options.low;
   fit_options.high = options.high;
   fit_options.modes = options.modes;
   fit_options.max_modes = options.max_modes;
   fit_options.fit_mass_line = options.mass_line;
-  fit_options.positive_gains = direct;
+  fit_options.positive_gains = looksDirect(receptance, options.low, options.high);
   ModalFit fit = fitModes(receptance, fit_options);
   if (options.parameters.measurement.exponential_time > 0.0) {
     ImpactOptions window;
@@ -125,9 +126,25 @@ void runTaps(const Options& options, TapFormat format) {
     ImpactAnalysis(window).removeWindowDamping(fit.model);
   }
   std::printf("modes fitted together (%serror of the fit %.1f %% of the receptance in the band):\n",
-              direct ? "direct point, gains kept positive; " : "", 100.0 * fit.relative_error);
+              fit_options.positive_gains ? "direct point, gains kept positive; " : "",
+              100.0 * fit.relative_error);
+  return fit;
+}
+
+void runTaps(const Options& options, TapFormat format) {
+  const Response response = readResponse(options, format);
+  const FrequencyResponse& receptance = response.receptance;
+  std::printf("%s\n", response.title.c_str());
+  printPeaks(options, response.peaks_of);
+  std::cerr << "fitting modes\n";
+  std::printf(
+      "modes at the peaks of |Im| of the receptance, each fitted alone above its half-power height:\n");
+  const std::vector<ModeReading> peak_modes = peakModes(
+      receptance, options.low, options.high, options.peak_share, static_cast<std::size_t>(options.max_peaks));
+  printModes(peak_modes);
+  const ModalFit fit = fitTogether(options, receptance);
   printModes(readModes(fit.model, receptance));
-  write(options, "", title, receptance, fit.model, options.low, options.high);
+  write(options, "", response.title, receptance, fit.model, options.low, options.high);
   ModalModel alone;
   for (const ModeReading& row : peak_modes) alone.modes.push_back(row.mode);
   writeModesCsv(alone, options.out + "/peak_modes.csv");

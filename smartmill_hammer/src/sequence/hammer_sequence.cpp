@@ -397,10 +397,7 @@ void HammerSequence::handle(const SampleBlock& block) {
 
 // ---------------------------------------------------------------------------------------------- steps
 
-void HammerSequence::reached(double now) {
-  wait_ = Wait::nothing;
-  const Axes3 station = stationPosition();
-  const auto d = static_cast<std::size_t>(direction_);
+FluteSearchOptions HammerSequence::searchOptions() const {
   FluteSearchOptions options = FluteSearchOptions::forPitch(pitch_);
   const double scale = options.first_step / FluteSearchOptions().first_step;
   options.first_step = scale * parameters_.bracket_first_step;
@@ -409,30 +406,36 @@ void HammerSequence::reached(double now) {
   options.range_volt = station_.range_volt;
   options.noise_sigmas = parameters_.noise_sigmas;
   options.least_rise = parameters_.least_rise;
+  return options;
+}
+
+void HammerSequence::moveToStation(double now) {
+  const Axes3 station = stationPosition();
+  Axes3 here{};
+  double to_go = 0.0;
+  readPosition(*state_, here, to_go);
+  Axes3 above = station;
+  above[static_cast<std::size_t>(direction_)] -= parameters_.standoff;
+  above[2] = std::max(safeHeight(), here[2]);
+  Axes3 up = here, beside = above;
+  up[2] = above[2];
+  beside[2] = station[2];
+  at_station_ = true;
+  move(now, here,
+       {{up, 0.0}, {above, 0.0}, {beside, parameters_.approach_feed}, {station, parameters_.approach_feed}});
+}
+
+void HammerSequence::reached(double now) {
+  wait_ = Wait::nothing;
   switch (stage_) {
-    case Stage::orient_start: {
+    case Stage::orient_start:
       stage_ = Stage::to_station;
       say("moving to the hammer station " + goal_.direction, 0.05);
-      Axes3 here{};
-      double to_go = 0.0;
-      readPosition(*state_, here, to_go);
-      Axes3 above = station;
-      above[d] -= parameters_.standoff;
-      above[2] = std::max(safeHeight(), here[2]);
-      Axes3 up = here, beside = above;
-      up[2] = above[2];
-      beside[2] = station[2];
-      at_station_ = true;
-      return move(now, here,
-                  {{up, 0.0},
-                   {above, 0.0},
-                   {beside, parameters_.approach_feed},
-                   {station, parameters_.approach_feed}});
-    }
+      return moveToStation(now);
     case Stage::to_station:
       stage_ = Stage::search_low;
       say("searching a flute at the tip", 0.1);
-      search_.emplace(parameters_.start_angle, options);
+      search_.emplace(parameters_.start_angle, searchOptions());
       return orient(now, search_->next());
     case Stage::search_low:
     case Stage::search_high:
@@ -443,7 +446,7 @@ void HammerSequence::reached(double now) {
       say("searching the flute halfway up to the hammer", 0.3);
       // A right-hand helix lags with height: the spindle must turn on by the lag.
       expected_angle_ = result_.flute_low + tool_.lag() * 0.5 * station_.offset;
-      search_.emplace(expected_angle_, options);
+      search_.emplace(expected_angle_, searchOptions());
       return orient(now, search_->next());
     case Stage::to_tip:
       stage_ = Stage::orient_flute;
@@ -460,43 +463,26 @@ void HammerSequence::reached(double now) {
   }
 }
 
+SensorCalibrationOptions HammerSequence::calibrationOptions() const {
+  SensorCalibrationOptions o;
+  o.first_jog = parameters_.first_jog;
+  o.max_jog = parameters_.max_jog;
+  o.least_jog = parameters_.least_jog;
+  o.resolution = parameters_.resolution;
+  o.zero_volt = parameters_.zero_volt;
+  o.check_jog = parameters_.check_jog;
+  o.position_std = parameters_.position_std;
+  o.range_volt = station_.range_volt;
+  o.gain_volt = station_.gain_volt;
+  o.gap_at_zero_volt = station_.gap_at_zero_volt;
+  o.min_gap = parameters_.min_gap_share * station_.gap_at_zero_volt;
+  // The flute faces the hammer, so the sensor may look between two flutes.
+  o.max_travel = parameters_.max_approach + station_.flute_depth;
+  return o;
+}
+
 void HammerSequence::measured(double now, double volt, double volt_std) {
-  if (stage_ == Stage::calibrate) {
-    if (!calibration_) {
-      SensorCalibrationOptions o;
-      o.first_jog = parameters_.first_jog;
-      o.max_jog = parameters_.max_jog;
-      o.least_jog = parameters_.least_jog;
-      o.resolution = parameters_.resolution;
-      o.zero_volt = parameters_.zero_volt;
-      o.check_jog = parameters_.check_jog;
-      o.position_std = parameters_.position_std;
-      o.range_volt = station_.range_volt;
-      o.gain_volt = station_.gain_volt;
-      o.gap_at_zero_volt = station_.gap_at_zero_volt;
-      o.min_gap = parameters_.min_gap_share * station_.gap_at_zero_volt;
-      // The flute faces the hammer, so the sensor may look between two flutes.
-      o.max_travel = parameters_.max_approach + station_.flute_depth;
-      calibration_.emplace(o);
-      calibration_->start(volt, volt_std);
-    } else {
-      calibration_->give(volt, volt_std);
-    }
-    switch (calibration_->state()) {
-      case SensorCalibration::State::jogging:
-        return jog(now, goal_.direction, calibration_->next(), parameters_.jog_feed);
-      case SensorCalibration::State::failed:
-        return abort(now, FrfCode::bad_data, "sensor calibration: " + calibration_->reason());
-      case SensorCalibration::State::done:
-        result_.sensitivity = calibration_->sensitivity();
-        result_.sensitivity_std = calibration_->sensitivityStd();
-        stage_ = Stage::strike;
-        say(format("sensor calibrated: %.3f +- %.3f um/V", 1e6 * result_.sensitivity,
-                   1e6 * result_.sensitivity_std),
-            0.7);
-        return strike(now);
-    }
-  }
+  if (stage_ == Stage::calibrate) return calibrated(now, volt, volt_std);
   search_->give(reached_angle_, volt, volt_std);
   if (search_->state() == FluteSearch::State::searching) return orient(now, search_->next());
   if (search_->state() == FluteSearch::State::no_flute) {
@@ -507,6 +493,33 @@ void HammerSequence::measured(double now, double volt, double volt_std) {
         now, FrfCode::no_flute,
         format("the flute is too near to the sensor: %.2f V is the end of its range", search_->volt()));
   }
+  fluteFound(now);
+}
+
+void HammerSequence::calibrated(double now, double volt, double volt_std) {
+  if (!calibration_) {
+    calibration_.emplace(calibrationOptions());
+    calibration_->start(volt, volt_std);
+  } else {
+    calibration_->give(volt, volt_std);
+  }
+  switch (calibration_->state()) {
+    case SensorCalibration::State::jogging:
+      return jog(now, goal_.direction, calibration_->next(), parameters_.jog_feed);
+    case SensorCalibration::State::failed:
+      return abort(now, FrfCode::bad_data, "sensor calibration: " + calibration_->reason());
+    case SensorCalibration::State::done:
+      result_.sensitivity = calibration_->sensitivity();
+      result_.sensitivity_std = calibration_->sensitivityStd();
+      stage_ = Stage::strike;
+      say(format("sensor calibrated: %.3f +- %.3f um/V", 1e6 * result_.sensitivity,
+                 1e6 * result_.sensitivity_std),
+          0.7);
+      return strike(now);
+  }
+}
+
+void HammerSequence::fluteFound(double now) {
   const double half = roundTo(0.5 * station_.offset, parameters_.resolution);
   if (stage_ == Stage::search_low) {
     result_.flute_low = search_->angle();

@@ -59,41 +59,52 @@ FrictionLaw FrictionLaw::fromValues(const FrictionShape& shape, const double* va
   return law;
 }
 
-std::vector<FittedFriction> fitFrictionLaws(const std::vector<TimedAirCut>& air_cuts, double load_meter_gain,
-                                            double zero_below) {
-  std::vector<AirCut> plain;
-  std::vector<TimedAirCut> used;
-  std::set<double> speeds, times;
-  for (const TimedAirCut& a : air_cuts) {
-    plain.push_back(a.cut);
-    if (a.cut.speed < zero_below) continue;
-    used.push_back(a);
-    speeds.insert(a.cut.speed);
-    times.insert(a.start_time);
-  }
-  const Friction linear = fitFriction(plain, load_meter_gain, zero_below);
-  const bool weighted =
-      std::all_of(used.begin(), used.end(), [](const TimedAirCut& a) { return a.cut.voltage_std > 0.0; });
-  const double slowest = *speeds.begin(), fastest = *speeds.rbegin();
+namespace {
 
-  std::vector<FittedFriction> found;
-  for (const FrictionShape shape :
-       {FrictionShape{}, FrictionShape{true, false}, FrictionShape{false, true}, FrictionShape{true, true}}) {
-    const std::size_t unknowns = shape.unknowns();
-    if (used.size() <= unknowns && unknowns > 2) continue;
-    if (shape.stribeck && speeds.size() < 4) continue;
-    if (shape.warmup && times.size() < 4) continue;
+// Air cuts at or above the speed below which friction counts as zero.
+struct FrictionData {
+  std::vector<TimedAirCut> cuts;
+  double gain, zero_below;
+  bool weighted;
+  Friction linear;
+  std::set<double> speeds, times;
+
+  FrictionData(const std::vector<TimedAirCut>& air_cuts, double load_meter_gain, double zero_below_)
+      : gain(load_meter_gain), zero_below(zero_below_) {
+    std::vector<AirCut> plain;
+    for (const TimedAirCut& a : air_cuts) {
+      plain.push_back(a.cut);
+      if (a.cut.speed < zero_below) continue;
+      cuts.push_back(a);
+      speeds.insert(a.cut.speed);
+      times.insert(a.start_time);
+    }
+    linear = fitFriction(plain, gain, zero_below);
+    weighted =
+        std::all_of(cuts.begin(), cuts.end(), [](const TimedAirCut& a) { return a.cut.voltage_std > 0.0; });
+  }
+
+  bool carries(const FrictionShape& shape) const {
+    return (cuts.size() > shape.unknowns() || shape.unknowns() == 2) &&
+           (!shape.stribeck || speeds.size() >= 4) && (!shape.warmup || times.size() >= 4);
+  }
+
+  // [N m] of a law against one air cut.
+  double rest(const TimedAirCut& a, const FrictionLaw& law) const {
+    return a.cut.voltage / (gain * a.cut.speed) - law.torque(a.cut.speed, a.start_time);
+  }
+
+  // The exponentials have several hollows: started in each.
+  FitResult solve(const FrictionShape& shape) const {
+    const double slowest = *speeds.begin(), fastest = *speeds.rbegin();
     const auto residuals = [&](const std::vector<double>& value, double* out) {
       const FrictionLaw law = FrictionLaw::fromValues(shape, value.data(), zero_below);
-      for (const TimedAirCut& a : used) {
-        const double watt = load_meter_gain * a.cut.speed;
+      for (const TimedAirCut& a : cuts) {
         // Unweighted: torques count alike, as in the thesis.
-        const double sigma = weighted ? a.cut.voltage_std / watt : 1.0;
-        *out++ = (a.cut.voltage / watt - law.torque(a.cut.speed, a.start_time)) / sigma;
+        *out++ = rest(a, law) / (weighted ? a.cut.voltage_std / (gain * a.cut.speed) : 1.0);
       }
     };
     FitResult best;
-    // The exponentials have several hollows: start in each.
     for (const double share : {0.15, 0.4}) {
       for (const double constant : {150.0, 600.0, 2400.0}) {
         FrictionLaw start;
@@ -102,31 +113,45 @@ std::vector<FittedFriction> fitFrictionLaws(const std::vector<TimedAirCut>& air_
         start.stribeck_speed = std::clamp(share * fastest, 0.3 * slowest, fastest);
         start.warmup_time = constant;
         const FitResult tried =
-            fit(residuals, used.size(), FrictionLaw::parameters(shape, slowest, fastest, start));
+            fit(residuals, cuts.size(), FrictionLaw::parameters(shape, slowest, fastest, start));
         if (best.value.empty() || tried.squares < best.squares) best = tried;
         if (!shape.warmup) break;
       }
       if (!shape.stribeck) break;
     }
+    return best;
+  }
+
+  FittedFriction fitted(const FrictionShape& shape) const {
+    const FitResult best = solve(shape);
+    const std::size_t unknowns = shape.unknowns();
     FittedFriction f;
     f.shape = shape;
     f.law = FrictionLaw::fromValues(shape, best.value.data(), zero_below);
-    const double freedom = static_cast<double>(used.size()) - static_cast<double>(unknowns);
+    const double count = static_cast<double>(cuts.size()), freedom = count - static_cast<double>(unknowns);
     const double scatter = freedom > 0.0 ? best.squares / freedom : 0.0;
     const double variance = weighted ? std::max(1.0, scatter) : scatter;
     for (std::size_t i = 0; i < unknowns; ++i)
       f.std_dev.push_back(std::sqrt(variance * best.covarianceOf(i, i)));
     f.value = best.value;
     for (const double c : best.covariance) f.covariance.push_back(variance * c);
-    f.bic = informationCriterion(best.squares, used.size(), unknowns, weighted);
+    f.bic = informationCriterion(best.squares, cuts.size(), unknowns, weighted);
     double rest2 = 0.0;
-    for (const TimedAirCut& a : used) {
-      const double rest =
-          a.cut.voltage / (load_meter_gain * a.cut.speed) - f.law.torque(a.cut.speed, a.start_time);
-      rest2 += rest * rest / static_cast<double>(used.size());
-    }
+    for (const TimedAirCut& a : cuts) rest2 += std::pow(rest(a, f.law), 2) / count;
     f.rms = std::sqrt(rest2);
-    found.push_back(f);
+    return f;
+  }
+};
+
+}  // namespace
+
+std::vector<FittedFriction> fitFrictionLaws(const std::vector<TimedAirCut>& air_cuts, double load_meter_gain,
+                                            double zero_below) {
+  const FrictionData data(air_cuts, load_meter_gain, zero_below);
+  std::vector<FittedFriction> found;
+  for (const FrictionShape shape :
+       {FrictionShape{}, FrictionShape{true, false}, FrictionShape{false, true}, FrictionShape{true, true}}) {
+    if (data.carries(shape)) found.push_back(data.fitted(shape));
   }
   // A term whose place is searched for pays off by chance more often than the criterion allows for.
   const auto key = [](const FittedFriction& f) {

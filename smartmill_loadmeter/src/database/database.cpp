@@ -304,50 +304,88 @@ double distance(const CoefficientRecord& record, const CoefficientQuery& query, 
   return std::sqrt(sum);
 }
 
+// Newest records of a pair about the asked cutting speed; any speed where there is none near.
+std::vector<CoefficientRecord> CoefficientDatabase::near(const std::string& tool,
+                                                         const CoefficientQuery& query) const {
+  std::vector<CoefficientRecord> found;
+  const std::string select =
+      "SELECT " + columns() + " FROM coefficients" + impl_->where(tool, query.material);
+  const std::string newest = " ORDER BY stamp DESC LIMIT " + std::to_string(NEWEST);
+  const auto collect = [&](Statement& s) {
+    while (s.step()) found.push_back(recordOf(s));
+    s.reset();
+  };
+  if (query.cutting_speed > 0.0) {
+    const char* also = select.find(" WHERE") == std::string::npos ? " WHERE" : " AND";
+    Statement s(impl_->db, impl_->file, select + also + " speed_bucket = ?3" + newest);
+    std::vector<int> buckets{NO_SPEED};
+    for (int b = -BUCKETS; b <= BUCKETS; ++b) buckets.push_back(bucketOf(query.cutting_speed) + b);
+    for (const int bucket : buckets) {
+      Impl::bindPair(s, tool, query.material);
+      s.bind(3, bucket);
+      collect(s);
+    }
+  }
+  if (found.empty()) {
+    Statement any(impl_->db, impl_->file, select + newest);
+    Impl::bindPair(any, tool, query.material);
+    collect(any);
+  }
+  return found;
+}
+
+namespace {
+
+// One coefficient from all records, each widened by its distance. @return {value, standard deviation}; NaN:
+// none has it.
+std::array<double, 2> combine(const std::vector<CoefficientRecord>& near,
+                              const std::vector<double>& distances, double CuttingCoefficients::*coefficient,
+                              double growth) {
+  struct Term {
+    double value, variance, widened;
+  };
+  std::vector<Term> terms;
+  double weight = 0.0, sum = 0.0, fade = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < near.size(); ++i) {
+    const double v = near[i].set.value.*coefficient, s = near[i].set.std_dev.*coefficient;
+    if (!std::isfinite(v)) continue;
+    // A set without a standard deviation counts as known to the growth of one distance.
+    const double own = std::isfinite(s) ? s : growth * std::abs(v), widened = growth * distances[i] * v;
+    terms.push_back({v, own * own + widened * widened, widened});
+    const double variance = std::max(terms.back().variance, 1e-12 * v * v + 1e-300);
+    weight += 1.0 / variance;
+    sum += v / variance;
+    fade = std::min(fade, std::abs(widened));
+  }
+  if (!(weight > 0.0)) return {CoefficientRecord::UNKNOWN, CoefficientRecord::UNKNOWN};
+  const double value = sum / weight;
+  // Sets of one pair differ by more than their own noise when the process changes between them.
+  double scatter = 0.0;
+  for (const Term& t : terms) scatter += (t.value - value) * (t.value - value) / (t.variance + 1e-300);
+  const double freedom = static_cast<double>(terms.size()) - 1.0;
+  const double factor = freedom > 0.0 ? std::max(1.0, scatter / freedom) : 1.0;
+  // All of them share the distance: averaging does not take it away.
+  return {value, std::sqrt(factor / weight + fade * fade)};
+}
+
+}  // namespace
+
 std::optional<CoefficientEstimate> CoefficientDatabase::estimate(const CoefficientQuery& query,
                                                                  const DistanceScale& scale) const {
   CoefficientEstimate result;
-  std::vector<CoefficientRecord> near;
-  const auto collect = [&](const std::string& tool) {
-    std::string sql = "SELECT " + columns() + " FROM coefficients" + impl_->where(tool, query.material);
-    const bool speed = query.cutting_speed > 0.0;
-    if (speed)
-      sql += std::string(sql.find(" WHERE") == std::string::npos ? " WHERE" : " AND") + " speed_bucket = ?3";
-    sql += " ORDER BY stamp DESC LIMIT " + std::to_string(NEWEST);
-    Statement s(impl_->db, impl_->file, sql);
-    std::vector<int> buckets{NO_SPEED};
-    const int middle = bucketOf(query.cutting_speed);
-    for (int b = -BUCKETS; speed && b <= BUCKETS; ++b) buckets.push_back(middle + b);
-    for (const int bucket : buckets) {
-      Impl::bindPair(s, tool, query.material);
-      if (speed) s.bind(3, bucket);
-      while (s.step()) near.push_back(recordOf(s));
-      s.reset();
-      if (!speed) break;
-    }
-    // Nothing near: the newest, however far.
-    if (near.empty() && speed) {
-      Statement any(impl_->db, impl_->file,
-                    "SELECT " + columns() + " FROM coefficients" + impl_->where(tool, query.material) +
-                        " ORDER BY stamp DESC LIMIT " + std::to_string(NEWEST));
-      Impl::bindPair(any, tool, query.material);
-      while (any.step()) near.push_back(recordOf(any));
-    }
-  };
-  collect(query.tool);
-  if (near.empty() && !query.tool.empty()) {
-    collect("");
+  std::vector<CoefficientRecord> records = near(query.tool, query);
+  if (records.empty() && !query.tool.empty()) {
+    records = near("", query);
     result.other_tool = true;
   }
-  if (near.empty()) return std::nullopt;
-
-  result.set.value = result.set.std_dev = NOT_IDENTIFIED;
-  double nearest = std::numeric_limits<double>::infinity();
+  if (records.empty()) return std::nullopt;
+  result.nearest = std::numeric_limits<double>::infinity();
+  result.records = static_cast<int>(records.size());
   std::vector<double> distances;
-  for (const CoefficientRecord& r : near) {
+  for (const CoefficientRecord& r : records) {
     distances.push_back(distance(r, query, scale));
-    if (distances.back() < nearest) {
-      nearest = distances.back();
+    if (distances.back() < result.nearest) {
+      result.nearest = distances.back();
       result.set.tool = r.set.tool;
       result.set.material = r.set.material;
       result.set.source = r.set.source;
@@ -355,38 +393,11 @@ std::optional<CoefficientEstimate> CoefficientDatabase::estimate(const Coefficie
     result.set.stamp = std::max(result.set.stamp, r.set.stamp);
     result.set.tests += r.set.tests;
   }
-  result.nearest = nearest;
-  result.records = static_cast<int>(near.size());
+  result.set.value = result.set.std_dev = NOT_IDENTIFIED;
   for (const CuttingKey& k : cuttingKeys()) {
-    double weight = 0.0, sum = 0.0, fade = std::numeric_limits<double>::infinity();
-    for (std::size_t i = 0; i < near.size(); ++i) {
-      const double v = near[i].set.value.*k.coefficient, s = near[i].set.std_dev.*k.coefficient;
-      if (!std::isfinite(v)) continue;
-      // A set without a standard deviation counts as known to the growth of one distance.
-      const double own = std::isfinite(s) ? s : scale.growth * std::abs(v);
-      const double widened = scale.growth * distances[i] * v;
-      const double variance = std::max(own * own + widened * widened, 1e-12 * v * v + 1e-300);
-      weight += 1.0 / variance;
-      sum += v / variance;
-      fade = std::min(fade, std::abs(widened));
-    }
-    if (!(weight > 0.0)) continue;
-    const double value = sum / weight;
-    // Sets of one pair differ by more than their own noise when the process changes between them.
-    double scatter = 0.0;
-    int count = 0;
-    for (std::size_t i = 0; i < near.size(); ++i) {
-      const double v = near[i].set.value.*k.coefficient, s = near[i].set.std_dev.*k.coefficient;
-      if (!std::isfinite(v)) continue;
-      const double own = std::isfinite(s) ? s : scale.growth * std::abs(v);
-      const double widened = scale.growth * distances[i] * v;
-      scatter += (v - value) * (v - value) / (own * own + widened * widened + 1e-300);
-      ++count;
-    }
-    const double factor = count > 1 ? std::max(1.0, scatter / (count - 1)) : 1.0;
+    const auto [value, std_dev] = combine(records, distances, k.coefficient, scale.growth);
     result.set.value.*k.coefficient = value;
-    // All of them share the distance: averaging does not take it away.
-    result.set.std_dev.*k.coefficient = std::sqrt(factor / weight + fade * fade);
+    result.set.std_dev.*k.coefficient = std_dev;
   }
   return result;
 }

@@ -78,14 +78,18 @@ double RecursiveCoefficients::covariance() const {
   return -information_[1] / determinant(information_);
 }
 
-TestPlan planTests(const ToolGeometry& tool, const Spindle& spindle, const CuttingCoefficients& believed,
-                   const CandidateCuts& candidates, const CutLimits& limits, double voltage_std,
-                   double asked_ktc_std, double asked_kte_std, std::size_t most) {
-  struct Candidate {
-    PlannedCut cut;
-    Sensitivity s;
-    double variance;
-  };
+namespace {
+
+struct Candidate {
+  PlannedCut cut;
+  Sensitivity s;
+  double variance;  // [N2 m2] of its torque
+};
+
+// Cuts that keep the limits.
+std::vector<Candidate> allowedCuts(const ToolGeometry& tool, const Spindle& spindle,
+                                   const CuttingCoefficients& believed, const CandidateCuts& candidates,
+                                   const CutLimits& limits, double voltage_std) {
   std::vector<Candidate> allowed;
   for (const double speed : candidates.speeds) {
     for (const double feed : candidates.feeds) {
@@ -106,68 +110,112 @@ TestPlan planTests(const ToolGeometry& tool, const Spindle& spindle, const Cutti
       }
     }
   }
+  return allowed;
+}
+
+// Chooses among allowed cuts, one by one, then exchanged while that helps.
+class Planner {
+ public:
+  Planner(const std::vector<Candidate>& allowed, double asked_ktc_std, double asked_kte_std)
+      : allowed_(allowed), asked_ktc_(asked_ktc_std), asked_kte_(asked_kte_std) {}
+
+  // @return whether `most` cuts reach what is asked.
+  bool choose(std::size_t most) {
+    double reached = INFINITY;
+    while (chosen_.size() < most) {
+      chosen_.push_back(bestAddition());
+      reached = exchange();
+      if (chosen_.size() >= 3 && reached <= 1.0) break;
+    }
+    std::sort(chosen_.begin(), chosen_.end());
+    return reached <= 1.0;
+  }
+
+  const std::vector<std::size_t>& chosen() const { return chosen_; }
+  // Ktc, Kte.
+  std::array<double, 2> stds() const { return stdsOf(informationOf(chosen_)); }
+
+ private:
+  using List = std::vector<std::size_t>;
+
+  Information informationOf(const List& list) const {
+    Information i{0.0, 0.0, 0.0};
+    for (const std::size_t k : list) add(i, allowed_[k].s, allowed_[k].variance);
+    return i;
+  }
+
+  static std::array<double, 2> stdsOf(const Information& i) {
+    const double d = determinant(i);
+    if (!(d > 1e-12 * i[0] * i[2])) return {INFINITY, INFINITY};
+    return {std::sqrt(i[2] / d), std::sqrt(i[0] / d)};
+  }
+
+  // The worse of the two against what is asked; too few feeds are impossible.
+  double cost(const List& list) const {
+    std::set<double> own;
+    for (const std::size_t k : list) own.insert(allowed_[k].cut.engagement.feed_per_tooth);
+    const Information i = informationOf(list);
+    const std::array<double, 2> s = stdsOf(i);
+    const double missing = own.size() < std::min<std::size_t>(3, list.size()) ? 1e6 : 1.0;
+    // The sum breaks ties before both are finite.
+    if (!std::isfinite(s[0])) return 1e12 * missing / (1e-300 + i[0] * asked_ktc_ * asked_ktc_);
+    return missing * std::max(s[0] / asked_ktc_, s[1] / asked_kte_);
+  }
+
+  std::size_t bestAddition() const {
+    std::size_t pick = 0;
+    double best = INFINITY;
+    for (std::size_t k = 0; k < allowed_.size(); ++k) {
+      List other = chosen_;
+      other.push_back(k);
+      const double c = cost(other);
+      if (c < best) best = c, pick = k;
+    }
+    return pick;
+  }
+
+  // @return the cost reached.
+  double exchange() {
+    double best = cost(chosen_);
+    for (bool better = true; better;) {
+      better = false;
+      for (std::size_t at = 0; at < chosen_.size(); ++at) {
+        for (std::size_t k = 0; k < allowed_.size(); ++k) {
+          List other = chosen_;
+          other[at] = k;
+          const double c = cost(other);
+          if (c >= best * (1.0 - 1e-12)) continue;
+          best = c;
+          chosen_ = other;
+          better = true;
+        }
+      }
+    }
+    return best;
+  }
+
+  const std::vector<Candidate>& allowed_;
+  double asked_ktc_, asked_kte_;
+  List chosen_;
+};
+
+}  // namespace
+
+TestPlan planTests(const ToolGeometry& tool, const Spindle& spindle, const CuttingCoefficients& believed,
+                   const CandidateCuts& candidates, const CutLimits& limits, double voltage_std,
+                   double asked_ktc_std, double asked_kte_std, std::size_t most) {
+  const std::vector<Candidate> allowed =
+      allowedCuts(tool, spindle, believed, candidates, limits, voltage_std);
   std::set<double> feeds;
   for (const Candidate& c : allowed) feeds.insert(c.cut.engagement.feed_per_tooth);
   if (feeds.size() < 3) {
     throw Error("test plan: " + std::to_string(feeds.size()) +
                 " feeds keep the limits of torque, power and stability; three are due");
   }
-  std::vector<std::size_t> chosen;
-  const auto stds = [&](const std::vector<std::size_t>& list) {
-    Information i{0.0, 0.0, 0.0};
-    for (const std::size_t k : list) add(i, allowed[k].s, allowed[k].variance);
-    const double d = determinant(i);
-    if (!(d > 1e-12 * i[0] * i[2])) return std::array<double, 2>{INFINITY, INFINITY};
-    return std::array<double, 2>{std::sqrt(i[2] / d), std::sqrt(i[0] / d)};
-  };
-  // Cost: the worse of the two against what is asked; too few feeds are impossible.
-  const auto cost = [&](const std::vector<std::size_t>& list) {
-    std::set<double> own;
-    for (const std::size_t k : list) own.insert(allowed[k].cut.engagement.feed_per_tooth);
-    const auto s = stds(list);
-    const std::size_t due = std::min<std::size_t>(3, list.size());
-    const double missing = own.size() < due ? 1e6 : 1.0;
-    // The sum breaks ties before both are finite.
-    Information i{0.0, 0.0, 0.0};
-    for (const std::size_t k : list) add(i, allowed[k].s, allowed[k].variance);
-    if (!std::isfinite(s[0])) return 1e12 * missing / (1e-300 + i[0] * asked_ktc_std * asked_ktc_std);
-    return missing * std::max(s[0] / asked_ktc_std, s[1] / asked_kte_std);
-  };
-  const auto improve = [&] {
-    double best = cost(chosen);
-    for (bool better = true; better;) {
-      better = false;
-      for (std::size_t at = 0; at < chosen.size(); ++at) {
-        for (std::size_t k = 0; k < allowed.size(); ++k) {
-          std::vector<std::size_t> other = chosen;
-          other[at] = k;
-          const double c = cost(other);
-          if (c < best * (1.0 - 1e-12)) {
-            best = c;
-            chosen = other;
-            better = true;
-          }
-        }
-      }
-    }
-    return best;
-  };
-  double reached = INFINITY;
-  while (chosen.size() < most) {
-    std::size_t pick = 0;
-    double best = INFINITY;
-    for (std::size_t k = 0; k < allowed.size(); ++k) {
-      std::vector<std::size_t> other = chosen;
-      other.push_back(k);
-      const double c = cost(other);
-      if (c < best) best = c, pick = k;
-    }
-    chosen.push_back(pick);
-    reached = improve();
-    if (chosen.size() >= 3 && reached <= 1.0) break;
-  }
-  if (!(reached <= 1.0)) {
-    const auto s = stds(chosen);
+  Planner planner(allowed, asked_ktc_std, asked_kte_std);
+  const bool reached = planner.choose(most);
+  const std::array<double, 2> s = planner.stds();
+  if (!reached) {
     char text[200];
     std::snprintf(
         text, sizeof text,
@@ -176,9 +224,7 @@ TestPlan planTests(const ToolGeometry& tool, const Spindle& spindle, const Cutti
     throw Error(text);
   }
   TestPlan plan;
-  std::sort(chosen.begin(), chosen.end());
-  for (const std::size_t k : chosen) plan.cuts.push_back(allowed[k].cut);
-  const auto s = stds(chosen);
+  for (const std::size_t k : planner.chosen()) plan.cuts.push_back(allowed[k].cut);
   plan.ktc_std = s[0];
   plan.kte_std = s[1];
   return plan;

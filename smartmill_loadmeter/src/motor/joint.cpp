@@ -32,54 +32,75 @@ std::optional<Estimate> axisForce(const FeedDrive& drive, double current, double
   return force;
 }
 
-JointResult identifyJointly(const std::vector<JointReading>& readings) {
+namespace {
+
+// Torques and forces of axes in units of their standard deviations, rows x coefficients in units of UNIT.
+struct Observations {
   std::vector<Eigen::Matrix<double, 1, 6>> rows;
   std::vector<double> targets;
-  const auto observe = [&](const Eigen::Matrix<double, 1, 6>& row, const Estimate& e) {
+
+  void add(const Eigen::Matrix<double, 1, 6>& row, const Estimate& e) {
     if (!(e.std_dev > 0.0) || !std::isfinite(e.value)) {
       throw Error("joint coefficients: a reading without a standard deviation > 0");
     }
     rows.push_back(row / e.std_dev);
     targets.push_back(e.value / e.std_dev);
-  };
-  for (const JointReading& r : readings) {
+  }
+
+  void add(const JointReading& r) {
     const auto map = meanForceMatrix(r.tool, r.engagement);
     std::array<Eigen::Matrix<double, 1, 6>, 4> row;
     for (std::size_t f = 0; f < 4; ++f) {
       for (std::size_t c = 0; c < 6; ++c) row[f][static_cast<Eigen::Index>(c)] = map[f][c] * UNIT[c];
     }
     const double cosine = std::cos(r.heading), sine = std::sin(r.heading);
-    if (r.torque) observe(row[3], *r.torque);
-    if (r.axis_force[0]) observe(cosine * row[0] - sine * row[1], *r.axis_force[0]);
-    if (r.axis_force[1]) observe(sine * row[0] + cosine * row[1], *r.axis_force[1]);
-    if (r.axis_force[2]) observe(row[2], *r.axis_force[2]);
+    if (r.torque) add(row[3], *r.torque);
+    if (r.axis_force[0]) add(cosine * row[0] - sine * row[1], *r.axis_force[0]);
+    if (r.axis_force[1]) add(sine * row[0] + cosine * row[1], *r.axis_force[1]);
+    if (r.axis_force[2]) add(row[2], *r.axis_force[2]);
   }
-  if (rows.empty()) throw Error("joint coefficients: no torque and no moving axis in any reading");
-  Eigen::MatrixXd a(static_cast<Eigen::Index>(rows.size()), 6);
-  Eigen::VectorXd b(static_cast<Eigen::Index>(rows.size()));
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    a.row(static_cast<Eigen::Index>(i)) = rows[i];
-    b[static_cast<Eigen::Index>(i)] = targets[i];
+};
+
+struct JointFit {
+  Eigen::Matrix<double, 6, 1> found = Eigen::Matrix<double, 6, 1>::Zero();
+  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
+  Eigen::Matrix<double, 6, 1> unseen = found;  // squared share of each coefficient that no row tells
+};
+
+JointFit solve(const Observations& all) {
+  Eigen::MatrixXd a(static_cast<Eigen::Index>(all.rows.size()), 6);
+  Eigen::VectorXd b(static_cast<Eigen::Index>(all.rows.size()));
+  for (std::size_t i = 0; i < all.rows.size(); ++i) {
+    a.row(static_cast<Eigen::Index>(i)) = all.rows[i];
+    b[static_cast<Eigen::Index>(i)] = all.targets[i];
   }
   const Eigen::JacobiSVD<Eigen::MatrixXd> svd(a, Eigen::ComputeThinU | Eigen::ComputeFullV);
   const Eigen::VectorXd s = svd.singularValues();
   const Eigen::MatrixXd v = svd.matrixV();
-  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
-  Eigen::Matrix<double, 6, 1> found = Eigen::Matrix<double, 6, 1>::Zero(), unseen = found;
+  JointFit fit;
   Eigen::Index rank = 0;
   for (Eigen::Index k = 0; k < 6; ++k) {
     if (k < s.size() && s[k] > RANK * s[0]) {
-      found += v.col(k) * (svd.matrixU().col(k).dot(b) / s[k]);
-      covariance += v.col(k) * v.col(k).transpose() / (s[k] * s[k]);
+      fit.found += v.col(k) * (svd.matrixU().col(k).dot(b) / s[k]);
+      fit.covariance += v.col(k) * v.col(k).transpose() / (s[k] * s[k]);
       ++rank;
     } else {
-      unseen += v.col(k).cwiseAbs2();
+      fit.unseen += v.col(k).cwiseAbs2();
     }
   }
   // Scatter beyond the stated standard deviations widens them.
-  const double freedom = static_cast<double>(rows.size()) - static_cast<double>(rank);
-  if (freedom > 0.0) covariance *= std::max(1.0, (a * found - b).squaredNorm() / freedom);
+  const double freedom = static_cast<double>(all.rows.size()) - static_cast<double>(rank);
+  if (freedom > 0.0) fit.covariance *= std::max(1.0, (a * fit.found - b).squaredNorm() / freedom);
+  return fit;
+}
 
+}  // namespace
+
+JointResult identifyJointly(const std::vector<JointReading>& readings) {
+  Observations all;
+  for (const JointReading& r : readings) all.add(r);
+  if (all.rows.empty()) throw Error("joint coefficients: no torque and no moving axis in any reading");
+  const JointFit fit = solve(all);
   JointResult result;
   result.value = result.std_dev = NOT_IDENTIFIED;
   result.covariance.fill(NOT_IDENTIFIED.ktc);
@@ -88,20 +109,20 @@ JointResult identifyJointly(const std::vector<JointReading>& readings) {
   for (std::size_t c = 0; c < 6; ++c) {
     const Eigen::Index i = static_cast<Eigen::Index>(c);
     const CuttingKey& key = cuttingKeys()[c];
-    seen[c] = std::sqrt(unseen[i]) < LEAKAGE;
+    seen[c] = std::sqrt(fit.unseen[i]) < LEAKAGE;
     if (!seen[c]) {
       const std::string name = key.key;
       result.not_observable.push_back(name.substr(0, name.find('_')));
       continue;
     }
-    result.value.*key.coefficient = found[i] * UNIT[c];
-    result.std_dev.*key.coefficient = std::sqrt(covariance(i, i)) * UNIT[c];
+    result.value.*key.coefficient = fit.found[i] * UNIT[c];
+    result.std_dev.*key.coefficient = std::sqrt(fit.covariance(i, i)) * UNIT[c];
   }
   for (std::size_t i = 0; i < 6; ++i) {
     for (std::size_t j = 0; j < 6; ++j) {
       if (!seen[i] || !seen[j]) continue;
       result.covariance[6 * i + j] =
-          covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) * UNIT[i] * UNIT[j];
+          fit.covariance(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) * UNIT[i] * UNIT[j];
     }
   }
   if (result.not_observable.size() == 6) {

@@ -161,65 +161,88 @@ std::vector<MachineCurrents> readMachineCurrents(const std::string& file) {
   return all;
 }
 
-MotorCalibration calibrateMotors(const std::vector<StandardCut>& cuts,
-                                 const std::vector<MachineCurrents>& currents, double base_speed) {
+namespace {
+
+// Currents of the machine beside what the dynamometer recorded of the same cut.
+struct MatchedCuts {
+  std::array<std::vector<double>, 3> rises, forces;  // [A], [N]
+  std::vector<SpindleCut> spindle;
+};
+
+MatchedCuts match(const std::vector<StandardCut>& cuts, const std::vector<MachineCurrents>& currents,
+                  std::vector<std::string>* notes) {
   std::map<std::string, const StandardCut*> standard;
   for (const StandardCut& cut : cuts) {
     if (!standard.emplace(cut.name, &cut).second) throw Error("standard cut '" + cut.name + "' stands twice");
   }
-  MotorCalibration result;
-  std::array<std::vector<double>, 3> rises, forces;
-  std::vector<SpindleCut> spindle;
+  MatchedCuts matched;
   for (const MachineCurrents& c : currents) {
     const auto found = standard.find(c.name);
     if (found == standard.end()) {
-      result.notes.push_back("cut '" + c.name + "' is no standard cut, left out");
+      notes->push_back("cut '" + c.name + "' is no standard cut, left out");
       continue;
     }
     const StandardCut& cut = *found->second;
     for (std::size_t a = 0; a < 3; ++a) {
       if (!c.current[a] || !cut.force[a]) continue;
-      rises[a].push_back(*c.current[a] - *c.air[a]);
-      forces[a].push_back(*cut.force[a]);
+      matched.rises[a].push_back(*c.current[a] - *c.air[a]);
+      matched.forces[a].push_back(*cut.force[a]);
     }
     if (c.spindle_current && cut.torque) {
-      spindle.push_back(
+      matched.spindle.push_back(
           {units::rpmFromRadPerSec(c.spindle_speed), *c.spindle_current - *c.spindle_air, *cut.torque});
     }
   }
-  for (std::size_t a = 0; a < 3; ++a) {
-    const std::size_t n = rises[a].size();
-    if (n == 0) continue;
-    if (n < 3) {
-      result.notes.push_back(std::string("axis ") + AXES[a] + ": " + std::to_string(n) +
-                             " standard cuts in which it moves, three are due; not calibrated");
-      continue;
-    }
-    double rr = 0.0, rf = 0.0, left = 0.0;
-    for (std::size_t i = 0; i < n; ++i) rr += rises[a][i] * rises[a][i], rf += rises[a][i] * forces[a][i];
-    if (!(rr > 0.0)) throw Error(std::string("axis ") + AXES[a] + ": its current never differs from air");
-    DriveCalibration drive;
-    drive.cuts = static_cast<int>(n);
-    drive.newton_per_ampere.value = rf / rr;
-    for (std::size_t i = 0; i < n; ++i) {
-      left += std::pow(forces[a][i] - drive.newton_per_ampere.value * rises[a][i], 2);
-    }
-    drive.scatter = std::sqrt(left / static_cast<double>(n - 1));
-    drive.newton_per_ampere.std_dev = drive.scatter / std::sqrt(rr);
-    // No current beyond air means no force: a line that misses zero tells of other air cuts than these.
-    const Line line = fitLine(rises[a], forces[a]);
-    if (std::abs(line.level.value) > 4.0 * line.level.std_dev + 1e-9 * std::sqrt(rf)) {
-      char text[160];
-      std::snprintf(
-          text, sizeof text,
-          "axis %s: forces are %.1f +- %.1f N where the current is that of air: were the air currents "
-          "taken in the same motion?",
-          AXES[a], line.level.value, line.level.std_dev);
-      result.notes.push_back(text);
-    }
-    result.drive[a] = drive;
+  return matched;
+}
+
+// F = m (I - Ia) of one axis; empty with fewer than three cuts.
+std::optional<DriveCalibration> calibrateDrive(const char* axis, const std::vector<double>& rises,
+                                               const std::vector<double>& forces,
+                                               std::vector<std::string>* notes) {
+  const std::size_t n = rises.size();
+  if (n == 0) return std::nullopt;
+  if (n < 3) {
+    notes->push_back(std::string("axis ") + axis + ": " + std::to_string(n) +
+                     " standard cuts in which it moves, three are due; not calibrated");
+    return std::nullopt;
   }
-  if (!spindle.empty()) result.spindle = TorquePowerLaw(spindle, units::rpmFromRadPerSec(base_speed));
+  double rr = 0.0, rf = 0.0, left = 0.0;
+  for (std::size_t i = 0; i < n; ++i) rr += rises[i] * rises[i], rf += rises[i] * forces[i];
+  if (!(rr > 0.0)) throw Error(std::string("axis ") + axis + ": its current never differs from air");
+  DriveCalibration drive;
+  drive.cuts = static_cast<int>(n);
+  drive.newton_per_ampere.value = rf / rr;
+  for (std::size_t i = 0; i < n; ++i)
+    left += std::pow(forces[i] - drive.newton_per_ampere.value * rises[i], 2);
+  drive.scatter = std::sqrt(left / static_cast<double>(n - 1));
+  drive.newton_per_ampere.std_dev = drive.scatter / std::sqrt(rr);
+  // No current beyond air means no force: a line that misses zero tells of other air cuts than these.
+  const Line line = fitLine(rises, forces);
+  if (std::abs(line.level.value) > 4.0 * line.level.std_dev + 1e-9 * std::sqrt(rf)) {
+    char text[160];
+    std::snprintf(
+        text, sizeof text,
+        "axis %s: forces are %.1f +- %.1f N where the current is that of air: were the air currents "
+        "taken in the same motion?",
+        axis, line.level.value, line.level.std_dev);
+    notes->push_back(text);
+  }
+  return drive;
+}
+
+}  // namespace
+
+MotorCalibration calibrateMotors(const std::vector<StandardCut>& cuts,
+                                 const std::vector<MachineCurrents>& currents, double base_speed) {
+  MotorCalibration result;
+  const MatchedCuts matched = match(cuts, currents, &result.notes);
+  for (std::size_t a = 0; a < 3; ++a) {
+    result.drive[a] = calibrateDrive(AXES[a], matched.rises[a], matched.forces[a], &result.notes);
+  }
+  if (!matched.spindle.empty()) {
+    result.spindle = TorquePowerLaw(matched.spindle, units::rpmFromRadPerSec(base_speed));
+  }
   if (!result.drive[0] && !result.drive[1] && !result.drive[2] && !result.spindle) {
     throw Error("motor calibration: no axis and no spindle with three standard cuts and their currents");
   }

@@ -167,8 +167,13 @@ class HammerSequence {
   void average(double from);
   void send(Command command, Wait wait, double timeout);
 
+  FluteSearchOptions searchOptions() const;
+  SensorCalibrationOptions calibrationOptions() const;
+  void moveToStation(double now);
   void reached(double now);
   void measured(double now, double volt, double volt_std);
+  void calibrated(double now, double volt, double volt_std);
+  void fluteFound(double now);
   void search(double now);
   void recorded(double now, HitCollector::Record record);
   void badHit(double now, const std::string& why, bool bad_data);

@@ -109,6 +109,8 @@ class CoefficientDatabase {
   std::string contents() const;
 
  private:
+  std::vector<CoefficientRecord> near(const std::string& tool, const CoefficientQuery& query) const;
+
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
