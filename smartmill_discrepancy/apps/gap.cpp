@@ -45,7 +45,5 @@ int main(int argc, char** argv) {
   line.option("campaign", campaign, "campaign folder").required();
   line.option("--model", model, "machine model file (default: the campaign's)");
   line.option("--threads", threads, "computing threads").within(1, 64);
-  return runProgram(line, argc, argv, [&] {
-    run(campaign, model, threads);
-  });
+  return runProgram(line, argc, argv, [&] { run(campaign, model, threads); });
 }

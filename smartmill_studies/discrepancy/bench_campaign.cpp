@@ -9,7 +9,7 @@
 #include "smartmill_core/campaign/record.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/units.h"
-#include "smartmill_discrepancy/hypotheses/hypothesis.h"
+#include "smartmill_discrepancy/hypotheses/nominal_freedom.h"
 #include "smartmill_sim/twin/cutting_machine.h"
 #include "smartmill_sim/twin/twin.h"
 

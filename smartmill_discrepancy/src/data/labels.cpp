@@ -4,9 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <map>
 
-#include "smartmill_core/error.h"
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/units.h"
 #include "smartmill_discrepancy/gap/twin_runner.h"
@@ -36,6 +34,13 @@ std::string joined(const std::vector<std::string>& names) {
   return text;
 }
 
+sim::SimulationOptions quickly() {
+  sim::SimulationOptions options;
+  options.noise = false;
+  options.substeps = 2;
+  return options;
+}
+
 // Speed at which the recorded angle turns [rad/s].
 double turningSpeed(const TestData& t) {
   const std::vector<double>& angle = t.record.column("spindle_angle");
@@ -53,53 +58,54 @@ double forceSquares(const TestData& t, const Record& simulated) {
   return s;
 }
 
-}  // namespace
-
-Labels checkLabels(const Dataset& data, int threads) {
-  Labels labels;
-  std::vector<std::string>& wrong = labels.wrong;
-  char line[300];
+std::vector<std::string> wrongSpeeds(const Dataset& data) {
+  std::vector<std::string> wrong;
   for (const TestData& t : data.tests) {
     if (t.test.kind == TestKind::tap || t.phase_estimated || !t.record.has("spindle_angle")) continue;
     const double speed = turningSpeed(t);
-    if (std::abs(speed / t.test.spindle_speed - 1.0) > SPEED_TOLERANCE) {
-      std::snprintf(line, sizeof line,
-                    "test %s looks mislabelled: its spindle turns at %.0f rpm, spindle_speed_rpm says %.0f",
-                    t.test.name.c_str(), units::rpmFromRadPerSec(speed),
-                    units::rpmFromRadPerSec(t.test.spindle_speed));
-      wrong.push_back(line);
+    if (std::abs(speed / t.test.spindle_speed - 1.0) <= SPEED_TOLERANCE) continue;
+    char line[300];
+    std::snprintf(line, sizeof line,
+                  "test %s looks mislabelled: its spindle turns at %.0f rpm, spindle_speed_rpm says %.0f",
+                  t.test.name.c_str(), units::rpmFromRadPerSec(speed),
+                  units::rpmFromRadPerSec(t.test.spindle_speed));
+    wrong.push_back(line);
+  }
+  return wrong;
+}
+
+// A channel of all cuts beside what the model says.
+struct Comparison {
+  double product = 0.0, simulated = 0.0, measured = 0.0;  // sums over samples; the last two of squares
+};
+
+Comparison compare(const Dataset& data, const std::vector<Record>& own, const std::string& channel) {
+  Comparison c;
+  for (std::size_t i = 0; i < own.size(); ++i) {
+    const TestData& t = data.tests[i];
+    if (t.test.kind != TestKind::cut || !t.record.has(channel) || !own[i].has(channel)) continue;
+    const auto &m = t.record.column(channel), &s = own[i].column(channel);
+    for (std::size_t k = 0; k < m.size(); ++k) {
+      c.product += m[k] * s[k];
+      c.simulated += s[k] * s[k];
+      c.measured += m[k] * m[k];
     }
   }
-  if (!wrong.empty()) return labels;
+  return c;
+}
 
-  const std::size_t count = data.tests.size();
-  sim::SimulationOptions options;
-  options.noise = false;
-  options.substeps = 2;
-  std::vector<Record> own(count);
-  runParallel(count, threads, [&](std::size_t i) {
-    own[i] = sim::simulateTest(data.nominal, data.tests[i].test, data.tests[i].record, options);
-  });
-
-  // Units and signs: one factor over all records of a channel.
-  std::vector<std::string> turned;
+// Units and signs: one factor over all records of a channel.
+std::vector<std::string> wrongScales(const Dataset& data, const std::vector<Record>& own) {
+  std::vector<std::string> wrong, turned;
   for (const auto& [channel, noise] : data.noise) {
-    double product = 0.0, square = 0.0, measured = 0.0;
-    for (std::size_t i = 0; i < count; ++i) {
-      if (data.tests[i].test.kind != TestKind::cut || !data.tests[i].record.has(channel) ||
-          !own[i].has(channel))
-        continue;
-      const auto &m = data.tests[i].record.column(channel), &s = own[i].column(channel);
-      for (std::size_t k = 0; k < m.size(); ++k) {
-        product += m[k] * s[k];
-        square += s[k] * s[k];
-        measured += m[k] * m[k];
-      }
-    }
-    if (product < 0.0 && product * product > ALIKE * square * measured) turned.push_back(channel);
-    if (square <= noise * noise) continue;
-    const double factor = std::abs(product / square);
-    if (factor > UNIT || (factor < 1.0 / UNIT && product * product / square > 100.0 * noise * noise)) {
+    const Comparison c = compare(data, own, channel);
+    if (c.product < 0.0 && c.product * c.product > ALIKE * c.simulated * c.measured)
+      turned.push_back(channel);
+    if (c.simulated <= noise * noise) continue;
+    const double factor = std::abs(c.product / c.simulated);
+    if (factor > UNIT ||
+        (factor < 1.0 / UNIT && c.product * c.product / c.simulated > 100.0 * noise * noise)) {
+      char line[300];
       std::snprintf(line, sizeof line,
                     "%s reads %.3g times what the model says in every cut: its unit looks wrong",
                     channel.c_str(), factor);
@@ -109,67 +115,95 @@ Labels checkLabels(const Dataset& data, int threads) {
   if (!turned.empty())
     wrong.push_back(joined(turned) +
                     " read minus what the model says: sign or force_sensor.measures looks wrong");
-  if (!wrong.empty()) return labels;
+  return wrong;
+}
 
-  // Swapped channels.
-  std::map<std::pair<std::size_t, std::size_t>, std::vector<std::string>> swapped;
-  std::vector<bool> doubted(count, false);
-  for (std::size_t i = 0; i < count; ++i) {
-    const TestData& t = data.tests[i];
-    if (t.test.kind == TestKind::air) continue;
-    for (std::size_t a = 0; a < 3; ++a) {
-      for (std::size_t b = a + 1; b < 3; ++b) {
-        const std::string &x = FORCES[a], &y = FORCES[b];
-        if (!t.record.has(x) || !t.record.has(y)) continue;
-        const double as_is = squaresBetween(t.record.column(x), own[i].column(x)) +
-                             squaresBetween(t.record.column(y), own[i].column(y));
-        const double swap = squaresBetween(t.record.column(x), own[i].column(y)) +
-                            squaresBetween(t.record.column(y), own[i].column(x));
-        const double floor = static_cast<double>(t.record.size()) *
-                             (std::pow(data.noise.at(x), 2) + std::pow(data.noise.at(y), 2));
-        if (as_is > FAR * floor && swap - floor < SWAPPED * (as_is - floor)) {
-          swapped[{a, b}].push_back(t.test.name);
-          doubted[i] = true;
-        }
+// Whether two force channels of a test fit the model far better swapped.
+bool looksSwapped(const Dataset& data, const TestData& t, const Record& own, const std::string& x,
+                  const std::string& y) {
+  if (!t.record.has(x) || !t.record.has(y)) return false;
+  const double as_is =
+      squaresBetween(t.record.column(x), own.column(x)) + squaresBetween(t.record.column(y), own.column(y));
+  const double swap =
+      squaresBetween(t.record.column(x), own.column(y)) + squaresBetween(t.record.column(y), own.column(x));
+  const double floor =
+      static_cast<double>(t.record.size()) * (std::pow(data.noise.at(x), 2) + std::pow(data.noise.at(y), 2));
+  return as_is > FAR * floor && swap - floor < SWAPPED * (as_is - floor);
+}
+
+std::vector<std::string> swappedChannels(const Dataset& data, const std::vector<Record>& own) {
+  std::vector<std::string> wrong;
+  for (std::size_t a = 0; a < 3; ++a) {
+    for (std::size_t b = a + 1; b < 3; ++b) {
+      std::vector<std::string> tests;
+      for (std::size_t i = 0; i < own.size(); ++i) {
+        const TestData& t = data.tests[i];
+        if (t.test.kind != TestKind::air && looksSwapped(data, t, own[i], FORCES[a], FORCES[b]))
+          tests.push_back(t.test.name);
       }
+      if (!tests.empty())
+        wrong.push_back(FORCES[a] + " and " + FORCES[b] + " look swapped in tests " + joined(tests));
     }
   }
-  for (const auto& [pair, tests] : swapped)
-    wrong.push_back(FORCES[pair.first] + " and " + FORCES[pair.second] + " look swapped in tests " +
-                    joined(tests));
-  if (!wrong.empty()) return labels;
+  return wrong;
+}
 
-  // A cut that another cut's label fits far better than its own, while the others fit theirs.
-  std::vector<double> gaps(count, 0.0), all;
-  for (std::size_t i = 0; i < count; ++i) {
+// The cut whose label fits a cut's record best.
+struct Foreign {
+  double gap = 0.0, theirs = 0.0;  // [N2] of the record with the label, and of the label's own record
+  std::string name;
+};
+
+Foreign bestForeignLabel(const Dataset& data, const std::vector<double>& gaps, std::size_t of) {
+  const TestData& t = data.tests[of];
+  Foreign best{gaps[of], 0.0, {}};
+  for (std::size_t k = 0; k < gaps.size(); ++k) {
+    const TestData& other = data.tests[k];
+    if (other.test.kind != TestKind::cut || other.test.name == t.test.name) continue;
+    CampaignTest test = t.test;
+    test.engagement = other.test.engagement;
+    const double gap = forceSquares(t, sim::simulateTest(data.nominal, test, t.record, quickly())) /
+                       static_cast<double>(t.record.size());
+    if (gap < best.gap) best = {gap, gaps[k], other.test.name};
+  }
+  return best;
+}
+
+// Cuts that another cut's label fits far better than their own, while the others fit theirs.
+std::vector<std::string> foreignLabels(const Dataset& data, const std::vector<Record>& own) {
+  std::vector<double> gaps(own.size(), 0.0), all;
+  for (std::size_t i = 0; i < own.size(); ++i) {
     if (data.tests[i].test.kind != TestKind::cut) continue;
     gaps[i] = forceSquares(data.tests[i], own[i]) / static_cast<double>(data.tests[i].record.size());
     all.push_back(gaps[i]);
   }
-  if (all.size() < 4) return labels;
+  if (all.size() < 4) return {};
   const double usual = median(all);
-  for (std::size_t i = 0; i < count; ++i) {
+  std::vector<std::string> doubtful;
+  for (std::size_t i = 0; i < own.size(); ++i) {
     const TestData& t = data.tests[i];
     if (t.test.kind != TestKind::cut || gaps[i] < 3.0 * usual || gaps[i] < FAR) continue;
-    double best = gaps[i], theirs = 0.0;
-    std::string name;
-    for (std::size_t k = 0; k < count; ++k) {
-      const TestData& other = data.tests[k];
-      if (other.test.kind != TestKind::cut || other.test.name == t.test.name) continue;
-      CampaignTest test = t.test;
-      test.engagement = other.test.engagement;
-      const double gap = forceSquares(t, sim::simulateTest(data.nominal, test, t.record, options)) /
-                         static_cast<double>(t.record.size());
-      if (gap < best) {
-        best = gap;
-        theirs = gaps[k];
-        name = other.test.name;
-      }
-    }
-    if (best < RELABELLED * gaps[i] && best < AS_WELL * std::max(theirs, 6.0))
-      labels.doubtful.push_back("test " + t.test.name + " looks mislabelled: feed, depth or immersion of " +
-                                name + " fit its record");
+    const Foreign best = bestForeignLabel(data, gaps, i);
+    if (best.gap < RELABELLED * gaps[i] && best.gap < AS_WELL * std::max(best.theirs, 6.0))
+      doubtful.push_back("test " + t.test.name + " looks mislabelled: feed, depth or immersion of " +
+                         best.name + " fit its record");
   }
+  return doubtful;
+}
+
+}  // namespace
+
+Labels checkLabels(const Dataset& data, int threads) {
+  Labels labels;
+  labels.wrong = wrongSpeeds(data);
+  if (!labels.wrong.empty()) return labels;
+  std::vector<Record> own(data.tests.size());
+  runParallel(own.size(), threads, [&](std::size_t i) {
+    own[i] = sim::simulateTest(data.nominal, data.tests[i].test, data.tests[i].record, quickly());
+  });
+  labels.wrong = wrongScales(data, own);
+  if (labels.wrong.empty()) labels.wrong = swappedChannels(data, own);
+  if (labels.wrong.empty()) labels.doubtful = foreignLabels(data, own);
   return labels;
 }
 

@@ -5,16 +5,19 @@
 #include <cmath>
 #include <complex>
 #include <numeric>
+#include <optional>
 #include <set>
-#include <tuple>
+#include <string>
+#include <utility>
 
 #include "smartmill_core/signal/fourier.h"
 #include "smartmill_core/units.h"
+#include "smartmill_discrepancy/gap/dependence.h"
+#include "smartmill_discrepancy/gap/significance.h"
 
 namespace smartmill::discrepancy {
 namespace {
 
-constexpr double LEAST_P = 1e-300;
 constexpr std::size_t ORDERS = 36;
 constexpr std::size_t HALF_ORDERS = 4;  // 0.5, 1.5, ..
 constexpr std::size_t PADDED = 1 << 16;
@@ -24,7 +27,6 @@ using Turn = std::complex<double>;
 // The part of a block in which one kind of thing goes on: the cut of a cut, all of the rest.
 struct Stretch {
   const TestData* test;
-  std::size_t block;
   double noise;
   std::vector<double> values;
   std::vector<double> angle;  // unwrapped; empty without spindle angle
@@ -140,46 +142,29 @@ std::pair<double, double> settlingOf(double time_constant, const Stretch& s) {
   return {xy / xx, xy * xy / xx};
 }
 
-std::vector<Candidate> candidatesOf(const std::vector<Stretch>& stretches) {
-  std::vector<Candidate> all;
-  Candidate level{Kind::level, 0.0, 0.0, 0, 1.0}, trend{Kind::trend, 0.0, 0.0, 0, 1.0};
-  std::vector<Candidate> orders;
-  std::vector<Candidate> halves, settling;
-  for (std::size_t k = 0; k < HALF_ORDERS; ++k)
-    halves.push_back({Kind::order, static_cast<double>(k) + 0.5, 0.0, 0, 1.0});
-  for (const double t : {0.02, 0.035, 0.06, 0.1}) settling.push_back({Kind::settling, t, 0.0, 0, 2.0});
-  for (std::size_t k = 1; k <= ORDERS; ++k)
-    orders.push_back({Kind::order, static_cast<double>(k), 0.0, 0, 1.0});
+void countOrders(const Stretch& s, std::vector<Candidate>& halves, std::vector<Candidate>& orders) {
+  const std::array<Line, ORDERS> lines = orderLines(s.values, s.turns);
+  for (Candidate& o : halves) {
+    o.squares += lineOf(s.values, [&](std::size_t i) { return o.place * s.angle[i]; }).squares;
+    o.freedom += 2;
+  }
+  for (std::size_t k = 0; k < ORDERS; ++k) {
+    Candidate& o = orders[k];
+    if (o.place * s.test->test.spindle_speed / units::TWO_PI > 0.45 * s.rate) continue;
+    o.squares += lines[k].squares;
+    o.freedom += 2;
+  }
+}
+
+// The strongest line at a fixed frequency over all stretches of the highest rate; no freedom: there is none.
+Candidate strongestFrequency(const std::vector<Stretch>& stretches) {
   double rate = 0.0;
-  std::size_t longest = 0;
-  std::vector<double> sum(PADDED / 2 + 1, 0.0);
+  std::size_t longest = 0, used = 0;
   for (const Stretch& s : stretches) {
-    const double n = static_cast<double>(s.values.size()), m = meanOf(s.values);
-    level.squares += n * m * m;
-    ++level.freedom;
-    trend.squares += trendOf(s.values).second;
-    ++trend.freedom;
-    for (Candidate& c : settling) {
-      c.squares += settlingOf(c.place, s).second;
-      ++c.freedom;
-    }
     rate = std::max(rate, s.rate);
     longest = std::max(longest, s.values.size());
-    if (!s.angle.empty()) {
-      const std::array<Line, ORDERS> lines = orderLines(s.values, s.turns);
-      for (Candidate& o : halves) {
-        o.squares += lineOf(s.values, [&](std::size_t i) { return o.place * s.angle[i]; }).squares;
-        o.freedom += 2;
-      }
-      for (std::size_t k = 0; k < ORDERS; ++k) {
-        Candidate& o = orders[k];
-        if (o.place * s.test->test.spindle_speed / units::TWO_PI > 0.45 * s.rate) continue;
-        o.squares += lines[k].squares;
-        o.freedom += 2;
-      }
-    }
   }
-  std::size_t used = 0;
+  std::vector<double> sum(PADDED / 2 + 1, 0.0);
   for (const Stretch& s : stretches) {
     if (s.rate != rate || s.values.size() > PADDED) continue;
     std::vector<double> padded(s.values);
@@ -191,245 +176,181 @@ std::vector<Candidate> candidatesOf(const std::vector<Stretch>& stretches) {
       sum[k] += 2.0 * std::norm(spectrum[k]) / static_cast<double>(s.values.size());
     ++used;
   }
-  all.push_back(level);
-  all.push_back(trend);
+  if (used == 0) return {};
+  // Below one cycle a record a line is a trend.
+  const auto first = static_cast<std::size_t>(PADDED / longest + 1);
+  const auto top = static_cast<std::size_t>(
+      std::max_element(sum.begin() + static_cast<std::ptrdiff_t>(first), sum.end() - 1) - sum.begin());
+  double place = static_cast<double>(top);
+  const double a = sum[top - 1], b = sum[top], c = sum[top + 1];
+  if (2.0 * b - a - c > 0.0) place += 0.5 * (c - a) / (2.0 * b - a - c);
+  return {Kind::frequency, place * rate / PADDED, sum[top], 2 * used, 0.5 * static_cast<double>(longest)};
+}
+
+std::vector<Candidate> candidatesOf(const std::vector<Stretch>& stretches) {
+  Candidate level{Kind::level, 0.0, 0.0, 0, 1.0}, trend{Kind::trend, 0.0, 0.0, 0, 1.0};
+  std::vector<Candidate> orders, halves, settling;
+  for (std::size_t k = 0; k < HALF_ORDERS; ++k)
+    halves.push_back({Kind::order, static_cast<double>(k) + 0.5, 0.0, 0, 1.0});
+  for (const double t : {0.02, 0.035, 0.06, 0.1}) settling.push_back({Kind::settling, t, 0.0, 0, 2.0});
+  for (std::size_t k = 1; k <= ORDERS; ++k)
+    orders.push_back({Kind::order, static_cast<double>(k), 0.0, 0, 1.0});
+  for (const Stretch& s : stretches) {
+    const double n = static_cast<double>(s.values.size()), m = meanOf(s.values);
+    level.squares += n * m * m;
+    ++level.freedom;
+    trend.squares += trendOf(s.values).second;
+    ++trend.freedom;
+    for (Candidate& c : settling) {
+      c.squares += settlingOf(c.place, s).second;
+      ++c.freedom;
+    }
+    if (!s.angle.empty()) countOrders(s, halves, orders);
+  }
+  std::vector<Candidate> all{level, trend};
   all.insert(all.end(), settling.begin(), settling.end());
   all.insert(all.end(), halves.begin(), halves.end());
   all.insert(all.end(), orders.begin(), orders.end());
-  if (used > 0) {
-    // Below one cycle a record a line is a trend.
-    const auto first = static_cast<std::size_t>(PADDED / longest + 1);
-    const auto top = static_cast<std::size_t>(
-        std::max_element(sum.begin() + static_cast<std::ptrdiff_t>(first), sum.end() - 1) - sum.begin());
-    double place = static_cast<double>(top);
-    const double a = sum[top - 1], b = sum[top], c = sum[top + 1];
-    if (2.0 * b - a - c > 0.0) place += 0.5 * (c - a) / (2.0 * b - a - c);
-    all.push_back(
-        {Kind::frequency, place * rate / PADDED, sum[top], 2 * used, 0.5 * static_cast<double>(longest)});
-  }
+  const Candidate frequency = strongestFrequency(stretches);
+  if (frequency.freedom > 0) all.push_back(frequency);
   return all;
 }
 
-// Rank of association of the line's amplitudes with the tests' conditions.
-std::vector<std::string> dependence(const std::vector<const TestData*>& tests,
-                                    const std::vector<double>& amplitudes,
-                                    const std::vector<double>& std_devs) {
-  std::vector<std::string> names;
-  std::vector<double> cut, rest;
-  std::vector<std::size_t> cuts;
-  for (std::size_t t = 0; t < tests.size(); ++t) {
-    (tests[t]->test.kind == TestKind::cut ? cut : rest).push_back(amplitudes[t]);
-    if (tests[t]->test.kind == TestKind::cut) cuts.push_back(t);
+// What a candidate was in one stretch.
+struct Taken {
+  double amplitude = 0.0, squares = 0.0, std_dev = 1.0;
+};
+
+// Takes a candidate's part out of a stretch; nothing where it cannot be there.
+std::optional<Taken> takeAway(const Candidate& c, Stretch& s) {
+  const double n = static_cast<double>(s.values.size());
+  if (c.kind == Kind::level) {
+    const double mean = meanOf(s.values);
+    for (double& v : s.values) v -= mean;
+    return Taken{mean, n * mean * mean, 1.0 / std::sqrt(n)};
   }
-  const auto rmsOf = [](const std::vector<double>& v) {
-    double s = 0.0;
-    for (const double x : v) s += x * x;
-    return v.empty() ? 0.0 : std::sqrt(s / static_cast<double>(v.size()));
+  if (c.kind == Kind::trend) {
+    const auto [slope, squares] = trendOf(s.values);
+    for (std::size_t i = 0; i < s.values.size(); ++i)
+      s.values[i] -= slope * (static_cast<double>(i) - 0.5 * (n - 1.0));
+    return Taken{slope * s.rate, squares, s.rate * std::sqrt(12.0 / (n * n * n))};
+  }
+  if (c.kind == Kind::settling) {
+    const auto [size, squares] = settlingOf(c.place, s);
+    for (std::size_t i = 0; i < s.values.size(); ++i) s.values[i] -= size * settled(c.place, s, i);
+    return Taken{size, squares, std::sqrt(2.0 / (s.rate * c.place))};
+  }
+  if (c.kind == Kind::order && s.angle.empty()) return {};
+  const auto phase = [&](std::size_t i) {
+    return c.kind == Kind::order ? c.place * s.angle[i]
+                                 : units::TWO_PI * c.place * static_cast<double>(i) / s.rate;
   };
-  if (!cut.empty() && !rest.empty() && rmsOf(rest) < 0.3 * rmsOf(cut)) names.push_back("cutting");
-  struct Condition {
-    const char* name;
-    std::vector<double> values;
-  };
-  const bool among_cuts = cuts.size() >= 4;
-  std::vector<std::size_t> chosen = cuts;
-  if (!among_cuts) {
-    chosen.clear();
-    for (std::size_t t = 0; t < tests.size(); ++t) {
-      if (tests[t]->test.kind != TestKind::tap) chosen.push_back(t);
-    }
-  }
-  std::vector<Condition> conditions{{"speed", {}}, {"time", {}}};
-  if (among_cuts)
-    conditions = {{"speed", {}}, {"chip_load", {}}, {"depth", {}}, {"immersion", {}}, {"time", {}}};
-  for (const std::size_t t : chosen) {
-    const CampaignTest& test = tests[t]->test;
-    for (Condition& c : conditions) {
-      const std::string name = c.name;
-      c.values.push_back(name == "speed"       ? test.spindle_speed
-                         : name == "chip_load" ? test.engagement->feed_per_tooth
-                         : name == "depth"     ? test.engagement->axial_depth
-                         : name == "immersion"
-                             ? test.engagement->exit - test.engagement->entry + test.engagement->entry / 7.0
-                             : test.start_time.value_or(0.0));
-    }
-  }
-  const std::size_t n = chosen.size();
-  if (n < 4) return names;
-  // Spread beyond the amplitudes' own uncertainty?
-  double weighted = 0.0, weights = 0.0;
-  for (const std::size_t t : chosen) {
-    weighted += amplitudes[t] / (std_devs[t] * std_devs[t]);
-    weights += 1.0 / (std_devs[t] * std_devs[t]);
-  }
-  double spread = 0.0;
-  for (const std::size_t t : chosen) {
-    const double z = (amplitudes[t] - weighted / weights) / std_devs[t];
-    spread += z * z;
-  }
-  if (chiSquareTail(spread, n - 1 + (n - 1) % 2) > 1e-4) return names;
-  std::vector<std::pair<double, std::string>> strengths;
-  for (const Condition& c : conditions) {
-    double mx = meanOf(c.values), my = 0.0;
-    for (const std::size_t t : chosen) my += amplitudes[t] / static_cast<double>(n);
-    double xx = 0.0, yy = 0.0, xy = 0.0;
-    for (std::size_t k = 0; k < n; ++k) {
-      const double x = c.values[k] - mx, y = amplitudes[chosen[k]] - my;
-      xx += x * x;
-      yy += y * y;
-      xy += x * y;
-    }
-    if (xx <= 0.0 || yy <= 0.0) continue;
-    const double r = std::abs(xy) / std::sqrt(xx * yy);
-    // Fisher's z against chance among n tests and as many looks as there are conditions.
-    const double z =
-        std::atanh(std::min(r, 0.999999)) * std::sqrt(std::max(static_cast<double>(n) - 3.0, 1.0));
-    if (std::erfc(z / std::sqrt(2.0)) * static_cast<double>(conditions.size()) < 0.05)
-      strengths.emplace_back(-r, c.name);
-  }
-  std::sort(strengths.begin(), strengths.end());
-  for (const auto& s : strengths) names.push_back(s.second);
-  return names;
+  const Line line = lineOf(s.values, phase);
+  subtract(s.values, phase, line);
+  return Taken{std::hypot(line.sine, line.cosine), line.squares, std::sqrt(2.0 / n)};
 }
 
-}  // namespace
-
-double chiSquareTail(double value, std::size_t freedom) {
-  // exp(-x/2) sum (x/2)^k / k!, in logarithms.
-  const double half = 0.5 * value;
-  if (half <= 0.0) return 1.0;
-  double largest = -1e308, sum = 0.0;
-  std::vector<double> logs;
-  for (std::size_t k = 0; k < std::max<std::size_t>(freedom / 2, 1); ++k) {
-    logs.push_back(static_cast<double>(k) * std::log(half) - std::lgamma(static_cast<double>(k) + 1.0) -
-                   half);
-    largest = std::max(largest, logs.back());
+// Domain and location as reports name them.
+Finding named(const Candidate& c, const std::string& channel) {
+  Finding f;
+  f.channel = channel;
+  switch (c.kind) {
+    case Kind::level:
+      f.domain = "level";
+      break;
+    case Kind::trend:
+      f.domain = "time";
+      f.location["time_s"] = 0.0;
+      break;
+    case Kind::settling:
+      f.domain = "time";
+      f.location["time_s"] = c.place;
+      break;
+    case Kind::order:
+      f.domain = "order";
+      f.location["order"] = c.place;
+      break;
+    case Kind::frequency:
+      f.domain = "frequency";
+      f.location["frequency_hz"] = c.place;
   }
-  for (const double l : logs) sum += std::exp(l - largest);
-  return std::clamp(std::exp(largest + std::log(sum)), LEAST_P, 1.0);
+  f.squares = c.squares;
+  return f;
 }
 
-std::vector<double> falseDiscoveryRates(const std::vector<double>& p_values) {
-  const std::size_t n = p_values.size();
-  std::vector<std::size_t> order(n);
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::sort(order.begin(), order.end(),
-            [&](std::size_t a, std::size_t b) { return p_values[a] < p_values[b]; });
-  std::vector<double> rates(n);
-  double least = 1.0;
-  for (std::size_t k = n; k-- > 0;) {
-    least = std::min(least, p_values[order[k]] * static_cast<double>(n) / static_cast<double>(k + 1));
-    rates[order[k]] = std::max(least, LEAST_P);
+// Takes a candidate out of every stretch and tells of it.
+Finding take(const Candidate& c, const std::string& channel, std::vector<Stretch>& stretches) {
+  Finding f = named(c, channel);
+  std::vector<Shown> shown;
+  for (Stretch& s : stretches) {
+    const std::optional<Taken> taken = takeAway(c, s);
+    if (!taken) continue;
+    shown.push_back({s.test, taken->amplitude, taken->std_dev});
+    if (chiSquareTail(taken->squares, 2) < 1e-4) f.tests.push_back(s.test->test.name);
+    f.amplitude = std::max(f.amplitude, std::abs(taken->amplitude) * s.noise);
   }
-  return rates;
+  f.depends_on = dependence(shown);
+  return f;
 }
 
-std::vector<Finding> findStructure(const TwinRunner& runner, const std::vector<double>& residual,
-                                   const StructureOptions& options) {
-  std::set<std::string> channels;
-  double all_excess = options.squares_of_gap;
-  if (all_excess <= 0.0) {
-    double all_squares = 0.0;
-    for (const double r : residual) all_squares += r * r;
-    all_excess = std::max(all_squares - static_cast<double>(residual.size()), 1.0);
-  }
-  for (const Block& b : runner.blocks()) channels.insert(b.channel);
-  std::vector<Finding> found;
-  std::vector<double> looks;  // p-values of every look that found nothing, for the control of false discovery
-  for (const std::string& channel : channels) {
-    std::vector<Stretch> stretches;
-    double samples = 0.0, floor = 0.0;
-    for (std::size_t b = 0; b < runner.blocks().size(); ++b) {
-      const Block& block = runner.blocks()[b];
-      if (block.channel != channel) continue;
-      const TestData& test = runner.data().tests[block.test];
-      const std::size_t from = test.test.kind == TestKind::cut ? test.first_cut : 0;
-      if (block.size < from + 32) continue;
-      Stretch s{&test, b, block.noise, {}, {}, {}, test.test.sample_rate};
-      s.values.assign(residual.begin() + static_cast<std::ptrdiff_t>(block.offset + from),
-                      residual.begin() + static_cast<std::ptrdiff_t>(block.offset + block.size));
-      if (test.test.kind != TestKind::tap && test.record.has("spindle_angle"))
-        s.angle = unwrapped(test.record.column("spindle_angle"), from);
-      for (const double a : s.angle) s.turns.push_back(std::polar(1.0, a));
-      samples += static_cast<double>(s.values.size());
-      for (std::size_t i = block.offset; i < block.offset + block.size; ++i) {
-        const double trust = options.twin_accuracy * runner.measured()[i];
-        floor += trust * trust;
-      }
-      stretches.push_back(std::move(s));
+// One channel of a campaign, to be taken apart.
+struct Channel {
+  std::vector<Stretch> stretches;
+  double samples = 0.0;
+  double floor = 0.0;  // squares by which two faithful twins may differ
+};
+
+Channel channelOf(const TwinRunner& runner, const std::vector<double>& residual, const std::string& name,
+                  double twin_accuracy) {
+  constexpr std::size_t LEAST_SAMPLES = 32;
+  Channel channel;
+  for (const Block& block : runner.blocks()) {
+    if (block.channel != name) continue;
+    const TestData& test = runner.data().tests[block.test];
+    const std::size_t from = test.test.kind == TestKind::cut ? test.first_cut : 0;
+    if (block.size < from + LEAST_SAMPLES) continue;
+    Stretch s{&test, block.noise, {}, {}, {}, test.test.sample_rate};
+    s.values.assign(residual.begin() + static_cast<std::ptrdiff_t>(block.offset + from),
+                    residual.begin() + static_cast<std::ptrdiff_t>(block.offset + block.size));
+    if (test.test.kind != TestKind::tap && test.record.has("spindle_angle"))
+      s.angle = unwrapped(test.record.column("spindle_angle"), from);
+    for (const double a : s.angle) s.turns.push_back(std::polar(1.0, a));
+    channel.samples += static_cast<double>(s.values.size());
+    for (std::size_t i = block.offset; i < block.offset + block.size; ++i) {
+      const double trust = twin_accuracy * runner.measured()[i];
+      channel.floor += trust * trust;
     }
-    if (stretches.empty()) continue;
-    for (int step = 0; step < options.most; ++step) {
-      const std::vector<Candidate> all = candidatesOf(stretches);
-      std::vector<double> p_values;
-      for (const Candidate& c : all)
-        p_values.push_back(
-            std::min(1.0, c.freedom ? c.looks * chiSquareTail(c.squares, c.freedom + c.freedom % 2) : 1.0));
-      const Candidate* best = nullptr;
-      for (const Candidate& c : all) {
-        if (c.freedom > 0 && (!best || excess(c) > excess(*best))) best = &c;
-      }
-      const double p = p_values[static_cast<std::size_t>(best - all.data())];
-      if (p > options.p_value || best->squares < options.least_share * samples + floor) {
-        looks.insert(looks.end(), p_values.begin(), p_values.end());
-        break;
-      }
-      Finding f;
-      f.channel = channel;
-      f.domain = best->kind == Kind::level                                   ? "level"
-                 : best->kind == Kind::trend || best->kind == Kind::settling ? "time"
-                 : best->kind == Kind::order                                 ? "order"
-                                                                             : "frequency";
-      if (best->kind == Kind::order) f.location["order"] = best->place;
-      if (best->kind == Kind::frequency) f.location["frequency_hz"] = best->place;
-      if (best->kind == Kind::trend) f.location["time_s"] = 0.0;
-      if (best->kind == Kind::settling) f.location["time_s"] = best->place;
-      f.p_value = p;
-      f.share_of_gap = (best->squares - static_cast<double>(best->freedom)) / all_excess;
-      f.squares = best->squares;
-      std::vector<const TestData*> tests;
-      std::vector<double> amplitudes, std_devs;
-      for (Stretch& s : stretches) {
-        const double n = static_cast<double>(s.values.size());
-        double amplitude = 0.0, squares = 0.0, std_dev = 1.0 / std::sqrt(n);
-        if (best->kind == Kind::level) {
-          amplitude = meanOf(s.values);
-          squares = n * amplitude * amplitude;
-          for (double& v : s.values) v -= amplitude;
-        } else if (best->kind == Kind::trend) {
-          const auto [slope, taken] = trendOf(s.values);
-          squares = taken;
-          amplitude = slope * s.rate;
-          std_dev = s.rate * std::sqrt(12.0 / (n * n * n));
-          for (std::size_t i = 0; i < s.values.size(); ++i)
-            s.values[i] -= slope * (static_cast<double>(i) - 0.5 * (n - 1.0));
-        } else if (best->kind == Kind::settling) {
-          std::tie(amplitude, squares) = settlingOf(best->place, s);
-          std_dev = std::sqrt(2.0 / (s.rate * best->place));
-          for (std::size_t i = 0; i < s.values.size(); ++i)
-            s.values[i] -= amplitude * settled(best->place, s, i);
-        } else {
-          if (best->kind == Kind::order && s.angle.empty()) continue;
-          const auto phase = [&](std::size_t i) {
-            return best->kind == Kind::order ? best->place * s.angle[i]
-                                             : units::TWO_PI * best->place * static_cast<double>(i) / s.rate;
-          };
-          const Line line = lineOf(s.values, phase);
-          amplitude = std::hypot(line.sine, line.cosine);
-          squares = line.squares;
-          std_dev = std::sqrt(2.0 / n);
-          subtract(s.values, phase, line);
-        }
-        tests.push_back(s.test);
-        amplitudes.push_back(amplitude);
-        std_devs.push_back(std_dev);
-        if (chiSquareTail(squares, 2) < 1e-4) f.tests.push_back(s.test->test.name);
-        f.amplitude = std::max(f.amplitude, std::abs(amplitude) * s.noise);
-      }
-      f.depends_on = dependence(tests, amplitudes, std_devs);
-      found.push_back(std::move(f));
-    }
+    channel.stretches.push_back(std::move(s));
   }
+  return channel;
+}
+
+// Takes a channel apart. Returns the p-values of the last looks, which found nothing.
+std::vector<double> takeApart(const std::string& name, Channel channel, const StructureOptions& options,
+                              double all_excess, std::vector<Finding>& found) {
+  for (int step = 0; step < options.most; ++step) {
+    const std::vector<Candidate> all = candidatesOf(channel.stretches);
+    std::vector<double> p_values;
+    const Candidate* best = nullptr;
+    for (const Candidate& c : all) {
+      p_values.push_back(
+          std::min(1.0, c.freedom ? c.looks * chiSquareTail(c.squares, c.freedom + c.freedom % 2) : 1.0));
+      if (c.freedom > 0 && (!best || excess(c) > excess(*best))) best = &c;
+    }
+    const double p = p_values[static_cast<std::size_t>(best - all.data())];
+    if (p > options.p_value || best->squares < options.least_share * channel.samples + channel.floor)
+      return p_values;
+    Finding f = take(*best, name, channel.stretches);
+    f.p_value = p;
+    f.share_of_gap = (best->squares - static_cast<double>(best->freedom)) / all_excess;
+    found.push_back(std::move(f));
+  }
+  return {};
+}
+
+// Corrects the p-values for all looks and keeps what stands, the largest first.
+void keepSignificant(const std::vector<double>& looks, const StructureOptions& options,
+                     std::vector<Finding>& found) {
   std::vector<double> p_values = looks;
   for (const Finding& f : found) p_values.push_back(f.p_value);
   const std::vector<double> rates = falseDiscoveryRates(p_values);
@@ -439,8 +360,31 @@ std::vector<Finding> findStructure(const TwinRunner& runner, const std::vector<d
               found.end());
   std::stable_sort(found.begin(), found.end(),
                    [](const Finding& a, const Finding& b) { return a.share_of_gap > b.share_of_gap; });
-  if (found.size() > 2 * static_cast<std::size_t>(options.most))
-    found.resize(2 * static_cast<std::size_t>(options.most));
+  const std::size_t most = 2 * static_cast<std::size_t>(options.most);
+  if (found.size() > most) found.resize(most);
+}
+
+}  // namespace
+
+std::vector<Finding> findStructure(const TwinRunner& runner, const std::vector<double>& residual,
+                                   const StructureOptions& options) {
+  double all_excess = options.squares_of_gap;
+  if (all_excess <= 0.0) {
+    double squares = 0.0;
+    for (const double r : residual) squares += r * r;
+    all_excess = std::max(squares - static_cast<double>(residual.size()), 1.0);
+  }
+  std::set<std::string> channels;
+  for (const Block& b : runner.blocks()) channels.insert(b.channel);
+  std::vector<Finding> found;
+  std::vector<double> looks;  // p-values of every look that found nothing, for the control of false discovery
+  for (const std::string& name : channels) {
+    Channel channel = channelOf(runner, residual, name, options.twin_accuracy);
+    if (channel.stretches.empty()) continue;
+    const std::vector<double> last = takeApart(name, std::move(channel), options, all_excess, found);
+    looks.insert(looks.end(), last.begin(), last.end());
+  }
+  keepSignificant(looks, options, found);
   return found;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <exception>
 #include <string>
 #include <thread>
@@ -173,6 +174,13 @@ void TwinRunner::correctTo(const MachineModel& reference, const std::vector<doub
 
 std::vector<double> TwinRunner::simulate(const MachineModel& model) const {
   return std::move(simulate(std::vector<MachineModel>{model}).front());
+}
+
+double squaresLeft(const TwinRunner& runner, const std::vector<double>& simulated) {
+  double squares = 0.0;
+  for (std::size_t i = 0; i < simulated.size(); ++i)
+    squares += std::pow(runner.measured()[i] - simulated[i], 2);
+  return squares;
 }
 
 }  // namespace smartmill::discrepancy

@@ -1,79 +1,92 @@
+#include "smartmill_discrepancy/hypotheses/nominal_freedom.h"
+
+#include <algorithm>
 #include <cmath>
 #include <limits>
-
-#include "smartmill_discrepancy/hypotheses/hypothesis.h"
+#include <string>
+#include <utility>
 
 namespace smartmill::discrepancy {
+namespace {
+
+using ModesOf = std::function<std::vector<Mode>&(MachineModel&)>;
+
+}  // namespace
 
 NominalFreedom::NominalFreedom(const MachineModel& nominal) {
-  const auto add = [&](std::string name, double value, double percent,
-                       std::function<void(MachineModel&, double)> scale) {
-    if (value == 0.0 || !std::isfinite(value) || percent <= 0.0) return;
-    const double std_dev = 0.01 * percent;
-    // Not far enough to hide an effect that a value could stand for.
-    constexpr double REACH = 4.5;
-    coordinates_.push_back(
-        {std::move(name), 0.0, -REACH * std_dev, REACH * std_dev, 2e-3 * std_dev, std_dev});
-    set_.push_back(std::move(scale));
-  };
-  const Uncertainty& u = nominal.uncertainty;
-  if (nominal.cutting) {
-    for (const CuttingKey& key : cuttingKeys()) {
-      const auto c = key.coefficient;
-      const double value = (*nominal.cutting).*c;
-      double percent = u.cutting;
-      if (nominal.cutting_std && std::isfinite((*nominal.cutting_std).*c))
-        percent = 100.0 * (*nominal.cutting_std).*c / value;
-      add(std::string("cutting.") + key.key, value, percent,
-          [c](MachineModel& m, double factor) { (*m.cutting).*c *= factor; });
-    }
+  if (nominal.cutting) addCutting(nominal);
+  addModes(nominal);
+  if (nominal.spindle) addSpindle(nominal);
+}
+
+void NominalFreedom::add(std::string name, double value, double percent, Scale scale) {
+  // Not far enough to hide an effect that a value could stand for.
+  constexpr double REACH = 4.5;
+  constexpr double STEP = 2e-3;  // of tangents, standard deviations
+  if (value == 0.0 || !std::isfinite(value) || percent <= 0.0) return;
+  const double std_dev = 0.01 * percent;
+  coordinates_.push_back({std::move(name), 0.0, -REACH * std_dev, REACH * std_dev, STEP * std_dev, std_dev});
+  scale_.push_back(std::move(scale));
+}
+
+void NominalFreedom::addCutting(const MachineModel& nominal) {
+  for (const CuttingKey& key : cuttingKeys()) {
+    const auto c = key.coefficient;
+    const double value = (*nominal.cutting).*c;
+    double percent = nominal.uncertainty.cutting;
+    if (nominal.cutting_std && std::isfinite((*nominal.cutting_std).*c))
+      percent = 100.0 * (*nominal.cutting_std).*c / value;
+    add(std::string("cutting.") + key.key, value, percent,
+        [c](MachineModel& m, double factor) { (*m.cutting).*c *= factor; });
   }
-  const auto addModes = [&](const std::string& name, const std::vector<Mode>& modes, auto get,
-                            bool stiffness) {
+}
+
+void NominalFreedom::addModes(const MachineModel& nominal) {
+  const Uncertainty& u = nominal.uncertainty;
+  MachineModel copy = nominal;
+  const auto addAxis = [&](const std::string& name, const ModesOf& of, bool stiffness) {
+    const std::vector<Mode>& modes = of(copy);
     for (std::size_t k = 0; k < modes.size(); ++k) {
       const std::string mode = name + "[" + std::to_string(k) + "].";
       add(mode + "frequency_hz", modes[k].frequency, u.frequency,
-          [get, k](MachineModel& m, double factor) { get(m)[k].frequency *= factor; });
-      add(mode + "damping_ratio", modes[k].damping_ratio, u.damping,
-          [get, k](MachineModel& m, double factor) {
-            double& damping = get(m)[k].damping_ratio;
-            damping = std::min(damping * factor, 0.99);
-          });
-      if (stiffness) {
-        add(mode + "stiffness_n_per_um", modes[k].gain, u.stiffness,
-            [get, k](MachineModel& m, double factor) { get(m)[k].gain /= factor; });
-      }
+          [of, k](MachineModel& m, double factor) { of(m)[k].frequency *= factor; });
+      add(mode + "damping_ratio", modes[k].damping_ratio, u.damping, [of, k](MachineModel& m, double factor) {
+        double& damping = of(m)[k].damping_ratio;
+        damping = std::min(damping * factor, 0.99);
+      });
+      if (!stiffness) continue;
+      add(mode + "stiffness_n_per_um", modes[k].gain, u.stiffness,
+          [of, k](MachineModel& m, double factor) { of(m)[k].gain /= factor; });
     }
   };
   const char* const AXES[] = {"x", "y", "z"};
   for (std::size_t a = 0; a < 3; ++a) {
-    addModes(
-        std::string("force_sensor.") + AXES[a], nominal.force_sensor.axis[a].modes,
+    addAxis(
+        std::string("force_sensor.") + AXES[a],
         [a](MachineModel& m) -> std::vector<Mode>& { return m.force_sensor.axis[a].modes; }, false);
   }
-  addModes(
-      "tool_tip.x", nominal.tool_tip.x.modes,
-      [](MachineModel& m) -> std::vector<Mode>& { return m.tool_tip.x.modes; }, true);
-  addModes(
-      "tool_tip.y", nominal.tool_tip.y.modes,
-      [](MachineModel& m) -> std::vector<Mode>& { return m.tool_tip.y.modes; }, true);
-  if (nominal.spindle) {
-    const Spindle& s = *nominal.spindle;
-    add("spindle.viscous_nm_s_per_rad", s.viscous, u.spindle,
-        [](MachineModel& m, double factor) { m.spindle->viscous *= factor; });
-    add("spindle.coulomb_nm", s.coulomb, u.spindle,
-        [](MachineModel& m, double factor) { m.spindle->coulomb *= factor; });
-    add("spindle.load_meter_v_per_w", s.load_meter_gain, u.spindle,
-        [](MachineModel& m, double factor) { m.spindle->load_meter_gain *= factor; });
-    add("spindle.load_meter_bandwidth_hz", s.load_meter_bandwidth, u.spindle,
-        [](MachineModel& m, double factor) { m.spindle->load_meter_bandwidth *= factor; });
-  }
+  addAxis(
+      "tool_tip.x", [](MachineModel& m) -> std::vector<Mode>& { return m.tool_tip.x.modes; }, true);
+  addAxis(
+      "tool_tip.y", [](MachineModel& m) -> std::vector<Mode>& { return m.tool_tip.y.modes; }, true);
+}
+
+void NominalFreedom::addSpindle(const MachineModel& nominal) {
+  const double percent = nominal.uncertainty.spindle;
+  const auto addValue = [&](const std::string& key, double Spindle::*value) {
+    add("spindle." + key, (*nominal.spindle).*value, percent,
+        [value](MachineModel& m, double factor) { (*m.spindle).*value *= factor; });
+  };
+  addValue("viscous_nm_s_per_rad", &Spindle::viscous);
+  addValue("coulomb_nm", &Spindle::coulomb);
+  addValue("load_meter_v_per_w", &Spindle::load_meter_gain);
+  addValue("load_meter_bandwidth_hz", &Spindle::load_meter_bandwidth);
 }
 
 MachineModel NominalFreedom::apply(const MachineModel& nominal, const std::vector<double>& values) const {
   MachineModel model = nominal;
-  for (std::size_t i = 0; i < set_.size(); ++i) {
-    if (values[i] != 0.0) set_[i](model, std::exp(values[i]));
+  for (std::size_t i = 0; i < scale_.size(); ++i) {
+    if (values[i] != 0.0) scale_[i](model, std::exp(values[i]));
   }
   return model;
 }

@@ -89,9 +89,8 @@ void StretchRecorder::handle(const SampleBlock& dynamometer) {
   if (length >= parameters_.length - 0.5 / dynamometer.sample_rate) finish();
 }
 
-void StretchRecorder::finish() {
-  const double begin = blocks_.front().stamp, end = blocks_.back().timeOf(blocks_.back().size());
-  // Speed and angle at the begin: the line that fits the angles of the stretch.
+// The line that fits the angles of a stretch; nothing where the spindle does not turn evenly.
+std::optional<StretchRecorder::Turning> StretchRecorder::evenTurning(double begin, double end) const {
   double n = 0.0, st = 0.0, sa = 0.0, stt = 0.0, sta = 0.0, turned = 0.0, last = 0.0, last_stamp = 0.0;
   for (const SpindleAngle& a : angles_) {
     if (a.stamp < begin || a.stamp > end) continue;
@@ -111,23 +110,21 @@ void StretchRecorder::finish() {
     sta += t * turned;
   }
   const double det = n * stt - st * st;
-  if (n < 3.0 || det <= 0.0) {
-    blocks_.clear();
-    return;
-  }
-  const double speed = (n * sta - st * sa) / det, phase = (sa - speed * st) / n;
+  if (n < 3.0 || det <= 0.0) return {};
+  Turning turning;
+  turning.speed = (n * sta - st * sa) / det;
+  turning.phase = (sa - turning.speed * st) / n;
   const bool even = std::all_of(angles_.begin(), angles_.end(), [&](const SpindleAngle& a) {
+    const double expected = turning.phase + turning.speed * (a.stamp - begin);
     return a.stamp < begin || a.stamp > end ||
-           std::abs(std::remainder(a.angle - phase - speed * (a.stamp - begin), units::TWO_PI)) <
-               ANGLE_TOLERANCE;
+           std::abs(std::remainder(a.angle - expected, units::TWO_PI)) < ANGLE_TOLERANCE;
   });
-  if (!even) {
-    blocks_.clear();
-    return;
-  }
-  Stretch stretch;
-  stretch.stamp = end;
-  CampaignTest& test = stretch.test;
+  if (!even) return {};
+  return turning;
+}
+
+CampaignTest StretchRecorder::testOf(double begin, double speed) const {
+  CampaignTest test;
   test.name = condition_->name;
   test.file = condition_->name + ".csv";
   test.kind = condition_->kind == CuttingCondition::Kind::air ? TestKind::air : TestKind::cut;
@@ -139,16 +136,20 @@ void StretchRecorder::finish() {
     test.engagement = condition_->engagement;
     test.cut_time_before = cut_time_ + *test.running_before;
   }
-  Record& record = stretch.record;
-  record.file = test.name;
+  return test;
+}
+
+Record StretchRecorder::recordOf(const std::string& name, const Turning& turning) const {
+  Record record;
+  record.file = name;
   std::vector<double> angle;
   std::array<std::vector<double>, 3> force;
   for (const SampleBlock& b : blocks_) {
     const std::array<std::size_t, 3> channel{{b.channel("fx"), b.channel("fy"), b.channel("fz")}};
     for (std::size_t i = 0; i < b.size(); ++i) {
-      const double t = static_cast<double>(record.time.size()) / test.sample_rate;
+      const double t = static_cast<double>(record.time.size()) / blocks_.front().sample_rate;
       record.time.push_back(t);
-      const double a = std::fmod(phase + speed * t, units::TWO_PI);
+      const double a = std::fmod(turning.phase + turning.speed * t, units::TWO_PI);
       angle.push_back(a < 0.0 ? a + units::TWO_PI : a);
       for (std::size_t axis = 0; axis < 3; ++axis) force[axis].push_back(b.at(i, channel[axis]));
     }
@@ -157,11 +158,22 @@ void StretchRecorder::finish() {
   record.add("fx") = std::move(force[0]);
   record.add("fy") = std::move(force[1]);
   record.add("fz") = std::move(force[2]);
-  blocks_.clear();
-  for (const LoadSample& l : loads_) {
-    if (l.stamp >= begin && l.stamp <= end) stretch.load.push_back({l.stamp - begin, l.spindle_load});
+  return record;
+}
+
+void StretchRecorder::finish() {
+  const double begin = blocks_.front().stamp, end = blocks_.back().timeOf(blocks_.back().size());
+  if (const std::optional<Turning> turning = evenTurning(begin, end)) {
+    Stretch stretch;
+    stretch.stamp = end;
+    stretch.test = testOf(begin, turning->speed);
+    stretch.record = recordOf(stretch.test.name, *turning);
+    for (const LoadSample& l : loads_) {
+      if (l.stamp >= begin && l.stamp <= end) stretch.load.push_back({l.stamp - begin, l.spindle_load});
+    }
+    unconfirmed_.push_back(std::move(stretch));
   }
-  unconfirmed_.push_back(std::move(stretch));
+  blocks_.clear();
 }
 
 SortedStretches::SortedStretches(const StretchParameters& parameters, double hold_back,

@@ -1,3 +1,5 @@
+#include "smartmill_discrepancy/report/pictures.h"
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -5,18 +7,10 @@
 #include <set>
 #include <sstream>
 
-#include "smartmill_core/error.h"
-#include "smartmill_discrepancy/explain/explanation.h"
+#include "smartmill_core/io/gnuplot.h"
 
 namespace smartmill::discrepancy {
 namespace {
-
-// In gnuplot's single quotes only the quote itself means something.
-std::string quoted(const std::string& name) {
-  std::string text = "'";
-  for (const char c : name) text += c == '\'' ? std::string("''") : std::string(1, c);
-  return text + "'";
-}
 
 // Tests from left to right, channels from bottom to top, colour: logarithm of the gap.
 std::string gapMap(const Explanation& e, bool after) {
@@ -39,9 +33,11 @@ std::string gapMap(const Explanation& e, bool after) {
          "'#fd8d3c', 1 '#7f0000')\n";
   out << "set xrange [-0.5:" << tests.size() << "-0.5]\nset yrange [-0.5:" << channels.size()
       << "-0.5]\nset xtics rotate by -60 (";
-  for (std::size_t k = 0; k < tests.size(); ++k) out << (k ? "," : "") << quoted(tests[k]) << " " << k;
+  for (std::size_t k = 0; k < tests.size(); ++k)
+    out << (k ? "," : "") << Gnuplot::quoted(tests[k]) << " " << k;
   out << ")\nset ytics (";
-  for (std::size_t k = 0; k < channels.size(); ++k) out << (k ? "," : "") << quoted(channels[k]) << " " << k;
+  for (std::size_t k = 0; k < channels.size(); ++k)
+    out << (k ? "," : "") << Gnuplot::quoted(channels[k]) << " " << k;
   out << ")\nplot $map using 1:2:(0.5):(0.5):3 with boxxyerror fillstyle solid 1.0 border lc 'white' fc "
          "palette notitle, "
          "$map using 1:2:(sprintf('%.2g', $3)) with labels font ',7' notitle\n";
@@ -61,7 +57,8 @@ std::string revolutions(const Explanation& e) {
   out << "set multiplot layout " << (n + 1) / 2
       << ",2\nset grid\nset xrange [0:360]\nset xtics 60\nset xlabel 'spindle angle [deg]'\n";
   for (std::size_t k = 0; k < n; ++k) {
-    out << "set title " << quoted(e.revolutions[k].channel + ", " + e.revolutions[k].test) << "\nplot $c" << k
+    out << "set title " << Gnuplot::quoted(e.revolutions[k].channel + ", " + e.revolutions[k].test)
+        << "\nplot $c" << k
         << " u 1:2 w p pt 7 ps 0.4 lc 'black' t 'measured', '' u 1:3 w l lw 1.5 lc '#d95f02' t 'nominal', '' "
            "u 1:4 w l lw 1.5 lc "
            "'#1b9e77' t 'improved'\n";
@@ -99,7 +96,7 @@ std::string spectra(const Explanation& e) {
         }
       }
     }
-    out << "set title " << quoted(s.channel + ", " + s.test + order) << "\nplot $s" << k
+    out << "set title " << Gnuplot::quoted(s.channel + ", " + s.test + order) << "\nplot $s" << k
         << " u 1:2 w l lc '#d95f02' t 'nominal', '' u 1:3 w l lc '#1b9e77' t 'improved'\n";
   }
   out << "unset multiplot\n";
@@ -110,7 +107,7 @@ std::string ladder(const Explanation& e) {
   std::ostringstream out;
   out << "$l << EOD\n";
   std::vector<std::string> names;
-  for (const Rung& r : e.ladder) {
+  for (const TriedEffect& r : e.ladder) {
     const std::string name =
         std::to_string(r.round + 1) + ". " + r.effect + (r.variant.empty() ? "" : " " + r.variant);
     out << names.size() << " " << std::max(r.delta_bic, 1.0) << " " << (r.taken ? 1 : 0) << "\n";
@@ -118,7 +115,8 @@ std::string ladder(const Explanation& e) {
   }
   out << "EOD\nset logscale x\nset xrange [1:*]\nset yrange [" << names.size()
       << ":-1]\nset xlabel 'gain of evidence (difference of BIC)'\nset grid x\nset ytics (";
-  for (std::size_t k = 0; k < names.size(); ++k) out << (k ? "," : "") << quoted(names[k]) << " " << k;
+  for (std::size_t k = 0; k < names.size(); ++k)
+    out << (k ? "," : "") << Gnuplot::quoted(names[k]) << " " << k;
   out << ")\nset title 'evidence ladder: hypotheses by round, taken ones dark'\n";
   out << "plot $l using (1):1:(1):2:($1-0.35):($1+0.35):($3>0 ? 0x1b9e77 : 0xbbbbbb) with boxxyerror "
          "fillstyle solid lc rgb variable notitle\n";
@@ -134,7 +132,7 @@ std::string remains(const Explanation& e) {
   out << "EOD\nset grid y\nset ylabel 'gap after'\nset title 'what remains: 1 is the noise floor; bars: 95 % "
          "by chance'\nset xtics rotate by -75 font ',6' (";
   for (std::size_t k = 0; k < e.gaps.size(); ++k)
-    out << (k ? "," : "") << quoted(e.gaps[k].test + " " + e.gaps[k].channel) << " " << k;
+    out << (k ? "," : "") << Gnuplot::quoted(e.gaps[k].test + " " + e.gaps[k].channel) << " " << k;
   out << ")\nplot 1 w l lc 'black' notitle, $r u 1:($4==0?$2:NaN):3 w yerrorbars pt 7 ps 0.5 lc '#1b9e77' t "
          "'fit tests', "
          "'' u 1:($4==1?$2:NaN):3 w yerrorbars pt 7 ps 0.5 lc '#7570b3' t 'held-out tests'\n";
@@ -143,18 +141,10 @@ std::string remains(const Explanation& e) {
 
 }  // namespace
 
-void drawWithGnuplot(const std::string& png, int width, int height, const std::string& commands) {
-  FILE* pipe = popen("gnuplot", "w");
-  if (!pipe) throw Error("gnuplot cannot be started");
-  std::fprintf(pipe, "set terminal pngcairo size %d,%d font 'sans,10' noenhanced\nset output %s\n%s\n", width,
-               height, quoted(png).c_str(), commands.c_str());
-  if (pclose(pipe) != 0) throw Error(png + ": gnuplot failed");
-}
-
 std::vector<std::string> drawPictures(const Explanation& e, const std::string& folder) {
   std::vector<std::string> names;
   const auto add = [&](const std::string& name, int width, int height, const std::string& commands) {
-    drawWithGnuplot(folder + "/" + name, width, height, commands);
+    (Gnuplot(folder + "/" + name, width, height, 10) << commands).draw();
     names.push_back(name);
   };
   add("gaps.png", 1200, 900,

@@ -1,3 +1,5 @@
+#include "smartmill_discrepancy/report/report_html.h"
+
 #include <cstdio>
 #include <fstream>
 #include <iterator>
@@ -5,7 +7,6 @@
 #include <sstream>
 
 #include "smartmill_core/error.h"
-#include "smartmill_discrepancy/explain/explanation.h"
 
 namespace smartmill::discrepancy {
 namespace {
@@ -41,8 +42,10 @@ std::string joined(const std::vector<std::string>& words) {
   return text;
 }
 
-void findings(std::ostream& out, const std::vector<Finding>& list) {
-  out << "<table><tr><th>channel<th>domain<th>where<th>largest amplitude<th>share of the gap<th>false "
+void findings(std::ostream& out, const char* title, const std::vector<Finding>& list) {
+  if (list.empty()) return;
+  out << "<h2>" << title
+      << "</h2>\n<table><tr><th>channel<th>domain<th>where<th>largest amplitude<th>share of the gap<th>false "
          "discovery rate<th>depends on<th>tests</tr>\n";
   for (const Finding& f : list) {
     out << "<tr><td>" << f.channel << "<td>" << f.domain << "<td>";
@@ -54,12 +57,20 @@ void findings(std::ostream& out, const std::vector<Finding>& list) {
   out << "</table>\n";
 }
 
-const std::map<std::string, std::string> VERDICTS{
-    {"no_disagreement", "Model and records agree to the noise."},
-    {"explained", "The effects below explain what model and records differ by."},
-    {"partly_explained",
-     "The effects below explain a part; something remains that no effect of the catalogue explains."},
-    {"unknown_effect", "Model and records differ, and no effect of the catalogue explains it."}};
+const char* sentenceOf(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::no_disagreement:
+      return "Model and records agree to the noise.";
+    case Verdict::explained:
+      return "The effects below explain what model and records differ by.";
+    case Verdict::partly_explained:
+      return "The effects below explain a part; something remains that no effect of the catalogue explains.";
+    case Verdict::unknown_effect:
+      break;
+  }
+  return "Model and records differ, and no effect of the catalogue explains it.";
+}
+
 const std::map<std::string, std::string> CAPTIONS{
     {"gaps.png", "Gap of every test and channel before and after"},
     {"revolution.png", "One revolution of the cut that differed most: measured, nominal, improved"},
@@ -68,12 +79,7 @@ const std::map<std::string, std::string> CAPTIONS{
     {"ladder.png", "Evidence of the hypotheses tried"},
     {"remains.png", "Gap after, test by test"}};
 
-}  // namespace
-
-void writeHtml(const Explanation& e, const std::string& campaign, const std::vector<std::string>& pictures,
-               const std::string& folder) {
-  const std::string file = folder + "/report.html";
-  std::ofstream out(file);
+void head(std::ostream& out, const std::string& campaign) {
   out << "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>Discrepancy report: "
       << escaped(campaign)
       << "</title>\n<style>body{font-family:sans-serif;max-width:78em;margin:2em auto;padding:0 "
@@ -84,12 +90,19 @@ void writeHtml(const Explanation& e, const std::string& campaign, const std::vec
          "background:#eef5ee}"
          "</style></head><body>\n<h1>Where simulation and measurement disagree: "
       << escaped(campaign) << "</h1>\n";
-  out << "<p class=\"verdict\"><b>" << e.verdict << "</b>. " << VERDICTS.at(e.verdict) << "</p>\n";
+}
+
+void verdict(std::ostream& out, const Explanation& e) {
+  out << "<p class=\"verdict\"><b>" << nameOf(e.verdict) << "</b>. " << sentenceOf(e.verdict) << "</p>\n";
+  if (e.interrupted) out << "<p>The search was interrupted: this is what was found until then.</p>\n";
   out << "<table><tr><th>gap<th>before<th>after</tr><tr><td>fit tests<td>" << number(e.before.fit) << "<td>"
       << number(e.after.fit) << "</tr><tr><td>held-out tests<td>" << number(e.before.heldout) << "<td>"
       << number(e.after.heldout)
       << "</tr></table>\n<p>The gap is the RMS of (measured - simulated) over the noise; 1 is the noise "
          "floor.</p>\n";
+}
+
+void effects(std::ostream& out, const Explanation& e) {
   if (!e.effects.empty()) {
     out << "<h2>Effects found</h2>\n<table><tr><th>effect<th>parameters<th>evidence lost without it<th>share "
            "of the held-out gap<th>alternatives (evidence)</tr>\n";
@@ -109,14 +122,9 @@ void writeHtml(const Explanation& e, const std::string& campaign, const std::vec
     out << "<p>Not to be told apart on this campaign: " << joined(group) << ".</p>\n";
   if (e.suggested_test)
     out << "<p>A test that would tell them apart: " << escaped(*e.suggested_test) << ".</p>\n";
-  if (!e.unexplained.empty()) {
-    out << "<h2>What remains unexplained</h2>\n";
-    findings(out, e.unexplained);
-  }
-  if (!e.where.empty()) {
-    out << "<h2>Where the nominal model differs</h2>\n";
-    findings(out, e.where);
-  }
+}
+
+void images(std::ostream& out, const std::vector<std::string>& pictures, const std::string& folder) {
   for (const std::string& name : pictures) {
     std::ifstream png(folder + "/" + name, std::ios::binary);
     const std::string bytes((std::istreambuf_iterator<char>(png)), std::istreambuf_iterator<char>());
@@ -124,22 +132,42 @@ void writeHtml(const Explanation& e, const std::string& campaign, const std::vec
     out << "<h2>" << (caption != CAPTIONS.end() ? caption->second : name) << "</h2>\n<img alt=\"" << name
         << "\" src=\"data:image/png;base64," << base64(bytes) << "\">\n";
   }
-  if (!e.ladder.empty()) {
-    out << "<h2>Candidates fitted</h2>\n<table><tr><th>round<th>effect<th>evidence promised by its "
-           "tangents<th>evidence gained<th>tests simulated<th>seconds</tr>\n";
-    for (const Rung& r : e.ladder) {
-      out << "<tr><td>" << r.round + 1 << "<td>" << (r.taken ? "<b>" : "") << r.effect
-          << (r.variant.empty() ? "" : " (" + r.variant + ")") << (r.taken ? "</b>" : "") << "<td>"
-          << number(r.promised) << "<td>" << number(r.delta_bic) << "<td>" << r.simulations << "<td>"
-          << number(r.seconds, "%.1f") << "</tr>\n";
-    }
-    out << "</table>\n";
+}
+
+void ladder(std::ostream& out, const std::vector<TriedEffect>& tried) {
+  if (tried.empty()) return;
+  out << "<h2>Candidates fitted</h2>\n<table><tr><th>round<th>effect<th>evidence promised by its "
+         "tangents<th>evidence gained<th>tests simulated<th>seconds</tr>\n";
+  for (const TriedEffect& t : tried) {
+    out << "<tr><td>" << t.round + 1 << "<td>" << (t.taken ? "<b>" : "") << t.effect
+        << (t.variant.empty() ? "" : " (" + t.variant + ")") << (t.taken ? "</b>" : "") << "<td>"
+        << number(t.promised) << "<td>" << number(t.delta_bic) << "<td>" << t.simulations << "<td>"
+        << number(t.seconds, "%.1f") << "</tr>\n";
   }
-  if (!e.notes.empty()) {
-    out << "<h2>Notes</h2>\n<ul>";
-    for (const std::string& note : e.notes) out << "<li>" << escaped(note) << "</li>";
-    out << "</ul>\n";
-  }
+  out << "</table>\n";
+}
+
+void notes(std::ostream& out, const std::vector<std::string>& lines) {
+  if (lines.empty()) return;
+  out << "<h2>Notes</h2>\n<ul>";
+  for (const std::string& note : lines) out << "<li>" << escaped(note) << "</li>";
+  out << "</ul>\n";
+}
+
+}  // namespace
+
+void writeHtml(const Explanation& e, const std::string& campaign, const std::vector<std::string>& pictures,
+               const std::string& folder) {
+  const std::string file = folder + "/report.html";
+  std::ofstream out(file);
+  head(out, campaign);
+  verdict(out, e);
+  effects(out, e);
+  findings(out, "What remains unexplained", e.unexplained);
+  findings(out, "Where the nominal model differs", e.where);
+  images(out, pictures, folder);
+  ladder(out, e.ladder);
+  notes(out, e.notes);
   out << "<p>" << number(e.seconds, "%.0f") << " s.</p></body></html>\n";
   if (!out) throw Error(file + ": cannot be written");
 }

@@ -1,10 +1,11 @@
+#include "smartmill_discrepancy/report/report_json.h"
+
 #include <cmath>
 #include <fstream>
 
 #include <nlohmann/json.hpp>
 
 #include "smartmill_core/error.h"
-#include "smartmill_discrepancy/explain/explanation.h"
 
 namespace smartmill::discrepancy {
 namespace {
@@ -39,7 +40,7 @@ Json findingsOf(const std::vector<Finding>& findings) {
 void writeReport(const Explanation& e, const std::string& folder) {
   Json report;
   report["format"] = "smartmill-report/1";
-  report["verdict"] = e.verdict;
+  report["verdict"] = nameOf(e.verdict);
   report["where"] = findingsOf(e.where);
   report["effects"] = Json::array();
   for (const FoundEffect& effect : e.effects) {
@@ -73,17 +74,18 @@ void writeReport(const Explanation& e, const std::string& folder) {
          {"interval", {rounded(g.after - 1.96 * g.std_dev), rounded(g.after + 1.96 * g.std_dev)}}});
   }
   report["candidates"] = Json::array();
-  for (const Rung& r : e.ladder) {
-    report["candidates"].push_back({{"round", r.round + 1},
-                                    {"name", r.effect},
-                                    {"variant", r.variant},
-                                    {"promised", rounded(r.promised)},
-                                    {"delta_bic", rounded(r.delta_bic)},
-                                    {"taken", r.taken},
-                                    {"simulations", r.simulations},
-                                    {"seconds", rounded(r.seconds)}});
+  for (const TriedEffect& t : e.ladder) {
+    report["candidates"].push_back({{"round", t.round + 1},
+                                    {"name", t.effect},
+                                    {"variant", t.variant},
+                                    {"promised", rounded(t.promised)},
+                                    {"delta_bic", rounded(t.delta_bic)},
+                                    {"taken", t.taken},
+                                    {"simulations", t.simulations},
+                                    {"seconds", rounded(t.seconds)}});
   }
   report["notes"] = e.notes;
+  if (e.interrupted) report["interrupted"] = true;
   report["seconds"] = rounded(e.seconds);
   const std::string file = folder + "/report.json";
   std::ofstream out(file);

@@ -4,8 +4,7 @@
 #include <cmath>
 #include <map>
 
-#include <Eigen/Cholesky>
-
+#include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_discrepancy/search/mode_probes.h"
 
 namespace smartmill::discrepancy {
@@ -16,104 +15,37 @@ using Eigen::Index;
 // Orthogonal projection off the nominal tangents (with their priors) and off the tangents of the members.
 class Projection {
  public:
-  Projection(const Fitter& fitter, const Fit& now, const NominalTangents& tangents) {
-    const auto& freedom = fitter.freedom().coordinates();
+  Projection(const Fitter& fitter, const Fit& now, const NominalTangents& tangents)
+      : freedom_(fitter.freedom().coordinates()), nominal_(now.state.nominal), basis_(tangents.columns) {
+    addMembers(fitter, now.state);
     const auto samples = static_cast<Index>(fitter.runner().size());
-    std::vector<MachineModel> models{fitter.model(now.state)};
-    std::vector<double> steps;
-    for (std::size_t m = 0; m < now.state.members.size(); ++m) {
-      const auto& coordinates = now.state.members[m].hypothesis->coordinates;
-      for (std::size_t c = 0; c < coordinates.size(); ++c) {
-        FitState moved = now.state;
-        double& value = moved.members[m].values[c];
-        const double step =
-            value + coordinates[c].step > coordinates[c].high ? -coordinates[c].step : coordinates[c].step;
-        value += step;
-        steps.push_back(step);
-        models.push_back(fitter.model(moved));
-      }
-    }
-    auto simulated = fitter.runner().simulate(models);
-    base_ = std::move(simulated.front());
-    basis_.resize(samples, static_cast<Index>(freedom.size() + steps.size()));
-    basis_.leftCols(static_cast<Index>(freedom.size())) = tangents.columns;
-    Eigen::VectorXd prior = Eigen::VectorXd::Zero(basis_.cols());
-    for (std::size_t c = 0; c < freedom.size(); ++c)
-      prior[static_cast<Index>(c)] = 1.0 / (freedom[c].prior_std * freedom[c].prior_std);
-    Eigen::VectorXd pull = Eigen::VectorXd::Zero(basis_.cols());
-    for (std::size_t c = 0; c < freedom.size(); ++c)
-      pull[static_cast<Index>(c)] = -now.state.nominal[c] * prior[static_cast<Index>(c)];
-    for (std::size_t k = 0; k < steps.size(); ++k) {
-      const auto column = static_cast<Index>(freedom.size() + k);
-      for (Index i = 0; i < samples; ++i) {
-        const auto s = static_cast<std::size_t>(i);
-        basis_(i, column) = (simulated[k + 1][s] - base_[s]) / steps[k];
-      }
-      prior[column] = 1e-12 + 1e-9 * basis_.col(column).squaredNorm();
-    }
     residual_ = Eigen::Map<const Eigen::VectorXd>(now.residual.data(), samples);
-    Eigen::MatrixXd information = basis_.transpose() * basis_;
-    information.diagonal() += prior;
-    Eigen::VectorXd right = basis_.transpose() * residual_ + pull;
-    const auto hold = [&](std::size_t coordinate) {
-      const auto c = static_cast<Index>(coordinate);
-      basis_.col(c).setZero();
-      information.row(c).setZero();
-      information.col(c).setZero();
-      information(c, c) = prior[c];
-      right[c] = 0.0;
-    };
-    // One that stands at its bound moves no further, nor does one that the rest would push over it.
-    std::vector<bool> held(freedom.size(), false);
-    for (std::size_t c = 0; c < freedom.size(); ++c) {
-      const double room =
-          std::min(now.state.nominal[c] - freedom[c].low, freedom[c].high - now.state.nominal[c]);
-      held[c] = room < 0.01 * freedom[c].prior_std;
-      if (held[c]) hold(c);
-    }
-    for (bool over = true; over;) {
-      information_.compute(information);
-      solved_residual_ = information_.solve(right);
-      double worst = 0.01;  // standard deviations
-      std::size_t which = freedom.size();
-      for (std::size_t c = 0; c < freedom.size(); ++c) {
-        const double at = now.state.nominal[c] + solved_residual_[static_cast<Index>(c)];
-        const double beyond = std::max(freedom[c].low - at, at - freedom[c].high) / freedom[c].prior_std;
-        if (held[c] || beyond <= worst) continue;
-        worst = beyond;
-        which = c;
-      }
-      over = which < freedom.size();
-      if (over) {
-        held[which] = true;
-        hold(which);
-      }
-    }
+    information_ = basis_.transpose() * basis_;
+    information_.diagonal() += prior_;
+    Eigen::VectorXd right = basis_.transpose() * residual_;
+    for (std::size_t c = 0; c < freedom_.size(); ++c)
+      right[static_cast<Index>(c)] -= nominal_[c] * prior_[static_cast<Index>(c)];
+    solveWithinBounds(right);
   }
 
   const std::vector<double>& base() const { return base_; }
 
   // Chi2 that these columns take away, with the amplitudes that do it.
-  double gain(const Eigen::MatrixXd& columns, Eigen::VectorXd* amplitudes, Eigen::VectorXd* signature) const {
+  double gain(const Eigen::MatrixXd& columns, Eigen::VectorXd* amplitudes) const {
     const Eigen::MatrixXd cross = basis_.transpose() * columns;
-    const Eigen::MatrixXd solved = information_.solve(cross);
+    const Eigen::MatrixXd solved = linear::solveSymmetric(information_, cross);
     Eigen::MatrixXd own = columns.transpose() * columns - cross.transpose() * solved;
     const Eigen::VectorXd raw = columns.colwise().squaredNorm();
     for (Index k = 0; k < own.rows(); ++k) own(k, k) += 1e-9 * raw[k] + 1e-30;
     const Eigen::VectorXd score = columns.transpose() * residual_ - cross.transpose() * solved_residual_;
-    *amplitudes = own.ldlt().solve(score);
-    if (signature) {
-      *signature = columns * *amplitudes - basis_ * (solved * *amplitudes);
-      const double size = signature->norm();
-      if (size > 0.0) *signature /= size;
-    }
+    *amplitudes = linear::solveSymmetric(own, score);
     return score.dot(*amplitudes);
   }
 
   // The same of each column by itself; 0 where it has no trace, no number, or a sign that cannot be.
   Eigen::VectorXd gains(const Eigen::MatrixXd& columns, bool positive) const {
     const Eigen::MatrixXd cross = basis_.transpose() * columns;
-    const Eigen::MatrixXd solved = information_.solve(cross);
+    const Eigen::MatrixXd solved = linear::solveSymmetric(information_, cross);
     const Eigen::VectorXd raw = columns.colwise().squaredNorm();
     const Eigen::VectorXd own = raw - (cross.cwiseProduct(solved)).colwise().sum().transpose();
     const Eigen::VectorXd score = columns.transpose() * residual_ - cross.transpose() * solved_residual_;
@@ -126,10 +58,76 @@ class Projection {
   }
 
  private:
+  // Tangents of the members' values beside the nominal ones.
+  void addMembers(const Fitter& fitter, const FitState& state) {
+    std::vector<MachineModel> models{fitter.model(state)};
+    std::vector<double> steps;
+    for (std::size_t m = 0; m < state.members.size(); ++m) {
+      const auto& coordinates = state.members[m].hypothesis->coordinates;
+      for (std::size_t c = 0; c < coordinates.size(); ++c) {
+        FitState moved = state;
+        double& value = moved.members[m].values[c];
+        const double step =
+            value + coordinates[c].step > coordinates[c].high ? -coordinates[c].step : coordinates[c].step;
+        value += step;
+        steps.push_back(step);
+        models.push_back(fitter.model(moved));
+      }
+    }
+    auto simulated = fitter.runner().simulate(models);
+    base_ = std::move(simulated.front());
+    const auto nominal = static_cast<Index>(freedom_.size());
+    basis_.conservativeResize(Eigen::NoChange, nominal + static_cast<Index>(steps.size()));
+    prior_ = Eigen::VectorXd::Zero(basis_.cols());
+    for (std::size_t c = 0; c < freedom_.size(); ++c)
+      prior_[static_cast<Index>(c)] = 1.0 / (freedom_[c].prior_std * freedom_[c].prior_std);
+    for (std::size_t k = 0; k < steps.size(); ++k) {
+      const Index column = nominal + static_cast<Index>(k);
+      for (std::size_t i = 0; i < base_.size(); ++i)
+        basis_(static_cast<Index>(i), column) = (simulated[k + 1][i] - base_[i]) / steps[k];
+      prior_[column] = 1e-12 + 1e-9 * basis_.col(column).squaredNorm();
+    }
+  }
+
+  // One that stands at its bound moves no further, nor does one that the rest would push over it.
+  void solveWithinBounds(Eigen::VectorXd& right) {
+    constexpr double AT_BOUND = 0.01;  // standard deviations
+    std::vector<bool> held(freedom_.size(), false);
+    const auto hold = [&](std::size_t coordinate) {
+      const auto c = static_cast<Index>(coordinate);
+      held[coordinate] = true;
+      basis_.col(c).setZero();
+      information_.row(c).setZero();
+      information_.col(c).setZero();
+      information_(c, c) = prior_[c];
+      right[c] = 0.0;
+    };
+    for (std::size_t c = 0; c < freedom_.size(); ++c) {
+      const double room = std::min(nominal_[c] - freedom_[c].low, freedom_[c].high - nominal_[c]);
+      if (room < AT_BOUND * freedom_[c].prior_std) hold(c);
+    }
+    for (;;) {
+      solved_residual_ = linear::solveSymmetric(information_, right);
+      double worst = AT_BOUND;
+      std::size_t which = freedom_.size();
+      for (std::size_t c = 0; c < freedom_.size(); ++c) {
+        const double at = nominal_[c] + solved_residual_[static_cast<Index>(c)];
+        const double beyond = std::max(freedom_[c].low - at, at - freedom_[c].high) / freedom_[c].prior_std;
+        if (held[c] || beyond <= worst) continue;
+        worst = beyond;
+        which = c;
+      }
+      if (which == freedom_.size()) return;
+      hold(which);
+    }
+  }
+
+  const std::vector<Coordinate>& freedom_;
+  const std::vector<double>& nominal_;
   std::vector<double> base_;
   Eigen::MatrixXd basis_;
-  Eigen::VectorXd residual_, solved_residual_;
-  Eigen::LDLT<Eigen::MatrixXd> information_;
+  Eigen::VectorXd prior_, residual_, solved_residual_;
+  Eigen::MatrixXd information_;
 };
 
 // The two best frequencies of a mode, one octave-third or more apart, from columns to first order.
@@ -202,54 +200,67 @@ std::vector<Hypothesis::Probe> modeProbes(const Hypothesis& h, const Projection&
   return found;
 }
 
+bool isMember(const FitState& state, const std::string& effect, const std::string& variant) {
+  return std::any_of(state.members.begin(), state.members.end(), [&](const Member& m) {
+    return m.hypothesis->effect == effect && m.hypothesis->variant == variant;
+  });
+}
+
+// What the points of a probe add to the records.
+Eigen::MatrixXd columnsOf(const Fitter& fitter, const FitState& state, const Hypothesis& h,
+                          const Hypothesis::Probe& probe, const std::vector<double>& base) {
+  std::vector<MachineModel> models;
+  for (const std::vector<double>& point : probe.points) {
+    FitState with = state;
+    with.members.push_back({&h, point});
+    models.push_back(fitter.model(with));
+  }
+  const auto simulated = fitter.runner().simulate(models);
+  Eigen::MatrixXd columns(static_cast<Index>(base.size()), static_cast<Index>(models.size()));
+  for (std::size_t k = 0; k < models.size(); ++k) {
+    for (std::size_t i = 0; i < base.size(); ++i)
+      columns(static_cast<Index>(i), static_cast<Index>(k)) = simulated[k][i] - base[i];
+  }
+  return columns;
+}
+
+// Where a fit begins that has these amplitudes along a probe's points.
+std::vector<double> startOf(const Hypothesis& h, const Hypothesis::Probe& probe,
+                            const Eigen::VectorXd& amplitudes) {
+  std::vector<double> start = probe.from_points ? probe.points.front() : probe.null;
+  for (Index k = 0; k < amplitudes.size() && !probe.from_points; ++k) {
+    for (std::size_t c = 0; c < start.size(); ++c)
+      start[c] += amplitudes[k] * (probe.points[static_cast<std::size_t>(k)][c] - probe.null[c]);
+  }
+  for (std::size_t c = 0; c < start.size(); ++c)
+    start[c] = std::clamp(start[c], h.coordinates[c].low, h.coordinates[c].high);
+  return start;
+}
+
 }  // namespace
 
 std::vector<Promise> screen(const Fitter& fitter, const Fit& now, const NominalTangents& tangents,
                             const std::vector<Hypothesis>& tried) {
   const Projection projection(fitter, now, tangents);
-  const auto samples = static_cast<Index>(fitter.runner().size());
   const ModeProbes mode_probes(fitter.runner(), fitter.model(now.state));
   std::map<char, std::vector<double>> tip;
   std::vector<Promise> promises;
   for (const Hypothesis& h : tried) {
-    const auto has = [&](const std::string& variant) {
-      return std::any_of(now.state.members.begin(), now.state.members.end(), [&](const Member& m) {
-        return m.hypothesis->effect == h.effect && m.hypothesis->variant == variant;
-      });
-    };
-    if (has(h.variant) || (!h.after.empty() && !has(h.after))) continue;
+    if (isMember(now.state, h.effect, h.variant) ||
+        (!h.after.empty() && !isMember(now.state, h.effect, h.after)))
+      continue;
     Promise best;
     best.hypothesis = &h;
     for (const Hypothesis::Probe& probe :
          h.probes.empty() ? modeProbes(h, projection, mode_probes, fitter.runner(), tip) : h.probes) {
-      std::vector<MachineModel> models;
-      for (const std::vector<double>& point : probe.points) {
-        FitState with = now.state;
-        with.members.push_back({&h, point});
-        models.push_back(fitter.model(with));
-      }
-      const auto simulated = fitter.runner().simulate(models);
-      Eigen::MatrixXd columns(samples, static_cast<Index>(models.size()));
-      for (Index k = 0; k < columns.cols(); ++k) {
-        for (Index i = 0; i < samples; ++i) {
-          const auto s = static_cast<std::size_t>(i);
-          columns(i, k) = simulated[static_cast<std::size_t>(k)][s] - projection.base()[s];
-        }
-      }
+      const Eigen::MatrixXd columns = columnsOf(fitter, now.state, h, probe, projection.base());
       if (!columns.allFinite() || columns.squaredNorm() == 0.0) continue;
-      Eigen::VectorXd amplitudes, signature;
-      const double gain = projection.gain(columns, &amplitudes, &signature);
+      Eigen::VectorXd amplitudes;
+      const double gain = projection.gain(columns, &amplitudes);
       if (gain <= best.gain) continue;
-      std::vector<double> start = probe.from_points ? probe.points.front() : probe.null;
-      for (Index k = 0; k < amplitudes.size() && !probe.from_points; ++k) {
-        for (std::size_t c = 0; c < start.size(); ++c)
-          start[c] += amplitudes[k] * (probe.points[static_cast<std::size_t>(k)][c] - probe.null[c]);
-      }
-      for (std::size_t c = 0; c < start.size(); ++c)
-        start[c] = std::clamp(start[c], h.coordinates[c].low, h.coordinates[c].high);
+      std::vector<double> start = startOf(h, probe, amplitudes);
       if (start == probe.null) continue;  // the data ask for what cannot be
       best.gain = gain;
-      best.signature = std::move(signature);
       best.start = std::move(start);
       best.null = probe.from_points ? std::vector<double>{} : probe.null;
     }

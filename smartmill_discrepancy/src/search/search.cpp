@@ -7,13 +7,17 @@
 #include <limits>
 #include <map>
 #include <optional>
+#include <utility>
+
+#include "smartmill_core/error.h"
+#include "smartmill_discrepancy/search/evidence.h"
+#include "smartmill_discrepancy/search/refinement.h"
+#include "smartmill_discrepancy/search/screening.h"
 
 namespace smartmill::discrepancy {
 namespace {
 
-constexpr double PHASE_SETTLED = 1e-4;  // [rad] of a turn of the records
-
-std::string text(const char* format, double a, double b) {
+std::string text(const char* format, double a, double b = 0.0) {
   char line[160];
   std::snprintf(line, sizeof line, format, a, b);
   return line;
@@ -21,58 +25,26 @@ std::string text(const char* format, double a, double b) {
 
 std::string describe(const Member& m) {
   std::string line = m.hypothesis->title() + ":";
-  const EffectEntry entry = m.hypothesis->entry(m.values);
-  for (const auto& [key, value] : numbersOf(entry)) line += " " + key + text(" %.5g", value, 0.0);
+  for (const auto& [key, value] : numbersOf(m.hypothesis->entry(m.values)))
+    line += " " + key + text(" %.5g", value);
   return line;
 }
 
-double squaresLeft(const TwinRunner& runner, const std::vector<double>& simulated) {
-  double squares = 0.0;
-  for (std::size_t i = 0; i < simulated.size(); ++i)
-    squares += std::pow(runner.measured()[i] - simulated[i], 2);
-  return squares;
-}
-
-// Squares by channel.
-std::map<std::string, double> squaresOf(const TwinRunner& runner, const std::vector<double>& values) {
-  std::map<std::string, double> squares;
-  for (const Block& b : runner.blocks()) {
-    double& sum = squares[b.channel];
-    for (std::size_t i = b.offset; i < b.offset + b.size; ++i) sum += values[i] * values[i];
+// The flexibility hypothesis whose axes are just those of some modes, with these modes.
+std::optional<Member> flexibilityOf(const std::map<char, std::vector<double>>& modes,
+                                    const std::vector<Hypothesis>& hypotheses) {
+  for (const Hypothesis& h : hypotheses) {
+    if (h.effect != "tool_flexibility" || h.variant.size() != modes.size()) continue;
+    if (!std::all_of(h.variant.begin(), h.variant.end(), [&](char axis) { return modes.count(axis) > 0; }))
+      continue;
+    Member one{&h, {}};
+    for (const char axis : h.variant) {
+      const std::vector<double>& mode = modes.at(axis);
+      one.values.insert(one.values.end(), mode.begin(), mode.end());
+    }
+    return one;
   }
-  return squares;
-}
-
-// Gain of BIC below which one fit is not better than another: in the channels in which they differ two
-// faithful simulations differ by so many squares.
-double leastGain(const TwinRunner& runner, const Fit& less, const Fit& more, const SearchOptions& options) {
-  constexpr double SHARE = 0.05;  // of the gain, for a channel to count
-  const auto before = squaresOf(runner, less.residual), after = squaresOf(runner, more.residual),
-             signal = squaresOf(runner, runner.measured());
-  double floor = 0.0;
-  for (const auto& [channel, squares] : signal) {
-    if (before.at(channel) - after.at(channel) > SHARE * (less.chi2 - more.chi2))
-      floor += squares * options.twin_accuracy * options.twin_accuracy;
-  }
-  return std::max(options.least_gain, floor);
-}
-
-// Nominal values pulled far off their stated uncertainty speak for an effect even where they could stand for
-// it.
-bool relieves(const Fit& less, const Fit& more, const SearchOptions& options) {
-  return less.bic - more.bic > options.least_prior_gain &&
-         less.penalty - more.penalty > 4.0 * options.least_prior_gain;
-}
-
-// Whether a fit is better than one with less in it.
-bool tells(const TwinRunner& runner, const Fit& less, const Fit& more, const SearchOptions& options) {
-  return less.bic - more.bic > leastGain(runner, less, more, options) || relieves(less, more, options);
-}
-
-FitState without(const FitState& state, std::size_t member) {
-  FitState less = state;
-  less.members.erase(less.members.begin() + static_cast<std::ptrdiff_t>(member));
-  return less;
+  return {};
 }
 
 // A mode of the tool found beside another on the same axis may be what the other stood for, and modes found
@@ -93,18 +65,9 @@ std::optional<FitState> withOneFlexibility(const FitState& state, const std::vec
     }
   }
   if (members < 2) return {};
-  Member one{nullptr, {}};
-  for (const Hypothesis& h : hypotheses) {
-    if (h.effect != "tool_flexibility" || h.variant.size() != modes.size()) continue;
-    one = {&h, {}};
-    for (const char axis : h.variant) {
-      if (modes.count(axis) == 0) one.hypothesis = nullptr;
-      one.values.insert(one.values.end(), modes[axis].begin(), modes[axis].end());
-    }
-    if (one.hypothesis) break;
-  }
-  if (!one.hypothesis) return {};
-  merged.members.push_back(std::move(one));
+  const std::optional<Member> one = flexibilityOf(modes, hypotheses);
+  if (!one) return {};
+  merged.members.push_back(*one);
   return merged;
 }
 
@@ -134,245 +97,261 @@ std::vector<double> startOf(const Fitter& fitter, const Fit& now, const Promise&
   return starts[best];
 }
 
-}  // namespace
+class Search {
+ public:
+  Search(Workbench& bench, const std::vector<Hypothesis>& hypotheses, const SearchOptions& options)
+      : bench_(bench), quick_(bench.quick()), hypotheses_(hypotheses), options_(options) {}
 
-void refine(TwinRunner& quick_runner, const Fitter& quick, const Fitter& exact, const FitState& state,
-            const SearchOptions& options, SearchResult* result) {
-  // The quick runner, made equal to the exact one at the state, finds the exact solution in a few passes.
-  // They end when no value moves by much of its standard deviation: in a narrow valley the cost says little.
-  constexpr int PASSES = 6;
-  constexpr double SETTLED = 0.1;
-  NominalTangents tangents;
-  FitState from = state;
-  double weight = 1.0;
-  for (int pass = 0; pass <= PASSES; ++pass) {
-    const MachineModel model = quick.model(from);
-    const bool turned = options.turn_phases && options.turn_phases(model) > PHASE_SETTLED * std::sqrt(weight);
-    const std::vector<double> simulated = exact.runner().simulate(model);
-    quick_runner.correctTo(model, simulated);
-    // Where structure is left the noise does not tell how well values are known; what is stated of them does.
-    weight = std::max(1.0, squaresLeft(exact.runner(), simulated) / static_cast<double>(simulated.size()));
-    tangents = quick.nominalTangents(from);
-    // All tangents at one point: only these tell what is known along a valley.
-    Fit here = quick.fit(from, &tangents, {0, 1e-8, true, weight});
-    if (!here.converged) break;
-    const Eigen::MatrixXd covariance = weight * here.covariance;
-    result->best = std::move(here);
-    if (pass == PASSES) break;
-    const Fit next = quick.fit(from, &tangents, {6, 1e-5, true, weight});
-    if (!next.converged) break;
-    double moved = 0.0;
-    Eigen::Index k = 0;
-    const auto compare = [&](const std::vector<double>& a, const std::vector<double>& b) {
-      for (std::size_t c = 0; c < a.size(); ++c, ++k)
-        moved = std::max(moved, std::abs(a[c] - b[c]) / std::sqrt(covariance(k, k)));
-    };
-    compare(from.nominal, next.state.nominal);
-    for (std::size_t m = 0; m < from.members.size(); ++m)
-      compare(from.members[m].values, next.state.members[m].values);
-    if (moved < SETTLED && !turned) break;
-    from = next.state;
+  SearchResult run();
+
+ private:
+  // A round's fits, one effect more than before.
+  struct Round {
+    std::size_t number = 0;
+    Fit best;
+    double best_promise = 0.0;
+    double least = 0.0;     // gain of BIC that an effect must bring
+    bool strained = false;  // next to nothing is left but nominal values far off
+    std::vector<Rung> rungs;
+  };
+
+  void fitNominal();
+  bool addEffect(std::size_t round);
+  Round fitPromises(std::size_t number);
+  bool worthFitting(const Round& round, const Promise& promise, double largest) const;
+  void fitPromise(const Promise& promise, Round& round);
+  bool isBetter(const Round& round) const;
+  void settle(Fit best);
+  void dropNeedless();
+  void stepBack(const Fit& before, const Hypothesis* newest);
+  void finish();
+
+  NominalTangents linearise(const FitState& where);
+  Fit refit(const Fit& from, const FitOptions& options) const;
+  Fit withPhasesTurned(Fit fit);
+  // Squares above the noise.
+  double excess(const Fit& fit) const { return fit.chi2 - bench_.samples(); }
+  std::string gapText(double squares) const {
+    return text("gap %.4f", std::sqrt(squares / bench_.samples()));
   }
-  const FitState& at = result->best.state;
-  result->contribution.clear();
-  result->needed.clear();
-  result->rivals.clear();
-  if (at.members.empty()) return;
-  const double bic = result->best.bic;
-  for (std::size_t m = 0; m < at.members.size(); ++m) {
-    const FitState less = without(at, m);
-    const Fit rest = quick.fit(less, &tangents, {6, 1e-3, true, weight});
-    const double lost = rest.bic;
-    result->contribution.push_back(lost - bic);
-    result->needed.push_back(tells(quick.runner(), rest, result->best, options));
-    const std::string& own = at.members[m].hypothesis->effect;
-    // Rivals: what came near to it in the round that took it.
-    std::size_t round = 0;
-    for (const Rung& r : result->ladder) {
-      if (r.taken && r.effect == own && r.variant == at.members[m].hypothesis->variant) round = r.round;
+
+  Workbench& bench_;
+  const Fitter& quick_;
+  const std::vector<Hypothesis>& hypotheses_;
+  const SearchOptions& options_;
+  NominalTangents tangents_;
+  Fit now_;
+  double exact_now_ = 0.0;  // squares that the exact twin leaves
+  std::vector<const Hypothesis*> refused_;
+  std::size_t repeated_ = 0;  // rounds that did not count
+  SearchResult result_;
+};
+
+// What is missing pulls the nominal values far away, but they belong near to what is stated: there the
+// tangents are taken.
+NominalTangents Search::linearise(const FitState& where) {
+  constexpr double NEAR = 2.5;  // standard deviations
+  FitState at = where;
+  const std::vector<Coordinate>& free = bench_.freedom().coordinates();
+  for (std::size_t c = 0; c < free.size(); ++c) {
+    const double reach = NEAR * free[c].prior_std;
+    at.nominal[c] = std::clamp(at.nominal[c], free[c].null - reach, free[c].null + reach);
+  }
+  return bench_.linearise(at);
+}
+
+// Where the twin gives no numbers the fit stays what it was.
+Fit Search::refit(const Fit& from, const FitOptions& options) const {
+  Fit fit = quick_.fit(from.state, &tangents_, options);
+  return fit.converged ? fit : from;
+}
+
+Fit Search::withPhasesTurned(Fit fit) {
+  constexpr int PASSES = 4;
+  for (int pass = 0; pass < PASSES && bench_.phasesEstimated() && !bench_.cancelled(); ++pass) {
+    if (bench_.turnPhases(fit.state) < PHASE_SETTLED) break;
+    tangents_ = linearise(fit.state);
+    const double before = fit.bic;
+    fit = refit(fit, {8, 1e-4, true});
+    if (std::abs(before - fit.bic) < std::max(1.0, 0.01 * excess(fit))) break;
+  }
+  return fit;
+}
+
+void Search::fitNominal() {
+  now_.state.nominal.assign(bench_.freedom().coordinates().size(), 0.0);
+  // Nominal values that are off far: tangents are taken anew where the fit went.
+  for (int pass = 0; pass < 3; ++pass) {
+    tangents_ = linearise(now_.state);
+    Fit fit = quick_.fit(now_.state, &tangents_, {8, 1e-5, true});
+    if (!fit.converged && pass == 0)
+      throw Error(bench_.data().campaign.folder + ": the twin gives no numbers for the nominal model");
+    if (!fit.converged) break;
+    const bool settled = pass > 0 && std::abs(now_.bic - fit.bic) < std::max(1.0, 1e-3 * fit.bic);
+    now_ = std::move(fit);
+    if (settled || bench_.cancelled()) break;
+  }
+  tangents_ = linearise(now_.state);
+  now_ = withPhasesTurned(refit(now_, {3, 1e-5, true}));
+  result_.null = now_;
+  options_.say("nominal model, values free within their uncertainty: " + gapText(now_.chi2));
+  // The quick twin may lie far from where it was corrected: near its stability limit a tool vibrates in it
+  // that is quiet in the exact one, or the reverse.
+  exact_now_ = bench_.exactSquares(now_.state);
+}
+
+bool Search::worthFitting(const Round& round, const Promise& promise, double largest) const {
+  const std::size_t fitted = round.rungs.size();
+  if (promise.gain < round.least && !(round.strained && promise.gain > 4.0 * options_.least_prior_gain))
+    return false;
+  if (fitted >= options_.fitted_per_round) return false;
+  if (fitted >= 2 && promise.gain < 0.02 * largest) return false;
+  // Nothing that is left could make another hypothesis better.
+  if (fitted >= 2 && excess(round.best) < 0.01 * excess(now_)) return false;
+  // One that leaves next to nothing can be bettered only by one that promises about as much.
+  return !(excess(round.best) < 0.02 * excess(now_) && promise.gain < 0.5 * round.best_promise);
+}
+
+void Search::fitPromise(const Promise& promise, Round& round) {
+  FitState with = now_.state;
+  with.members.push_back({promise.hypothesis, startOf(quick_, now_, promise)});
+  const auto begin = std::chrono::steady_clock::now();
+  const std::size_t simulations = quick_.runner().simulations();
+  const Fit tried = quick_.fit(with, round.strained ? nullptr : &tangents_, {6, 1e-3, true});
+  const Member& newest = tried.state.members.back();
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  round.rungs.push_back({{round.number, promise.hypothesis->effect, promise.hypothesis->variant, promise.gain,
+                          now_.bic - tried.bic, false, seconds, quick_.runner().simulations() - simulations},
+                         promise.hypothesis,
+                         newest.values});
+  options_.say(text("  promise %.4g, gain %.4g  ", promise.gain, now_.bic - tried.bic) + describe(newest));
+  if (tried.bic < round.best.bic) {
+    round.best = tried;
+    round.best_promise = promise.gain;
+  }
+}
+
+Search::Round Search::fitPromises(std::size_t number) {
+  const std::vector<Promise> promises = screen(quick_, now_, tangents_, hypotheses_);
+  Round round;
+  round.number = number;
+  round.best = now_;
+  // A trifle beside what is left is not what is missing.
+  round.least = std::max(options_.least_gain, options_.least_share * excess(now_));
+  // With next to nothing left but nominal values far off, an effect may do what they do; only all values
+  // moved together go along that valley.
+  round.strained = excess(now_) < 0.01 * bench_.samples() && now_.penalty > 4.0 * options_.least_prior_gain;
+  for (const Promise& p : promises) {
+    if (std::find(refused_.begin(), refused_.end(), p.hypothesis) != refused_.end()) continue;
+    if (!worthFitting(round, p, promises.front().gain) || bench_.cancelled()) break;
+    fitPromise(p, round);
+  }
+  return round;
+}
+
+bool Search::isBetter(const Round& round) const {
+  return now_.bic - round.best.bic >
+             std::max(round.least, leastGain(quick_.runner(), now_, round.best, options_)) ||
+         (excess(now_) < 0.01 * bench_.samples() && relieves(now_, round.best, options_));
+}
+
+// Takes a round's best fit in and fits everything anew beside it.
+void Search::settle(Fit best) {
+  constexpr FitOptions CLOSELY{8, 1e-4, true};
+  tangents_ = linearise(best.state);
+  if (const auto one = withOneFlexibility(best.state, hypotheses_)) {
+    Fit merged = quick_.fit(*one, &tangents_, CLOSELY);
+    if (merged.bic < best.bic) {
+      best = std::move(merged);
+      tangents_ = linearise(best.state);
     }
-    double largest = 0.0;
-    for (const Rung& r : result->ladder) {
-      if (r.round == round) largest = std::max(largest, r.delta_bic);
-    }
-    for (const Rung& r : result->ladder) {
-      if (r.round != round || r.effect == own || r.delta_bic < 0.3 * largest) continue;
-      const bool member = std::any_of(at.members.begin(), at.members.end(), [&](const Member& o) {
-        return o.hypothesis->effect == r.effect && o.hypothesis->variant == r.variant;
-      });
-      if (member || !r.hypothesis) continue;
-      FitState with = less;
-      with.members.push_back({r.hypothesis, r.values});
-      const Fit fit = quick.fit(with, &tangents, {6, 1e-3, true, weight});
-      if (fit.converged) result->rivals.push_back({m, r.effect, r.variant, lost - fit.bic, fit.state});
+  }
+  const Fit refined = refit(best, CLOSELY);
+  // The tangents held where the fit began; where it went far they are taken anew.
+  tangents_ = linearise(refined.state);
+  now_ = withPhasesTurned(refit(refined, CLOSELY));
+}
+
+// What was found earlier may have stood for what has been found now.
+void Search::dropNeedless() {
+  for (std::size_t m = 0; m < now_.state.members.size() && now_.state.members.size() > 1;) {
+    Fit less = quick_.fit(without(now_.state, m), &tangents_, {6, 1e-3, true});
+    if (!tells(quick_.runner(), less, now_, options_)) {
+      options_.say("  not needed any more: " + now_.state.members[m].hypothesis->title());
+      now_ = std::move(less);
+    } else {
+      ++m;
     }
   }
 }
 
-SearchResult search(TwinRunner& quick_runner, const Fitter& quick, const Fitter& exact,
-                    const std::vector<Hypothesis>& hypotheses, const SearchOptions& options) {
-  const auto say = [&](const std::string& line) {
-    if (options.progress) options.progress(line);
-  };
-  SearchResult result;
-  FitState state;
-  const std::vector<Coordinate>& free = quick.freedom().coordinates();
-  state.nominal.assign(free.size(), 0.0);
-  // What is missing pulls the nominal values far away, but they belong near to what is stated: there the
-  // tangents are taken.
-  const auto anchored = [&](FitState at) {
-    constexpr double NEAR = 2.5;  // standard deviations
-    for (std::size_t c = 0; c < free.size(); ++c) {
-      const double reach = NEAR * free[c].prior_std;
-      at.nominal[c] = std::clamp(at.nominal[c], free[c].null - reach, free[c].null + reach);
-    }
-    return at;
-  };
-  const auto linearise = [&](const FitState& where) {
-    const FitState at = anchored(where);
-    const MachineModel model = quick.model(at);
-    quick_runner.correctTo(model, exact.runner().simulate(model));
-    return quick.nominalTangents(at);
-  };
-  const auto turnPhases = [&](Fit fit, NominalTangents& tangents) {
-    constexpr int PASSES = 4;
-    for (int pass = 0; pass < PASSES && options.turn_phases; ++pass) {
-      if (options.turn_phases(quick.model(fit.state)) < PHASE_SETTLED) break;
-      tangents = linearise(fit.state);
-      const double before = fit.bic;
-      fit = quick.fit(fit.state, &tangents, {8, 1e-4, true});
-      const double excess = fit.chi2 - static_cast<double>(quick.runner().size());
-      if (std::abs(before - fit.bic) < std::max(1.0, 0.01 * excess)) break;
-    }
-    return fit;
-  };
-  // Nominal values that are off far: tangents are taken anew where the fit went.
-  NominalTangents tangents;
-  Fit now;
-  for (int pass = 0; pass < 3; ++pass) {
-    tangents = linearise(state);
-    Fit fit = quick.fit(state, &tangents, {8, 1e-5, true});
-    const bool settled = pass > 0 && std::abs(now.bic - fit.bic) < std::max(1.0, 1e-3 * fit.bic);
-    now = std::move(fit);
-    state = now.state;
-    if (settled) break;
+// Back to before a round that the exact twin does not bear out, with smaller steps or without its effect.
+void Search::stepBack(const Fit& before, const Hypothesis* newest) {
+  ++repeated_;
+  if (bench_.refineQuick()) {
+    options_.say("  again with smaller steps");
+  } else {
+    refused_.push_back(newest);
   }
-  tangents = linearise(state);
-  now = turnPhases(quick.fit(state, &tangents, {3, 1e-5, true}), tangents);
-  result.null = now;
-  const double samples = static_cast<double>(quick.runner().size());
-  say(text("nominal model, values free within their uncertainty: gap %.4f", std::sqrt(now.chi2 / samples),
-           0.0));
-  // The quick runner may lie far from where it was corrected: near its stability limit a tool vibrates in it
-  // that is quiet in the exact one, or the reverse.
-  const auto exactSquares = [&](const FitState& at) {
-    return squaresLeft(exact.runner(), exact.runner().simulate(quick.model(at)));
-  };
-  double exact_now = exactSquares(now.state);
-  std::vector<const Hypothesis*> refused;
-  std::size_t repeated = 0;
-  for (std::size_t round = 0; round < options.most_effects + repeated; ++round) {
-    const std::vector<Promise> promises = screen(quick, now, tangents, hypotheses);
-    // A trifle beside what is left is not what is missing.
-    const double least = std::max(options.least_gain, options.least_share * (now.chi2 - samples));
-    // With next to nothing left but nominal values far off, an effect may do what they do; only all values
-    // moved together go along that valley.
-    const bool strained = now.chi2 - samples < 0.01 * samples && now.penalty > 4.0 * options.least_prior_gain;
-    Fit best = now;
-    double best_promise = 0.0;
-    std::size_t fitted = 0;
-    std::vector<Rung> rungs;
-    for (const Promise& p : promises) {
-      if (std::find(refused.begin(), refused.end(), p.hypothesis) != refused.end()) continue;
-      if (p.gain < least && !(strained && p.gain > 4.0 * options.least_prior_gain)) break;
-      if (fitted >= 2 && p.gain < 0.02 * promises.front().gain) break;
-      if (fitted >= options.fitted_per_round) break;
-      // One that leaves next to nothing can be bettered only by one that promises about as much.
-      if (best.chi2 - samples < 0.02 * (now.chi2 - samples) && p.gain < 0.5 * best_promise) break;
-      FitState with = now.state;
-      with.members.push_back({p.hypothesis, startOf(quick, now, p)});
-      const auto begin = std::chrono::steady_clock::now();
-      const std::size_t simulations = quick.runner().simulations();
-      const Fit tried = quick.fit(with, strained ? nullptr : &tangents, {6, 1e-3, true});
-      ++fitted;
-      rungs.push_back({round, p.hypothesis->effect, p.hypothesis->variant, p.gain, now.bic - tried.bic, false,
-                       std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(),
-                       quick.runner().simulations() - simulations, p.hypothesis,
-                       tried.state.members.back().values});
-      say(text("  promise %.4g, gain %.4g  ", p.gain, now.bic - tried.bic) +
-          describe(tried.state.members.back()));
-      if (tried.bic < best.bic) {
-        best = tried;
-        best_promise = p.gain;
-      }
-      // Nothing that is left could make another hypothesis better.
-      if (fitted >= 2 && best.chi2 - samples < 0.01 * (now.chi2 - samples)) break;
-    }
-    const bool better = now.bic - best.bic > std::max(least, leastGain(quick.runner(), now, best, options)) ||
-                        (now.chi2 - samples < 0.01 * samples && relieves(now, best, options));
-    for (Rung& r : rungs) {
-      r.taken = better && r.effect == best.state.members.back().hypothesis->effect &&
-                r.variant == best.state.members.back().hypothesis->variant;
-      result.ladder.push_back(r);
-    }
-    if (!better) break;
-    const Fit before = now;
-    const Hypothesis* const newest = best.state.members.back().hypothesis;
-    tangents = linearise(best.state);
-    if (const auto one = withOneFlexibility(best.state, hypotheses)) {
-      const Fit merged = quick.fit(*one, &tangents, {8, 1e-4, true});
-      if (merged.bic < best.bic) {
-        best = merged;
-        tangents = linearise(best.state);
-      }
-    }
-    Fit refined = quick.fit(best.state, &tangents, {8, 1e-4, true});
-    // The tangents held where the fit began; where it went far they are taken anew.
-    tangents = linearise(refined.state);
-    now = turnPhases(quick.fit(refined.state, &tangents, {8, 1e-4, true}), tangents);
-    // What was found earlier may have stood for what has been found now.
-    for (std::size_t m = 0; m < now.state.members.size() && now.state.members.size() > 1;) {
-      const Fit less = quick.fit(without(now.state, m), &tangents, {6, 1e-3, true});
-      if (!tells(quick.runner(), less, now, options)) {
-        say("  not needed any more: " + now.state.members[m].hypothesis->title());
-        now = less;
-      } else {
-        ++m;
-      }
-    }
-    const double exact_squares = exactSquares(now.state);
-    if (!(exact_squares < exact_now)) {
-      say(text("gap %.4f when simulated exactly, not taken: ", std::sqrt(exact_squares / samples), 0.0) +
-          newest->title());
-      ++repeated;
-      if (quick_runner.substeps() < options.final_substeps) {
-        quick_runner.setSubsteps(std::min(4 * quick_runner.substeps(), options.final_substeps));
-        say("  again with smaller steps");
-      } else {
-        refused.push_back(newest);
-      }
-      for (Rung& r : result.ladder) r.taken = r.taken && r.round != round;
-      now = before;
-      if (options.turn_phases) options.turn_phases(quick.model(now.state));
-      tangents = linearise(now.state);
-      now = quick.fit(now.state, &tangents, {8, 1e-4, true});
-      exact_now = exactSquares(now.state);
-      continue;
-    }
-    exact_now = exact_squares;
-    say(text("gap %.4f with ", std::sqrt(now.chi2 / samples), 0.0) + describe(now.state.members.back()));
+  now_ = before;
+  bench_.turnPhases(now_.state);
+  tangents_ = linearise(now_.state);
+  now_ = refit(now_, {8, 1e-4, true});
+  exact_now_ = bench_.exactSquares(now_.state);
+}
+
+// @return false: nothing more is to be added
+bool Search::addEffect(std::size_t number) {
+  Round round = fitPromises(number);
+  const bool better = isBetter(round) && !bench_.cancelled();
+  const Hypothesis* const newest = better ? round.best.state.members.back().hypothesis : nullptr;
+  const std::size_t first = result_.ladder.size();
+  result_.ladder.insert(result_.ladder.end(), round.rungs.begin(), round.rungs.end());
+  if (!better) return false;
+  const Fit before = now_;
+  settle(std::move(round.best));
+  dropNeedless();
+  const double exact_squares = bench_.exactSquares(now_.state);
+  if (!(exact_squares < exact_now_)) {
+    options_.say(gapText(exact_squares) + " when simulated exactly, not taken: " + newest->title());
+    stepBack(before, newest);
+    return true;
   }
-  refine(quick_runner, quick, exact, now.state, options, &result);
+  for (std::size_t k = first; k < result_.ladder.size(); ++k)
+    result_.ladder[k].tried.taken = result_.ladder[k].hypothesis == newest;
+  exact_now_ = exact_squares;
+  options_.say(gapText(now_.chi2) + " with " + describe(now_.state.members.back()));
+  return true;
+}
+
+void Search::finish() {
+  result_.best = now_;
+  bool refined = refine(bench_, now_.state, options_, &result_);
   // With everything settled an effect may turn out to be needed no more.
-  while (!result.contribution.empty()) {
-    const auto least = std::min_element(result.contribution.begin(), result.contribution.end());
-    const auto m = static_cast<std::size_t>(least - result.contribution.begin());
-    if (result.needed[m]) break;
-    say("  not needed any more: " + result.best.state.members[m].hypothesis->title());
-    refine(quick_runner, quick, exact, without(result.best.state, m), options, &result);
+  while (refined && !result_.contribution.empty()) {
+    const auto least = std::min_element(result_.contribution.begin(), result_.contribution.end());
+    const auto m = static_cast<std::size_t>(least - result_.contribution.begin());
+    if (result_.needed[m]) break;
+    options_.say("  not needed any more: " + result_.best.state.members[m].hypothesis->title());
+    refined = refine(bench_, without(result_.best.state, m), options_, &result_);
   }
-  for (const Member& m : result.best.state.members) say("found " + describe(m));
-  return result;
+  for (const Member& m : result_.best.state.members) options_.say("found " + describe(m));
+}
+
+SearchResult Search::run() {
+  fitNominal();
+  for (std::size_t round = 0; round < options_.most_effects + repeated_ && !bench_.cancelled(); ++round) {
+    if (!addEffect(round)) break;
+  }
+  finish();
+  return std::move(result_);
+}
+
+}  // namespace
+
+SearchResult search(Workbench& bench, const std::vector<Hypothesis>& hypotheses,
+                    const SearchOptions& options) {
+  return Search(bench, hypotheses, options).run();
 }
 
 }  // namespace smartmill::discrepancy

@@ -1,9 +1,10 @@
+#include "smartmill_discrepancy/search/separating_test.h"
+
 #include <cmath>
 #include <cstdio>
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/units.h"
-#include "smartmill_discrepancy/search/search.h"
 #include "smartmill_sim/twin/twin.h"
 
 namespace smartmill::discrepancy {

@@ -1,21 +1,14 @@
 #include "smartmill_discrepancy/gap/gap.h"
 
 #include <algorithm>
-#include <cstdlib>
-#include <filesystem>
-#include <iostream>
+#include <string>
 
 #include <gtest/gtest.h>
 
-#include "smartmill_core/error.h"
+#include "smartmill_core/testing/shared_data.h"
 
 namespace smartmill::discrepancy {
 namespace {
-
-std::string campaigns() {
-  const char* folder = std::getenv("SMARTMILL_SHARED");
-  return std::string(folder ? folder : SMARTMILL_SHARED_FOLDER) + "/campaigns";
-}
 
 double largestOf(const CampaignGap& gap, const std::string& channel) {
   double largest = 0.0;
@@ -27,12 +20,9 @@ double largestOf(const CampaignGap& gap, const std::string& channel) {
 
 // Independent campaigns: one whose model is exact, others with something hidden in the channels named.
 TEST(Gap, isTheNoiseFloorOnlyWhereNothingIsHidden) {
-  if (!std::filesystem::exists(campaigns())) {
-    std::cout << campaigns() << " is absent, not checked\n";
-    return;
-  }
-  const auto load = [](const std::string& name) {
-    const Campaign campaign = readCampaign(campaigns() + "/" + name);
+  SMARTMILL_SHARED_DATA(campaigns, "campaigns");
+  const auto load = [&](const std::string& name) {
+    const Campaign campaign = readCampaign(campaigns + "/" + name);
     return loadDataset(campaign, readMachineModel(campaign.modelPath()));
   };
   const auto gapOf = [&](const std::string& name) {

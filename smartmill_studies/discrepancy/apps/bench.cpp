@@ -13,10 +13,12 @@
 
 #include "discrepancy/bench_campaign.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/io/gnuplot.h"
 #include "smartmill_core/model/effect_catalogue.h"
 #include "smartmill_core/program.h"
-#include "smartmill_discrepancy/explain/explanation.h"
+#include "smartmill_discrepancy/explain/explain.h"
 #include "smartmill_discrepancy/gap/twin_runner.h"
+#include "smartmill_discrepancy/report/report_json.h"
 
 namespace {
 
@@ -89,6 +91,7 @@ bool grouped(const Explanation& e, const std::string& name) {
 // What one case came to.
 struct Outcome {
   std::string expected, found;  // names; nothing
+  std::string verdict;          // or why the campaign was refused
   std::vector<std::string> named;
   Explanation explanation;
   bool right = false, false_effect = false;
@@ -114,14 +117,15 @@ Outcome runCase(const Options& o, const Case& c, int number, std::uint64_t seed)
     const Campaign campaign = readCampaign(folder);
     const Dataset data = loadDataset(campaign, readMachineModel(campaign.modelPath()));
     ExplainOptions options;
-    options.search.threads = 1;
+    options.bench.threads = 1;
     if (o.only_case >= 0)
       options.search.progress = [](const std::string& line) { std::fprintf(stderr, "%s\n", line.c_str()); };
     std::filesystem::create_directories(folder + "/report");
     e = explain(data, options, folder + "/report");
     writeReport(e, folder + "/report");
+    outcome.verdict = nameOf(e.verdict);
   } catch (const Error& error) {
-    e.verdict = std::string("refused: ") + error.what();
+    outcome.verdict = std::string("refused: ") + error.what();
   }
   for (const std::string& name : c.names) outcome.expected += (outcome.expected.empty() ? "" : "+") + name;
   if (truth.outside) outcome.expected = "outside: " + truth.outside->kind + " " + truth.outside->channel;
@@ -131,14 +135,14 @@ Outcome runCase(const Options& o, const Case& c, int number, std::uint64_t seed)
     outcome.found += (outcome.found.empty() ? "" : "+") + f.name;
   }
   if (c.kind == "outside") {
-    outcome.right = (e.verdict == "unknown_effect" || e.verdict == "partly_explained") &&
+    outcome.right = (outcome.verdict == "unknown_effect" || outcome.verdict == "partly_explained") &&
                     !e.unexplained.empty() && e.unexplained.front().channel == truth.outside->channel &&
                     e.unexplained.front().domain == truth.outside->domain();
-    outcome.false_effect = e.verdict == "explained";
+    outcome.false_effect = outcome.verdict == "explained";
     for (const Finding& f : e.unexplained) outcome.found += " [" + f.channel + " " + f.domain + "]";
   } else if (c.names.empty()) {
     outcome.false_effect = !e.effects.empty();
-    outcome.right = e.verdict == "no_disagreement";
+    outcome.right = outcome.verdict == "no_disagreement";
   } else {
     outcome.right = true;
     for (std::size_t k = 0; k < c.names.size(); ++k) {
@@ -159,7 +163,7 @@ Outcome runCase(const Options& o, const Case& c, int number, std::uint64_t seed)
       if (std::find(c.names.begin(), c.names.end(), f.name) == c.names.end()) outcome.false_effect = true;
     }
   }
-  if (outcome.found.empty()) outcome.found = e.verdict;
+  if (outcome.found.empty()) outcome.found = outcome.verdict;
   if (!o.keep && outcome.right) std::filesystem::remove_all(folder);
   return outcome;
 }
@@ -179,8 +183,7 @@ void drawConfusion(const std::vector<Case>& cases, const std::vector<Outcome>& o
     known(hidden, truth);
     ++all[truth];
     std::vector<std::string> columns = outcomes[k].named;
-    if (columns.empty())
-      columns.push_back(outcomes[k].explanation.verdict.substr(0, outcomes[k].explanation.verdict.find(':')));
+    if (columns.empty()) columns.push_back(outcomes[k].verdict.substr(0, outcomes[k].verdict.find(':')));
     for (const std::string& c : columns) ++count[{truth, c}];
   }
   named = hidden;
@@ -209,7 +212,7 @@ void drawConfusion(const std::vector<Case>& cases, const std::vector<Outcome>& o
       "-0.5]\nset yrange [" + std::to_string(hidden.size()) +
       "-0.5:-0.5]\nplot $m using 1:2:(0.5):(0.5):3 with boxxyerror fillstyle solid 1.0 border lc 'white' "
       "fc palette notitle, $m using 1:2:(sprintf('%d', $4)) with labels font ',8' tc rgb 'orange' notitle\n";
-  drawWithGnuplot(png, 1100, 900, program);
+  (Gnuplot(png, 1100, 900, 10) << program).draw();
 }
 
 // Stated confidence of each named effect against the share that was really hidden.
@@ -251,12 +254,13 @@ void drawReliability(const std::vector<Case>& cases, const std::vector<Outcome>&
                 b.all);
   }
   if (data.empty()) return;
-  drawWithGnuplot(
-      out + "/reliability.png", 700, 650,
-      "$r << EOD\n" + data +
-          "EOD\nset title 'reliability of the stated confidence'\nset xlabel 'stated'\nset ylabel "
-          "'share right'\nset xrange [0.4:1.02]\nset yrange [0:1.05]\nset key left\nplot x with lines "
-          "dt 2 lc 'gray' title 'ideal', $r using 1:2:3:4 with yerrorbars pt 7 title 'named effects'\n");
+  Gnuplot picture(out + "/reliability.png", 700, 650, 10);
+  picture << "$r << EOD\n"
+          << data
+          << "EOD\nset title 'reliability of the stated confidence'\nset xlabel 'stated'\nset ylabel "
+             "'share right'\nset xrange [0.4:1.02]\nset yrange [0:1.05]\nset key left\nplot x with lines "
+             "dt 2 lc 'gray' title 'ideal', $r using 1:2:3:4 with yerrorbars pt 7 title 'named effects'\n";
+  picture.draw();
 }
 
 void run(const Options& o) {
@@ -275,8 +279,9 @@ void run(const Options& o) {
     const Explanation& e = outcome.explanation;
     char line[600];
     std::snprintf(line, sizeof line, "%zu,%s,%s,%s,%s,%d,%.2f,%.3f,%.4f,%.4f,%.1f", k, cases[k].kind.c_str(),
-                  outcome.expected.c_str(), e.verdict.c_str(), outcome.found.c_str(), outcome.right ? 1 : 0,
-                  outcome.largest_score, e.before.fit, e.after.fit, e.after.heldout, e.seconds);
+                  outcome.expected.c_str(), outcome.verdict.c_str(), outcome.found.c_str(),
+                  outcome.right ? 1 : 0, outcome.largest_score, e.before.fit, e.after.fit, e.after.heldout,
+                  e.seconds);
     const std::lock_guard<std::mutex> lock(mutex);
     table << line << std::endl;
     std::printf("%s\n", line);
@@ -332,7 +337,5 @@ int main(int argc, char** argv) {
   line.option("--substeps", o.substeps, "integration steps a sample of the hidden machine").within(2, 64);
   line.flag("--keep", o.keep, "keep the campaigns of right cases too");
   line.flag("--exact-nominal", o.exact_nominal, "nominal values are true");
-  return runProgram(line, argc, argv, [&] {
-    run(o);
-  });
+  return runProgram(line, argc, argv, [&] { run(o); });
 }

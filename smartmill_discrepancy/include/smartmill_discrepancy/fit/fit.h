@@ -1,12 +1,14 @@
 #pragma once
 
-#include <string>
+#include <cstddef>
+#include <functional>
 #include <vector>
 
 #include <Eigen/Core>
 
 #include "smartmill_discrepancy/gap/twin_runner.h"
 #include "smartmill_discrepancy/hypotheses/hypothesis.h"
+#include "smartmill_discrepancy/hypotheses/nominal_freedom.h"
 
 namespace smartmill::discrepancy {
 
@@ -22,16 +24,19 @@ struct FitState {
   std::vector<Member> members;
 };
 
+/// The same without one of its members.
+FitState without(const FitState& state, std::size_t member);
+
 struct Fit {
   FitState state;
   double chi2 = 0.0;             ///< sum of squares of residuals over noise
   double penalty = 0.0;          ///< of the priors
   double bic = 0.0;              ///< chi2 + penalty + effect coordinates x ln(samples)
-  std::vector<double> residual;  ///< (measured - simulated) / noise at the state
+  std::vector<double> residual;  ///< (measured - simulated) / noise at the state; empty unless converged
   /// Covariance of nominal coordinates, then members' in their order: inverse of Fisher information with
   /// priors.
   Eigen::MatrixXd covariance;
-  bool converged = false;
+  bool converged = false;  ///< false: the twin gives no numbers there; chi2 and bic are infinite
 };
 
 /// Tangents of the nominal coordinates about a state.
@@ -51,14 +56,16 @@ struct FitOptions {
 /// weak priors; tangents by one simulation a coordinate.
 class Fitter {
  public:
-  /// Both must outlive this.
-  Fitter(const TwinRunner& runner, const NominalFreedom& freedom);
+  /// @param runner, freedom must outlive this. @param cancelled asked at each step of a fit: true ends it
+  /// there
+  Fitter(const TwinRunner& runner, const NominalFreedom& freedom, std::function<bool()> cancelled = {});
 
   MachineModel model(const FitState& state) const;
 
   NominalTangents nominalTangents(const FitState& state) const;
 
   /// @param frozen nominal values act linearly along these tangents; nullptr: they are simulated anew
+  /// @return at a start where the twin gives no numbers: the start, not converged
   Fit fit(const FitState& start, const NominalTangents* frozen, const FitOptions& options) const;
 
   const TwinRunner& runner() const { return runner_; }
@@ -67,6 +74,7 @@ class Fitter {
  private:
   const TwinRunner& runner_;
   const NominalFreedom& freedom_;
+  std::function<bool()> cancelled_;
 };
 
 }  // namespace smartmill::discrepancy

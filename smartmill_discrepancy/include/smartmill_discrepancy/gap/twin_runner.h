@@ -81,6 +81,9 @@ class TwinRunner {
   mutable std::atomic<std::size_t> simulations_{0};
 };
 
+/// Sum of squares over noise that a simulation leaves of the records.
+double squaresLeft(const TwinRunner& runner, const std::vector<double>& simulated);
+
 /// Calls job(0) .. job(count - 1), spread over threads. @throws the first exception of a job, by index.
 void runParallel(std::size_t count, int threads, const std::function<void(std::size_t)>& job);
 

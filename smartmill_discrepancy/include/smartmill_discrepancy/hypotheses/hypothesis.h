@@ -7,33 +7,9 @@
 
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_discrepancy/data/dataset.h"
+#include "smartmill_discrepancy/hypotheses/coordinate.h"
 
 namespace smartmill::discrepancy {
-
-/// A number of the model that a fit may move.
-struct Coordinate {
-  std::string name;
-  double null = 0.0;  ///< value that changes nothing (nominal: 0; prior mean)
-  double low = 0.0, high = 0.0;
-  double step = 0.0;       ///< of numeric tangents
-  double prior_std = 0.0;  ///< Gaussian prior about null
-};
-
-/// Values of the nominal model, free within their stated uncertainty: each coordinate is the natural
-/// logarithm of value over nominal value.
-class NominalFreedom {
- public:
-  explicit NominalFreedom(const MachineModel& nominal);
-  const std::vector<Coordinate>& coordinates() const { return coordinates_; }
-  /// The model with these values. values.size() == coordinates().size()
-  MachineModel apply(const MachineModel& nominal, const std::vector<double>& values) const;
-  /// Writes the standard deviations that the file format has a place for (cutting coefficients).
-  void writeStdDevs(MachineModel& model, const std::vector<double>& std_devs) const;
-
- private:
-  std::vector<Coordinate> coordinates_;
-  std::vector<std::function<void(MachineModel&, double)>> set_;
-};
 
 /// One way in which an effect of the catalogue may be present, e.g. gain_error of fx.
 struct Hypothesis {

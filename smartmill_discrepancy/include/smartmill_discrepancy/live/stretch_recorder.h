@@ -3,6 +3,7 @@
 #include <deque>
 #include <functional>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "smartmill_core/campaign/campaign.h"
@@ -48,7 +49,14 @@ class StretchRecorder {
   void reset();
 
  private:
+  // How the spindle turned: angle [rad] at a moment, and speed [rad/s].
+  struct Turning {
+    double phase = 0.0, speed = 0.0;
+  };
   void finish();
+  std::optional<Turning> evenTurning(double begin, double end) const;
+  CampaignTest testOf(double begin, double speed) const;
+  Record recordOf(const std::string& name, const Turning& turning) const;
   void unsteady();
   void forget();
 

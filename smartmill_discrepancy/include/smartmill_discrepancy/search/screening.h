@@ -14,7 +14,6 @@ struct Promise {
   std::vector<double> start;  ///< coordinates to start a fit from
   std::vector<double>
       null;  ///< the point without effect that the start was reached from; empty: the start stands
-  Eigen::VectorXd signature;  ///< what it explains of the residual, free of the nominal tangents, of length 1
 };
 
 /// Score test of each hypothesis at a fitted state. Best first; hypotheses without any trace in the data come

@@ -3,7 +3,7 @@
 
 #include "smartmill_core/signal/fourier.h"
 #include "smartmill_core/units.h"
-#include "smartmill_discrepancy/explain/explanation.h"
+#include "smartmill_discrepancy/explain/outcome.h"
 
 namespace smartmill::discrepancy {
 namespace {

@@ -1,0 +1,14 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "smartmill_discrepancy/results/explanation.h"
+
+namespace smartmill::discrepancy {
+
+/// Writes FOLDER/report.html, which holds the pictures of the folder. @throws Error.
+void writeHtml(const Explanation& explanation, const std::string& campaign,
+               const std::vector<std::string>& pictures, const std::string& folder);
+
+}  // namespace smartmill::discrepancy

@@ -1,0 +1,12 @@
+#pragma once
+
+#include <string>
+
+#include "smartmill_discrepancy/results/explanation.h"
+
+namespace smartmill::discrepancy {
+
+/// Writes FOLDER/report.json (smartmill-report/1). @throws Error.
+void writeReport(const Explanation& explanation, const std::string& folder);
+
+}  // namespace smartmill::discrepancy

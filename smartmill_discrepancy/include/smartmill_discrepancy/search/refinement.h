@@ -1,0 +1,13 @@
+#pragma once
+
+#include "smartmill_discrepancy/search/search.h"
+
+namespace smartmill::discrepancy {
+
+/// Fits a state with every value free and simulated exactly, and measures what each member contributes and
+/// how its best rivals do in its place.
+/// @param result its ladder tells the rivals; best, contribution, needed and rivals are written
+/// @return false: the twin gives no numbers there, best is as it was
+bool refine(Workbench& bench, const FitState& state, const SearchOptions& options, SearchResult* result);
+
+}  // namespace smartmill::discrepancy

@@ -1,0 +1,66 @@
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "smartmill_discrepancy/data/dataset.h"
+#include "smartmill_discrepancy/fit/fit.h"
+#include "smartmill_discrepancy/gap/twin_runner.h"
+#include "smartmill_discrepancy/hypotheses/nominal_freedom.h"
+
+namespace smartmill::discrepancy {
+
+/// [rad] A turn of the records that changes nothing any more.
+constexpr double PHASE_SETTLED = 1e-4;
+
+struct WorkbenchOptions {
+  int threads = 2;
+  int screening_substeps = 1;
+  int final_substeps = 8;
+  std::function<bool()> cancelled;  ///< asked now and then; true ends every fit where it stands
+};
+
+/// A campaign with what simulates and fits it: a quick and an exact twin of the tests to be fitted, and an
+/// exact one of the held-out tests. The quick twin is made equal to the exact one where the search stands.
+class Workbench {
+ public:
+  Workbench(const Dataset& data, const WorkbenchOptions& options);
+  Workbench(const Workbench&) = delete;
+  Workbench& operator=(const Workbench&) = delete;
+
+  const Dataset& data() const { return data_; }
+  const NominalFreedom& freedom() const { return freedom_; }
+  const Fitter& quick() const { return quick_; }
+  const Fitter& exact() const { return exact_; }
+  const TwinRunner& fitted() const { return exact_runner_; }     ///< exact twin of the fit tests
+  const TwinRunner& heldout() const { return heldout_runner_; }  ///< exact twin of the held-out tests
+  bool cancelled() const { return cancelled_ && cancelled_(); }
+
+  /// Samples of the fit tests.
+  double samples() const { return static_cast<double>(exact_runner_.size()); }
+
+  /// Makes the quick twin equal to the exact one at a state and takes the nominal tangents there.
+  /// @param exact_squares receives what the exact twin leaves there; may be nullptr
+  NominalTangents linearise(const FitState& state, double* exact_squares = nullptr);
+
+  /// What the exact twin leaves of the fit tests at a state.
+  double exactSquares(const FitState& state) const;
+
+  /// Smaller steps for the quick twin. @return false: they are as small as the exact one's
+  bool refineQuick();
+
+  bool phasesEstimated() const { return phases_estimated_; }  ///< some records have no spindle angle
+
+  /// Turns the records without spindle angle to where a state fits best. @return by how much [rad]
+  double turnPhases(const FitState& state);
+
+ private:
+  Dataset data_;  // its records without spindle angle are turned as the model becomes better
+  NominalFreedom freedom_;
+  bool phases_estimated_;
+  std::function<bool()> cancelled_;
+  TwinRunner quick_runner_, exact_runner_, heldout_runner_;
+  Fitter quick_, exact_;
+};
+
+}  // namespace smartmill::discrepancy

@@ -1,0 +1,109 @@
+#include "smartmill_discrepancy/explain/explain.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+
+#include "smartmill_core/error.h"
+#include "smartmill_discrepancy/data/labels.h"
+#include "smartmill_discrepancy/explain/challenge.h"
+#include "smartmill_discrepancy/explain/judge.h"
+#include "smartmill_discrepancy/explain/outcome.h"
+#include "smartmill_sim/twin/twin.h"
+
+namespace smartmill::discrepancy {
+namespace {
+
+template <class... Values>
+std::string text(const char* format, Values... values) {
+  char line[200];
+  std::snprintf(line, sizeof line, format, values...);
+  return line;
+}
+
+void refuse(const Dataset& data, const std::vector<std::string>& reasons) {
+  std::string all;
+  for (const std::string& r : reasons) all += (all.empty() ? "" : "; ") + r;
+  if (!reasons.empty()) throw Error(data.campaign.folder + ": " + all);
+}
+
+// A search needs numbers to begin with.
+void refuseWithoutNumbers(const TwinRunner& runner, const std::vector<double>& residual) {
+  for (const Block& b : runner.blocks()) {
+    const auto from = residual.begin() + static_cast<std::ptrdiff_t>(b.offset);
+    if (!std::all_of(from, from + static_cast<std::ptrdiff_t>(b.size),
+                     [](double r) { return std::isfinite(r); }))
+      throw Error(runner.data().campaign.folder + ": test " + runner.data().tests[b.test].test.name +
+                  ": the twin gives no numbers for " + b.channel);
+  }
+}
+
+// Cuts that chatter speak for a model that chatters in them.
+void addChatter(const Dataset& data, Explanation* result) {
+  sim::SimulationOptions options;
+  options.noise = false;
+  for (const ChatteringTest& c : data.chattering) {
+    const auto chatters = [&](const MachineModel& model) {
+      const Record simulated = sim::simulateTest(model, c.data.test, c.data.record, options);
+      return findChatter(simulated, c.data.test, c.data.first_cut).has_value();
+    };
+    if (chatters(data.nominal)) continue;
+    Finding f;
+    f.channel = "fx";
+    f.tests = {c.data.test.name};
+    f.domain = "frequency";
+    f.location["frequency_hz"] = c.chatter.frequency;
+    f.depends_on = {"cutting"};
+    f.amplitude = c.chatter.amplitude;
+    f.p_value = 1e-300;
+    result->where.push_back(f);
+    if (!chatters(result->model)) result->unexplained.push_back(f);
+  }
+}
+
+}  // namespace
+
+Explanation explain(const Dataset& data, const ExplainOptions& options, const std::string& folder) {
+  const auto begin = std::chrono::steady_clock::now();
+  Explanation result;
+  result.notes = data.notes;
+  const Labels labels = checkLabels(data, options.bench.threads);
+  refuse(data, labels.wrong);
+
+  Workbench bench(data, options.bench);
+  const Remains before = remainsOf(bench, data.nominal);
+  refuseWithoutNumbers(bench.fitted(), before.fit);
+  refuseWithoutNumbers(bench.heldout(), before.heldout);
+  result.before = before.gap;
+  options.search.say(
+      text("gap of the nominal model: %.4f, held out %.4f", result.before.fit, result.before.heldout));
+
+  SearchOptions searched = options.search;
+  if (!labels.doubtful.empty()) searched.most_effects = std::min<std::size_t>(searched.most_effects, 2);
+  const std::vector<Hypothesis> hypotheses = catalogueHypotheses(data, &result.notes);
+  SearchResult found = search(bench, hypotheses, searched);
+  for (const Rung& r : found.ladder) result.ladder.push_back(r.tried);
+
+  // What the calibration of the nominal values takes away is no disagreement of their kind.
+  StructureOptions structure = options.structure;
+  structure.squares_of_gap = std::max(found.null.chi2 - bench.samples(), 1.0);
+  result.where = findStructure(bench.fitted(), found.null.residual, structure);
+  result.unexplained = findStructure(bench.fitted(), found.best.residual, structure);
+  challenge(bench, options, structure, &found, &result.unexplained);
+  result.interrupted = bench.cancelled();
+
+  const MachineModel improved = nameEffects(bench, searched, found, &result);
+  writeOutcome(bench, before, improved, folder, &result);
+  addChatter(bench.data(), &result);
+  result.verdict = verdictOf(result);
+  if (result.verdict == Verdict::no_disagreement) result.where.clear();
+  // An effect that acts in one test most may look like another test's label; one that explains all clears it.
+  if (!result.unexplained.empty()) refuse(data, labels.doubtful);
+  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  options.search.say(text("verdict %s; gap %.4f -> %.4f, held out %.4f -> %.4f", nameOf(result.verdict),
+                          result.before.fit, result.after.fit, result.before.heldout, result.after.heldout));
+  return result;
+}
+
+}  // namespace smartmill::discrepancy

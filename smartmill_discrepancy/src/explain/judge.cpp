@@ -1,0 +1,131 @@
+#include "smartmill_discrepancy/explain/judge.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "smartmill_core/math/linear_algebra.h"
+#include "smartmill_discrepancy/explain/evidence_of_members.h"
+#include "smartmill_discrepancy/search/separating_test.h"
+
+namespace smartmill::discrepancy {
+namespace {
+
+constexpr double TWIN_ACCURACY = 2e-4;  // share of a value by which two faithful simulations differ
+
+// A member with its values moved along a direction, within their bounds.
+std::vector<std::pair<std::string, double>> numbersAt(const Member& member, const Eigen::VectorXd& shift) {
+  std::vector<double> moved = member.values;
+  for (std::size_t c = 0; c < moved.size(); ++c) {
+    const Coordinate& limits = member.hypothesis->coordinates[c];
+    moved[c] = std::clamp(moved[c] + shift[static_cast<Eigen::Index>(c)], limits.low, limits.high);
+  }
+  return numbersOf(member.hypothesis->entry(moved));
+}
+
+// Standard deviations of the keys of a member's entry: root mean square of what they differ by at points that
+// have the covariance of the coordinates. Straight tangents would say nothing of the size of a vector of
+// which only one direction is known.
+std::vector<FoundParameter> parametersOf(const Member& member, const Eigen::MatrixXd& covariance) {
+  const auto numbers = numbersOf(member.hypothesis->entry(member.values));
+  const Eigen::Index count = covariance.cols();
+  const linear::SymmetricEigensystem axes = linear::symmetricEigensystem(covariance);
+  std::vector<double> variance(numbers.size(), 0.0);
+  for (Eigen::Index k = 0; k < count; ++k) {
+    const double reach = std::sqrt(static_cast<double>(count) * std::max(axes.values[k], 0.0));
+    for (const double sign : {-1.0, 1.0}) {
+      const auto other = numbersAt(member, sign * reach * axes.vectors.col(k));
+      if (other.size() != numbers.size()) continue;
+      for (std::size_t n = 0; n < numbers.size(); ++n) {
+        double difference = other[n].second - numbers[n].second;
+        if (numbers[n].first == "angle_deg") difference = std::remainder(difference, 360.0);
+        variance[n] += difference * difference / (2.0 * static_cast<double>(count));
+      }
+    }
+  }
+  std::vector<FoundParameter> parameters;
+  for (std::size_t k = 0; k < numbers.size(); ++k) {
+    const double own = TWIN_ACCURACY * (numbers[k].first == "angle_deg" ? 57.3 : numbers[k].second);
+    parameters.push_back({numbers[k].first, numbers[k].second, std::sqrt(variance[k] + own * own)});
+  }
+  return parameters;
+}
+
+void writeStdDevs(EffectEntry& entry, const std::vector<FoundParameter>& parameters) {
+  for (const FoundParameter& p : parameters) {
+    if (entry.numbers.count(p.key)) entry.std_devs[p.key] = p.std_dev;
+  }
+  const auto setModes = [&](const std::string& axis, ModalModel& modes) {
+    for (std::size_t k = 0; k < modes.modes.size(); ++k) {
+      const std::string name = axis + "[" + std::to_string(k) + "].";
+      for (const FoundParameter& p : parameters) {
+        if (p.key == name + "frequency_hz") modes.modes[k].frequency_std = p.std_dev;
+        if (p.key == name + "damping_ratio") modes.modes[k].damping_ratio_std = p.std_dev;
+        if (p.key == name + "stiffness_n_per_um")
+          modes.modes[k].gain_std = modes.modes[k].gain * p.std_dev / p.value;
+      }
+    }
+  };
+  setModes("x", entry.flexibility.x);
+  setModes("y", entry.flexibility.y);
+}
+
+// Other effects in the place of a member.
+void addAlternatives(const Workbench& bench, const SearchOptions& options, const SearchResult& found,
+                     std::size_t member, FoundEffect* effect, Explanation* result) {
+  const Fitter& exact = bench.exact();
+  for (const Rival& rival : found.rivals) {
+    if (rival.member != member) continue;
+    effect->confidence =
+        std::min(effect->confidence, confidenceBetween(exact, found.best.state, rival.state));
+    effect->alternatives.emplace_back(rival.effect, rival.delta_bic);
+    // What would not be enough to name an effect is not enough to tell it from another.
+    const double alike = std::min(options.least_gain, 0.5 * effect->delta_bic);
+    if (rival.delta_bic <= effect->delta_bic - alike) continue;
+    result->not_separable.push_back({effect->name, rival.effect});
+    if (!result->suggested_test)
+      result->suggested_test =
+          separatingTest(bench.data(), exact.model(found.best.state), exact.model(rival.state));
+  }
+}
+
+}  // namespace
+
+MachineModel nameEffects(const Workbench& bench, const SearchOptions& options, const SearchResult& found,
+                         Explanation* result) {
+  const Fit& best = found.best;
+  MachineModel model = bench.exact().model(best.state);
+  // Where structure is left, the noise does not tell how well the values are known.
+  const Eigen::MatrixXd covariance = std::max(1.0, best.chi2 / bench.samples()) * best.covariance;
+  std::vector<double> nominal_std;
+  auto first = static_cast<Eigen::Index>(best.state.nominal.size());
+  for (Eigen::Index i = 0; i < first; ++i) nominal_std.push_back(std::sqrt(covariance(i, i)));
+  bench.freedom().writeStdDevs(model, nominal_std);
+  for (std::size_t m = 0; m < best.state.members.size(); ++m) {
+    const Member& member = best.state.members[m];
+    const auto own = static_cast<Eigen::Index>(member.values.size());
+    EffectEntry& entry = model.effects[bench.data().nominal.effects.size() + m];
+    FoundEffect effect;
+    effect.name = member.hypothesis->effect;
+    effect.variant = member.hypothesis->variant;
+    effect.words = entry.words;
+    effect.parameters = parametersOf(member, covariance.block(first, first, own, own));
+    first += own;
+    writeStdDevs(entry, effect.parameters);
+    effect.delta_bic = found.contribution[m];
+    effect.evenness = traceOf(bench.exact(), best, m).evenness;
+    effect.heldout_gap_reduction = heldoutReduction(bench, best.state, m);
+    effect.confidence = confidenceBetween(bench.exact(), best.state, without(best.state, m));
+    addAlternatives(bench, options, found, m, &effect, result);
+    result->effects.push_back(std::move(effect));
+  }
+  return model;
+}
+
+Verdict verdictOf(const Explanation& result) {
+  if (result.effects.empty())
+    return result.unexplained.empty() ? Verdict::no_disagreement : Verdict::unknown_effect;
+  return result.unexplained.empty() ? Verdict::explained : Verdict::partly_explained;
+}
+
+}  // namespace smartmill::discrepancy

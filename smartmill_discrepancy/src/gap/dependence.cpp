@@ -1,0 +1,107 @@
+#include "smartmill_discrepancy/gap/dependence.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numeric>
+#include <utility>
+
+#include "smartmill_discrepancy/gap/significance.h"
+
+namespace smartmill::discrepancy {
+namespace {
+
+constexpr std::size_t LEAST_TESTS = 4;
+
+struct Condition {
+  const char* name;
+  std::function<double(const CampaignTest&)> of;
+};
+
+std::vector<Condition> conditionsOf(bool among_cuts) {
+  const Condition speed{"speed", [](const CampaignTest& t) { return t.spindle_speed; }};
+  const Condition time{"time", [](const CampaignTest& t) { return t.start_time.value_or(0.0); }};
+  if (!among_cuts) return {speed, time};
+  return {speed,
+          {"chip_load", [](const CampaignTest& t) { return t.engagement->feed_per_tooth; }},
+          {"depth", [](const CampaignTest& t) { return t.engagement->axial_depth; }},
+          // Up- and down-milling of the same immersion are told apart too.
+          {"immersion",
+           [](const CampaignTest& t) {
+             return t.engagement->exit - t.engagement->entry + t.engagement->entry / 7.0;
+           }},
+          time};
+}
+
+double rmsAmplitude(const std::vector<Shown>& shown) {
+  double squares = 0.0;
+  for (const Shown& s : shown) squares += s.amplitude * s.amplitude;
+  return shown.empty() ? 0.0 : std::sqrt(squares / static_cast<double>(shown.size()));
+}
+
+// Whether the sizes differ by more than their own uncertainty.
+bool differ(const std::vector<Shown>& shown) {
+  double weighted = 0.0, weights = 0.0, spread = 0.0;
+  for (const Shown& s : shown) {
+    weighted += s.amplitude / (s.std_dev * s.std_dev);
+    weights += 1.0 / (s.std_dev * s.std_dev);
+  }
+  for (const Shown& s : shown) {
+    const double z = (s.amplitude - weighted / weights) / s.std_dev;
+    spread += z * z;
+  }
+  const std::size_t freedom = shown.size() - 1;
+  return chiSquareTail(spread, freedom + freedom % 2) <= 1e-4;
+}
+
+// Correlation of the sizes with a condition; 0 where one of them does not change.
+double correlation(const std::vector<Shown>& shown, const Condition& condition) {
+  const double n = static_cast<double>(shown.size());
+  std::vector<double> x;
+  double my = 0.0;
+  for (const Shown& s : shown) {
+    x.push_back(condition.of(s.test->test));
+    my += s.amplitude / n;
+  }
+  const double mx = std::accumulate(x.begin(), x.end(), 0.0) / n;
+  double xx = 0.0, yy = 0.0, xy = 0.0;
+  for (std::size_t k = 0; k < shown.size(); ++k) {
+    const double dx = x[k] - mx, dy = shown[k].amplitude - my;
+    xx += dx * dx;
+    yy += dy * dy;
+    xy += dx * dy;
+  }
+  return xx > 0.0 && yy > 0.0 ? std::abs(xy) / std::sqrt(xx * yy) : 0.0;
+}
+
+}  // namespace
+
+std::vector<std::string> dependence(const std::vector<Shown>& shown) {
+  constexpr double AIR_SHARE = 0.3;  // of the size in cuts, below which only cutting shows it
+  std::vector<Shown> cuts, rest, turning;
+  for (const Shown& s : shown) {
+    (s.test->test.kind == TestKind::cut ? cuts : rest).push_back(s);
+    if (s.test->test.kind != TestKind::tap) turning.push_back(s);
+  }
+  std::vector<std::string> names;
+  if (!cuts.empty() && !rest.empty() && rmsAmplitude(rest) < AIR_SHARE * rmsAmplitude(cuts))
+    names.push_back("cutting");
+  const bool among_cuts = cuts.size() >= LEAST_TESTS;
+  const std::vector<Shown>& chosen = among_cuts ? cuts : turning;
+  if (chosen.size() < LEAST_TESTS || !differ(chosen)) return names;
+  const std::vector<Condition> conditions = conditionsOf(among_cuts);
+  std::vector<std::pair<double, std::string>> strengths;
+  for (const Condition& c : conditions) {
+    // Fisher's z against chance among n tests and as many looks as there are conditions.
+    const double r = correlation(chosen, c);
+    const double z = std::atanh(std::min(r, 0.999999)) *
+                     std::sqrt(std::max(static_cast<double>(chosen.size()) - 3.0, 1.0));
+    if (std::erfc(z / std::sqrt(2.0)) * static_cast<double>(conditions.size()) < 0.05)
+      strengths.emplace_back(-r, c.name);
+  }
+  std::sort(strengths.begin(), strengths.end());
+  for (const auto& s : strengths) names.push_back(s.second);
+  return names;
+}
+
+}  // namespace smartmill::discrepancy

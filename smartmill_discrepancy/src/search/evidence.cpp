@@ -1,0 +1,44 @@
+#include "smartmill_discrepancy/search/evidence.h"
+
+#include <algorithm>
+#include <map>
+#include <string>
+
+namespace smartmill::discrepancy {
+namespace {
+
+// Squares by channel.
+std::map<std::string, double> squaresOf(const TwinRunner& runner, const std::vector<double>& values) {
+  std::map<std::string, double> squares;
+  for (const Block& b : runner.blocks()) {
+    double& sum = squares[b.channel];
+    for (std::size_t i = b.offset; i < b.offset + b.size; ++i) sum += values[i] * values[i];
+  }
+  return squares;
+}
+
+}  // namespace
+
+double leastGain(const TwinRunner& runner, const Fit& less, const Fit& more, const SearchOptions& options) {
+  constexpr double SHARE = 0.05;  // of the gain, for a channel to count
+  if (!less.converged || !more.converged) return options.least_gain;
+  const auto before = squaresOf(runner, less.residual), after = squaresOf(runner, more.residual),
+             signal = squaresOf(runner, runner.measured());
+  double floor = 0.0;
+  for (const auto& [channel, squares] : signal) {
+    if (before.at(channel) - after.at(channel) > SHARE * (less.chi2 - more.chi2))
+      floor += squares * options.twin_accuracy * options.twin_accuracy;
+  }
+  return std::max(options.least_gain, floor);
+}
+
+bool relieves(const Fit& less, const Fit& more, const SearchOptions& options) {
+  return less.bic - more.bic > options.least_prior_gain &&
+         less.penalty - more.penalty > 4.0 * options.least_prior_gain;
+}
+
+bool tells(const TwinRunner& runner, const Fit& less, const Fit& more, const SearchOptions& options) {
+  return less.bic - more.bic > leastGain(runner, less, more, options) || relieves(less, more, options);
+}
+
+}  // namespace smartmill::discrepancy

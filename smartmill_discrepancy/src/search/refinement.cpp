@@ -1,0 +1,119 @@
+#include "smartmill_discrepancy/search/refinement.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "smartmill_discrepancy/search/evidence.h"
+
+namespace smartmill::discrepancy {
+namespace {
+
+constexpr FitOptions COMPARED{6, 1e-3, true};
+
+// Tangents and weight of the priors at the refined state.
+struct Settled {
+  NominalTangents tangents;
+  double weight = 1.0;
+  bool converged = false;
+};
+
+// Largest change of a value, in its standard deviations.
+double moved(const FitState& from, const FitState& to, const Eigen::MatrixXd& covariance) {
+  double largest = 0.0;
+  Eigen::Index k = 0;
+  const auto compare = [&](const std::vector<double>& a, const std::vector<double>& b) {
+    for (std::size_t c = 0; c < a.size(); ++c, ++k)
+      largest = std::max(largest, std::abs(a[c] - b[c]) / std::sqrt(covariance(k, k)));
+  };
+  compare(from.nominal, to.nominal);
+  for (std::size_t m = 0; m < from.members.size(); ++m) compare(from.members[m].values, to.members[m].values);
+  return largest;
+}
+
+FitOptions weighted(FitOptions options, double weight) {
+  options.prior_weight = weight;
+  return options;
+}
+
+// The quick twin, made equal to the exact one at the state, finds the exact solution in a few passes. They
+// end when no value moves by much of its standard deviation: in a narrow valley the cost says little.
+Settled settle(Workbench& bench, FitState from, Fit* best) {
+  constexpr int PASSES = 6;
+  constexpr double SETTLED = 0.1;
+  Settled settled;
+  for (int pass = 0; pass <= PASSES; ++pass) {
+    const bool turned = bench.turnPhases(from) > PHASE_SETTLED * std::sqrt(settled.weight);
+    double squares = 0.0;
+    settled.tangents = bench.linearise(from, &squares);
+    // Where structure is left the noise does not tell how well values are known; what is stated of them does.
+    settled.weight = std::max(1.0, squares / bench.samples());
+    // All tangents at one point: only these tell what is known along a valley.
+    Fit here = bench.quick().fit(from, &settled.tangents, weighted({0, 1e-8, true}, settled.weight));
+    if (!here.converged) break;
+    const Eigen::MatrixXd covariance = settled.weight * here.covariance;
+    *best = std::move(here);
+    settled.converged = true;
+    if (pass == PASSES || bench.cancelled()) break;
+    const Fit next = bench.quick().fit(from, &settled.tangents, weighted({6, 1e-5, true}, settled.weight));
+    if (!next.converged || (moved(from, next.state, covariance) < SETTLED && !turned)) break;
+    from = next.state;
+  }
+  return settled;
+}
+
+bool isMember(const FitState& state, const TriedEffect& tried) {
+  return std::any_of(state.members.begin(), state.members.end(), [&](const Member& m) {
+    return m.hypothesis->effect == tried.effect && m.hypothesis->variant == tried.variant;
+  });
+}
+
+// What came near to a member in the round that took it.
+std::vector<const Rung*> rivalsOf(const FitState& state, std::size_t member,
+                                  const std::vector<Rung>& ladder) {
+  constexpr double NEAR = 0.3;  // of the round's largest gain
+  const Hypothesis& own = *state.members[member].hypothesis;
+  std::size_t round = 0;
+  for (const Rung& r : ladder) {
+    if (r.tried.taken && r.tried.effect == own.effect && r.tried.variant == own.variant)
+      round = r.tried.round;
+  }
+  double largest = 0.0;
+  for (const Rung& r : ladder) {
+    if (r.tried.round == round) largest = std::max(largest, r.tried.delta_bic);
+  }
+  std::vector<const Rung*> rivals;
+  for (const Rung& r : ladder) {
+    if (r.tried.round == round && r.tried.effect != own.effect && r.tried.delta_bic >= NEAR * largest &&
+        !isMember(state, r.tried))
+      rivals.push_back(&r);
+  }
+  return rivals;
+}
+
+}  // namespace
+
+bool refine(Workbench& bench, const FitState& state, const SearchOptions& options, SearchResult* result) {
+  const Settled settled = settle(bench, state, &result->best);
+  if (!settled.converged) return false;
+  const FitOptions compared = weighted(COMPARED, settled.weight);
+  const FitState& at = result->best.state;
+  result->contribution.clear();
+  result->needed.clear();
+  result->rivals.clear();
+  for (std::size_t m = 0; m < at.members.size(); ++m) {
+    const FitState less = without(at, m);
+    const Fit rest = bench.quick().fit(less, &settled.tangents, compared);
+    result->contribution.push_back(rest.bic - result->best.bic);
+    result->needed.push_back(tells(bench.quick().runner(), rest, result->best, options));
+    for (const Rung* rival : rivalsOf(at, m, result->ladder)) {
+      FitState with = less;
+      with.members.push_back({rival->hypothesis, rival->values});
+      const Fit fit = bench.quick().fit(with, &settled.tangents, compared);
+      if (fit.converged) result->rivals.push_back({m, rival->tried.effect, rest.bic - fit.bic, fit.state});
+    }
+  }
+  return true;
+}
+
+}  // namespace smartmill::discrepancy

@@ -1,0 +1,119 @@
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <ostream>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <yaml-cpp/yaml.h>
+
+#include "smartmill_core/testing/shared_data.h"
+#include "smartmill_core/testing/temporary_folder.h"
+#include "smartmill_discrepancy/explain/explain.h"
+
+namespace smartmill::discrepancy {
+namespace {
+
+// Records of another program, with what it hid in them: nothing, one or two effects of the catalogue, or a
+// cause that the catalogue does not list.
+struct Example {
+  std::string name;
+  Verdict verdict;
+};
+
+std::ostream& operator<<(std::ostream& out, const Example& e) {
+  return out << e.name;
+}
+
+// A number of truth.yaml, with half a unit of its last printed digit.
+struct Printed {
+  double value = 0.0, rounding = 0.0;
+};
+
+Printed printed(const std::string& text) {
+  const std::size_t point = text.find('.');
+  const std::size_t digits = point == std::string::npos ? 0 : text.size() - point - 1;
+  return {std::stod(text), 0.5 * std::pow(10.0, -static_cast<double>(digits))};
+}
+
+using Truth = std::map<std::string, std::map<std::string, Printed>>;  // effect, key
+
+Truth truthOf(const std::string& folder) {
+  Truth truth;
+  for (const auto& effect : YAML::LoadFile(folder + "/truth.yaml")["effects"]) {
+    auto& keys = truth[effect.first.as<std::string>()];
+    for (const auto& key : effect.second)
+      keys[key.first.as<std::string>()] = printed(key.second.as<std::string>());
+  }
+  return truth;
+}
+
+Explanation explained(const std::string& folder) {
+  TemporaryFolder out;
+  const Campaign campaign = readCampaign(folder);
+  return explain(loadDataset(campaign, readMachineModel(campaign.modelPath())), {}, out.file("."));
+}
+
+std::vector<std::string> namesOf(const Explanation& e) {
+  std::vector<std::string> names;
+  for (const FoundEffect& effect : e.effects) names.push_back(effect.name);
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+void expectTrue(const FoundEffect& found, const std::map<std::string, Printed>& truth) {
+  for (const FoundParameter& p : found.parameters) {
+    const auto at = truth.find(p.key);
+    const Printed expected = at == truth.end() ? Printed{} : at->second;  // a key left out is 0
+    double error = p.value - expected.value;
+    if (p.key == "angle_deg") error = std::remainder(error, 360.0);
+    EXPECT_LE(std::abs(error), 3.0 * p.std_dev + expected.rounding)
+        << found.name << " " << p.key << " " << p.value << ", truth " << expected.value;
+  }
+}
+
+// The cause outside the catalogue is a tone on fz, told where it is.
+void expectTone(const std::vector<Finding>& unexplained, const std::map<std::string, Printed>& truth) {
+  ASSERT_FALSE(unexplained.empty());
+  const Finding& tone = unexplained.front();
+  EXPECT_EQ(tone.channel, "fz");
+  EXPECT_EQ(tone.domain, "frequency");
+  // Records of 0.2 s tell lines 5 Hz apart; their amplitude tells the centre far better.
+  EXPECT_NEAR(tone.location.at("frequency_hz"), truth.at("frequency_hz").value, 0.3);
+  EXPECT_NEAR(tone.amplitude, truth.at("amplitude_n").value, 0.5);
+}
+
+class ExampleCampaign : public testing::TestWithParam<Example> {};
+
+TEST_P(ExampleCampaign, IsExplainedAsItsMakerKnows) {
+  SMARTMILL_SHARED_DATA(folder, "campaigns/" + GetParam().name);
+  const Truth truth = truthOf(folder);
+  const Explanation e = explained(folder);
+  EXPECT_STREQ(nameOf(e.verdict), nameOf(GetParam().verdict));
+  std::vector<std::string> names;
+  for (const auto& [name, keys] : truth) {
+    if (GetParam().verdict == Verdict::explained) names.push_back(name);
+  }
+  ASSERT_EQ(namesOf(e), names);
+  for (const FoundEffect& effect : e.effects) expectTrue(effect, truth.at(effect.name));
+  if (GetParam().verdict == Verdict::unknown_effect) {
+    expectTone(e.unexplained, truth.begin()->second);
+    return;
+  }
+  EXPECT_TRUE(e.unexplained.empty());
+  EXPECT_LE(e.after.fit, 1.05);
+  EXPECT_LE(e.after.heldout, 1.05);
+}
+
+INSTANTIATE_TEST_SUITE_P(Shared, ExampleCampaign,
+                         testing::Values(Example{"none", Verdict::no_disagreement},
+                                         Example{"outside_catalogue", Verdict::unknown_effect},
+                                         Example{"stribeck_friction", Verdict::explained},
+                                         Example{"cross_talk", Verdict::explained},
+                                         Example{"runout", Verdict::explained},
+                                         Example{"tool_wear_and_unbalance", Verdict::explained}),
+                         [](const auto& example) { return example.param.name; });
+
+}  // namespace
+}  // namespace smartmill::discrepancy
