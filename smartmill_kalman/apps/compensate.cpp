@@ -20,6 +20,7 @@
 #include "smartmill_core/units.h"
 #include "smartmill_kalman/compensation/campaign_compensation.h"
 #include "smartmill_kalman/sensor/blind_mode.h"
+#include "smartmill_ros/parameter_options.h"
 
 namespace {
 
@@ -28,12 +29,11 @@ using namespace smartmill;
 constexpr std::array<const char*, 3> AXES{{"x", "y", "z"}};
 
 struct Request {
-  std::string source, out, model, parameters, method = "kalman", matrix_out;
+  std::string source, out, model, method = "kalman", matrix_out;
+  kalman::NodeParameters parameters;
   bool identify = false, coupled = false, blind = false;
   double blind_low = 600.0, blind_high = 1500.0;  // [Hz]
-  std::optional<double> bandwidth, noise, settling;
-  double lag = 0.05;  // [s]
-  kalman::SensorFitParameters fit;
+  double lag = 0.05;                              // [s]
 };
 
 void print(const char* axis, const ModalModel& sensor) {
@@ -86,16 +86,9 @@ std::array<std::vector<double>, 3> forces(const Record& record) {
 }
 
 kalman::NodeParameters parametersOf(const Request& request) {
-  kalman::NodeParameters parameters;
-  if (!request.parameters.empty()) {
-    ParameterReader reader = ParameterReader::fromFile(request.parameters);
-    parameters = kalman::readParameters(reader);
-  }
-  kalman::HarmonicFilterParameters& filter = parameters.compensation.filter;
-  if (request.bandwidth) filter.bandwidth = *request.bandwidth;
-  if (request.noise) filter.noise_rms = *request.noise;
+  kalman::NodeParameters parameters = request.parameters;
   if (request.method == "fixed-lag") parameters.compensation.lag = request.lag;
-  if (request.settling) filter.settling_revolutions = *request.settling;
+  parameters.validate();
   return parameters;
 }
 
@@ -103,14 +96,16 @@ void fromCampaign(const Request& request) {
   if (request.coupled && request.method != "kalman") throw Error("--coupled goes with --method kalman");
   const Campaign campaign = readCampaign(request.source);
   const kalman::NodeParameters parameters = parametersOf(request);
+  const kalman::SensorFitParameters fit{parameters.taps.fit_low, parameters.taps.fit_high,
+                                        parameters.taps.max_modes};
   std::array<ModalModel, 3> sensor;
   std::optional<kalman::SensorMatrix> matrix;
   bool workpiece = false;
   if (request.coupled) {
-    matrix = kalman::identifySensorMatrix(campaign, request.fit);
+    matrix = kalman::identifySensorMatrix(campaign, fit);
     for (std::size_t axis = 0; axis < 3; ++axis) sensor[axis] = matrix->h[axis][axis];
     double worst = 1.0;
-    for (double f = 0.0; f <= request.fit.high; f += 5.0) worst = std::max(worst, matrix->condition(f));
+    for (double f = 0.0; f <= fit.high; f += 5.0) worst = std::max(worst, matrix->condition(f));
     std::printf(
         "static cross-talk [%%]: xy %.2f xz %.2f yx %.2f yz %.2f zx %.2f zy %.2f; condition at most %.1f\n",
         100.0 * matrix->h[0][1].staticGain(), 100.0 * matrix->h[0][2].staticGain(),
@@ -120,7 +115,7 @@ void fromCampaign(const Request& request) {
     workpiece = kalman::measuresWorkpiece(campaign, request.model);
   } else if (request.identify) {
     workpiece = kalman::measuresWorkpiece(campaign, request.model);
-    sensor = kalman::identifySensor(campaign, request.fit);
+    sensor = kalman::identifySensor(campaign, fit);
   } else {
     const MachineModel model = readMachineModel(request.model.empty() ? campaign.modelPath() : request.model);
     sensor = model.force_sensor.axis;
@@ -225,7 +220,6 @@ int main(int argc, char** argv) {
   line.option("SOURCE", request.source, "campaign folder, or a bag").required();
   line.option("-o,--out", request.out, "folder for one CSV a cut").required();
   line.option("--model", request.model, "model file with the force sensor (default: the campaign's)");
-  line.option("--params", request.parameters, "parameter file of the node (launch/config/kalman.yaml)");
   line.flag("--identify", request.identify, "campaign: take the sensor's modes from its own taps");
   line.flag("--blind", request.blind, "campaign: say what the cuts show of the sensor's modes without a tap");
   line.option("--blind-low-hz", request.blind_low, "band of --blind").showDefault();
@@ -240,8 +234,13 @@ int main(int argc, char** argv) {
       .oneOf({"kalman", "smoother", "fixed-lag", "inverse"})
       .showDefault();
   line.option("--lag-s", request.lag, "lag of fixed-lag").within(0.0, 10.0).showDefault();
-  line.option("--bandwidth-hz", request.bandwidth, "harmonics up to this frequency");
-  line.option("--noise-rms-n", request.noise, "noise of one sample");
-  line.option("--settling-revolutions", request.settling, "time constant of the amplitudes");
-  return runProgram(line, argc, argv, [&] { run(request); });
+  const ParameterTable table = tableOf(request.parameters);
+  ParameterOptions parameters(line, table, "launch/config/kalman.yaml");
+  parameters.add("--bandwidth-hz", "bandwidth");
+  parameters.add("--noise-rms-n", "noise_rms");
+  parameters.add("--settling-revolutions", "settling_revolutions");
+  return runProgram(line, argc, argv, [&] {
+    parameters.apply();
+    run(request);
+  });
 }

@@ -29,25 +29,12 @@ constexpr double TRACKED = 1e-4;
 constexpr double TELLING = 0.15, LEAST_TELLING = 8.0;
 constexpr double STEADY_TIME = 0.05;  // [s] without a change of speed before filters are laid out
 
-void require(const char* key, double value, bool good, const char* due) {
-  if (!good || !std::isfinite(value))
-    throw Error(std::string(key) + ": " + std::to_string(value) + ", " + due + " is due");
-}
-
 }  // namespace
 
 void CompensationParameters::validate() const {
-  filter.validate();
-  follower.validate();
-  tracker.validate();
+  checkBounds(*this);
   // Following needs the angle of the teeth, which the force alone does not tell.
   if (track_speed && follow) throw Error("track_speed: follow needs the spindle's angle, false is due");
-  require("follow_revolutions", follow_revolutions, follow_revolutions > 0, "above 0");
-  require("least_speed", least_speed, least_speed > 0.0, "above 0 rad/s");
-  require("speed_tolerance", speed_tolerance, speed_tolerance > 0.0 && speed_tolerance < 0.5, "0 .. 0.5");
-  require("lag", lag, lag >= 0.0 && lag <= 10.0, "0 .. 10 s");
-  require("settling_periods", settling_periods, settling_periods >= 0.0, "at least 0");
-  require("saturation", saturation, saturation >= 0.0, "at least 0 N");
 }
 
 ForceCompensation::ForceCompensation(const CompensationParameters& parameters, bool measures_workpiece,

@@ -6,13 +6,18 @@
 #include <utility>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/names.h"
 
 namespace smartmill::kalman {
 namespace {
 
-// A stamp this far behind the newest one means that a recording was started again.
-constexpr double RESTART = 1.0;  // [s]
 constexpr double NEVER = -std::numeric_limits<double>::infinity();
+
+// A sample of the sensor that counts as clipped in a cut is none in a tap either.
+TapParameters withRange(TapParameters taps, double saturation) {
+  taps.response_range = saturation;
+  return taps;
+}
 
 int axisOf(const std::string& direction) {
   return direction == "x" ? 0 : direction == "y" ? 1 : direction == "z" ? 2 : -1;
@@ -26,20 +31,24 @@ SortedCompensation::SortedCompensation(const CompensationParameters& parameters,
       outputs_(std::move(outputs)),
       compensation_(parameters, sensor.measures_workpiece,
                     [this](const ForceBlock& m, const ForceBlock& c) { forward(m, c); }),
-      measurement_(taps),
+      measurement_(withRange(taps, parameters.saturation)),
       sorter_(hold_back),
-      conditions_(sorter_.addEvents("cut/condition")),
-      goals_(sorter_.addEvents("kalman/measure_frf")),
-      hammers_(sorter_.addEvents("daq/hammer")),
+      conditions_(sorter_.addLatched(names::CUTTING_CONDITION)),
+      goals_(sorter_.addEvents(names::MEASURE_SENSOR_FRF)),
+      hammers_(sorter_.addOptional(names::HAMMER)),
       // A machine without a tachometer has no angles to wait for.
-      angles_(parameters.track_speed ? sorter_.addEvents("spindle/angle")
-                                     : sorter_.addRegular("spindle/angle")),
-      blocks_(sorter_.addRegular("daq/dynamometer")),
-      newest_(NEVER),
-      newest_block_(NEVER),
-      newest_hammer_(NEVER),
-      newest_angle_(NEVER) {
+      angles_(parameters.track_speed ? sorter_.addUnawaited(names::SPINDLE_ANGLE)
+                                     : sorter_.addRegular(names::SPINDLE_ANGLE)),
+      blocks_(sorter_.addRegular(names::DYNAMOMETER)) {
   useModelFile();
+  sorter_.onRestart([this] {
+    compensation_.reset();
+    measurement_.reset();
+    if (spindle_) spindle_->reset();
+    invalid_.clear();
+    useModelFile();
+    if (restarted_) restarted_();
+  });
 }
 
 void SortedCompensation::useModelFile() {
@@ -57,24 +66,7 @@ void SortedCompensation::useModelFile() {
   }
 }
 
-void SortedCompensation::watch(double stamp, double& newest_here) {
-  // Against its own stream: under load one topic may come seconds after another.
-  if (stamp < newest_here - RESTART) {
-    sorter_.reset();
-    compensation_.reset();
-    measurement_.reset();
-    if (spindle_) spindle_->reset();
-    invalid_.clear();
-    useModelFile();
-    newest_ = newest_block_ = newest_hammer_ = newest_angle_ = NEVER;
-    if (restarted_) restarted_();
-  }
-  newest_here = std::max(newest_here, stamp);
-  newest_ = std::max(newest_, stamp);
-}
-
 void SortedCompensation::push(const SampleBlock& block) {
-  watch(block.stamp, newest_block_);
   sorter_.push(blocks_, block.stamp, [this, block] {
     if (SpindleForceSensor::isSixChannels(block)) {
       const SampleBlock forces = toForces(block);
@@ -126,8 +118,6 @@ void SortedCompensation::forward(const ForceBlock& measured, const ForceBlock& c
 }
 
 void SortedCompensation::pushHammer(const SampleBlock& block) {
-  watch(block.stamp, newest_hammer_);
-  sorter_.setRegular(hammers_, true);
   sorter_.push(hammers_, block.stamp, [this, block] {
     measurement_.handleHammer(block);
     drain();
@@ -135,7 +125,6 @@ void SortedCompensation::pushHammer(const SampleBlock& block) {
 }
 
 void SortedCompensation::push(const SpindleAngle& angle) {
-  watch(angle.stamp, newest_angle_);
   sorter_.push(angles_, angle.stamp, [this, angle] {
     if (spindle_) spindle_->handle(angle);
     compensation_.handle(angle);
@@ -143,7 +132,6 @@ void SortedCompensation::push(const SpindleAngle& angle) {
 }
 
 void SortedCompensation::push(const CuttingCondition& condition) {
-  // A latched condition is older than the data around it: no restart.
   sorter_.push(conditions_, condition.stamp, [this, condition] {
     if (spindle_) spindle_->handle(condition);
     compensation_.handle(condition);
@@ -160,15 +148,10 @@ void SortedCompensation::push(const MeasureFrfGoal& goal, std::function<bool(boo
 }
 
 void SortedCompensation::event(std::function<void(SensorMeasurement&)> what) {
-  const auto deliver = [this, what = std::move(what)] {
+  sorter_.pushNow(goals_, [this, what = std::move(what)] {
     what(measurement_);
     drain();
-  };
-  if (std::isfinite(newest_)) {
-    sorter_.push(goals_, newest_, deliver);
-  } else {
-    deliver();
-  }
+  });
 }
 
 void SortedCompensation::push(const MeasuredModes& modes) {
@@ -184,7 +167,7 @@ void SortedCompensation::push(const MeasuredModes& modes) {
 double SortedCompensation::modesAge() const {
   double age = 0.0;
   for (const double stamp : identified_) {
-    if (std::isfinite(stamp)) age = std::max(age, newest_ - stamp);
+    if (std::isfinite(stamp)) age = std::max(age, sorter_.newest() - stamp);
   }
   return age;
 }

@@ -36,13 +36,7 @@ std::array<Complex, 2> steady(const Mode& mode, double w) {
 }  // namespace
 
 void HarmonicFilterParameters::validate() const {
-  requirePositive("bandwidth", bandwidth);
-  requirePositive("noise_rms", noise_rms);
-  requirePositive("settling_revolutions", settling_revolutions);
-  requirePositive("memory_revolutions", memory_revolutions);
-  if (max_harmonics < 0 || max_harmonics > 200) {
-    throw Error("max_harmonics: " + std::to_string(max_harmonics) + ", 0 .. 200 is due");
-  }
+  checkBounds(*this);
 }
 
 double HarmonicFilterParameters::memory(std::size_t level) const {

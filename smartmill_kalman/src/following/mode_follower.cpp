@@ -25,10 +25,6 @@ constexpr std::size_t TERMS = 4;           // tangential and radial, chip and ed
 using Sensor = std::array<ModalModel, 2>;  // x, y
 using Basis = std::array<ModeFollower::Harmonics, TERMS>;
 
-void requirePositive(const char* key, double value) {
-  if (!(value > 0.0) || !std::isfinite(value)) throw Error(std::string(key) + ": above 0 is due");
-}
-
 /// Modes moved by p: log frequency, log damping of each in turn, x then y.
 std::array<ModalModel, 2> moved(const std::array<ModalModel, 2>& from, const Eigen::VectorXd& p) {
   std::array<ModalModel, 2> sensor = from;
@@ -266,10 +262,7 @@ class CutFit {
 }  // namespace
 
 void FollowParameters::validate() const {
-  requirePositive("misfit", misfit);
-  requirePositive("frequency_std", frequency_std);
-  requirePositive("damping_std", damping_std);
-  requirePositive("evidence", evidence);
+  checkBounds(*this);
 }
 
 ModeFollower::ModeFollower(const ToolGeometry& tool, const Engagement& engagement, int harmonics,

@@ -27,9 +27,7 @@ void requirePositive(const char* key, double value) {
 }  // namespace
 
 void SpeedTrackerParameters::validate() const {
-  requirePositive("speed_std", speed_std);
-  requirePositive("acceleration_std", acceleration_std);
-  requirePositive("acceleration_memory", acceleration_memory);
+  checkBounds(*this);
 }
 
 SpeedTracker::SpeedTracker(const SpeedTrackerParameters& parameters, double speed, double sample_rate)

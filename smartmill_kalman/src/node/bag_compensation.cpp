@@ -13,6 +13,7 @@
 #include <tf2_msgs/TFMessage.h>
 
 #include "node/rotation.h"
+#include "node/wiring.h"
 #include "smartmill_core/error.h"
 #include "smartmill_ros/bag_reader.h"
 #include "smartmill_ros/conversions.h"
@@ -104,10 +105,7 @@ BagSummary compensateBag(const std::string& path, const ForceSensor& sensor, con
                                   {},
                                   {},
                                   [&](const SensorResult& result) { summary.identified.push_back(result); }});
-  if (!parameters.sensor_matrix.empty()) sorted->useMatrix(readSensorMatrix(parameters.sensor_matrix));
-  if (!parameters.spindle_sensor.empty()) {
-    sorted->useSpindleSensor(readSpindleSensor(parameters.spindle_sensor), parameters.spindle_sensor_length);
-  }
+  useFiles(*sorted, parameters);
   {
     // The rotation holds for the whole bag, also for blocks that came before it.
     BagReader bag(path);
@@ -123,31 +121,28 @@ BagSummary compensateBag(const std::string& path, const ForceSensor& sensor, con
   BagReader bag(path);
   summary.duration = bag.duration();
   std::size_t blocks = 0;
-  bag.on<smartmill_msgs::SampleBlock>("daq/dynamometer", [&](const smartmill_msgs::SampleBlock& m, double) {
+  bag.on<smartmill_msgs::SampleBlock>(names::DYNAMOMETER, [&](const smartmill_msgs::SampleBlock& m, double) {
     if (blocks++ == 0) {
       if (!m.header.frame_id.empty()) frame = m.header.frame_id;
       findRotation();
     }
     sorted->push(fromMsg(m));
   });
-  bag.on<smartmill_msgs::SampleBlock>(
-      "daq/hammer", [&](const smartmill_msgs::SampleBlock& m, double) { sorted->pushHammer(fromMsg(m)); });
-  bag.on<smartmill_msgs::SpindleAngle>(
-      "spindle/angle", [&](const smartmill_msgs::SpindleAngle& m, double) { sorted->push(fromMsg(m)); });
-  bag.on<smartmill_msgs::CuttingCondition>("cut/condition",
+  connect(bag, *sorted);
+  bag.on<smartmill_msgs::CuttingCondition>(names::CUTTING_CONDITION,
                                            [&](const smartmill_msgs::CuttingCondition& m, double) {
                                              const CuttingCondition condition = fromMsg(m);
                                              cutter.condition(condition);
                                              sorted->push(condition);
                                            });
-  bag.on<smartmill_msgs::ModalModel>(
-      "tool/modes", [&](const smartmill_msgs::ModalModel& m, double) { sorted->push(fromMsg(m)); });
+  feed<smartmill_msgs::ModalModel>(bag, names::TOOL_MODES, *sorted);
   bag.on<smartmill_msgs::MeasureFrfActionGoal>(
-      "kalman/measure_frf/goal", [&](const smartmill_msgs::MeasureFrfActionGoal& m, double received) {
+      names::goals(names::MEASURE_SENSOR_FRF),
+      [&](const smartmill_msgs::MeasureFrfActionGoal& m, double received) {
         sorted->push(goalFromMsg(m.goal, received));
       });
   bag.run(progress);
-  if (blocks == 0) throw Error(path + ": holds no daq/dynamometer");
+  if (blocks == 0) throw Error(path + ": holds no " + names::DYNAMOMETER);
   sorted->flush();
   cutter.close();
   summary.gaps = sorted->health().gaps;

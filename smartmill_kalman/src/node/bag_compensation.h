@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "node/parameters_ros.h"
+#include "node/parameters.h"
 #include "smartmill_kalman/compensation/record_compensation.h"
 
 namespace smartmill::kalman {

@@ -4,98 +4,78 @@
 #include <cmath>
 
 #include <geometry_msgs/WrenchStamped.h>
-#include <smartmill_msgs/CuttingCondition.h>
 #include <smartmill_msgs/ForceBlock.h>
-#include <smartmill_msgs/SampleBlock.h>
-#include <smartmill_msgs/SpindleAngle.h>
-#include <boost/function.hpp>
 
 #include "node/rotation.h"
+#include "node/wiring.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/machine_model.h"
-#include "smartmill_ros/conversions.h"
 #include "smartmill_ros/frames.h"
+#include "smartmill_ros/parameter_reader.h"
 
 namespace smartmill::kalman {
 namespace {
 
-constexpr std::size_t QUEUE = 2000;  // 20 s of blocks
-constexpr double COLOURED = 0.5;     // [1] correlation of neighbouring innovations
+constexpr std::size_t MOST_WAITING = 2000;  // blocks, 20 s
+constexpr double COLOURED = 0.5;            // [1] correlation of neighbouring innovations
+constexpr double WATCH_PERIOD = 0.05;       // [s]
+/// A goal that a dead stream holds back is refused after this.
+constexpr double GOAL_PATIENCE = 1.0;  // [s]
+
+ForceSensor sensorOf(const NodeParameters& parameters) {
+  if (parameters.model.empty()) throw Error("model: the path of a smartmill-model/1 file is due");
+  return readMachineModel(parameters.model).force_sensor;
+}
 
 }  // namespace
 
 KalmanNode::KalmanNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
-    : parameters_([&] {
-        ParameterReader reader = ParameterReader::fromServer(private_nh);
-        return readParameters(reader);
-      }()),
+    : parameters_(ParameterReader::fromServer(private_nh).readAll<NodeParameters>()),
       listener_(transforms_),
-      sorted_(parameters_.compensation, parameters_.taps,
-              [this] {
-                if (parameters_.model.empty())
-                  throw Error("model: the path of a smartmill-model/1 file is due");
-                return readMachineModel(parameters_.model).force_sensor;
-              }(),
-              parameters_.hold_back,
+      shell_(nh, private_nh, "force sensor", parameters_.input_timeout),
+      measured_(nh.advertise<smartmill_msgs::ForceBlock>(names::FORCE_MEASURED, STREAM_QUEUE)),
+      compensated_(nh.advertise<smartmill_msgs::ForceBlock>(names::FORCE_COMPENSATED, STREAM_QUEUE)),
+      wrench_(nh.advertise<geometry_msgs::WrenchStamped>(names::FORCE_WRENCH, STREAM_QUEUE)),
+      strike_(nh, POINT_FORCE_SENSOR),
+      sorted_(parameters_.compensation, parameters_.taps, sensorOf(parameters_), parameters_.hold_back,
               {[this](const ForceBlock& m, const ForceBlock& c) { publish(m, c); },
-               [this](const StrikeCommand& command) { measure_.strike(command); },
-               [this](const TapFeedback& feedback) { measure_.feedback(feedback); },
-               [this](const SensorResult& result) { measure_.finish(result); }}),
-      measure_(nh, sorted_, parameters_.command_machine),
-      diagnostics_(ros::NodeHandle(), private_nh) {
-  if (!parameters_.sensor_matrix.empty()) sorted_.useMatrix(readSensorMatrix(parameters_.sensor_matrix));
-  if (!parameters_.spindle_sensor.empty()) {
-    sorted_.useSpindleSensor(readSpindleSensor(parameters_.spindle_sensor),
-                             parameters_.spindle_sensor_length);
-  }
-  measured_ = nh.advertise<smartmill_msgs::ForceBlock>("force/measured", QUEUE);
-  compensated_ = nh.advertise<smartmill_msgs::ForceBlock>("force/compensated", QUEUE);
-  wrench_ = nh.advertise<geometry_msgs::WrenchStamped>("force/wrench", QUEUE);
+               [this](const StrikeCommand& command) {
+                 if (parameters_.command_machine) strike_.strike(command.direction);
+               },
+               [this](const TapFeedback& f) { measure_.feedback(f.stage, f.progress, f.hits_done); },
+               [this](const SensorResult& r) {
+                 measure_.finish({r.code, r.message, r.frf, r.modes});
+               }}),
+      measure_(nh, names::MEASURE_SENSOR_FRF, "kalman",
+               {[this](const MeasureFrfGoal& goal, std::function<bool(bool)> begin) {
+                  sorted_.push(goal, std::move(begin));
+                },
+                [this](std::function<bool()> due) {
+                  sorted_.event([due](SensorMeasurement& m) {
+                    if (due()) m.cancel();
+                  });
+                }}) {
+  useFiles(sorted_, parameters_);
   sorted_.onRestart([this] { measure_.restart(); });
-  subscribe<smartmill_msgs::SampleBlock>(
-      nh, "daq/dynamometer", [this](const smartmill_msgs::SampleBlock& message) {
-        last_block_ = ros::WallTime::now();
-        flushed_ = false;
+  listen();
+  shell_.diagnose("force compensation", [this](auto& status) { diagnose(status); });
+  shell_.every(WATCH_PERIOD, [this] { watch(); });
+}
+
+void KalmanNode::listen() {
+  Inputs& inputs = shell_.inputs();
+  inputs.on<smartmill_msgs::SampleBlock>(
+      names::DYNAMOMETER, [this](const smartmill_msgs::SampleBlock& message, double) {
         const std::string frame =
             message.header.frame_id.empty() ? frames::DYNAMOMETER : message.header.frame_id;
         if (frame != sensor_frame_) rotation_known_ = false;
         sensor_frame_ = frame;
         sorted_.push(fromMsg(message));
       });
-  subscribe<smartmill_msgs::SampleBlock>(nh, "daq/hammer",
-                                         [this](const smartmill_msgs::SampleBlock& message) {
-                                           last_hammer_ = ros::WallTime::now();
-                                           hammer_seen_ = true;
-                                           sorted_.pushHammer(fromMsg(message));
-                                         });
-  subscribe<smartmill_msgs::SpindleAngle>(
-      nh, "spindle/angle", [this](const smartmill_msgs::SpindleAngle& m) { sorted_.push(fromMsg(m)); });
-  subscribe<smartmill_msgs::CuttingCondition>(
-      nh, "cut/condition", [this](const smartmill_msgs::CuttingCondition& m) { sorted_.push(fromMsg(m)); });
+  connect(inputs, sorted_);
+  feed<smartmill_msgs::CuttingCondition>(inputs, names::CUTTING_CONDITION, sorted_);
   // A recording that began after the taps holds the modes that served in it.
-  if (!parameters_.command_machine) {
-    subscribe<smartmill_msgs::ModalModel>(
-        nh, "tool/modes", [this](const smartmill_msgs::ModalModel& m) { sorted_.push(fromMsg(m)); });
-  }
-  diagnostics_.setHardwareID("force sensor");
-  diagnostics_.add("force compensation", this, &KalmanNode::diagnose);
-  last_block_ = last_hammer_ = ros::WallTime::now();
-  timer_ = nh.createWallTimer(ros::WallDuration(0.05), [this](const ros::WallTimerEvent&) { watch(); });
-  diagnostics_timer_ = nh.createWallTimer(ros::WallDuration(0.5),
-                                          [this](const ros::WallTimerEvent&) { diagnostics_.update(); });
-}
-
-template <typename Message, typename Handle>
-void KalmanNode::subscribe(ros::NodeHandle& nh, const char* topic, Handle handle) {
-  const boost::function<void(const Message&)> callback = [handle, topic](const Message& message) {
-    try {
-      handle(message);
-    } catch (const Error& error) {
-      ROS_ERROR_THROTTLE(5.0, "kalman: %s: %s", topic, error.what());
-    }
-  };
-  subscribers_.push_back(
-      nh.subscribe<Message>(topic, QUEUE, callback, ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay()));
+  if (!parameters_.command_machine) feed<smartmill_msgs::ModalModel>(inputs, names::TOOL_MODES, sorted_);
 }
 
 // The sensor is bolted to its table: its rotation is asked for once. Until it is known results wait, for
@@ -114,7 +94,7 @@ bool KalmanNode::findRotation() {
 
 void KalmanNode::publish(const ForceBlock& measured, const ForceBlock& compensated) {
   waiting_.emplace_back(measured, compensated);
-  if (waiting_.size() > QUEUE) waiting_.pop_front();
+  if (waiting_.size() > MOST_WAITING) waiting_.pop_front();
   publishWaiting();
 }
 
@@ -148,63 +128,69 @@ void KalmanNode::publishWrench(const ForceBlock& block) {
 }
 
 void KalmanNode::watch() {
-  const ros::WallTime now = ros::WallTime::now();
-  const double silent = (now - last_block_).toSec(), hammer_silent = (now - last_hammer_).toSec();
-  const bool sensor_dead = silent > parameters_.input_timeout;
-  const bool hammer_dead = hammer_silent > parameters_.input_timeout;
-  std::string dead;
-  if (sensor_dead) dead = "daq/dynamometer is silent";
-  if (hammer_dead) dead = "daq/hammer is silent";
-  if (hammer_dead && hammer_seen_) {
-    hammer_seen_ = false;
-    sorted_.hammerLost(dead);
-  } else if (!dead.empty() && parameters_.command_machine && sorted_.measuring()) {
-    sorted_.event([dead](SensorMeasurement& m) { m.lost(dead); });
-    sorted_.flush();
-  }
-  measure_.poll(parameters_.command_machine ? dead : "");
+  watchMeasurement();
   publishWaiting();
   // End of data: nothing more will come to release what waits.
-  if (!flushed_ && sensor_dead) {
-    sorted_.flush();
-    flushed_ = true;
+  if (shell_.inputs().watchdog(names::DYNAMOMETER).ended()) sorted_.flush();
+}
+
+void KalmanNode::watchMeasurement() {
+  if (const auto fault = strike_.takeFault()) {
+    using Kind = StrikeCaller::Answer::Kind;
+    sorted_.event([fault](SensorMeasurement& m) {
+      // Without an automatic hammer somebody hits by hand.
+      if (fault->kind == Kind::failed) return m.commandFailed(fault->message);
+      m.hitByHand();
+    });
   }
+  const InputHealth* dead = shell_.inputs().dead({names::HAMMER, names::DYNAMOMETER});
+  if (!dead) return;
+  const std::string text = dead->topic() + " is silent";
+  if (shell_.inputs().watchdog(names::HAMMER).ended()) {
+    sorted_.hammerLost(text);
+  } else if (parameters_.command_machine && sorted_.measuring()) {
+    sorted_.event([text](SensorMeasurement& m) { m.lost(text); });
+    sorted_.flush();
+  }
+  if (parameters_.command_machine) measure_.refuseWaiting(text, GOAL_PATIENCE);
+}
+
+std::pair<int, std::string> KalmanNode::judge(const SpindleSensorHealth* spindle) {
+  using Level = diagnostic_msgs::DiagnosticStatus;
+  const CompensationHealth& health = sorted_.health();
+  const std::size_t invalid = spindle ? spindle->unloaded + spindle->overloaded : 0;
+  const double zero =
+      std::max({std::abs(health.zero[0]), std::abs(health.zero[1]), std::abs(health.zero[2])});
+  // Told once, whatever came after.
+  if (spindle && invalid != invalid_told_) {
+    invalid_told_ = invalid;
+    return {Level::ERROR,
+            "a sensor of the spindle was unloaded or overloaded: those samples are no measurement"};
+  }
+  if (shell_.inputs().watchdog(names::DYNAMOMETER).dead())
+    return {Level::STALE, "no samples from the force sensor"};
+  if (!rotation_known_) return {Level::ERROR, "no transform of the force sensor"};
+  if (health.gaps + health.not_finite + health.clipped > 0)
+    return {Level::WARN, "samples were lost, clipped or not numbers"};
+  if (health.innovation_ratio > 3.0)
+    return {Level::WARN, "innovations larger than the sensor model explains"};
+  if (health.speed > 0.0 && health.colour > COLOURED) {
+    return {Level::WARN,
+            "innovations are not white: something of the force or of the sensor is not in the model"};
+  }
+  if (parameters_.drift_limit > 0.0 && zero > parameters_.drift_limit)
+    return {Level::WARN, "the sensor's zero has drifted"};
+  if (parameters_.model_max_age > 0.0 && sorted_.modesAge() > parameters_.model_max_age)
+    return {Level::WARN, "the taps in use are old: measure the sensor again"};
+  if (sorted_.measuring()) return {Level::OK, "measuring the sensor"};
+  return {Level::OK, health.speed > 0.0 ? "compensating" : "passing through"};
 }
 
 void KalmanNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
   const CompensationHealth& health = sorted_.health();
-  const double silent = (ros::WallTime::now() - last_block_).toSec();
   const SpindleSensorHealth* spindle = sorted_.spindleHealth();
-  const std::size_t invalid = spindle ? spindle->unloaded + spindle->overloaded : 0;
-  // Told once, whatever came after.
-  if (spindle && invalid != invalid_told_) {
-    invalid_told_ = invalid;
-    status.summary(diagnostic_msgs::DiagnosticStatus::ERROR,
-                   "a sensor of the spindle was unloaded or overloaded: those samples are no measurement");
-  } else if (silent > parameters_.input_timeout) {
-    status.summary(diagnostic_msgs::DiagnosticStatus::STALE, "no samples from the force sensor");
-  } else if (!rotation_known_) {
-    status.summary(diagnostic_msgs::DiagnosticStatus::ERROR, "no transform of the force sensor");
-  } else if (health.gaps + health.not_finite + health.clipped > 0) {
-    status.summary(diagnostic_msgs::DiagnosticStatus::WARN, "samples were lost, clipped or not numbers");
-  } else if (health.innovation_ratio > 3.0) {
-    status.summary(diagnostic_msgs::DiagnosticStatus::WARN,
-                   "innovations larger than the sensor model explains");
-  } else if (health.speed > 0.0 && health.colour > COLOURED) {
-    status.summary(diagnostic_msgs::DiagnosticStatus::WARN,
-                   "innovations are not white: something of the force or of the sensor is not in the model");
-  } else if (parameters_.drift_limit > 0.0 &&
-             std::max({std::abs(health.zero[0]), std::abs(health.zero[1]), std::abs(health.zero[2])}) >
-                 parameters_.drift_limit) {
-    status.summary(diagnostic_msgs::DiagnosticStatus::WARN, "the sensor's zero has drifted");
-  } else if (parameters_.model_max_age > 0.0 && sorted_.modesAge() > parameters_.model_max_age) {
-    status.summary(diagnostic_msgs::DiagnosticStatus::WARN,
-                   "the taps in use are old: measure the sensor again");
-  } else {
-    status.summary(diagnostic_msgs::DiagnosticStatus::OK, sorted_.measuring()  ? "measuring the sensor"
-                                                          : health.speed > 0.0 ? "compensating"
-                                                                               : "passing through");
-  }
+  const auto [level, text] = judge(spindle);
+  status.summary(static_cast<unsigned char>(level), text);
   status.add("spindle speed of the filters [rad/s]", health.speed);
   status.add("innovation over design [1]", health.innovation_ratio);
   status.add("colour of the innovations [1]", health.colour);

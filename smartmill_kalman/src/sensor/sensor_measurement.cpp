@@ -28,30 +28,11 @@ std::string format(const char* pattern, double a, double b = 0.0) {
   return line;
 }
 
-void need(bool good, const char* key, double value, const char* due) {
-  if (!good || !std::isfinite(value)) {
-    throw Error(std::string(key) + ": " + format("%g", value) + ", " + due + " is due");
-  }
-}
-
 }  // namespace
 
 void TapParameters::validate() const {
-  need(trigger_force > 0.0, "trigger_force", trigger_force, "above 0 N");
-  need(weak_force >= trigger_force, "weak_force", weak_force, "at least trigger_force");
-  need(second_hit_share > 0.0 && second_hit_share < 1.0, "second_hit_share", second_hit_share, "0..1");
-  need(pre_trigger > 0.0, "pre_trigger", pre_trigger, "above 0 s");
-  need(record_length > 2.0 * pre_trigger, "record_length", record_length, "above 2 x pre_trigger");
-  need(rest_time >= 0.0, "rest_time", rest_time, "at least 0 s");
-  need(strike_timeout > 0.0, "strike_timeout", strike_timeout, "above 0 s");
-  need(max_bad_hits >= 0, "max_bad_hits", max_bad_hits, "at least 0");
-  need(response_range >= 0.0, "response_range", response_range, "at least 0 N");
-  need(static_tolerance > 0.0, "static_tolerance", static_tolerance, "above 0");
-  need(systematic >= 0.0 && systematic < 1.0, "systematic", systematic, "0..1");
-  need(frf_high > 0.0, "frf_high", frf_high, "above 0 Hz");
-  need(fit_low >= 0.0, "fit_low", fit_low, "at least 0 Hz");
-  need(fit_high > fit_low, "fit_high", fit_high, "above fit_low");
-  need(max_modes >= 1 && max_modes <= 20, "max_modes", max_modes, "1..20");
+  checkBounds(*this);
+  validateHitTest();
 }
 
 SensorMeasurement::SensorMeasurement(const TapParameters& parameters)

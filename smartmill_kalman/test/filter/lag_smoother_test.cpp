@@ -79,6 +79,7 @@ Outcome runOf(const ReferenceRecord& record, double lag) {
   constexpr std::size_t BLOCK = 256;
   CompensationParameters parameters;
   parameters.lag = lag;
+  parameters.filter.memory_revolutions = 2.0;  // a longer memory leaves less for the lag to win
   Outcome run;
   std::size_t blocks = 0;
   ForceCompensation compensation(parameters, false, [&](const ForceBlock& m, const ForceBlock& c) {

@@ -15,6 +15,7 @@
 #include <smartmill_msgs/SpindleAngle.h>
 
 #include "smartmill_core/modal/modal_model.h"
+#include "smartmill_core/names.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill {
@@ -41,12 +42,13 @@ TEST(KalmanNode, compensatesInTheMachinesFrame) {
   ros::NodeHandle nh;
   Blocks compensated, measured;
   std::vector<geometry_msgs::WrenchStamped> wrenches;
-  const auto sub1 = collect(nh, "force/compensated", compensated),
-             sub2 = collect(nh, "force/measured", measured);
+  const auto sub1 = collect(nh, names::FORCE_COMPENSATED, compensated),
+             sub2 = collect(nh, names::FORCE_MEASURED, measured);
   const auto sub3 = nh.subscribe<geometry_msgs::WrenchStamped>(
-      "force/wrench", 2000, [&](const geometry_msgs::WrenchStamped::ConstPtr& m) { wrenches.push_back(*m); });
-  auto blocks = nh.advertise<smartmill_msgs::SampleBlock>("daq/dynamometer", 2000);
-  auto angles = nh.advertise<smartmill_msgs::SpindleAngle>("spindle/angle", 2000);
+      names::FORCE_WRENCH, 2000,
+      [&](const geometry_msgs::WrenchStamped::ConstPtr& m) { wrenches.push_back(*m); });
+  auto blocks = nh.advertise<smartmill_msgs::SampleBlock>(names::DYNAMOMETER, 2000);
+  auto angles = nh.advertise<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE, 2000);
   ASSERT_TRUE(waitUntil([&] {
     return blocks.getNumSubscribers() > 0 && angles.getNumSubscribers() > 0 && sub1.getNumPublishers() > 0 &&
            sub2.getNumPublishers() > 0 && sub3.getNumPublishers() > 0;
@@ -99,15 +101,15 @@ TEST(KalmanNode, takesSixSensorsInTheSpindle) {
   ros::NodeHandle nh("/spindle_sensor");
   Blocks compensated, measured;
   bool told = false;
-  const auto sub1 = collect(nh, "force/compensated", compensated),
-             sub2 = collect(nh, "force/measured", measured);
+  const auto sub1 = collect(nh, names::FORCE_COMPENSATED, compensated),
+             sub2 = collect(nh, names::FORCE_MEASURED, measured);
   const auto sub3 = nh.subscribe<diagnostic_msgs::DiagnosticArray>(
       "/diagnostics", 100, [&](const diagnostic_msgs::DiagnosticArray::ConstPtr& m) {
         for (const auto& status : m->status)
           told = told || status.message.find("unloaded or overloaded") != std::string::npos;
       });
-  auto blocks = nh.advertise<smartmill_msgs::SampleBlock>("daq/dynamometer", 2000);
-  auto angles = nh.advertise<smartmill_msgs::SpindleAngle>("spindle/angle", 2000);
+  auto blocks = nh.advertise<smartmill_msgs::SampleBlock>(names::DYNAMOMETER, 2000);
+  auto angles = nh.advertise<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE, 2000);
   ASSERT_TRUE(waitUntil([&] {
     return blocks.getNumSubscribers() > 0 && angles.getNumSubscribers() > 0 && sub1.getNumPublishers() > 0 &&
            sub2.getNumPublishers() > 0 && sub3.getNumPublishers() > 0;

@@ -30,7 +30,9 @@
 #include "node/bag_compensation.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/machine_model.h"
+#include "smartmill_core/names.h"
 #include "smartmill_core/units.h"
+#include "smartmill_ros/parameter_reader.h"
 
 namespace smartmill::kalman {
 namespace {
@@ -49,8 +51,8 @@ bool waitUntil(Done done, double patience = 15.0) {
 
 class MeasureFrf : public testing::Test {
  protected:
-  MeasureFrf() : client("kalman/measure_frf", true), spinner(2) {
-    condition = nh.advertise<smartmill_msgs::CuttingCondition>("cut/condition", 10, true);
+  MeasureFrf() : client(names::MEASURE_SENSOR_FRF, true), spinner(2) {
+    condition = nh.advertise<smartmill_msgs::CuttingCondition>(names::CUTTING_CONDITION, 10, true);
     spinner.start();
   }
 
@@ -120,18 +122,18 @@ TEST_F(MeasureFrf, TapsThenCutsAndReplaysToTheLastDigit) {
   ASSERT_TRUE(client.waitForServer(ros::Duration(20.0)));
   const std::string file = testing::TempDir() + "smartmill_kalman_measure_frf_test.bag";
   bag.open(file, rosbag::bagmode::Write);
-  collect("force/compensated", live);
+  collect(names::FORCE_COMPENSATED, live);
   collect("again/force/compensated", again);
   record<tf2_msgs::TFMessage>("/tf_static");
-  record<smartmill_msgs::SampleBlock>("daq/hammer");
-  record<smartmill_msgs::SampleBlock>("daq/dynamometer");
-  record<smartmill_msgs::SpindleAngle>("spindle/angle");
-  record<smartmill_msgs::CuttingCondition>("cut/condition");
-  record<smartmill_msgs::MeasureFrfActionGoal>("kalman/measure_frf/goal");
+  record<smartmill_msgs::SampleBlock>(names::HAMMER);
+  record<smartmill_msgs::SampleBlock>(names::DYNAMOMETER);
+  record<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE);
+  record<smartmill_msgs::CuttingCondition>(names::CUTTING_CONDITION);
+  record<smartmill_msgs::MeasureFrfActionGoal>(names::goals(names::MEASURE_SENSOR_FRF));
   ASSERT_TRUE(waitUntil([&] {
     const std::lock_guard<std::mutex> lock(mutex);
-    return messages["daq/hammer"] > 10 && messages["daq/dynamometer"] > 10 &&
-           messages["spindle/angle"] > 10 && messages["/tf_static"] > 0 && live.size() > 10;
+    return messages[names::HAMMER] > 10 && messages[names::DYNAMOMETER] > 10 &&
+           messages[names::SPINDLE_ANGLE] > 10 && messages["/tf_static"] > 0 && live.size() > 10;
   }));
 
   std::map<std::string, smartmill_msgs::MeasureFrfResult> results;
@@ -156,7 +158,7 @@ TEST_F(MeasureFrf, TapsThenCutsAndReplaysToTheLastDigit) {
         const std::lock_guard<std::mutex> lock(mutex);
         if (m.point == POINT_FORCE_SENSOR) directions.insert(m.direction);
       };
-  subscribers.push_back(nh.subscribe<smartmill_msgs::ModalModel>("tool/modes", 10, note));
+  subscribers.push_back(nh.subscribe<smartmill_msgs::ModalModel>(names::TOOL_MODES, 10, note));
   EXPECT_TRUE(waitUntil([&] {
     const std::lock_guard<std::mutex> lock(mutex);
     return directions.size() == 2;
@@ -188,8 +190,8 @@ TEST_F(MeasureFrf, TapsThenCutsAndReplaysToTheLastDigit) {
 
   // Offline, from the bag.
   // With the live node's own parameters.
-  ParameterReader reader = ParameterReader::fromServer(ros::NodeHandle("/smartmill/kalman"));
-  const NodeParameters parameters = readParameters(reader);
+  const auto parameters =
+      ParameterReader::fromServer(ros::NodeHandle("/smartmill/kalman")).readAll<NodeParameters>();
   std::vector<BagCut> cuts;
   const BagSummary summary = compensateBag(file, ForceSensor(), parameters, Method::kalman,
                                            [&](BagCut&& c) { cuts.push_back(std::move(c)); });

@@ -11,6 +11,7 @@
 #include <boost/function.hpp>
 
 #include "smartmill_core/cutting/mechanistic.h"
+#include "smartmill_core/names.h"
 #include "smartmill_kalman_testing/tap_rig.h"
 #include "smartmill_ros/conversions.h"
 
@@ -23,9 +24,9 @@ void run() {
   sensor.modes = {{930.0, 0.03, 0.9}};
   sensor.direct = 0.1;
   TapRig rig(TapRig::diagonal(sensor), toSec(ros::Time::now()), 7);
-  auto hammer = nh.advertise<smartmill_msgs::SampleBlock>("daq/hammer", 1000);
-  auto dynamometer = nh.advertise<smartmill_msgs::SampleBlock>("daq/dynamometer", 1000);
-  auto angle = nh.advertise<smartmill_msgs::SpindleAngle>("spindle/angle", 1000);
+  auto hammer = nh.advertise<smartmill_msgs::SampleBlock>(names::HAMMER, 1000);
+  auto dynamometer = nh.advertise<smartmill_msgs::SampleBlock>(names::DYNAMOMETER, 1000);
+  auto angle = nh.advertise<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE, 1000);
   const boost::function<bool(smartmill_msgs::Strike::Request&, smartmill_msgs::Strike::Response&)> strike =
       [&](smartmill_msgs::Strike::Request& request, smartmill_msgs::Strike::Response& response) {
         if (request.point != "force_sensor" || request.direction == "z") {
@@ -35,7 +36,7 @@ void run() {
         rig.strike(request.direction == "x" ? 0 : 1);
         return true;
       };
-  const auto service = nh.advertiseService("daq/strike", strike);
+  const auto service = nh.advertiseService(names::STRIKE, strike);
   const boost::function<void(const smartmill_msgs::CuttingCondition&)> turn =
       [&](const smartmill_msgs::CuttingCondition& message) {
         const CuttingCondition condition = fromMsg(message);
@@ -50,7 +51,7 @@ void run() {
           return std::array<double, 3>{f.fx, f.fy, f.fz};
         };
       };
-  const auto conditions = nh.subscribe<smartmill_msgs::CuttingCondition>("cut/condition", 10, turn);
+  const auto conditions = nh.subscribe<smartmill_msgs::CuttingCondition>(names::CUTTING_CONDITION, 10, turn);
   const auto timer = nh.createWallTimer(ros::WallDuration(0.005), [&](const ros::WallTimerEvent&) {
     // A block is there when its last sample is.
     while (rig.now() + TapRig::BLOCK / TapRig::RATE < toSec(ros::Time::now())) {

@@ -189,6 +189,7 @@ void runSpeeds(const std::vector<double>& speeds, double duration) {
       const auto error = [&](const ReferenceCase& told, bool track) {
         CompensationParameters parameters = allHarmonics();
         parameters.track_speed = track;
+        parameters.filter.memory_revolutions = 2.0;  // without a tachometer a longer memory errs more
         const auto force = runCompensation(told, record, reference.sensor, parameters);
         const std::size_t to = force[0].size();
         const auto from = to - static_cast<std::size_t>(0.3 * reference.sample_rate);

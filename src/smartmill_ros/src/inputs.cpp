@@ -55,18 +55,21 @@ void Inputs::take(InputHealth& health, const std::function<void()>& handle) {
   if (!line.empty()) ROS_ERROR_STREAM(line);
 }
 
-const Watchdog& Inputs::watchdog(const std::string& topic) const {
-  for (const InputHealth& input : inputs_) {
-    if (input.topic() == topic) return input.watchdog();
+InputHealth& Inputs::find(const std::string& topic) {
+  for (InputHealth& input : inputs_) {
+    if (input.topic() == topic) return input;
   }
   throw std::out_of_range("no input " + topic);
 }
 
-const InputHealth* Inputs::dead(std::initializer_list<const char*> topics) const {
-  for (const InputHealth& input : inputs_) {
-    for (const char* topic : topics) {
-      if (input.topic() == topic && input.watchdog().dead()) return &input;
-    }
+Watchdog& Inputs::watchdog(const std::string& topic) {
+  return find(topic).watchdog();
+}
+
+const InputHealth* Inputs::dead(std::initializer_list<const char*> topics) {
+  for (const char* topic : topics) {
+    const InputHealth& input = find(topic);
+    if (input.watchdog().dead()) return &input;
   }
   return nullptr;
 }

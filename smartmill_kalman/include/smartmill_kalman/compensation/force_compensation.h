@@ -22,25 +22,42 @@
 
 namespace smartmill::kalman {
 
-/// See launch/config/kalman.yaml.
 struct CompensationParameters {
   HarmonicFilterParameters filter;
-  double least_speed = 20.0;  ///< [rad/s] > 0; slower than this the samples pass through
-  /// [1] > 0; a spindle whose speed changes by more than this share within 50 ms is not steady: samples
-  /// pass
+  double least_speed = 20.0;
   double speed_tolerance = 0.002;
-  double settling_periods =
-      5.0;  ///< [1] >= 0 settling times after a start or gap that are marked as settling
-  /// [s] >= 0: blocks come out so much later and tell each force from the samples up to so much after it
-  /// (LagSmoother); 0: causal
   double lag = 0.0;
-  /// No tachometer: the speed is told from the force, beginning with the cutting condition's.
   bool track_speed = false;
   SpeedTrackerParameters tracker;
-  bool follow = false;         ///< moves the sensor's modes where the cut says so (ModeFollower)
-  int follow_revolutions = 8;  ///< [1] > 0 between two looks
+  double settling_periods = 5.0;
+  bool follow = false;
+  int follow_revolutions = 8;
   FollowParameters follower;
-  double saturation = 0.0;  ///< [N] >= 0 a sample at or beyond it counts as clipped; 0: not watched
+  double saturation = 0.0;
+
+  void declare(ParameterTable& table) {
+    filter.declare(table);
+    table.number("least_speed", least_speed, "rad/s", Range::positive(),
+                 "slower than this the samples pass through");
+    table.number("speed_tolerance", speed_tolerance, "1", Range::open(0.0, 0.5),
+                 "speed that changes by more within 50 ms is not steady: samples pass through");
+    table.number(
+        "lag", lag, "s", Range::closed(0.0, 10.0),
+        "blocks come so much later, each force told from the samples up to so much after it; 0: causal");
+    table.flag("track_speed", track_speed,
+               "true: no tachometer; the speed is told from the force, from the cutting condition's on; a "
+               "memory of 2 "
+               "revolutions serves it best");
+    tracker.declare(table);
+    table.number("settling_periods", settling_periods, "1", Range::notNegative(),
+                 "settling times after a start or a gap that are marked SETTLING");
+    table.flag("follow", follow,
+               "moves the sensor's modes where the harmonics of the cut say that they have moved");
+    table.number("follow_revolutions", follow_revolutions, "1", Range::positive(), "between two looks");
+    table.part("follow_", follower);
+    table.number("saturation", saturation, "N", Range::notNegative(),
+                 "samples at or beyond it count as clipped; 0: not watched");
+  }
   /// @throws Error naming key and value.
   void validate() const;
 };

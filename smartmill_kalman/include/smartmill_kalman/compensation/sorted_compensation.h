@@ -86,7 +86,6 @@ class SortedCompensation {
   void onRestart(std::function<void()> told) { restarted_ = std::move(told); }
 
  private:
-  void watch(double stamp, double& newest_here);
   void drain();
   SampleBlock toForces(const SampleBlock& block);
   void forward(const ForceBlock& measured, const ForceBlock& compensated);
@@ -103,8 +102,6 @@ class SortedCompensation {
   std::optional<SensorMatrix> matrix_;
   std::deque<std::pair<std::uint64_t, std::uint64_t>> invalid_;  // samples [from, to) that are no measurement
   std::function<void()> restarted_;
-  double newest_;
-  double newest_block_, newest_hammer_, newest_angle_;  // [s] of each stream
 };
 
 }  // namespace smartmill::kalman

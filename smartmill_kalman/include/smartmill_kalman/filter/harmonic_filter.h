@@ -7,19 +7,32 @@
 #include <vector>
 
 #include "smartmill_core/modal/modal_model.h"
+#include "smartmill_core/parameters/parameter_table.h"
 #include "smartmill_kalman/filter/innovation_watch.h"
 
 namespace smartmill::kalman {
 
-/// How a filter is laid out; see launch/config/kalman.yaml.
+/// How a filter is laid out.
 struct HarmonicFilterParameters {
-  double bandwidth = 5000.0;          ///< [Hz] harmonics of the spindle frequency up to here; > 0
-  int max_harmonics = 100;            ///< 0..200, also kept below 0.45 of the sample rate; 0: a random walk
-  double noise_rms = 1.0;             ///< [N] of one sample; > 0
-  double settling_revolutions = 0.2;  ///< [1] time constant of each harmonic's amplitude after a change; > 0
-  /// [1] time constant once nothing changes any more, in revolutions; at most settling_revolutions: always
-  /// quick
-  double memory_revolutions = 2.0;
+  double bandwidth = 5000.0;
+  int max_harmonics = 50;
+  double noise_rms = 1.0;
+  double settling_revolutions = 0.2;
+  double memory_revolutions = 8.0;
+
+  void declare(ParameterTable& table) {
+    table.number("bandwidth", bandwidth, "Hz", Range::positive(),
+                 "harmonics of the spindle frequency up to here, and below 0.45 of the sample rate");
+    table.number(
+        "max_harmonics", max_harmonics, "1", Range::closed(0, 200),
+        "at most so many; low speeds reach this first. Laying out takes the cube of it; 0: a random walk");
+    table.number("noise_rms", noise_rms, "N", Range::positive(), "noise of one sample of the sensor");
+    table.number("settling_revolutions", settling_revolutions, "1", Range::positive(),
+                 "time constant of each harmonic's amplitude after a change: smaller follows faster");
+    table.number(
+        "memory_revolutions", memory_revolutions, "1", Range::positive(),
+        "time constant once nothing changes: larger is quieter; up to settling_revolutions: always quick");
+  }
   /// Memory of a level of `levels` [revolutions]: quick, geometric mean, slow.
   double memory(std::size_t level) const;
   /// @throws Error naming key and value.

@@ -7,14 +7,23 @@
 
 #include "smartmill_core/cutting/tool.h"
 #include "smartmill_core/modal/modal_model.h"
+#include "smartmill_core/parameters/parameter_table.h"
 
 namespace smartmill::kalman {
 
 struct FollowParameters {
-  double misfit = 0.01;         ///< [1] > 0 share of the force that the force model does not tell
-  double frequency_std = 0.02;  ///< [1] > 0 by which a mode may move between two looks
-  double damping_std = 0.1;     ///< [1] > 0 the same of its damping ratio
-  double evidence = 30.0;       ///< [1] > 0 fall of the sum of squares that counts as a move
+  double misfit = 0.01;
+  double frequency_std = 0.02;  ///< [1] by which a mode may move between two looks
+  double damping_std = 0.1;     ///< [1] the same of its damping ratio
+  double evidence = 30.0;       ///< [1] fall of the sum of squares that counts as a move
+
+  void declare(ParameterTable& table) {
+    table.number("misfit", misfit, "1", Range::positive(),
+                 "share of the force that its model (tool, engagement, runout) does not tell");
+    table.internal("frequency_std", frequency_std, "1", Range::positive());
+    table.internal("damping_std", damping_std, "1", Range::positive());
+    table.internal("evidence", evidence, "1", Range::positive());
+  }
   /// @throws Error naming key and value.
   void validate() const;
 };

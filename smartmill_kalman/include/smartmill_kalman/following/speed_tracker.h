@@ -2,14 +2,23 @@
 
 #include <cstddef>
 
+#include "smartmill_core/parameters/parameter_table.h"
+
 namespace smartmill::kalman {
 
-/// How the spindle's speed is told from the force where there is no tachometer; see
-/// launch/config/kalman.yaml.
+/// How the spindle's speed is told from the force where there is no tachometer.
 struct SpeedTrackerParameters {
-  double speed_std = 0.01;            ///< [1] > 0 share by which the cutting condition's speed may be off
-  double acceleration_std = 0.02;     ///< [1/s] > 0 share of speed that load takes or gives back in a second
-  double acceleration_memory = 0.25;  ///< [s] > 0 over which the acceleration changes
+  double speed_std = 0.01;
+  double acceleration_std = 0.02;
+  double acceleration_memory = 0.25;  ///< [s] over which the acceleration changes
+
+  void declare(ParameterTable& table) {
+    table.number("speed_std", speed_std, "1", Range::positive(),
+                 "share by which the cutting condition's speed may be off");
+    table.number("acceleration_std", acceleration_std, "1/s", Range::positive(),
+                 "share of the speed that load takes or gives back in a second");
+    table.internal("acceleration_memory", acceleration_memory, "s", Range::positive());
+  }
   /// @throws Error naming key and value.
   void validate() const;
 };

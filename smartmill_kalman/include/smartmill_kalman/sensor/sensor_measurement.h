@@ -7,30 +7,33 @@
 #include <string>
 #include <vector>
 
+#include "smartmill_core/modal/hit_test_parameters.h"
 #include "smartmill_core/modal/results.h"
 #include "smartmill_core/signal/hit_collector.h"
 #include "smartmill_core/signal/streams.h"
 
 namespace smartmill::kalman {
 
-/// Taps on the workpiece that identify the force sensor; see launch/config/kalman.yaml.
-struct TapParameters {
-  double trigger_force = 10.0;     ///< [N] of the hammer above the level before; > 0
-  double weak_force = 20.0;        ///< [N] a blow below this is not used; >= trigger_force
-  double second_hit_share = 0.1;   ///< [1] 0..1 of the peak: above it a second peak makes a double hit
-  double pre_trigger = 0.01;       ///< [s] > 0
-  double record_length = 0.2;      ///< [s] > 2 pre_trigger
-  double rest_time = 0.1;          ///< [s] >= 0 between a record's end and the next blow
-  double strike_timeout = 10.0;    ///< [s] > 0 from the command to the hit; time enough for a hit by hand
-  int max_bad_hits = 5;            ///< [1] >= 0, then it gives up
-  double response_range = 0.0;     ///< [N] >= 0 a sample of the sensor at or beyond it is clipped; 0: unknown
-  double static_tolerance = 0.25;  ///< [1] > 0 the sensor's measured static gain may differ from 1 by this
-  double systematic =
-      0.002;  ///< [1] 0..1 share of |H| that no scatter shows (linearity, aliasing), in every std_dev
-  double frf_high = 5000.0;  ///< [Hz] lines above are not handed out
-  double fit_low = 100.0;    ///< [Hz] >= 0
-  double fit_high = 5000.0;  ///< [Hz] above fit_low
-  int max_modes = 4;         ///< [1] 1..20 when the number is chosen by evidence
+/// Taps on the workpiece that identify the force sensor.
+struct TapParameters : HitTestParameters {
+  double response_range = 0.0;  ///< [N] a sample of the sensor at or beyond it is clipped; 0: unknown
+  double static_tolerance = 0.25;
+  double systematic = 0.002;
+
+  TapParameters() {
+    record_length = 0.2;
+    strike_timeout = 10.0;  // long enough for a blow by hand
+  }
+  void declare(ParameterTable& table) {
+    declareHits(table);
+    table.internal("response_range", response_range, "N", Range::notNegative());
+    table.number("static_tolerance", static_tolerance, "1", Range::positive(),
+                 "the measured static gain may differ from 1 by this");
+    table.number(
+        "systematic", systematic, "1", Range::openHigh(0.0, 1.0),
+        "share of |H| that scatter does not show (linearity, aliasing), in every standard deviation");
+    declareFit(table);
+  }
   /// @throws Error naming key and value.
   void validate() const;
 };

@@ -62,9 +62,9 @@ class Inputs {
   }
 
   /// Of one topic. @throws std::out_of_range when nobody listens to it.
-  const Watchdog& watchdog(const std::string& topic) const;
-  /// The first of these that is dead; nullptr: none.
-  const InputHealth* dead(std::initializer_list<const char*> topics) const;
+  Watchdog& watchdog(const std::string& topic);
+  /// The first of these that is dead; nullptr: none. @throws std::out_of_range as watchdog().
+  const InputHealth* dead(std::initializer_list<const char*> topics);
   /// Of all inputs together. ended() is the end of data: nothing more will come to release what waits.
   Watchdog& any() { return any_; }
 
@@ -76,6 +76,7 @@ class Inputs {
 
  private:
   InputHealth& add(const std::string& topic);
+  InputHealth& find(const std::string& topic);
   void take(InputHealth& health, const std::function<void()>& handle);
 
   ros::NodeHandle nh_;

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <string>
+
+#include "smartmill_core/parameters/parameter_table.h"
+#include "smartmill_kalman/compensation/sorted_compensation.h"
+
+namespace smartmill::kalman {
+
+/// Parameters of kalman_node and of `compensate` on a bag.
+struct NodeParameters {
+  std::string model;  ///< may stay empty where the tool is given one
+  std::string sensor_matrix, spindle_sensor;
+  double spindle_sensor_length = 0.139;
+  CompensationParameters compensation;
+  double hold_back = 0.05;
+  double wrench_rate = 100.0;
+  double drift_limit = 0.0;
+  double model_max_age = 0.0;
+  double input_timeout = 1.0;
+  bool command_machine = true;
+  TapParameters taps;
+
+  void declare(ParameterTable& table) {
+    table.title(
+        "Parameters of kalman_node (package smartmill_kalman): the force at the tool from a force sensor.");
+    table.atLaunch("model", model,
+                   "path of a smartmill-model/1 file whose force_sensor section gives the sensor's modes");
+    table.section();
+    table.text("sensor_matrix", sensor_matrix,
+               "smartmill-sensor-matrix/1 file (compensate --coupled --matrix-out): cross-talk is taken out");
+    table.text("spindle_sensor", spindle_sensor,
+               "smartmill-spindle-sensor/1 file: daq/dynamometer brings six sensors x1 x2 y1 y2 z1 z2");
+    table.number("spindle_sensor_length", spindle_sensor_length, "m", Range::positive(),
+                 "of tool and holder, for spindle_sensor");
+    compensation.declare(table);
+    table.number("hold_back", hold_back, "s", Range::notNegative(),
+                 "how late an event may arrive and still be in order");
+    table.number("wrench_rate", wrench_rate, "Hz", Range::positive(), "of force/wrench");
+    table.number("drift_limit", drift_limit, "N", Range::notNegative(),
+                 "zero of the sensor without cutting that raises a diagnostic; 0: not watched");
+    table.number("model_max_age", model_max_age, "s", Range::notNegative(),
+                 "age of the taps in use that raises a diagnostic; 0: not watched");
+    table.number("input_timeout", input_timeout, "s", Range::positive(),
+                 "silence of the sensor that raises a diagnostic");
+    table.section("Taps on the workpiece (kalman/measure_frf): the modes found serve from then on.");
+    table.flag("command_machine", command_machine,
+               "false: replay; daq/strike is not called, the recorded blows answer");
+    taps.declare(table);
+  }
+  /// @throws Error naming key and value.
+  void validate() const {
+    checkBounds(*this);
+    compensation.validate();
+    taps.validate();
+  }
+};
+
+}  // namespace smartmill::kalman

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <smartmill_msgs/SampleBlock.h>
+
+#include "node/parameters.h"
+#include "smartmill_core/names.h"
+#include "smartmill_kalman/compensation/sorted_compensation.h"
+#include "smartmill_kalman/sensor/spindle_sensor_calibration.h"
+#include "smartmill_ros/feed.h"
+
+namespace smartmill::kalman {
+
+/// The streams beside the sensor's own blocks, from a node's inputs or from a bag.
+template <class Source>
+void connect(Source& source, SortedCompensation& sorted) {
+  source.template on<smartmill_msgs::SampleBlock>(
+      names::HAMMER,
+      [&sorted](const smartmill_msgs::SampleBlock& m, double) { sorted.pushHammer(fromMsg(m)); });
+  feed<smartmill_msgs::SpindleAngle>(source, names::SPINDLE_ANGLE, sorted);
+}
+
+/// What the parameters say of the sensor beyond its modes. @throws Error on a bad file.
+inline void useFiles(SortedCompensation& sorted, const NodeParameters& parameters) {
+  if (!parameters.sensor_matrix.empty()) sorted.useMatrix(readSensorMatrix(parameters.sensor_matrix));
+  if (!parameters.spindle_sensor.empty()) {
+    sorted.useSpindleSensor(readSpindleSensor(parameters.spindle_sensor), parameters.spindle_sensor_length);
+  }
+}
+
+}  // namespace smartmill::kalman
