@@ -121,82 +121,101 @@ double refinedSpeed(const TestData& test, int teeth, double share) {
   return best * test.test.sample_rate;
 }
 
-std::vector<std::string> estimatePhases(Dataset& data) {
+namespace {
+
+using ForceLine = std::array<std::complex<double>, 3>;
+
+// Gives a cut its speed and, within one tooth period, its phase. @return a note
+std::string estimatePhase(const Dataset& data, TestData& t) {
   constexpr double SPEED_SHARE = 0.01;
   constexpr int PHASES = 240, TOOTH_LINES = 4;
+  const int teeth = data.nominal.tool->teeth;
+  t.test.spindle_speed = refinedSpeed(t, teeth, SPEED_SHARE);
+  sim::SimulationOptions options;
+  options.noise = false;
+  options.substeps = 2;
+  // Of the lines of the tooth passing only the phase turns.
+  setAngle(t, 0.0);
+  const Record model = sim::simulateTest(data.nominal, t.test, t.record, options);
+  const Lines lines = linesOf(data, t, model, t.first_cut, t.record.size(), teeth, TOOTH_LINES);
+  double best = 0.0, largest = -1e300;
+  for (int p = 0; p < PHASES; ++p) {
+    const double phase = TWO_PI / teeth * p / PHASES, match = lines.match(phase);
+    if (match > largest) {
+      largest = match;
+      best = phase;
+    }
+  }
+  setAngle(t, best);
+  char text[200];
+  std::snprintf(text, sizeof text,
+                "%s: no spindle angle; speed %.2f rpm and phase %.1f deg estimated from the forces",
+                t.test.name.c_str(), units::rpmFromRadPerSec(t.test.spindle_speed), units::degFromRad(best));
+  return text;
+}
+
+// Line of once a revolution against the spindle angle.
+ForceLine onceARevolution(const TestData& t) {
+  ForceLine line{};
+  const double phase = t.record.column("spindle_angle").front();
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (t.record.has(FORCES[a]))
+      line[a] = lineAt(t.record.column(FORCES[a]), beginOf(t), t.record.size(),
+                       t.test.spindle_speed / t.test.sample_rate) *
+                std::polar(1.0, -phase);
+  }
+  return line;
+}
+
+// By how many of equal parts of a turn a line agrees best with another.
+int bestPart(const ForceLine& line, const ForceLine& reference, int parts) {
+  int best = 0;
+  double largest = -1e300;
+  for (int k = 0; k < parts; ++k) {
+    double match = 0.0;
+    for (std::size_t a = 0; a < 3; ++a)
+      match += std::real(std::conj(reference[a]) * line[a] * std::polar(1.0, -TWO_PI * k / parts));
+    if (match > largest) {
+      largest = match;
+      best = k;
+    }
+  }
+  return best;
+}
+
+// Turns all records like the one with the strongest line of once a revolution.
+void turnAlike(const Dataset& data, const std::vector<TestData*>& turned) {
+  const auto strength = [](const ForceLine& l) {
+    return std::norm(l[0]) + std::norm(l[1]) + std::norm(l[2]);
+  };
+  ForceLine reference{};
+  for (const TestData* t : turned) {
+    const ForceLine line = onceARevolution(*t);
+    if (strength(line) > strength(reference)) reference = line;
+  }
+  for (TestData* t : turned) {
+    // The force of the cut has left the tooth open, an air cut any angle.
+    const int parts = t->test.kind == TestKind::cut && data.nominal.tool ? data.nominal.tool->teeth : 360;
+    const int best = bestPart(onceARevolution(*t), reference, parts);
+    if (best != 0) setAngle(*t, t->record.column("spindle_angle").front() + TWO_PI * best / parts);
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> estimatePhases(Dataset& data) {
   std::vector<std::string> notes;
   std::vector<TestData*> turned;
   for (TestData& t : data.tests) {
     if (!t.phase_estimated) continue;
-    if (t.test.kind != TestKind::cut || !data.nominal.tool) {
+    if (t.test.kind == TestKind::cut && data.nominal.tool) {
+      notes.push_back(estimatePhase(data, t));
+    } else {
       setAngle(t, 0.0);
-      turned.push_back(&t);
-      continue;
     }
-    const int teeth = data.nominal.tool->teeth;
-    t.test.spindle_speed = refinedSpeed(t, teeth, SPEED_SHARE);
-    sim::SimulationOptions options;
-    options.noise = false;
-    options.substeps = 2;
-    // One tooth period of phases; of the lines of the tooth passing only the phase turns.
-    setAngle(t, 0.0);
-    const Record model = sim::simulateTest(data.nominal, t.test, t.record, options);
-    const Lines lines = linesOf(data, t, model, t.first_cut, t.record.size(), teeth, TOOTH_LINES);
-    double best = 0.0, largest = -1e300;
-    for (int p = 0; p < PHASES; ++p) {
-      const double phase = TWO_PI / teeth * p / PHASES, match = lines.match(phase);
-      if (match > largest) {
-        largest = match;
-        best = phase;
-      }
-    }
-    setAngle(t, best);
     turned.push_back(&t);
-    char text[200];
-    std::snprintf(text, sizeof text,
-                  "%s: no spindle angle; speed %.2f rpm and phase %.1f deg estimated from the forces",
-                  t.test.name.c_str(), units::rpmFromRadPerSec(t.test.spindle_speed),
-                  units::degFromRad(best));
-    notes.push_back(text);
   }
-  if (turned.size() < 2) return notes;
-  // Lines of once a revolution against the spindle angle, all records turned like the strongest.
-  const auto once = [&](const TestData& t) {
-    std::array<std::complex<double>, 3> line{};
-    const double phase = t.record.column("spindle_angle").front();
-    for (std::size_t a = 0; a < 3; ++a) {
-      if (t.record.has(FORCES[a]))
-        line[a] = lineAt(t.record.column(FORCES[a]), beginOf(t), t.record.size(),
-                         t.test.spindle_speed / t.test.sample_rate) *
-                  std::polar(1.0, -phase);
-    }
-    return line;
-  };
-  const auto strength = [](const std::array<std::complex<double>, 3>& l) {
-    return std::norm(l[0]) + std::norm(l[1]) + std::norm(l[2]);
-  };
-  std::array<std::complex<double>, 3> reference{};
-  for (const TestData* t : turned) {
-    const auto line = once(*t);
-    if (strength(line) > strength(reference)) reference = line;
-  }
-  for (TestData* t : turned) {
-    const auto line = once(*t);
-    // The force of the cut has left the tooth open, an air cut any angle.
-    const int teeth = t->test.kind == TestKind::cut && data.nominal.tool ? data.nominal.tool->teeth : 360;
-    int best = 0;
-    double largest = -1e300;
-    for (int k = 0; k < teeth; ++k) {
-      double match = 0.0;
-      for (std::size_t a = 0; a < 3; ++a)
-        match += std::real(std::conj(reference[a]) * line[a] * std::polar(1.0, -TWO_PI * k / teeth));
-      if (match > largest) {
-        largest = match;
-        best = k;
-      }
-    }
-    if (best != 0) setAngle(*t, t->record.column("spindle_angle").front() + TWO_PI * best / teeth);
-  }
+  if (turned.size() > 1) turnAlike(data, turned);
   return notes;
 }
 
