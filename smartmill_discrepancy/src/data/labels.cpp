@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/units.h"
 #include "smartmill_discrepancy/gap/twin_runner.h"
+#include "smartmill_discrepancy/results/formatted.h"
 #include "smartmill_sim/twin/twin.h"
 
 namespace smartmill::discrepancy {
@@ -64,12 +64,9 @@ std::vector<std::string> wrongSpeeds(const Dataset& data) {
     if (t.test.kind == TestKind::tap || t.phase_estimated || !t.record.has("spindle_angle")) continue;
     const double speed = turningSpeed(t);
     if (std::abs(speed / t.test.spindle_speed - 1.0) <= SPEED_TOLERANCE) continue;
-    char line[300];
-    std::snprintf(line, sizeof line,
-                  "test %s looks mislabelled: its spindle turns at %.0f rpm, spindle_speed_rpm says %.0f",
-                  t.test.name.c_str(), units::rpmFromRadPerSec(speed),
-                  units::rpmFromRadPerSec(t.test.spindle_speed));
-    wrong.push_back(line);
+    wrong.push_back(formatted(
+        "test %s looks mislabelled: its spindle turns at %.0f rpm, spindle_speed_rpm says %.0f",
+        t.test.name.c_str(), units::rpmFromRadPerSec(speed), units::rpmFromRadPerSec(t.test.spindle_speed)));
   }
   return wrong;
 }
@@ -105,11 +102,8 @@ std::vector<std::string> wrongScales(const Dataset& data, const std::vector<Reco
     const double factor = std::abs(c.product / c.simulated);
     if (factor > UNIT ||
         (factor < 1.0 / UNIT && c.product * c.product / c.simulated > 100.0 * noise * noise)) {
-      char line[300];
-      std::snprintf(line, sizeof line,
-                    "%s reads %.3g times what the model says in every cut: its unit looks wrong",
-                    channel.c_str(), factor);
-      wrong.push_back(line);
+      wrong.push_back(formatted("%s reads %.3g times what the model says in every cut: its unit looks wrong",
+                                channel.c_str(), factor));
     }
   }
   if (!turned.empty())

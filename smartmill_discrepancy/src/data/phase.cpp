@@ -4,9 +4,9 @@
 #include <array>
 #include <cmath>
 #include <complex>
-#include <cstdio>
 
 #include "smartmill_core/units.h"
+#include "smartmill_discrepancy/results/formatted.h"
 #include "smartmill_sim/twin/twin.h"
 
 namespace smartmill::discrepancy {
@@ -147,11 +147,9 @@ std::string estimatePhase(const Dataset& data, TestData& t) {
     }
   }
   setAngle(t, best);
-  char text[200];
-  std::snprintf(text, sizeof text,
-                "%s: no spindle angle; speed %.2f rpm and phase %.1f deg estimated from the forces",
-                t.test.name.c_str(), units::rpmFromRadPerSec(t.test.spindle_speed), units::degFromRad(best));
-  return text;
+  return formatted("%s: no spindle angle; speed %.2f rpm and phase %.1f deg estimated from the forces",
+                   t.test.name.c_str(), units::rpmFromRadPerSec(t.test.spindle_speed),
+                   units::degFromRad(best));
 }
 
 // Line of once a revolution against the spindle angle.

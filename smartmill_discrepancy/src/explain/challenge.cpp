@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "smartmill_discrepancy/explain/evidence_of_members.h"
+#include "smartmill_discrepancy/results/formatted.h"
 #include "smartmill_discrepancy/search/refinement.h"
 
 namespace smartmill::discrepancy {
@@ -56,11 +56,10 @@ double doubtOf(const Workbench& bench, const ExplainOptions& options, const Stru
   const Trace trace = traceOf(bench.exact(), found.best, member);
   const double rest = leftWhere(bench.fitted(), trace, unexplained, structure);
   const bool helps = heldoutReduction(bench, found.best.state, member) > options.least_heldout_reduction;
-  char line[200];
-  std::snprintf(line, sizeof line, "  %s: tests differ by %.3g, left where it acts %.3g, contribution %.3g%s",
-                found.best.state.members[member].hypothesis->title().c_str(), trace.evenness, rest,
-                found.contribution[member], helps ? ", helps where it was not fitted" : "");
-  options.search.say(line);
+  options.search.say(formatted("  %s: tests differ by %.3g, left where it acts %.3g, contribution %.3g%s",
+                               found.best.state.members[member].hypothesis->title().c_str(), trace.evenness,
+                               rest, found.contribution[member],
+                               helps ? ", helps where it was not fitted" : ""));
   const double uneven = helps ? 0.0 : trace.evenness / options.least_evenness;
   const double in_its_place =
       atOnePlace(unexplained) ? 2.0 * rest / std::max(found.contribution[member], 1.0) : 0.0;

@@ -3,24 +3,17 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <cstdio>
 
 #include "smartmill_core/error.h"
 #include "smartmill_discrepancy/data/labels.h"
 #include "smartmill_discrepancy/explain/challenge.h"
 #include "smartmill_discrepancy/explain/judge.h"
 #include "smartmill_discrepancy/explain/outcome.h"
+#include "smartmill_discrepancy/results/formatted.h"
 #include "smartmill_sim/twin/twin.h"
 
 namespace smartmill::discrepancy {
 namespace {
-
-template <class... Values>
-std::string text(const char* format, Values... values) {
-  char line[200];
-  std::snprintf(line, sizeof line, format, values...);
-  return line;
-}
 
 void refuse(const Dataset& data, const std::vector<std::string>& reasons) {
   std::string all;
@@ -77,7 +70,7 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
   refuseWithoutNumbers(bench.heldout(), before.heldout);
   result.before = before.gap;
   options.search.say(
-      text("gap of the nominal model: %.4f, held out %.4f", result.before.fit, result.before.heldout));
+      formatted("gap of the nominal model: %.4f, held out %.4f", result.before.fit, result.before.heldout));
 
   SearchOptions searched = options.search;
   if (!labels.doubtful.empty()) searched.most_effects = std::min<std::size_t>(searched.most_effects, 2);
@@ -101,8 +94,9 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
   // An effect that acts in one test most may look like another test's label; one that explains all clears it.
   if (!result.unexplained.empty()) refuse(data, labels.doubtful);
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  options.search.say(text("verdict %s; gap %.4f -> %.4f, held out %.4f -> %.4f", nameOf(result.verdict),
-                          result.before.fit, result.after.fit, result.before.heldout, result.after.heldout));
+  options.search.say(formatted("verdict %s; gap %.4f -> %.4f, held out %.4f -> %.4f", nameOf(result.verdict),
+                               result.before.fit, result.after.fit, result.before.heldout,
+                               result.after.heldout));
   return result;
 }
 

@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <map>
 #include <optional>
 #include <utility>
 
 #include "smartmill_core/error.h"
+#include "smartmill_discrepancy/results/formatted.h"
 #include "smartmill_discrepancy/search/evidence.h"
 #include "smartmill_discrepancy/search/refinement.h"
 #include "smartmill_discrepancy/search/screening.h"
@@ -17,16 +17,10 @@
 namespace smartmill::discrepancy {
 namespace {
 
-std::string text(const char* format, double a, double b = 0.0) {
-  char line[160];
-  std::snprintf(line, sizeof line, format, a, b);
-  return line;
-}
-
 std::string describe(const Member& m) {
   std::string line = m.hypothesis->title() + ":";
   for (const auto& [key, value] : numbersOf(m.hypothesis->entry(m.values)))
-    line += " " + key + text(" %.5g", value);
+    line += " " + key + formatted(" %.5g", value);
   return line;
 }
 
@@ -132,7 +126,7 @@ class Search {
   // Squares above the noise.
   double excess(const Fit& fit) const { return fit.chi2 - bench_.samples(); }
   std::string gapText(double squares) const {
-    return text("gap %.4f", std::sqrt(squares / bench_.samples()));
+    return formatted("gap %.4f", std::sqrt(squares / bench_.samples()));
   }
 
   Workbench& bench_;
@@ -224,7 +218,8 @@ void Search::fitPromise(const Promise& promise, Round& round) {
                           now_.bic - tried.bic, false, seconds, quick_.runner().simulations() - simulations},
                          promise.hypothesis,
                          newest.values});
-  options_.say(text("  promise %.4g, gain %.4g  ", promise.gain, now_.bic - tried.bic) + describe(newest));
+  options_.say(formatted("  promise %.4g, gain %.4g  ", promise.gain, now_.bic - tried.bic) +
+               describe(newest));
   if (tried.bic < round.best.bic) {
     round.best = tried;
     round.best_promise = promise.gain;

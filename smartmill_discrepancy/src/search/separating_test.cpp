@@ -1,10 +1,10 @@
 #include "smartmill_discrepancy/search/separating_test.h"
 
 #include <cmath>
-#include <cstdio>
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/units.h"
+#include "smartmill_discrepancy/results/formatted.h"
 #include "smartmill_sim/twin/twin.h"
 
 namespace smartmill::discrepancy {
@@ -55,21 +55,19 @@ std::optional<std::string> separatingTest(const Dataset& data, const MachineMode
           }
           if (value <= largest) continue;
           largest = value;
-          char text[300];
           if (test.engagement) {
-            std::snprintf(text, sizeof text,
-                          "a cut at %.0f rpm, %.3g mm a tooth, %.3g mm deep, from %.0f to %.0f deg: the two "
-                          "predictions "
-                          "differ there by %.2g times the noise",
-                          units::rpmFromRadPerSec(test.spindle_speed), test.engagement->feed_per_tooth * 1e3,
-                          test.engagement->axial_depth * 1e3, units::degFromRad(test.engagement->entry),
-                          units::degFromRad(test.engagement->exit), value);
+            best = formatted(
+                "a cut at %.0f rpm, %.3g mm a tooth, %.3g mm deep, from %.0f to %.0f deg: the two "
+                "predictions "
+                "differ there by %.2g times the noise",
+                units::rpmFromRadPerSec(test.spindle_speed), test.engagement->feed_per_tooth * 1e3,
+                test.engagement->axial_depth * 1e3, units::degFromRad(test.engagement->entry),
+                units::degFromRad(test.engagement->exit), value);
           } else {
-            std::snprintf(text, sizeof text,
-                          "an air cut at %.0f rpm: the two predictions differ there by %.2g times the noise",
+            best =
+                formatted("an air cut at %.0f rpm: the two predictions differ there by %.2g times the noise",
                           units::rpmFromRadPerSec(test.spindle_speed), value);
           }
-          best = text;
         }
       }
     }
