@@ -36,6 +36,7 @@ TEST(LoadMeterIdentification, findsTheTruthWithHonestStandardDeviations) {
   Coverage ktc, kte;
   for (int run = 0; run < runs; ++run) {
     Session session(static_cast<unsigned>(run + 1), 2e-4);
+    session.ripple = true;
     LoadMeterIdentification identification(model(), {});
     connect(session, identification);
     takeThrough(session);
@@ -69,7 +70,8 @@ TEST(LoadMeterIdentification, runoutIsToldFromMeansAndRippleOfTheReadings) {
         std::vector<IdentifyResult> results;
         for (const double largest : {3e-5, 0.0}) {
           Session session(seed, 2e-4);
-          session.runout = std::max(offset, 1e-12);  // teeth pass without it too
+          session.ripple = true;
+          session.runout = offset;
           session.runout_angle = 0.7 * seed;
           IdentificationParameters parameters;
           parameters.largest_runout = largest;

@@ -98,6 +98,7 @@ TEST(Bag, aRunoutIsToldAsOnTheRunningMachine) {
   std::vector<IdentifyResult> live;
   {
     Recorder recorder(folder.file("run.bag"));
+    recorder.session.ripple = true;
     recorder.session.runout = 9e-6;
     recorder.session.runout_angle = 0.7;
     for (const double rpm : {3000.0, 6000.0, 9000.0, 12000.0}) recorder.session.air(rpm, 2.0);
