@@ -39,8 +39,17 @@ def tests(folders):
     return names
 
 
+def stands(path, folders):
+    """Whether a file of the tree, or a public header, has this path."""
+    roots = [ROOT, *folders.values(), *(f / "include" for f in folders.values())]
+    return any((root / path).exists() for root in roots)
+
+
 def faults(document, folders, known_tests):
     text = document.read_text()
+    for path in set(re.findall(r"`((?:src/)?(?:smartmill_|launch/)[\w/.]+\.(?:h|cpp|yaml|launch))`", text)):
+        if "/" in path and not stands(path, folders):
+            yield f"{path}: there is no such file"
     for package, program in re.findall(r"rosrun (smartmill_\w+) (\w+)", text):
         if package not in folders or program not in programs(folders[package]):
             yield f"rosrun {package} {program}: there is no such program"
