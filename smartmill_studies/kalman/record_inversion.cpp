@@ -5,9 +5,8 @@
 #include <complex>
 #include <string>
 
-#include <Eigen/Cholesky>
-
 #include "smartmill_core/error.h"
+#include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_core/signal/fourier.h"
 #include "smartmill_core/units.h"
 
@@ -119,7 +118,7 @@ std::vector<std::vector<double>> invertRecord(const TransferMatrix& matrix,
       const MatrixXcd here = forward.at(i);
       const double unknown = forward.floor[std::min(lines - 1, static_cast<std::size_t>(f / spacing + 0.5))];
       const MatrixXcd square = here.adjoint() * here + unknown * MatrixXcd::Identity(size, size);
-      m = weight * square.ldlt().solve(here.adjoint() * m);
+      m = weight * linear::solveSymmetric(square, Eigen::VectorXcd(here.adjoint() * m));
     }
     for (Index c = 0; c < size; ++c) spectra[static_cast<std::size_t>(c)][i] = m(c) * scale(c);
   }

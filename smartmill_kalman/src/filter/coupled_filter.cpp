@@ -5,12 +5,11 @@
 #include <fstream>
 #include <string>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <Eigen/LU>
-#include <Eigen/SVD>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_core/model/strict_yaml.h"
 #include "smartmill_core/units.h"
 
@@ -39,7 +38,7 @@ std::array<std::array<Complex, 3>, 3> SensorMatrix::response(double f) const {
 }
 
 double SensorMatrix::condition(double f) const {
-  const Eigen::Vector3d values = Eigen::JacobiSVD<Eigen::Matrix3cd>(matrixAt(*this, f)).singularValues();
+  const Eigen::Vector3d values = linear::singularValues(Eigen::MatrixXcd(matrixAt(*this, f)));
   return values(2) > 0.0 ? values(0) / values(2) : HUGE_VAL;
 }
 
@@ -81,9 +80,9 @@ ModalModel fitCrossTalk(const FrequencyResponse& frf, const ModalModel& own, con
     b(2 * l) = weight * band.value[k].real();
     b(2 * l + 1) = weight * band.value[k].imag();
   }
-  const Eigen::LDLT<Eigen::MatrixXd> normal(a.transpose() * a);
-  const Eigen::VectorXd x = normal.solve(a.transpose() * b);
-  const Eigen::MatrixXd covariance = normal.solve(Eigen::MatrixXd::Identity(terms, terms));
+  const Eigen::MatrixXd normal = a.transpose() * a;
+  const Eigen::VectorXd x = linear::solveSymmetric(normal, Eigen::VectorXd(a.transpose() * b));
+  const Eigen::MatrixXd covariance = linear::inverseSymmetric(normal);
   const double scale = std::max(
       1.0, (b - a * x).squaredNorm() / static_cast<double>(std::max<Eigen::Index>(1, 2 * lines - terms)));
   for (Eigen::Index t = 0; t + 1 < terms; ++t) {

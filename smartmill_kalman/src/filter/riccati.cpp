@@ -3,9 +3,8 @@
 #include <cmath>
 #include <string>
 
-#include <Eigen/LU>
-
 #include "smartmill_core/error.h"
+#include "smartmill_core/math/linear_algebra.h"
 
 namespace smartmill::kalman {
 
@@ -18,9 +17,10 @@ Eigen::MatrixXd stationaryCovariance(const Eigen::MatrixXd& phi, const Eigen::Ma
   Eigen::MatrixXd g = c.transpose() * c / r;
   Eigen::MatrixXd h = q;
   for (int i = 0; i < MAX_DOUBLINGS; ++i) {
-    const Eigen::PartialPivLU<Eigen::MatrixXd> w(Eigen::MatrixXd::Identity(n, n) + g * h);
-    const Eigen::MatrixXd w_a = w.solve(a);
-    const Eigen::MatrixXd w_g = w.solve(g);
+    Eigen::MatrixXd both(n, 2 * n);
+    both << a, g;
+    both = linear::solve(Eigen::MatrixXd(Eigen::MatrixXd::Identity(n, n) + g * h), both);
+    const auto w_a = both.leftCols(n), w_g = both.rightCols(n);
     const Eigen::MatrixXd rise = a.transpose() * h * w_a;
     const Eigen::MatrixXd more = a * w_g * a.transpose();
     h += 0.5 * (rise + rise.transpose());

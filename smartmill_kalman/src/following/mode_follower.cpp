@@ -4,11 +4,12 @@
 #include <cmath>
 #include <string>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/fit/least_squares.h"
+#include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_core/signal/fourier.h"
 #include "smartmill_core/units.h"
 #include "smartmill_kalman/following/runout_force.h"
@@ -59,7 +60,7 @@ Basis harmonicsOf(const ToolGeometry& tool, const Engagement& engagement, const 
 Eigen::VectorXd leastSquares(const Eigen::MatrixXd& seen, const Eigen::VectorXd& target, double stiffer) {
   Eigen::MatrixXd normal = seen.transpose() * seen;
   normal.diagonal().array() *= 1.0 + stiffer;
-  return normal.ldlt().solve(seen.transpose() * target);
+  return linear::solveSymmetric(normal, Eigen::VectorXd(seen.transpose() * target));
 }
 
 /// What is measured in one revolution of the cut, weighted: for each axis and harmonic (the mean first: it
@@ -158,40 +159,28 @@ std::vector<double> firstRadii(const WeightedHarmonics& measured, const Sensor& 
   return radius;
 }
 
-/// Least squares over the modes (log frequency, log damping of each, x then y) and the teeth's radii, the
-/// first tooth's being the datum.
-class CutFit {
+/// Innovations of the cut, and what the prior says against a move, over the modes (log frequency, log damping
+/// of each, x then y) and the teeth's radii [RADIUS_UNIT], the first tooth's being the datum.
+class CutResiduals : public fit::Residuals {
  public:
-  CutFit(const WeightedHarmonics& measured, const Sensor& now, const ToolGeometry& tool,
-         const Engagement& engagement, const std::vector<double>& radius, const FollowParameters& parameters)
+  CutResiduals(const WeightedHarmonics& measured, const Sensor& now, const ToolGeometry& tool,
+               const Engagement& engagement, const std::vector<double>& radius,
+               const FollowParameters& parameters)
       : measured_(measured), now_(now), tool_(tool), engagement_(engagement), radius_(radius) {
     modal_ = static_cast<Eigen::Index>(2 * (now[0].modes.size() + now[1].modes.size()));
-    const Eigen::Index freedom = modal_ + tool.teeth - 1;
-    prior_.resize(freedom);
-    for (Eigen::Index i = 0; i < freedom; ++i) {
+    prior_.resize(modal_ + tool.teeth - 1);
+    for (Eigen::Index i = 0; i < prior_.size(); ++i) {
       const double modes = i % 2 == 0 ? parameters.frequency_std : parameters.damping_std;
       prior_(i) = 1.0 / (i >= modal_ ? RADIUS_STD : modes);
     }
-    p_ = Eigen::VectorXd::Zero(freedom);
-    force_ = harmonicsOf(tool_, engagement_, radius_);
-    residual_ = measured_.innovations(now_, force_);
-    best_ = cost(residual_, p_);
   }
 
-  void fitRadii() { descend(modal_); }
-  void fitAll() { descend(0); }
+  Eigen::Index modal() const { return modal_; }  ///< so many unknowns are of the modes
+  Eigen::Index freedom() const { return prior_.size(); }
+  Eigen::Index count() const override { return measured_.rows() + freedom(); }
 
-  double cost() const { return best_; }                       ///< with what the prior says against the move
-  double squares() const { return residual_.squaredNorm(); }  ///< of the innovations
-  Sensor sensor() const { return moved(now_, p_); }
-  const Basis& force() const { return force_; }
-  std::vector<double> radii() const { return radii(p_); }
-  Eigen::Index freedom() const { return p_.size(); }
-
- private:
-  double cost(const Eigen::VectorXd& residual, const Eigen::VectorXd& at) const {
-    return residual.squaredNorm() + (prior_.array() * at.array()).square().sum();
-  }
+  Sensor sensor(const Eigen::VectorXd& at) const { return moved(now_, at); }
+  Basis force(const Eigen::VectorXd& at) const { return harmonicsOf(tool_, engagement_, radii(at)); }
   std::vector<double> radii(const Eigen::VectorXd& at) const {
     std::vector<double> radius = radius_;
     for (Eigen::Index i = modal_; i < at.size(); ++i)
@@ -199,64 +188,77 @@ class CutFit {
     return radius;
   }
 
-  /// Derivatives of the innovations by the unknowns from `first` on.
-  Eigen::MatrixXd slope(Eigen::Index first) const {
-    Eigen::MatrixXd slope(residual_.size(), p_.size() - first);
-    for (Eigen::Index i = first; i < p_.size(); ++i) {
+  bool evaluate(const Eigen::VectorXd& at, Eigen::VectorXd* residual,
+                Eigen::MatrixXd* jacobian) const override {
+    const Basis here = force(at);
+    const Eigen::VectorXd innovations = measured_.innovations(sensor(at), here);
+    *residual << innovations, prior_.cwiseProduct(at);
+    if (!jacobian) return true;
+    // Differences: the force changes with the radii only, and its pieces of a revolution ask for wide steps.
+    for (Eigen::Index i = 0; i < freedom(); ++i) {
       const bool of_mode = i < modal_;
       const double step = of_mode ? 1e-5 : 0.05;
-      Eigen::VectorXd other = p_;
+      Eigen::VectorXd other = at;
       other(i) += step;
-      const Basis& force = of_mode ? force_ : harmonicsOf(tool_, engagement_, radii(other));
-      slope.col(i - first) = (measured_.innovations(moved(now_, other), force) - residual_) / step;
+      jacobian->col(i).head(measured_.rows()) =
+          (measured_.innovations(sensor(other), of_mode ? here : force(other)) - innovations) / step;
+      (*jacobian)(measured_.rows() + i, i) = prior_(i);
     }
-    return slope;
-  }
-
-  /// The unknowns before `first` stay as they are.
-  void descend(Eigen::Index first) {
-    const Eigen::Index free = p_.size() - first;
-    const Eigen::VectorXd weight = prior_.tail(free).array().square();
-    double damping = 1e-3;
-    for (int iteration = 0; iteration < MAX_ITERATIONS; ++iteration) {
-      const Eigen::MatrixXd by = slope(first);
-      Eigen::MatrixXd normal = by.transpose() * by;
-      normal.diagonal() += weight;
-      const Eigen::VectorXd gradient = by.transpose() * residual_ + weight.cwiseProduct(p_.tail(free));
-      const double before = best_;
-      for (int attempt = 0; attempt < 8 && !(best_ < before); ++attempt) {
-        Eigen::MatrixXd damped = normal;
-        damped.diagonal() *= 1.0 + damping;
-        Eigen::VectorXd trial = p_;
-        trial.tail(free) -= damped.ldlt().solve(gradient);
-        damping *= take(trial) ? 0.2 : 6.0;
-      }
-      if (!(best_ < before) || before - best_ < 1e-3 * best_) break;
-    }
-  }
-
-  /// @return whether the trial is better and taken.
-  bool take(const Eigen::VectorXd& trial) {
-    const Basis force = harmonicsOf(tool_, engagement_, radii(trial));
-    const Eigen::VectorXd residual = measured_.innovations(moved(now_, trial), force);
-    const double trial_cost = cost(residual, trial);
-    if (!(trial_cost < best_)) return false;
-    p_ = trial;
-    force_ = force;
-    residual_ = residual;
-    best_ = trial_cost;
     return true;
   }
 
+ private:
   const WeightedHarmonics& measured_;
   const Sensor& now_;
   const ToolGeometry& tool_;
   const Engagement& engagement_;
   std::vector<double> radius_;  // [m] to begin with
-  Eigen::Index modal_ = 0;      // so many unknowns are of the modes
-  Eigen::VectorXd prior_, p_, residual_;
+  Eigen::Index modal_ = 0;
+  Eigen::VectorXd prior_;
+};
+
+/// The best modes and radii for what a cut shows.
+class CutFit {
+ public:
+  explicit CutFit(const CutResiduals& residuals) : residuals_(residuals) {
+    p_ = Eigen::VectorXd::Zero(residuals.freedom());
+    force_ = residuals_.force(p_);
+  }
+
+  void fitRadii() { descend(residuals_.modal()); }
+  void fitAll() { descend(0); }
+
+  double cost() const { return cost_; }        ///< with what the prior says against the move
+  double squares() const { return squares_; }  ///< of the innovations
+  Sensor sensor() const { return residuals_.sensor(p_); }
+  const Basis& force() const { return force_; }
+  std::vector<double> radii() const { return residuals_.radii(p_); }
+
+ private:
+  /// The unknowns before `first` stay as they are.
+  void descend(Eigen::Index first) {
+    std::vector<fit::Parameter> parameters(static_cast<std::size_t>(p_.size()));
+    for (Eigen::Index i = 0; i < p_.size(); ++i) {
+      fit::Parameter& parameter = parameters[static_cast<std::size_t>(i)];
+      parameter.start = p_(i);
+      if (i < first) parameter.low = parameter.high = p_(i);
+    }
+    fit::Options options;
+    options.name = "mode follower";
+    options.iterations = MAX_ITERATIONS;
+    options.function_tolerance = 1e-4;
+    options.trust_radius = 1e3;
+    const fit::Result found = fit::minimise(residuals_, parameters, options);
+    p_ = found.value;
+    force_ = residuals_.force(p_);
+    cost_ = found.squares;
+    squares_ = found.residual.head(found.residual.size() - p_.size()).squaredNorm();
+  }
+
+  const CutResiduals& residuals_;
+  Eigen::VectorXd p_;
   Basis force_;
-  double best_ = 0.0;
+  double cost_ = 0.0, squares_ = 0.0;
 };
 
 }  // namespace
@@ -290,21 +292,22 @@ std::optional<ModeFollower::Move> ModeFollower::look(const Harmonics& measured, 
     radius_ = firstRadii(seen, now, tool_, engagement_);
 
   // The tool's runout first, with the sensor as believed: that is what the cut may be without any move.
-  CutFit fit(seen, now, tool_, engagement_, radius_, parameters_);
-  fit.fitRadii();
-  const double unmoved = fit.cost();
-  const std::vector<double> radius = fit.radii();
+  const CutResiduals residuals(seen, now, tool_, engagement_, radius_, parameters_);
+  CutFit cut(residuals);
+  cut.fitRadii();
+  const double unmoved = cut.cost();
+  const std::vector<double> radius = cut.radii();
   Move move;
-  move.before = fit.squares();
-  const double first = seen.innovations(*first_, fit.force()).squaredNorm();
-  fit.fitAll();
-  move.after = fit.squares();
-  move.sensor = fit.sensor();
+  move.before = cut.squares();
+  const double first = seen.innovations(*first_, cut.force()).squaredNorm();
+  cut.fitAll();
+  move.after = cut.squares();
+  move.sensor = cut.sensor();
   // The force model's own shortcomings raise what counts as evidence.
-  const auto left = seen.rows() - static_cast<Eigen::Index>(TERMS) - fit.freedom();
+  const auto left = seen.rows() - static_cast<Eigen::Index>(TERMS) - residuals.freedom();
   const double scale = std::max(1.0, move.after / static_cast<double>(left));
-  if ((unmoved - fit.cost()) / scale > parameters_.evidence) {
-    radius_ = fit.radii();
+  if ((unmoved - cut.cost()) / scale > parameters_.evidence) {
+    radius_ = cut.radii();
     return move;
   }
   radius_ = radius;

@@ -5,9 +5,10 @@
 #include <limits>
 
 #include <Eigen/Core>
-#include <Eigen/LU>
 
+#include "blind_residuals.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/fit/least_squares.h"
 #include "smartmill_core/signal/fourier.h"
 #include "smartmill_core/signal/window.h"
 #include "smartmill_core/units.h"
@@ -22,16 +23,6 @@ constexpr double SKIRT = 4.0;
 constexpr double CORRELATED = 1.0 + 2.0 * (4.0 / 9.0 + 1.0 / 36.0);
 constexpr std::size_t LEAST_LINES = 50;
 
-struct Lines {
-  std::vector<double> frequency, power;
-};
-
-/// Shape of the resonance, 1 at rest.
-double shape(double f, double f0, double zeta) {
-  const double r = f / f0;
-  return 1.0 / ((1.0 - r * r) * (1.0 - r * r) + 4.0 * zeta * zeta * r * r);
-}
-
 struct Fit {
   double f0 = 0.0, zeta = 0.0, share = 0.0, floor = 0.0;
   double cost = std::numeric_limits<double>::infinity();  // minus log-likelihood
@@ -39,15 +30,14 @@ struct Fit {
 
 /// Share and floor for a given resonance: reweighted least squares, the weights those of the exponential
 /// distribution.
-Fit fitLevels(const Lines& lines, double f0, double zeta) {
+Fit fitLevels(const PowerLines& lines, double f0, double zeta) {
   Fit fit;
   fit.f0 = f0;
   fit.zeta = zeta;
-  double mean = 0.0;
-  for (const double p : lines.power) mean += p / static_cast<double>(lines.power.size());
+  const double mean = lines.mean();
   double share = 0.0, floor = mean;
   std::vector<double> known;
-  for (const double f : lines.frequency) known.push_back(shape(f, f0, zeta));
+  for (const double f : lines.frequency) known.push_back(resonance(f, f0, zeta));
   for (int pass = 0; pass < 12; ++pass) {
     double aa = 0, ab = 0, bb = 0, ay = 0, by = 0;
     for (std::size_t k = 0; k < known.size(); ++k) {
@@ -75,6 +65,52 @@ Fit fitLevels(const Lines& lines, double f0, double zeta) {
   return fit;
 }
 
+Eigen::VectorXd unknownsOf(const Fit& fit, double unit) {
+  Eigen::VectorXd at(4);
+  at << std::log(fit.f0), std::log(fit.zeta), fit.share / unit, fit.floor / unit;
+  return at;
+}
+
+/// The likelihood's maximum beside the best point of the grid.
+Fit refined(const BlindResiduals& residuals, const Fit& start, double low, double high) {
+  const Eigen::VectorXd at = unknownsOf(start, residuals.unit());
+  std::vector<fit::Parameter> unknowns(4);
+  for (Eigen::Index i = 0; i < 4; ++i) unknowns[static_cast<std::size_t>(i)].start = at[i];
+  unknowns[0].low = std::log(0.9 * low);
+  unknowns[0].high = std::log(1.1 * high);
+  unknowns[1].low = std::log(1e-4);
+  unknowns[1].high = std::log(0.5);
+  unknowns[2].low = unknowns[3].low = 0.0;
+  unknowns[2].scale = std::max(1e-6, at[2]);  // of a sharp resonance the share at rest is small
+  fit::Options options;
+  options.name = "blind mode";
+  const fit::Result found = fit::minimise(residuals, unknowns, options);
+  if (!found.usable()) return start;
+  Fit best;
+  best.f0 = std::exp(found.value[0]);
+  best.zeta = std::exp(found.value[1]);
+  best.share = residuals.unit() * found.value[2];
+  best.floor = residuals.unit() * found.value[3];
+  // The residuals' squares say it but for a constant, which the start tells.
+  Eigen::VectorXd before(residuals.count());
+  residuals.evaluate(at, &before, nullptr);
+  best.cost = start.cost + 0.5 * (found.squares - before.squaredNorm());
+  return best.cost <= start.cost ? best : start;
+}
+
+/// Of log f0, log zeta, share and floor: inverse of the information of an exponentially distributed spectrum,
+/// the sum of products of the log density's slopes.
+fit::Covariance covarianceOf(const PowerLines& lines, const Fit& best, double unit) {
+  const Eigen::VectorXd at = unknownsOf(best, unit);
+  Eigen::MatrixXd slopes(static_cast<Eigen::Index>(lines.frequency.size()), 4);
+  for (std::size_t k = 0; k < lines.frequency.size(); ++k) {
+    const DuePower due = duePower(lines.frequency[k], at, unit);
+    for (Eigen::Index i = 0; i < 4; ++i)
+      slopes(static_cast<Eigen::Index>(k), i) = due.slope[i] / due.value / std::sqrt(CORRELATED);
+  }
+  return fit::covarianceOf(slopes);
+}
+
 }  // namespace
 
 BlindMode findBlindMode(const std::vector<double>& samples, double sample_rate, double spindle_speed,
@@ -86,7 +122,7 @@ BlindMode findBlindMode(const std::vector<double>& samples, double sample_rate, 
   const std::vector<double> frequency = fourierFrequencies(samples.size(), sample_rate);
   const double line = sample_rate / static_cast<double>(samples.size());
   const double spindle = spindle_speed / units::TWO_PI;
-  Lines lines;
+  PowerLines lines;
   for (std::size_t k = 0; k < spectrum.size(); ++k) {
     if (frequency[k] < low || frequency[k] > high) continue;
     if (std::abs(frequency[k] - spindle * std::round(frequency[k] / spindle)) <= SKIRT * line) continue;
@@ -102,47 +138,17 @@ BlindMode findBlindMode(const std::vector<double>& samples, double sample_rate, 
       if (fit.cost < best.cost) best = fit;
     }
   }
-  double step_f = 0.004, step_zeta = 0.25;
-  while (step_f > 1e-5) {
-    Fit better = best;
-    for (const double df : {-step_f, 0.0, step_f}) {
-      for (const double dz : {-step_zeta, 0.0, step_zeta}) {
-        const Fit fit = fitLevels(lines, best.f0 * (1.0 + df), std::min(0.5, best.zeta * (1.0 + dz)));
-        if (fit.cost < better.cost) better = fit;
-      }
-    }
-    if (better.cost < best.cost) {
-      best = better;
-    } else {
-      step_f *= 0.5;
-      step_zeta *= 0.5;
-    }
-  }
-
-  // Information of an exponentially distributed spectrum: sum of products of the log density's slopes.
-  Eigen::Matrix4d information = Eigen::Matrix4d::Zero();
-  const auto logOf = [&](double f, double f0, double zeta, double share, double floor) {
-    return std::log(share * shape(f, f0, zeta) + floor + 1e-300);
-  };
-  for (const double f : lines.frequency) {
-    Eigen::Vector4d slope;
-    const double e = 1e-5;
-    const double base = logOf(f, best.f0, best.zeta, best.share, best.floor);
-    slope(0) = (logOf(f, best.f0 * (1.0 + e), best.zeta, best.share, best.floor) - base) / (e * best.f0);
-    slope(1) = (logOf(f, best.f0, best.zeta * (1.0 + e), best.share, best.floor) - base) / (e * best.zeta);
-    slope(2) = (logOf(f, best.f0, best.zeta, best.share * (1.0 + e), best.floor) - base) / e;
-    slope(3) = (logOf(f, best.f0, best.zeta, best.share, best.floor * (1.0 + e)) - base) / e;
-    information += slope * slope.transpose() / CORRELATED;
-  }
-  const Eigen::Matrix4d covariance = information.fullPivLu().inverse();
+  const BlindResiduals residuals(lines);
+  best = refined(residuals, best, low, high);
+  const fit::Covariance covariance = covarianceOf(lines, best, residuals.unit());
   const double flat = fitLevels(lines, 1e3 * high, 0.1).cost;  // no resonance in the band
   BlindMode result;
   result.mode.frequency = best.f0;
   result.mode.damping_ratio = best.zeta;
   result.mode.gain = std::numeric_limits<double>::quiet_NaN();
-  result.mode.frequency_std = std::sqrt(covariance(0, 0));
-  result.mode.damping_ratio_std = std::sqrt(covariance(1, 1));
-  result.above = best.floor > 0.0 ? best.share * shape(best.f0, best.f0, best.zeta) / best.floor
+  result.mode.frequency_std = best.f0 * covariance.deviation(0);
+  result.mode.damping_ratio_std = best.zeta * covariance.deviation(1);
+  result.above = best.floor > 0.0 ? best.share * resonance(best.f0, best.f0, best.zeta) / best.floor
                                   : std::numeric_limits<double>::infinity();
   result.likelihood = (flat - best.cost) / CORRELATED;
   return result;

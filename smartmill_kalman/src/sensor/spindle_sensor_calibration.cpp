@@ -6,11 +6,10 @@
 #include <map>
 #include <set>
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
-#include <Eigen/QR>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_core/modal/modal_fit.h"
 #include "smartmill_core/model/strict_yaml.h"
 #include "smartmill_core/units.h"
@@ -39,16 +38,15 @@ struct LeastSquares {
 };
 
 LeastSquares solve(const Eigen::MatrixXd& a, const Eigen::VectorXd& b, const std::string& what) {
-  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(a);
-  if (qr.rank() < a.cols()) throw Error(what + ": the readings do not tell all constants apart");
+  const linear::LeastSquares fitted = linear::leastSquares(a, b);
+  if (fitted.rank < a.cols()) throw Error(what + ": the readings do not tell all constants apart");
   LeastSquares found;
-  found.x = qr.solve(b);
+  found.x = fitted.x;
   const Eigen::Index free = a.rows() - a.cols();
   const double squares = (b - a * found.x).squaredNorm();
   found.residual = std::sqrt(squares / static_cast<double>(std::max<Eigen::Index>(1, a.rows())));
   const double variance = squares / static_cast<double>(std::max<Eigen::Index>(1, free));
-  const Eigen::MatrixXd covariance =
-      Eigen::LDLT<Eigen::MatrixXd>(a.transpose() * a).solve(Eigen::MatrixXd::Identity(a.cols(), a.cols()));
+  const Eigen::MatrixXd covariance = linear::inverseSymmetric(Eigen::MatrixXd(a.transpose() * a));
   found.std_dev = (variance * covariance.diagonal()).cwiseMax(0.0).cwiseSqrt();
   return found;
 }
@@ -120,7 +118,7 @@ LengthLine lineOf(const std::vector<LengthConstants>& lengths, int row, int colu
     normal += weight * row_of * row_of.transpose();
     right += weight * c * row_of;
   }
-  const Eigen::Matrix2d covariance = Eigen::LDLT<Eigen::Matrix2d>(normal).solve(Eigen::Matrix2d::Identity());
+  const Eigen::Matrix2d covariance = linear::inverseSymmetric(Eigen::MatrixXd(normal));
   const Eigen::Vector2d x = covariance * right;
   line.slope = x(0);
   line.offset = x(1) - x(0) * middle;
@@ -381,7 +379,7 @@ std::array<double, 3> verifyStatic(const StaticReadings& readings,
       const auto f = staticForce(calibration, readings.length[i], pairMeans(readings.sensors[i]));
       b.row(r) << f[0], f[1], f[2];
     }
-    const Eigen::MatrixXd zero = a.colPivHouseholderQr().solve(b);
+    const Eigen::MatrixXd zero = linear::leastSquares(a, b).x;
     for (const std::size_t i : rows) {
       const auto f = staticForce(calibration, readings.length[i], pairMeans(readings.sensors[i]));
       for (std::size_t axis = 0; axis < 3; ++axis) {

@@ -4,11 +4,8 @@
 #include <cmath>
 #include <limits>
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
-#include <Eigen/SVD>
-
 #include "smartmill_core/error.h"
+#include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::kalman {
@@ -44,11 +41,11 @@ StateSpaceCheck checkStateSpace(const StateSpace& space, const std::string& form
   const MatrixXd a = time * space.a;
   // However small the pivots: a matrix near to singular is what this number is for. A constant force is
   // singular.
-  const MatrixXd inverse = a.partialPivLu().inverse();
+  const MatrixXd inverse = linear::inverse(a);
   check.condition = inverse.allFinite() ? infinityNorm(a) * infinityNorm(inverse) : HUGE_VAL;
   check.conditioned = 1.0 / check.condition > PRECISION;
 
-  const Eigen::VectorXcd poles = Eigen::EigenSolver<MatrixXd>(a, false).eigenvalues();
+  const Eigen::VectorXcd poles = linear::eigenvalues(a);
   check.slowest = poles.real().maxCoeff() / time;
   check.stable = poles.real().maxCoeff() < 1e-9 * poles.cwiseAbs().maxCoeff();
 
@@ -58,7 +55,7 @@ StateSpaceCheck checkStateSpace(const StateSpace& space, const std::string& form
     observability.row(i) = row;
     row = row * a;
   }
-  const Eigen::VectorXd values = Eigen::JacobiSVD<MatrixXd>(observability).singularValues();
+  const Eigen::VectorXd values = linear::singularValues(observability);
   const double least = values(0) * PRECISION * static_cast<double>(n);
   check.rank = static_cast<int>((values.array() > least).count());
   check.observability_condition = values(n - 1) > 0.0 ? values(0) / values(n - 1) : HUGE_VAL;
@@ -69,7 +66,7 @@ StateSpaceCheck checkStateSpace(const StateSpace& space, const std::string& form
   for (Index p = 0; p < n; ++p) {
     test.topRows(n) = (a.cast<Complex>() - poles(p) * MatrixXcd::Identity(n, n)) / a.norm();
     test.bottomRows(1) = (space.c.row(0) / space.c.row(0).norm()).cast<Complex>();
-    check.margin = std::min(check.margin, Eigen::JacobiSVD<MatrixXcd>(test).singularValues()(n - 1));
+    check.margin = std::min(check.margin, linear::singularValues(test)(n - 1));
   }
   return check;
 }
@@ -133,12 +130,12 @@ Balanced balance(const StateSpace& space, int states) {
   const Index n = space.a.rows();
   if (states < 0 || states > n)
     throw Error("balanced truncation: " + std::to_string(states) + " states of " + std::to_string(n));
-  const Eigen::EigenSolver<MatrixXd> eigen(space.a);
-  if (eigen.info() != Eigen::Success || !(eigen.eigenvalues().real().maxCoeff() < 0.0))
+  const linear::Eigensystem eigen = linear::eigensystem(space.a);
+  if (!(eigen.values.real().maxCoeff() < 0.0))
     throw Error("balanced truncation: the state space is not stable");
   // Lyapunov equations in the coordinates of the poles.
-  const MatrixXcd v = eigen.eigenvectors(), back = v.inverse();
-  const Eigen::VectorXcd poles = eigen.eigenvalues();
+  const MatrixXcd v = eigen.vectors, back = linear::inverse(v);
+  const Eigen::VectorXcd& poles = eigen.values;
   const Eigen::VectorXcd b = back * space.b.col(0).cast<Complex>();
   const Eigen::RowVectorXcd c = space.c.row(0).cast<Complex>() * v;
   MatrixXcd reach(n, n), observe(n, n);
@@ -149,13 +146,13 @@ Balanced balance(const StateSpace& space, int states) {
     }
   }
   const auto root = [n](const MatrixXd& gramian) {
-    const Eigen::SelfAdjointEigenSolver<MatrixXd> s(0.5 * (gramian + gramian.transpose()));
-    return MatrixXd(s.eigenvectors() * s.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal());
+    const auto s = linear::symmetricEigensystem(0.5 * (gramian + gramian.transpose()));
+    return MatrixXd(s.vectors * s.values.cwiseMax(0.0).cwiseSqrt().asDiagonal());
   };
   const MatrixXd p = root((v * reach * v.adjoint()).real());
   const MatrixXd q = root((back.adjoint() * observe * back).real());
-  const Eigen::JacobiSVD<MatrixXd> svd(q.transpose() * p, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::VectorXd& hankel = svd.singularValues();
+  const linear::Svd svd = linear::svd(q.transpose() * p);
+  const Eigen::VectorXd& hankel = svd.values;
 
   Balanced balanced;
   balanced.hankel.assign(hankel.data(), hankel.data() + n);
@@ -163,8 +160,8 @@ Balanced balance(const StateSpace& space, int states) {
   while (keep > 1 && !(hankel(keep - 1) > 1e-12 * hankel(0))) --keep;  // what cannot be told at all
   for (Index i = keep; i < n; ++i) balanced.bound += 2.0 * hankel(i);
   const Eigen::VectorXd scale = hankel.head(keep).cwiseSqrt().cwiseInverse();
-  const MatrixXd t = p * svd.matrixV().leftCols(keep) * scale.asDiagonal();
-  const MatrixXd t_back = scale.asDiagonal() * svd.matrixU().leftCols(keep).transpose() * q.transpose();
+  const MatrixXd t = p * svd.v.leftCols(keep) * scale.asDiagonal();
+  const MatrixXd t_back = scale.asDiagonal() * svd.u.leftCols(keep).transpose() * q.transpose();
   balanced.space.a = t_back * space.a * t;
   balanced.space.b = t_back * space.b;
   balanced.space.c = space.c * t;
@@ -186,8 +183,8 @@ Complex responseOf(const StateSpace& space, double f) {
   if (n == 0) return space.d(0, 0);
   const MatrixXcd system =
       Complex(0.0, units::TWO_PI * f) * MatrixXcd::Identity(n, n) - space.a.cast<Complex>();
-  return (space.c.cast<Complex>() * system.partialPivLu().solve(space.b.cast<Complex>()))(0, 0) +
-         space.d(0, 0);
+  const MatrixXcd state = linear::solve(system, MatrixXcd(space.b.cast<Complex>()));
+  return (space.c.cast<Complex>() * state)(0, 0) + space.d(0, 0);
 }
 
 std::vector<StateSpaceCheck> checkSensor(const ModalModel& sensor) {

@@ -5,11 +5,8 @@
 #include <complex>
 #include <string>
 
-#include <Eigen/Cholesky>
-#include <Eigen/LU>
-#include <Eigen/SVD>
-
 #include "smartmill_core/error.h"
+#include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_core/signal/fourier.h"
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/signal/window.h"
@@ -44,7 +41,7 @@ Eigen::VectorXd blow(const MatrixTap& tap, Index channels, double lever) {
 
 MatrixXcd pseudoInverse(const MatrixXcd& m) {  // of full row rank (eq. 2.4)
   const MatrixXcd square = m * m.adjoint();
-  return m.adjoint() * square.ldlt().solve(MatrixXcd::Identity(m.rows(), m.rows()));
+  return m.adjoint() * linear::inverseSymmetric(square);
 }
 
 void check(const std::vector<MatrixTap>& taps) {
@@ -125,7 +122,7 @@ MatrixXd blowsOf(const std::vector<MatrixTap>& taps, Index channels, double leve
   MatrixXd blows(channels, static_cast<Index>(taps.size()));
   for (std::size_t k = 0; k < taps.size(); ++k)
     blows.col(static_cast<Index>(k)) = blow(taps[k], channels, lever);
-  const Eigen::VectorXd values = Eigen::JacobiSVD<MatrixXd>(blows).singularValues();
+  const Eigen::VectorXd values = linear::singularValues(blows);
   if (!(values(channels - 1) > FULL_RANK * values(0))) {
     throw Error(channels == 6 ? "transfer matrix: the taps do not press along and turn about every axis"
                               : "transfer matrix: the taps do not press along every axis");
@@ -197,7 +194,7 @@ struct LineFit {
 LineFit fitLine(const MatrixXcd& e, const MatrixXcd& m) {
   LineFit line;
   const MatrixXcd square = e * e.adjoint();
-  line.covariance = square.ldlt().solve(MatrixXcd::Identity(e.rows(), e.rows()));
+  line.covariance = linear::inverseSymmetric(square);
   line.forward = m * e.adjoint() * line.covariance;
   line.inverse = e * pseudoInverse(m);
   line.left = (m - line.forward * e).rowwise().squaredNorm();
@@ -259,7 +256,7 @@ TransferMatrix identifyTransferMatrix(const std::vector<MatrixTap>& taps, double
   const Eigen::VectorXd before = spectra.noise.rowwise().mean();
   for (std::size_t l = 0; l < lines.size(); ++l) {
     const auto std_dev = deviations(lines[l], varianceAt(lines, l, before, hits));
-    const Eigen::VectorXd singular = Eigen::JacobiSVD<MatrixXcd>(lines[l].forward).singularValues();
+    const Eigen::VectorXd singular = linear::singularValues(lines[l].forward);
     result.condition.push_back(singular(channels - 1) > 0.0 ? singular(0) / singular(channels - 1)
                                                             : HUGE_VAL);
     result.forward.push_back(scaledBy(scale, lines[l].forward));

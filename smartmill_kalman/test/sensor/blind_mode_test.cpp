@@ -8,9 +8,11 @@
 
 #include <gtest/gtest.h>
 
+#include "../../src/sensor/blind_residuals.h"
 #include "smartmill_core/campaign/campaign.h"
 #include "smartmill_core/campaign/record.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/fit/derivative_check.h"
 #include "smartmill_core/modal/modal_filter.h"
 #include "smartmill_core/testing/coverage.h"
 #include "smartmill_core/testing/shared_data.h"
@@ -35,6 +37,28 @@ std::vector<double> cut(const ModalModel& sensor, std::uint32_t seed, double rou
     if (i >= 2000) samples.push_back(measured);
   }
   return samples;
+}
+
+// Lines beside and on the resonance, some of them next to what is due, where the deviance is a small
+// difference.
+TEST(BlindMode, DerivativesAgreeWithDifferences) {
+  PowerLines lines;
+  Eigen::VectorXd at(4);
+  at << std::log(970.0), std::log(0.02), 0.3, 0.8;
+  for (double f = 500.0; f < 1500.0; f += 7.0) {
+    lines.frequency.push_back(f);
+    lines.power.push_back(2.0);
+  }
+  for (std::size_t k = 0; k < lines.power.size(); ++k) {
+    const double due = duePower(lines.frequency[k], at, 2.0).value;
+    if (k % 3 > 0) lines.power[k] = due * (k % 3 == 1 ? 1.0 + 1e-5 : 0.2);
+  }
+  // The mean power is the unit of share and floor.
+  const double unit = lines.mean() / 2.0;
+  at[2] /= unit;
+  at[3] /= unit;
+  const fit::DerivativeGap gap = fit::checkDerivatives(BlindResiduals(lines), at);
+  EXPECT_LT(gap.relative, 1e-6) << gap.row << " " << gap.column << " " << gap.given << " " << gap.numeric;
 }
 
 // One second of a cut, whose tenth harmonic lies at 1000 Hz beside the mode.

@@ -34,7 +34,7 @@ struct FollowParameters {
 /// harmonics' own innovations say nothing about it. What does is how the harmonics hang together: those of a
 /// helical end mill in a known engagement follow from a few numbers (tangential and radial pressure, and one
 /// edge or runout term a tooth), in x and in y alike. This force model sees the measured harmonics through
-/// the sensor; its innovations drive frequency and damping of each mode, by Gauss-Newton with both as
+/// the sensor; its innovations drive frequency and damping of each mode, by least squares with both as
 /// unknowns. A move is taken only when the innovations fall by more than evidence, and given back when the
 /// first sensor explains the cut as well.
 class ModeFollower {

@@ -3,19 +3,16 @@
 #include <functional>
 #include <vector>
 
+#include "smartmill_core/fit/least_squares.h"
+
 namespace smartmill::loadmeter {
 
-/// One unknown of a nonlinear fit.
-struct FitParameter {
-  double start = 0.0;
-  double low = 0.0, high = 0.0;  ///< bounds; equal: held at start
-  double scale = 1.0;            ///< > 0, typical size
-};
+using FitParameter = smartmill::fit::Parameter;
 
 struct FitResult {
   std::vector<double> value;
   /// (J'J)^-1 row by row: the covariance when residuals are weighted to variance 1; zero rows where held or
-  /// at a bound.
+  /// at a bound, infinite on the diagonal where the residuals do not tell an unknown.
   std::vector<double> covariance;
   double squares = 0.0;  ///< sum of squared residuals
   bool converged = false;
@@ -23,7 +20,7 @@ struct FitResult {
   double covarianceOf(std::size_t i, std::size_t j) const { return covariance[i * value.size() + j]; }
 };
 
-/// Least squares of residuals(value) within bounds (Ceres, central differences).
+/// Least squares of residuals(value) within bounds, by central differences.
 /// @param tolerance [1] relative change of the squares at which it ends.
 /// @param residuals fills `count` numbers. @throws Error when they are not finite at the start.
 FitResult fit(const std::function<void(const std::vector<double>& value, double* residuals)>& residuals,

@@ -270,7 +270,8 @@ Result minimise(const Residuals& residuals, const std::vector<Parameter>& parame
   silence();
   const Solved first = solve(residuals, parameters, options);
   const auto pressed = std::count(first.pressed.begin(), first.pressed.end(), true);
-  if (pressed == 0 || first.result.ending != Ending::converged) return first.result;
+  if (!options.finish_at_bounds || pressed == 0 || first.result.ending != Ending::converged)
+    return first.result;
   // Ceres judges its steps by what they would gain without bounds, and ends early where unknowns press
   // against theirs: the others go on without them.
   std::vector<Parameter> held = parameters;

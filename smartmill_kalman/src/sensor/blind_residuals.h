@@ -1,0 +1,43 @@
+#pragma once
+
+#include <vector>
+
+#include "smartmill_core/fit/least_squares.h"
+
+namespace smartmill::kalman {
+
+/// Powers of lines on which nothing but noise through a resonance stands.
+struct PowerLines {
+  std::vector<double> frequency, power;  // [Hz], [any]
+  double mean() const;
+};
+
+/// Shape of a resonance's power, 1 at rest.
+double resonance(double f, double f0, double zeta);
+
+/// Power that is due on a line with its derivatives by log f0, log zeta, share and floor (over `unit`).
+struct DuePower {
+  double value = 0.0;
+  double slope[4] = {};
+};
+DuePower duePower(double f, const Eigen::VectorXd& at, double unit);
+
+/// Deviance residuals of an exponentially distributed spectrum over log f0, log zeta, share and floor (over
+/// the mean power): half the sum of their squares is minus the log-likelihood but for a constant, so that
+/// least squares find its maximum.
+class BlindResiduals : public fit::Residuals {
+ public:
+  /// The lines must outlive this.
+  explicit BlindResiduals(const PowerLines& lines) : lines_(lines), unit_(lines.mean()) {}
+
+  double unit() const { return unit_; }
+  Eigen::Index count() const override { return static_cast<Eigen::Index>(lines_.power.size()); }
+  bool evaluate(const Eigen::VectorXd& at, Eigen::VectorXd* residual,
+                Eigen::MatrixXd* jacobian) const override;
+
+ private:
+  const PowerLines& lines_;
+  double unit_;
+};
+
+}  // namespace smartmill::kalman
