@@ -16,6 +16,7 @@
 #include "../src/report/session_bag.h"
 #include "../src/shell.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/io/csv.h"
 #include "smartmill_core/model/strict_yaml.h"
 #include "smartmill_core/program.h"
 #include "smartmill_core/units.h"

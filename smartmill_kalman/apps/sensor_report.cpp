@@ -12,10 +12,10 @@
 #include "smartmill_core/campaign/campaign.h"
 #include "smartmill_core/campaign/record.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/io/csv.h"
 #include "smartmill_core/model/strict_yaml.h"
 #include "smartmill_core/program.h"
 #include "smartmill_core/units.h"
-#include "smartmill_kalman/sensor/numeric_table.h"
 #include "smartmill_kalman/sensor/state_space_checks.h"
 #include "smartmill_kalman/sensor/transfer_matrix.h"
 
@@ -68,7 +68,7 @@ Taps fromList(const std::string& path) {
       tap.direction[i] = direction[i];
       tap.point[i] = point[i] * units::MM;
     }
-    auto table = kalman::readNumericTable((folder / entry.word("file")).string(), columns);
+    auto table = readColumns((folder / entry.word("file")).string(), columns);
     entry.finish();
     tap.hammer = std::move(table[0]);
     tap.channels.assign(std::make_move_iterator(table.begin() + 1), std::make_move_iterator(table.end()));

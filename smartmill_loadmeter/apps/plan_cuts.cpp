@@ -1,12 +1,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
 #include <string>
 #include <vector>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/io/csv.h"
 #include "smartmill_core/program.h"
+#include "smartmill_core/range.h"
 #include "smartmill_core/units.h"
 #include "smartmill_loadmeter/identification/production.h"
 
@@ -29,20 +30,13 @@ struct Limit {
 
 /// Rows speed_rpm,axial_depth_mm with rising speed; one header row.
 std::vector<Limit> readLimits(const std::string& file) {
-  std::ifstream stream(file);
-  if (!stream) throw Error(file + ": cannot be read");
-  std::string line;
-  std::getline(stream, line);
-  if (line.rfind("speed_rpm,axial_depth_mm", 0) != 0) {
-    throw Error(file + ": line 1: 'speed_rpm,axial_depth_mm' is due");
-  }
+  const auto columns = readColumns(file, {"speed_rpm", "axial_depth_mm"});
   std::vector<Limit> limits;
-  for (int number = 2; std::getline(stream, line); ++number) {
-    Limit l{};
-    if (std::sscanf(line.c_str(), "%lf,%lf", &l.rpm, &l.depth_mm) != 2 || !(l.rpm > 0.0) ||
-        !(l.depth_mm >= 0.0) || (!limits.empty() && l.rpm <= limits.back().rpm)) {
-      throw Error(file + ": line " + std::to_string(number) + ": two numbers with rising speed are due");
-    }
+  for (std::size_t i = 0; i < columns[0].size(); ++i) {
+    const Limit l{columns[0][i], columns[1][i]};
+    if (!(l.rpm > 0.0) || !(l.depth_mm >= 0.0) || (!limits.empty() && l.rpm <= limits.back().rpm))
+      throw Error(file + ": speed_rpm " + shortNumber(l.rpm) +
+                  ": rising speeds and depths of 0 or more are due");
     limits.push_back(l);
   }
   if (limits.size() < 2) throw Error(file + ": two speeds are due");

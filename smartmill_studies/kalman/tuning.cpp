@@ -3,10 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <cstdio>
-#include <sstream>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/io/gnuplot.h"
 #include "smartmill_core/signal/fourier.h"
 #include "smartmill_core/units.h"
 #include "smartmill_kalman/filter/harmonic_filter.h"
@@ -214,9 +213,7 @@ BandTuning tuneBands(const std::vector<double>& measured, const ModalModel& sens
 
 void drawMaps(const std::vector<std::pair<std::string, TuningMap>>& maps,
               const std::vector<std::pair<double, int>>& cuts, const std::string& png) {
-  std::ostringstream script;
-  script << "set terminal pngcairo size 1300," << 380 * ((maps.size() + 1) / 2)
-         << " font 'sans,10' noenhanced\nset output '" << png << "'\n";
+  Gnuplot script(png, 1300, 380 * static_cast<int>((maps.size() + 1) / 2), 10);
   for (std::size_t m = 0; m < maps.size(); ++m) {
     const TuningMap& map = maps[m].second;
     script << "$map" << m << " << EOD\n";
@@ -244,10 +241,7 @@ void drawMaps(const std::vector<std::pair<std::string, TuningMap>>& maps,
               "the cut'\n";
   }
   script << "unset multiplot\n";
-  FILE* pipe = popen("gnuplot", "w");
-  if (!pipe) throw Error("gnuplot cannot be started");
-  std::fputs(script.str().c_str(), pipe);
-  if (pclose(pipe) != 0) throw Error(png + ": gnuplot failed");
+  script.draw();
 }
 
 }  // namespace smartmill::kalman

@@ -7,6 +7,7 @@
 #include <fstream>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/io/gnuplot.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::report {
@@ -34,12 +35,7 @@ class Table {
   std::string close() {
     out_.close();
     if (!out_) throw Error(file_.string() + ": cannot be written");
-    return quoted(file_.string());
-  }
-  static std::string quoted(const std::string& name) {
-    std::string text = "'";
-    for (const char c : name) text += c == '\'' ? std::string("''") : std::string(1, c);
-    return text + "'";
+    return Gnuplot::quoted(file_.string());
   }
 
  private:
@@ -47,12 +43,10 @@ class Table {
   std::ofstream out_;
 };
 
-void draw(const std::filesystem::path& png, const std::string& size, const std::string& commands) {
-  FILE* pipe = popen("gnuplot", "w");
-  if (!pipe) throw Error("gnuplot cannot be started");
-  std::fprintf(pipe, "set terminal pngcairo size %s font 'sans,11'\nset output %s\nset grid\n%s\n",
-               size.c_str(), Table::quoted(png.string()).c_str(), commands.c_str());
-  if (pclose(pipe) != 0) throw Error(png.string() + ": gnuplot failed");
+void draw(const std::filesystem::path& png, int width, int height, const std::string& commands) {
+  Gnuplot plot(png.string(), width, height);
+  plot << "set termoption enhanced\nset grid\n" << commands << "\n";
+  plot.draw();
 }
 
 std::string number(double value) {
@@ -123,7 +117,7 @@ bool drawFrf(const SessionRecording& recording, const std::filesystem::path& fol
                   " with lines lw 1 lc rgb '#0044aa' title 'measured'\n";
     }
   }
-  draw(folder / "frf.png", "1400,1000", commands + "unset multiplot\n");
+  draw(folder / "frf.png", 1400, 1000, commands + "unset multiplot\n");
   return true;
 }
 
@@ -171,7 +165,7 @@ bool drawChart(const SessionRecording& recording, const Report& report,
              : chatter ? "2 lc rgb '#cc0000' title 'cut: chatter'"
                        : "4 lc rgb '#555555' title 'cut: not judged'");
   }
-  draw(folder / "chart.png", "1300,700",
+  draw(folder / "chart.png", 1300, 700,
        "set key outside below\nset xlabel 'spindle speed [rpm]'\nset ylabel 'axial depth [mm]'\nset yrange "
        "[0:" +
            number(highest / units::MM) + "]\n" + plot);
@@ -211,7 +205,7 @@ bool drawForce(const RecordedCut& cut, const std::filesystem::path& folder) {
                            : ", " + file + column(2) + " with lines lw 4 lc rgb '#bbbbbb' title 'true'") +
         ", " + file + column(1) + " with lines lw 1.5 lc rgb '#0044aa' title 'compensated'\n";
   }
-  draw(folder / "force.png", "1300,1000", commands + "unset multiplot\n");
+  draw(folder / "force.png", 1300, 1000, commands + "unset multiplot\n");
   return true;
 }
 

@@ -5,9 +5,6 @@
 
 #include <gtest/gtest.h>
 
-#include "smartmill_core/error.h"
-#include "smartmill_core/testing/temporary_folder.h"
-
 namespace smartmill::report {
 namespace {
 
@@ -34,19 +31,6 @@ TEST(Agreement, WhatOnlyOneSideHasIsMissing) {
   holes.add({1.0, NONE}, {1.0, 2.0});
   EXPECT_FALSE(holes.same(1.0));
   EXPECT_FALSE(Agreement().same(1.0));  // nothing was compared
-}
-
-TEST(NumberTable, ColumnsWithUnitsAndEmptyCells) {
-  const TemporaryFolder folder;
-  const NumberTable table =
-      readNumberTable(folder.write("table.csv", "time[s],fx[N],limit_mm\n0.5,-1.25e3,\n1,nan,2\n"));
-  EXPECT_EQ(table.column("fx")[0], -1250.0);
-  EXPECT_TRUE(std::isnan(table.column("fx")[1]));
-  EXPECT_TRUE(std::isnan(table.column("limit_mm")[0]));
-  EXPECT_THROW(table.column("fy"), Error);
-  EXPECT_THROW(readNumberTable(folder.write("short.csv", "time[s],fx[N]\n0.5\n")), Error);
-  EXPECT_THROW(readNumberTable(folder.write("word.csv", "time[s]\nabc\n")), Error);
-  EXPECT_THROW(readNumberTable(folder.file("absent.csv")), Error);
 }
 
 }  // namespace

@@ -3,13 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <cstdio>
 #include <fstream>
-#include <memory>
 #include <sstream>
 
 #include "smartmill_core/campaign/record.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/io/gnuplot.h"
 #include "smartmill_core/signal/streams.h"
 #include "smartmill_core/units.h"
 
@@ -286,37 +285,27 @@ void writeModesCsv(const ModalModel& model, const std::string& file) {
 
 void plotFrf(const std::string& csv_file, const std::string& png_file, const std::string& title, double low,
              double high, bool coherence) {
-  std::unique_ptr<FILE, int (*)(FILE*)> pipe(popen("gnuplot", "w"), pclose);
-  if (!pipe) throw Error(png_file + ": gnuplot cannot be started");
-  FILE* g = pipe.get();
   const int panels = coherence ? 3 : 2;
-  std::fprintf(g, "set terminal pngcairo size 1100,%d font 'sans,11'\nset output '%s'\n", 330 * panels,
-               png_file.c_str());
-  std::fprintf(g, "set datafile separator ','\nset datafile missing 'nan'\nset key autotitle columnhead\n");
-  std::fprintf(
-      g, "set multiplot layout %d,1 title '%s' noenhanced\nset xrange [%g:%g]\nset grid\nset lmargin 11\n",
-      panels, title.c_str(), low, high);
-  std::fprintf(g, "set ylabel 'receptance Re [um/N]'\n");
-  std::fprintf(g,
-               "plot '%s' using 1:($2*1e6) with lines lw 2 title 'measured', '' using 1:($6*1e6) with lines "
-               "lw 1.5 title "
-               "'fitted modes'\n",
-               csv_file.c_str());
-  if (!coherence) std::fprintf(g, "set xlabel 'frequency [Hz]'\n");
-  std::fprintf(g, "set ylabel 'receptance Im [um/N]'\n");
-  std::fprintf(g,
-               "plot '%s' using 1:($3*1e6) with lines lw 2 title 'measured', '' using 1:($7*1e6) with lines "
-               "lw 1.5 title "
-               "'fitted modes'\n",
-               csv_file.c_str());
+  const std::string csv = Gnuplot::quoted(csv_file);
+  Gnuplot plot(png_file, 1100, 330 * panels);
+  plot << "set datafile separator ','\nset datafile missing 'nan'\nset key autotitle columnhead\n"
+       << "set multiplot layout " << panels << ",1 title " << Gnuplot::quoted(title) << "\nset xrange ["
+       << low << ":" << high << "]\nset grid\nset lmargin 11\n";
+  const auto part = [&](const char* name, int measured, int fitted) {
+    plot << "set ylabel 'receptance " << name << " [um/N]'\nplot " << csv << " using 1:($" << measured
+         << "*1e6) with lines lw 2 title 'measured', '' using 1:($" << fitted
+         << "*1e6) with lines lw 1.5 title 'fitted modes'\n";
+  };
+  part("Re", 2, 6);
+  if (!coherence) plot << "set xlabel 'frequency [Hz]'\n";
+  part("Im", 3, 7);
   if (coherence) {
-    std::fprintf(g,
-                 "set xlabel 'frequency [Hz]'\nset ylabel 'coherence [1]'\nset yrange [0:1.05]\nset key "
-                 "bottom right\n");
-    std::fprintf(g, "plot '%s' using 1:4 with lines lw 1.5 title 'coherence'\n", csv_file.c_str());
+    plot << "set xlabel 'frequency [Hz]'\nset ylabel 'coherence [1]'\nset yrange [0:1.05]\nset key bottom "
+            "right\n"
+         << "plot " << csv << " using 1:4 with lines lw 1.5 title 'coherence'\n";
   }
-  std::fprintf(g, "unset multiplot\n");
-  if (pclose(pipe.release()) != 0) throw Error(png_file + ": gnuplot did not draw it");
+  plot << "unset multiplot\n";
+  plot.draw();
 }
 
 }  // namespace hammer

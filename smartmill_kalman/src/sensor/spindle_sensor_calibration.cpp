@@ -9,11 +9,11 @@
 #include <Eigen/Core>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/io/csv.h"
 #include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_core/modal/modal_fit.h"
 #include "smartmill_core/model/strict_yaml.h"
 #include "smartmill_core/units.h"
-#include "smartmill_kalman/sensor/numeric_table.h"
 
 namespace smartmill::kalman {
 namespace {
@@ -319,9 +319,8 @@ void writeSpindleSensor(const SpindleSensorCalibration& c, const std::string& fi
 }
 
 StaticReadings readStaticReadings(const std::string& file) {
-  const auto columns =
-      readNumericTable(file, {"test", "time[s]", "length[mm]", "load_x[N]", "load_y[N]", "load_z[N]", "x1[N]",
-                              "x2[N]", "y1[N]", "y2[N]", "z1[N]", "z2[N]"});
+  const auto columns = readColumns(file, {"test", "time[s]", "length[mm]", "load_x[N]", "load_y[N]",
+                                          "load_z[N]", "x1[N]", "x2[N]", "y1[N]", "y2[N]", "z1[N]", "z2[N]"});
   StaticReadings readings;
   readings.file = file;
   for (std::size_t i = 0; i < columns[0].size(); ++i) {

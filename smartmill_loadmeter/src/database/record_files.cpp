@@ -1,11 +1,13 @@
 // Export and import of coefficient records: database.h.
-#include <charconv>
+#include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <sstream>
+#include <string_view>
 
 #include "record_fields.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/io/csv.h"
+#include "smartmill_core/io/text_file.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/model/strict_yaml.h"
 
@@ -33,124 +35,72 @@ std::string keyOf(const NumberField& f) {
   return key;
 }
 
-std::string quoted(const std::string& word) {
-  if (word.find_first_of(",\"\n\r") == std::string::npos) return word;
-  std::string out = "\"";
-  for (const char c : word) out += c == '"' ? std::string("\"\"") : std::string(1, c);
-  return out + "\"";
-}
-
-// One record of a CSV file, quotes and line breaks within them included. @return false at the end.
-bool readRow(std::istream& stream, std::vector<std::string>* cells, int* lines) {
-  cells->clear();
-  std::string cell;
-  bool inside = false, any = false;
-  for (int c = stream.get(); c != EOF; c = stream.get()) {
-    any = true;
-    if (inside) {
-      if (c == '\n') ++*lines;
-      if (c != '"') {
-        cell += static_cast<char>(c);
-      } else if (stream.peek() == '"') {
-        cell += static_cast<char>(stream.get());
-      } else {
-        inside = false;
-      }
-    } else if (c == '"') {
-      inside = true;
-    } else if (c == ',') {
-      cells->push_back(cell);
-      cell.clear();
-    } else if (c == '\n') {
-      break;
-    } else if (c != '\r') {
-      cell += static_cast<char>(c);
-    }
-  }
-  if (!any) return false;
-  ++*lines;
-  cells->push_back(cell);
-  return true;
-}
-
 CoefficientRecord empty() {
   CoefficientRecord record;
   record.set.value = record.set.std_dev = NOT_IDENTIFIED;
   return record;
 }
 
-void close(std::ofstream& stream, const std::string& file) {
-  stream.close();
-  if (!stream) throw Error(file + ": cannot be written");
+}  // namespace
+
+void exportCsv(const std::vector<CoefficientRecord>& records, const std::string& file) {
+  std::string text;
+  for (const WordField& f : wordFields()) text += (text.empty() ? "" : ",") + f.name;
+  for (const NumberField& f : numberFields()) text += "," + columnName(f);
+  text += "\n";
+  for (CoefficientRecord record : records) {
+    std::string row;
+    for (const WordField& f : wordFields()) row += csvCell(f.at(record)) + ",";
+    for (const NumberField& f : numberFields()) row += exactNumber(f.get(record, f.index)) + ",";
+    row.back() = '\n';
+    text += row;
+  }
+  writeText(file, text);
+}
+
+namespace {
+
+void setCell(const CsvReader& reader, const std::string& column, std::string_view cell,
+             CoefficientRecord* record) {
+  for (const WordField& f : wordFields()) {
+    if (f.name == column) f.at(*record) = std::string(cell);
+  }
+  for (const NumberField& f : numberFields()) {
+    if (columnName(f) == column && !cell.empty()) f.set(*record, f.index, reader.number(cell, column));
+  }
+}
+
+bool isKnown(const std::string& column) {
+  const auto& words = wordFields();
+  const auto& numbers = numberFields();
+  return std::any_of(words.begin(), words.end(), [&](const WordField& f) { return f.name == column; }) ||
+         std::any_of(numbers.begin(), numbers.end(),
+                     [&](const NumberField& f) { return columnName(f) == column; });
 }
 
 }  // namespace
 
-void exportCsv(const std::vector<CoefficientRecord>& records, const std::string& file) {
-  std::ofstream out(file, std::ios::binary);
-  std::string head;
-  for (const WordField& f : wordFields()) head += (head.empty() ? "" : ",") + f.name;
-  for (const NumberField& f : numberFields()) head += "," + columnName(f);
-  out << head << "\n";
-  for (CoefficientRecord record : records) {
-    std::string row;
-    for (const WordField& f : wordFields()) row += quoted(f.at(record)) + ",";
-    for (const NumberField& f : numberFields()) row += exactNumber(f.get(record, f.index)) + ",";
-    row.pop_back();
-    out << row << "\n";
-  }
-  close(out, file);
-}
-
 std::vector<CoefficientRecord> importCsv(const std::string& file) {
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) throw Error(file + ": cannot be read");
-  int line = 0;
-  std::vector<std::string> head, cells;
-  if (!readRow(stream, &head, &line)) throw Error(file + ": empty");
-  const auto isKnown = [](const std::string& name) {
-    for (const WordField& f : wordFields()) {
-      if (f.name == name) return true;
-    }
-    for (const NumberField& f : numberFields()) {
-      if (columnName(f) == name) return true;
-    }
-    return false;
-  };
+  CsvReader reader(file);
+  std::vector<std::string_view> cells;
+  if (!reader.next(&cells)) throw Error(file + ": is empty");
+  const std::vector<std::string> head(cells.begin(), cells.end());
   for (const std::string& name : head) {
-    if (!isKnown(name)) throw Error(file + ": line 1: column '" + name + "' is not known");
+    if (!isKnown(name)) reader.fail("column '" + name + "' is not known");
   }
   std::vector<CoefficientRecord> records;
-  while (readRow(stream, &cells, &line)) {
-    if (cells.size() == 1 && cells[0].empty()) continue;
-    const std::string where = file + ": line " + std::to_string(line) + ": ";
-    if (cells.size() != head.size()) {
-      throw Error(where + std::to_string(cells.size()) + " values, " + std::to_string(head.size()) +
-                  " are due");
-    }
+  while (reader.nextFilled(&cells)) {
+    if (cells.size() != head.size())
+      reader.fail(std::to_string(cells.size()) + " values, " + std::to_string(head.size()) + " are due");
     CoefficientRecord record = empty();
-    for (std::size_t i = 0; i < head.size(); ++i) {
-      for (const WordField& f : wordFields()) {
-        if (f.name == head[i]) f.at(record) = cells[i];
-      }
-      for (const NumberField& f : numberFields()) {
-        if (columnName(f) != head[i] || cells[i].empty()) continue;
-        double value = 0.0;
-        const char* end = cells[i].data() + cells[i].size();
-        const auto parsed = std::from_chars(cells[i].data(), end, value);
-        if (parsed.ec != std::errc() || parsed.ptr != end || !std::isfinite(value)) {
-          throw Error(where + head[i] + ": '" + cells[i] + "' is not a number");
-        }
-        f.set(record, f.index, value);
-      }
-    }
+    for (std::size_t i = 0; i < head.size(); ++i) setCell(reader, head[i], cells[i], &record);
     records.push_back(record);
   }
   return records;
 }
 
 void exportYaml(const std::vector<CoefficientRecord>& records, const std::string& file) {
-  std::ofstream out(file, std::ios::binary);
+  std::ostringstream out;
   out << "format: " << FORMAT << "\n" << (records.empty() ? "entries: []\n" : "entries:\n");
   for (CoefficientRecord record : records) {
     out << "- source: " << yamlWord(record.set.source) << "\n";
@@ -170,7 +120,7 @@ void exportYaml(const std::vector<CoefficientRecord>& records, const std::string
       }
     }
   }
-  close(out, file);
+  writeText(file, out.str());
 }
 
 std::vector<CoefficientRecord> importYaml(const std::string& file) {

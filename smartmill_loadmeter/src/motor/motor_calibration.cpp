@@ -1,15 +1,14 @@
 #include "smartmill_loadmeter/motor/motor_calibration.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
 #include <limits>
 #include <map>
-#include <sstream>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/io/csv.h"
 #include "smartmill_core/model/strict_yaml.h"
 #include "smartmill_core/units.h"
 
@@ -23,52 +22,24 @@ const std::array<const char*, 3> AXES{"x", "y", "z"};
 /// Rows of a table whose first-named column is a word and all others numbers or empty.
 class Table {
  public:
-  Table(const std::string& file, const std::vector<std::string>& known) : file_(file) {
-    std::ifstream stream(file);
-    if (!stream) throw Error(file + ": cannot be read");
-    std::string line;
-    if (!std::getline(stream, line)) throw Error(file + ": is empty");
-    names_ = cellsOf(line);
-    std::map<std::string, int> seen;
-    bool has_cut = false;
-    for (const std::string& name : names_) {
-      if (++seen[name] > 1) throw Error(file + ": line 1: column '" + name + "' stands twice");
-      if (name == "cut") {
-        has_cut = true;
-        continue;
-      }
-      if (std::find(known.begin(), known.end(), name) == known.end()) {
-        throw Error(file + ": line 1: column '" + name + "' is not known");
-      }
+  Table(const std::string& file, const std::vector<std::string>& known) {
+    CsvReader reader(file);
+    std::vector<std::string_view> cells;
+    if (!reader.next(&cells)) throw Error(file + ": is empty");
+    const std::vector<std::string> names(cells.begin(), cells.end());
+    for (std::size_t c = 0; c < names.size(); ++c) {
+      if (std::count(names.begin(), names.end(), names[c]) > 1)
+        reader.fail("column '" + names[c] + "' stands twice");
+      if (names[c] != "cut" && std::find(known.begin(), known.end(), names[c]) == known.end())
+        reader.fail("column '" + names[c] + "' is not known");
     }
-    if (!has_cut) throw Error(file + ": line 1: column 'cut' is missing");
-    std::map<std::string, int> cuts;
-    for (int number = 2; std::getline(stream, line); ++number) {
-      if (line.find_first_not_of(" \t\r,") == std::string::npos) continue;
-      const std::vector<std::string> cells = cellsOf(line);
-      const std::string where = file + ": line " + std::to_string(number);
-      if (cells.size() != names_.size()) {
-        throw Error(where + ": " + std::to_string(cells.size()) + " cells, " + std::to_string(names_.size()) +
-                    " are due");
-      }
-      Row row;
-      row.line = number;
-      for (std::size_t c = 0; c < cells.size(); ++c) {
-        if (names_[c] == "cut") {
-          row.cut = cells[c];
-        } else if (!cells[c].empty()) {
-          double value = 0.0;
-          const char* last = cells[c].data() + cells[c].size();
-          const auto [end, code] = std::from_chars(cells[c].data(), last, value);
-          if (code != std::errc() || end != last || !std::isfinite(value)) {
-            throw Error(where + ": " + names_[c] + ": '" + cells[c] + "' is not a number");
-          }
-          row.values[names_[c]] = value;
-        }
-      }
-      if (row.cut.empty()) throw Error(where + ": cut: a name is due");
-      if (++cuts[row.cut] > 1) throw Error(where + ": cut '" + row.cut + "' stands twice");
-      rows_.push_back(row);
+    if (std::find(names.begin(), names.end(), "cut") == names.end()) reader.fail("column 'cut' is missing");
+    while (reader.next(&cells)) {
+      const auto blank = [](std::string_view cell) { return cell.empty(); };
+      if (std::all_of(cells.begin(), cells.end(), blank)) continue;
+      if (cells.size() != names.size())
+        reader.fail(std::to_string(cells.size()) + " cells, " + std::to_string(names.size()) + " are due");
+      rows_.push_back(rowOf(reader, names, cells));
     }
     if (rows_.empty()) throw Error(file + ": no cut in the table");
   }
@@ -87,19 +58,24 @@ class Table {
   const std::vector<Row>& rows() const { return rows_; }
 
  private:
-  static std::vector<std::string> cellsOf(const std::string& line) {
-    std::vector<std::string> cells;
-    std::stringstream stream(line + ",");
-    for (std::string cell; std::getline(stream, cell, ',');) {
-      const std::size_t first = cell.find_first_not_of(" \t\r");
-      const std::size_t last = cell.find_last_not_of(" \t\r");
-      cells.push_back(first == std::string::npos ? "" : cell.substr(first, last - first + 1));
+  Row rowOf(const CsvReader& reader, const std::vector<std::string>& names,
+            const std::vector<std::string_view>& cells) const {
+    Row row;
+    row.line = reader.line();
+    for (std::size_t c = 0; c < cells.size(); ++c) {
+      if (names[c] == "cut") {
+        row.cut = cells[c];
+      } else if (!cells[c].empty()) {
+        row.values[names[c]] = reader.number(cells[c], names[c]);
+      }
     }
-    return cells;
+    if (row.cut.empty()) reader.fail("cut: a name is due");
+    for (const Row& other : rows_) {
+      if (other.cut == row.cut) reader.fail("cut '" + row.cut + "' stands twice");
+    }
+    return row;
   }
 
-  std::string file_;
-  std::vector<std::string> names_;
   std::vector<Row> rows_;
 };
 

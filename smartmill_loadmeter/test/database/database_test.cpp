@@ -128,7 +128,7 @@ TEST(CoefficientDatabase, exportAndImportLoseNothing) {
 TEST(CoefficientDatabase, importNamesWhatIsWrong) {
   const TemporaryFolder folder;
   const std::string file = folder.write("x.csv", "tool,ktc[N/m2]\na,1e9\nb,many\n");
-  EXPECT_EQ(errorOf([&] { importCsv(file); }), file + ": line 3: ktc[N/m2]: 'many' is not a number");
+  EXPECT_EQ(errorOf([&] { importCsv(file); }), file + ": line 3: column ktc[N/m2]: 'many' is not a number");
   const std::string unknown = folder.write("y.csv", "tool,ktc[N/mm2]\n");
   EXPECT_EQ(errorOf([&] { importCsv(unknown); }), unknown + ": line 1: column 'ktc[N/mm2]' is not known");
   const std::string yaml = folder.write(

@@ -26,7 +26,7 @@ TEST(StandardCuts, sayWhatIsWrong) {
   EXPECT_THAT(errorOf([&] { standard("cut,force_x[kN]\na,1\n"); }),
               HasSubstr("s.csv: line 1: column 'force_x[kN]' is not known"));
   EXPECT_THAT(errorOf([&] { standard("cut,force_x[N]\na,lots\n"); }),
-              HasSubstr("s.csv: line 2: force_x[N]: 'lots' is not a number"));
+              HasSubstr("s.csv: line 2: column force_x[N]: 'lots' is not a number"));
   EXPECT_THAT(errorOf([&] { standard("cut,force_x[N]\na,1\na,2\n"); }),
               HasSubstr("line 3: cut 'a' stands twice"));
   EXPECT_THAT(errorOf([&] { standard("cut,force_x[N]\n"); }), HasSubstr("no cut in the table"));

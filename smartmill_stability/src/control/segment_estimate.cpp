@@ -1,11 +1,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-
-#include <Eigen/Cholesky>
-#include <Eigen/LU>
+#include <complex>
+#include <limits>
+#include <vector>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/fit/least_squares.h"
+#include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_core/units.h"
 #include "smartmill_stability/control/turning_control.h"
 
@@ -71,12 +73,11 @@ class Fit {
   Fit(const Blocks& blocks, const VectorXd& chip, const VectorXd& deflection, double rate)
       : blocks_(blocks), chip_(chip), target_(blocks.spectra(deflection)), rate_(rate) {}
 
-  /// Sum of squares left after the linear parameters (gain and the state at the begin) took their best
-  /// values.
-  double cost(double frequency, double damping) {
+  /// What is left after the linear parameters (gain and the state at the begin) took their best values.
+  VectorXd left(double frequency, double damping) {
     const MatrixXd basis = basisOf(frequency, damping);
-    linear_ = (basis.transpose() * basis).ldlt().solve(basis.transpose() * target_);
-    return (target_ - basis * linear_).squaredNorm();
+    linear_ = linear::solveSymmetric(basis.transpose() * basis, VectorXd(basis.transpose() * target_));
+    return target_ - basis * linear_;
   }
 
   double gain() const { return linear_[0]; }
@@ -113,47 +114,117 @@ class Fit {
   VectorXd linear_;
 };
 
-/// Minimum over two parameters (Nelder and Mead), from a simplex of the step given.
-Eigen::Vector2d minimum(const std::function<double(const Eigen::Vector2d&)>& cost,
-                        const Eigen::Vector2d& start, const Eigen::Vector2d& step) {
-  std::array<Eigen::Vector2d, 3> p{
-      {start, start + Eigen::Vector2d(step[0], 0.0), start + Eigen::Vector2d(0.0, step[1])}};
-  std::array<double, 3> f{{cost(p[0]), cost(p[1]), cost(p[2])}};
-  constexpr int MOST = 80;
-  for (int i = 0; i < MOST; ++i) {
-    std::array<std::size_t, 3> order{{0, 1, 2}};
-    std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return f[a] < f[b]; });
-    const auto [best, middle, worst] = order;
-    if ((p[worst] - p[best]).cwiseAbs().maxCoeff() < 1e-5 &&
-        (p[middle] - p[best]).cwiseAbs().maxCoeff() < 1e-5)
-      break;
-    const Eigen::Vector2d centre = 0.5 * (p[best] + p[middle]);
-    const auto along = [&](double t) { return Eigen::Vector2d(centre + t * (p[worst] - centre)); };
-    const Eigen::Vector2d reflected = along(-1.0);
-    const double fr = cost(reflected);
-    if (fr < f[best]) {
-      const Eigen::Vector2d further = along(-2.0);
-      const double fe = cost(further);
-      p[worst] = fe < fr ? further : reflected;
-      f[worst] = std::min(fe, fr);
-    } else if (fr < f[middle]) {
-      p[worst] = reflected;
-      f[worst] = fr;
-    } else {
-      const Eigen::Vector2d nearer = along(fr < f[worst] ? -0.5 : 0.5);
-      const double fc = cost(nearer);
-      if (fc < std::min(fr, f[worst])) {
-        p[worst] = nearer;
-        f[worst] = fc;
-      } else {
-        for (const std::size_t k : {middle, worst}) {
-          p[k] = 0.5 * (p[k] + p[best]);
-          f[k] = cost(p[k]);
-        }
-      }
+/// Lines of the blocks, those of the band first.
+struct Lines {
+  std::vector<int> all;
+  int in_band = 0;
+  std::vector<double> force, answer;  // power of each, summed over the blocks
+  int strongest = 0;                  // in the band, by answer
+};
+
+/// Lines of the band and, of the floor, some above it.
+Lines linesOf(const Blocks& blocks, const EstimatorParameters& p) {
+  Lines lines;
+  for (int l = 1; l < p.block / 2; ++l) {
+    const double f = blocks.frequencyOf(l);
+    if (f < p.frequency_low) continue;
+    if (f <= p.frequency_high) ++lines.in_band;
+    if (f <= p.frequency_high || l % 6 == 0) lines.all.push_back(l);
+  }
+  return lines;
+}
+
+/// H1 line by line.
+void ratios(const Blocks& blocks, const Lines& lines, const VectorXd& us, const VectorXd& ys,
+            SegmentEstimate* result) {
+  const int count = static_cast<int>(lines.all.size());
+  for (int l = 0; l < lines.in_band; ++l) {
+    Complex cross = 0.0;
+    for (int b = 0; b < blocks.count(); ++b) {
+      const Index i = 2 * (b * count + l);
+      cross += std::conj(Complex(us[i], us[i + 1])) * Complex(ys[i], ys[i + 1]);
+    }
+    result->frequency.push_back(blocks.frequencyOf(lines.all[static_cast<std::size_t>(l)]));
+    result->ratio.push_back(cross / lines.force[static_cast<std::size_t>(l)]);
+  }
+}
+
+/// Lines of the band on which both signals stand out of their floors.
+std::vector<int> usedLines(Lines* lines, double least_signal) {
+  const auto floorOf = [&](const std::vector<double>& values) {
+    std::vector<double> high(values.begin() + lines->in_band, values.end());
+    std::nth_element(high.begin(), high.begin() + static_cast<std::ptrdiff_t>(high.size() / 2), high.end());
+    return high[high.size() / 2];
+  };
+  const double floor_u = floorOf(lines->force), floor_y = floorOf(lines->answer);
+  std::vector<int> used;
+  for (int l = 0; l < lines->in_band; ++l) {
+    const auto i = static_cast<std::size_t>(l);
+    if (lines->force[i] > least_signal * floor_u && lines->answer[i] > least_signal * floor_y)
+      used.push_back(lines->all[i]);
+    if (lines->answer[i] > lines->answer[static_cast<std::size_t>(lines->strongest)]) lines->strongest = l;
+  }
+  return used;
+}
+
+/// The best of some starts, or the one given.
+std::array<double, 2> startOf(Fit* fit, const SecondOrder* start, double strongest) {
+  if (start) return {start->frequency, start->damping_ratio};
+  std::array<double, 2> best{strongest, 0.02};
+  double least = std::numeric_limits<double>::infinity();
+  for (int i = -12; i <= 8; ++i) {
+    for (const double damping : {0.008, 0.02, 0.05}) {
+      const double frequency = strongest * (1.0 + 0.0125 * i);
+      const double squares = fit->left(frequency, damping).squaredNorm();
+      if (squares < least) least = squares, best = {frequency, damping};
     }
   }
-  return p[static_cast<std::size_t>(std::min_element(f.begin(), f.end()) - f.begin())];
+  return best;
+}
+
+constexpr double MOST_DAMPING = 0.9, LEAST_DAMPING = 1e-6;
+
+/// Least squares over the logarithms of frequency and damping. @return sum of squares left
+double refine(Fit* fit, std::array<double, 2> start, SecondOrder* model) {
+  const fit::FunctionResiduals residuals(fit->size(), [&](const VectorXd& x, VectorXd& residual) {
+    residual = fit->left(std::exp(x[0]), std::exp(x[1]));
+  });
+  const double frequency = std::log(start[0]), damping = std::log(start[1]);
+  constexpr double FAR = 1.0, FREQUENCY_SCALE = 0.006, DAMPING_SCALE = 0.2;
+  fit::Options options;
+  options.name = "segment estimate";
+  options.function_tolerance = 1e-9;
+  const fit::Result found =
+      fit::minimise(residuals,
+                    {{frequency, frequency - FAR, frequency + FAR, FREQUENCY_SCALE},
+                     {damping, std::log(LEAST_DAMPING), std::log(MOST_DAMPING), DAMPING_SCALE}},
+                    options);
+  model->frequency = std::exp(found.value[0]);
+  model->damping_ratio = std::exp(found.value[1]);
+  const double rest = fit->left(model->frequency, model->damping_ratio).squaredNorm();
+  model->gain = fit->gain();
+  return rest;
+}
+
+/// Of gain, frequency and damping; blocks overlap by half, so half of the residuals count.
+Eigen::Matrix3d covarianceOf(const Fit& fit, const SecondOrder& model, double squares) {
+  const VectorXd linear = fit.linear();
+  MatrixXd jacobian(fit.size(), 5);
+  jacobian.rightCols(3) = fit.basisOf(model.frequency, model.damping_ratio);
+  const VectorXd here = jacobian.rightCols(3) * linear;
+  constexpr double STEP = 1e-4;
+  jacobian.col(0) = (fit.basisOf(model.frequency * (1.0 + STEP), model.damping_ratio) * linear - here) /
+                    (STEP * model.frequency);
+  jacobian.col(1) = (fit.basisOf(model.frequency, model.damping_ratio * (1.0 + STEP)) * linear - here) /
+                    (STEP * model.damping_ratio);
+  const double freedom = std::max(1.0, 0.5 * static_cast<double>(fit.size()) - 5.0);
+  const MatrixXd covariance = squares / freedom * fit::covarianceOf(jacobian).matrix;
+  const std::array<Index, 3> order{{2, 0, 1}};
+  Eigen::Matrix3d result;
+  for (Index i = 0; i < 3; ++i)
+    for (Index j = 0; j < 3; ++j)
+      result(i, j) = covariance(order[static_cast<std::size_t>(i)], order[static_cast<std::size_t>(j)]);
+  return result;
 }
 
 }  // namespace
@@ -167,112 +238,33 @@ SegmentEstimate estimateSegment(const std::vector<double>& chip, const std::vect
   const VectorXd u = Eigen::Map<const VectorXd>(chip.data(), p.segment);
   const VectorXd y = Eigen::Map<const VectorXd>(deflection.data(), p.segment);
   Blocks blocks(p);
-  std::vector<int> all;
-  int in_band = 0;
-  for (int l = 1; l < p.block / 2; ++l) {
-    const double f = blocks.frequencyOf(l);
-    if (f < p.frequency_low) continue;
-    if (f <= p.frequency_high) {
-      all.push_back(l);
-      ++in_band;
-    } else if (l % 6 == 0) {
-      all.push_back(l);  // of the floor
-    }
-  }
-  blocks.choose(all);
+  Lines lines = linesOf(blocks, p);
+  blocks.choose(lines.all);
   const VectorXd us = blocks.spectra(u), ys = blocks.spectra(y);
-  const int count = static_cast<int>(all.size());
-  const std::vector<double> power = powers(us, count, blocks.count()),
-                            answer = powers(ys, count, blocks.count());
+  const int count = static_cast<int>(lines.all.size());
+  lines.force = powers(us, count, blocks.count());
+  lines.answer = powers(ys, count, blocks.count());
   SegmentEstimate result;
-  // H1 line by line.
-  for (int l = 0; l < in_band; ++l) {
-    Complex cross = 0.0;
-    for (int b = 0; b < blocks.count(); ++b) {
-      const Index i = 2 * (b * count + l);
-      cross += std::conj(Complex(us[i], us[i + 1])) * Complex(ys[i], ys[i + 1]);
-    }
-    result.frequency.push_back(blocks.frequencyOf(all[static_cast<std::size_t>(l)]));
-    result.ratio.push_back(cross / power[static_cast<std::size_t>(l)]);
-  }
-  const auto floorOf = [&](const std::vector<double>& values) {
-    std::vector<double> high(values.begin() + in_band, values.end());
-    std::nth_element(high.begin(), high.begin() + static_cast<std::ptrdiff_t>(high.size() / 2), high.end());
-    return high[high.size() / 2];
-  };
-  const double floor_u = floorOf(power), floor_y = floorOf(answer);
-  std::vector<int> used;
-  int strongest = 0;
-  for (int l = 0; l < in_band; ++l) {
-    const auto i = static_cast<std::size_t>(l);
-    if (power[i] > p.least_signal * floor_u && answer[i] > p.least_signal * floor_y) used.push_back(all[i]);
-    if (answer[i] > answer[static_cast<std::size_t>(strongest)]) strongest = l;
-  }
+  ratios(blocks, lines, us, ys, &result);
+  std::vector<int> used = usedLines(&lines, p.least_signal);
   result.lines = static_cast<int>(used.size());
   // Gain, frequency, damping and the state at the begin: five numbers, two a line and block.
   constexpr int FEWEST = 3;
   if (result.lines < FEWEST) return result;
   // The strongest tell all; more lines cost time alone.
   constexpr std::size_t MOST = 24;
+  const int middle = lines.all[static_cast<std::size_t>(lines.strongest)];
   if (used.size() > MOST) {
-    const int middle = all[static_cast<std::size_t>(strongest)];
     std::sort(used.begin(), used.end(),
               [&](int a, int b) { return std::abs(a - middle) < std::abs(b - middle); });
     used.resize(MOST);
   }
   blocks.choose(used);
   Fit fit(blocks, u, y, p.sample_rate);
-  // Over the logarithms of frequency and damping.
-  const auto cost = [&](const Eigen::Vector2d& x) {
-    const double damping = std::exp(x[1]);
-    return damping < 0.9 ? fit.cost(std::exp(x[0]), damping) : 1e300;
-  };
-  Eigen::Vector2d best = Eigen::Vector2d::Zero();
-  double least = 1e300;
-  const auto consider = [&](double frequency, double damping) {
-    const Eigen::Vector2d x(std::log(frequency), std::log(damping));
-    const double c = cost(x);
-    if (c < least) {
-      least = c;
-      best = x;
-    }
-  };
-  if (start) {
-    consider(start->frequency, start->damping_ratio);
-  } else {
-    const double at = TWO_PI * blocks.frequencyOf(all[static_cast<std::size_t>(strongest)]);
-    for (int i = -12; i <= 8; ++i)
-      for (const double damping : {0.008, 0.02, 0.05}) consider(at * (1.0 + 0.0125 * i), damping);
-  }
-  best = minimum(cost, best, {0.006, 0.2});
   SecondOrder& model = result.model;
-  const double rest = cost(best);
-  model.frequency = std::exp(best[0]);
-  model.damping_ratio = std::exp(best[1]);
-  model.gain = fit.gain();
+  const double rest = refine(&fit, startOf(&fit, start, TWO_PI * blocks.frequencyOf(middle)), &model);
   if (!(model.gain > 0.0)) return result;
-  // Covariance from the derivatives; blocks overlap by half, so half of the residuals count.
-  const VectorXd linear = fit.linear();
-  const VectorXd here = fit.basisOf(model.frequency, model.damping_ratio) * linear;
-  MatrixXd jacobian(fit.size(), 5);
-  jacobian.rightCols(3) = fit.basisOf(model.frequency, model.damping_ratio);
-  constexpr double STEP = 1e-4;
-  jacobian.col(0) = (fit.basisOf(model.frequency * (1.0 + STEP), model.damping_ratio) * linear - here) /
-                    (STEP * model.frequency);
-  jacobian.col(1) = (fit.basisOf(model.frequency, model.damping_ratio * (1.0 + STEP)) * linear - here) /
-                    (STEP * model.damping_ratio);
-  const double freedom = std::max(1.0, 0.5 * static_cast<double>(fit.size()) - 5.0);
-  // Scaled columns keep the inverse well conditioned.
-  const VectorXd scale = jacobian.colwise().norm().cwiseMax(1e-300);
-  const MatrixXd unit = jacobian * scale.cwiseInverse().asDiagonal();
-  const MatrixXd covariance = rest / freedom *
-                              (scale.cwiseInverse().asDiagonal() * (unit.transpose() * unit).inverse() *
-                               scale.cwiseInverse().asDiagonal());
-  const std::array<Index, 3> order{{2, 0, 1}};  // gain, frequency, damping
-  for (Index i = 0; i < 3; ++i)
-    for (Index j = 0; j < 3; ++j)
-      model.covariance(i, j) =
-          covariance(order[static_cast<std::size_t>(i)], order[static_cast<std::size_t>(j)]);
+  model.covariance = covarianceOf(fit, model, rest);
   result.informed = model.covariance.allFinite();
   return result;
 }

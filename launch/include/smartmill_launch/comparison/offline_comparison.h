@@ -1,22 +1,9 @@
 #pragma once
 
 #include <cstddef>
-#include <string>
 #include <vector>
 
 namespace smartmill::report {
-
-/// Numbers that an offline tool wrote: a CSV with one line of column names.
-struct NumberTable {
-  std::vector<std::string> names;
-  std::vector<std::vector<double>> columns;  ///< NaN: an empty cell or "nan"
-
-  /// By the name's begin up to a bracket or the end: "fx" finds "fx[N]". @throws Error naming the column.
-  const std::vector<double>& column(const std::string& name) const;
-};
-
-/// @throws Error naming file and line.
-NumberTable readNumberTable(const std::string& file);
 
 /// How far the numbers of two sources part.
 struct Agreement {

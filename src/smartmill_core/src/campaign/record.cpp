@@ -1,13 +1,13 @@
 #include "smartmill_core/campaign/record.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
 #include <string_view>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/io/csv.h"
+#include "smartmill_core/io/text_file.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill {
@@ -39,61 +39,6 @@ const ColumnKind* kindOf(std::string_view name) {
   return nullptr;
 }
 
-std::string_view trimmed(std::string_view text) {
-  while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) text.remove_prefix(1);
-  while (!text.empty() && (text.back() == ' ' || text.back() == '\t' || text.back() == '\r'))
-    text.remove_suffix(1);
-  return text;
-}
-
-std::vector<std::string_view> split(std::string_view line, char separator) {
-  std::vector<std::string_view> parts;
-  for (;;) {
-    const std::size_t end = line.find(separator);
-    parts.push_back(trimmed(line.substr(0, end)));
-    if (end == std::string_view::npos) return parts;
-    line.remove_prefix(end + 1);
-  }
-}
-
-/// A text file, line by line, with the number of the line for messages.
-class Lines {
- public:
-  explicit Lines(const std::string& file) : file_(file) {
-    std::ifstream stream(file, std::ios::binary | std::ios::ate);
-    if (!stream) throw Error(file + ": cannot be read");
-    const std::streamoff size = stream.tellg();
-    if (size < 0) throw Error(file + ": cannot be read");
-    text_.resize(static_cast<std::size_t>(size));
-    stream.seekg(0);
-    stream.read(text_.data(), size);
-    if (!stream) throw Error(file + ": cannot be read");
-    rest_ = text_;
-    if (rest_.substr(0, 3) == "\xEF\xBB\xBF") rest_.remove_prefix(3);
-  }
-
-  bool next(std::string_view* line) {
-    if (rest_.empty()) return false;
-    const std::size_t end = rest_.find('\n');
-    *line = trimmed(rest_.substr(0, end));
-    rest_.remove_prefix(end == std::string_view::npos ? rest_.size() : end + 1);
-    ++number_;
-    return true;
-  }
-
-  [[noreturn]] void fail(const std::string& what) const {
-    throw Error(file_ + ": line " + std::to_string(number_) + ": " + what);
-  }
-
-  bool restIsBlank() const { return rest_.find_first_not_of(" \t\r\n") == std::string_view::npos; }
-
- private:
-  std::string file_;
-  std::string text_;
-  std::string_view rest_;
-  int number_ = 0;
-};
-
 /// Where a column of the file goes; nullptr: it is left out.
 struct Target {
   std::string name;
@@ -102,37 +47,19 @@ struct Target {
 };
 
 // The rows below the header.
-void readRows(Lines& lines, char separator, const std::vector<Target>& targets) {
-  std::string_view line;
-  while (lines.next(&line)) {
-    if (line.empty()) {
-      if (lines.restIsBlank()) break;
-      lines.fail("is empty");
+void readRows(CsvReader& reader, const std::vector<Target>& targets) {
+  std::vector<std::string_view> cells;
+  while (reader.next(&cells)) {
+    if (isBlank(cells)) {
+      if (reader.restIsBlank()) break;
+      reader.fail("is empty");
     }
-    const char* p = line.data();
-    const char* const end = p + line.size();
+    if (cells.size() != targets.size())
+      reader.fail(std::to_string(cells.size()) + " values, " + std::to_string(targets.size()) +
+                  " columns are due");
     for (std::size_t c = 0; c < targets.size(); ++c) {
-      const char* stop = std::find(p, end, separator);
-      if (const Target& t = targets[c]; t.values) {
-        const std::string_view cell = trimmed(std::string_view(p, static_cast<std::size_t>(stop - p)));
-        const char* first = cell.data() + (!cell.empty() && cell.front() == '+');
-        const char* const last = cell.data() + cell.size();
-        double value = 0.0;
-        const auto [parsed, code] = std::from_chars(first, last, value);
-        if (code != std::errc() || parsed != last) {
-          lines.fail("column " + t.name + ": '" + std::string(cell) + "' is not a number");
-        }
-        if (!std::isfinite(value)) {
-          lines.fail("column " + t.name + ": '" + std::string(cell) + "' is not a finite number");
-        }
-        t.values->push_back(value * t.si);
-      }
-      const bool at_end = stop == end;
-      if (at_end != (c + 1 == targets.size())) {
-        const auto count = split(line, separator).size();
-        lines.fail(std::to_string(count) + " values, " + std::to_string(targets.size()) + " columns are due");
-      }
-      p = at_end ? end : stop + 1;
+      const Target& t = targets[c];
+      if (t.values) t.values->push_back(reader.number(cells[c], t.name) * t.si);
     }
   }
 }
@@ -172,32 +99,38 @@ void checkTime(const Record& record, int first_line, double sample_rate) {
   }
 }
 
-Record readCsvAt(const std::string& file, double sample_rate) {
-  Lines lines(file);
-  std::string_view header;
-  if (!lines.next(&header)) throw Error(file + ": is empty");
-  Record record;
-  record.file = file;
-  const std::vector<std::string_view> cells = split(header, ',');
+// Which column each cell of the header names; nullptr: one that is not used, with a note.
+std::vector<const ColumnKind*> readHeader(const CsvReader& reader, const std::vector<std::string_view>& cells,
+                                          std::vector<std::string>* notes) {
   std::vector<const ColumnKind*> kinds;
   for (const std::string_view cell : cells) {
     const std::size_t open = cell.find('[');
     if (open == std::string_view::npos || cell.back() != ']') {
-      lines.fail("column '" + std::string(cell) + "' is not name[unit]");
+      reader.fail("column '" + std::string(cell) + "' is not name[unit]");
     }
-    const std::string_view name = trimmed(cell.substr(0, open));
+    const std::string_view name = cell.substr(0, cell.find_last_not_of(" \t", open - 1) + 1);
     const std::string_view unit = cell.substr(open + 1, cell.size() - open - 2);
     const ColumnKind* kind = kindOf(name);
     if (!kind) {
-      record.notes.push_back(file + ": column " + std::string(cell) + " is not used");
+      notes->push_back(reader.file() + ": column " + std::string(cell) + " is not used");
     } else if (unit != kind->unit) {
-      lines.fail("column " + std::string(name) + ": the unit is '" + std::string(unit) + "', " + kind->unit +
-                 " is due");
+      reader.fail("column " + std::string(name) + ": the unit is '" + std::string(unit) + "', " + kind->unit +
+                  " is due");
     } else if (std::find(kinds.begin(), kinds.end(), kind) != kinds.end()) {
-      lines.fail("column " + std::string(name) + " stands twice");
+      reader.fail("column " + std::string(name) + " stands twice");
     }
     kinds.push_back(kind);
   }
+  return kinds;
+}
+
+Record readCsvAt(const std::string& file, double sample_rate) {
+  CsvReader reader(file);
+  std::vector<std::string_view> header;
+  if (!reader.next(&header)) throw Error(file + ": is empty");
+  Record record;
+  record.file = file;
+  const std::vector<const ColumnKind*> kinds = readHeader(reader, header, &record.notes);
   if (std::none_of(kinds.begin(), kinds.end(), [](const ColumnKind* k) { return k && k == &COLUMNS[0]; })) {
     throw Error(file + ": column time is missing");
   }
@@ -215,30 +148,32 @@ Record readCsvAt(const std::string& file, double sample_rate) {
       record.names.push_back(kind->name);
     }
   }
-  readRows(lines, ',', targets);
+  readRows(reader, targets);
   checkTime(record, 2, sample_rate);
   return record;
 }
 
 Record readDynowareAt(const std::string& file, const std::map<std::string, std::string>& channels,
                       double sample_rate) {
-  Lines lines(file);
+  CsvReader reader(file);
   std::string_view line;
-  if (!lines.next(&line) || line.substr(0, 8) != "DynoWare") {
+  if (!reader.nextLine(&line) || line.substr(0, 8) != "DynoWare") {
     throw Error(file + ": line 1: not a DynoWare export");
   }
-  int number = 1;
   do {
-    if (!lines.next(&line)) throw Error(file + ": the row of channel names (Time, ...) is missing");
-    ++number;
+    if (!reader.nextLine(&line)) throw Error(file + ": the row of channel names (Time, ...) is missing");
   } while (line.substr(0, 4) != "Time" || line.size() < 5 || line[4] == ':');
   const char separator = line[4];
-  const std::vector<std::string_view> names = split(line, separator);
-  std::string_view unit_line;
-  if (!lines.next(&unit_line)) throw Error(file + ": the row of units is missing");
-  ++number;
-  const std::vector<std::string_view> units_row = split(unit_line, separator);
-  if (units_row.size() != names.size()) lines.fail("a unit for every channel is due");
+  std::vector<std::string> names;
+  for (std::size_t begin = 0, end = 0; end < line.size(); begin = end + 1) {
+    end = std::min(line.find(separator, begin), line.size());
+    names.emplace_back(line.substr(begin, end - begin));
+  }
+  reader.setSeparator(separator);
+  std::vector<std::string_view> units_row;
+  if (!reader.next(&units_row)) throw Error(file + ": the row of units is missing");
+  const int header_lines = reader.line();
+  if (units_row.size() != names.size()) reader.fail("a unit for every channel is due");
 
   Record record;
   record.file = file;
@@ -246,14 +181,14 @@ Record readDynowareAt(const std::string& file, const std::map<std::string, std::
   std::vector<Target> targets(names.size(), {"", nullptr, 1.0});
   const auto check = [&](std::size_t c, const char* unit) {
     if (units_row[c] != unit) {
-      lines.fail("column " + std::string(names[c]) + ": the unit is '" + std::string(units_row[c]) + "', " +
-                 unit + " is due");
+      reader.fail("column " + names[c] + ": the unit is '" + std::string(units_row[c]) + "', " + unit +
+                  " is due");
     }
   };
   check(0, "s");
   targets[0] = {"Time", &record.time, 1.0};
   for (const auto& [name, channel] : channels) {
-    const auto at = std::find(names.begin(), names.end(), std::string_view(channel));
+    const auto at = std::find(names.begin(), names.end(), channel);
     if (at == names.end()) throw Error(file + ": column " + channel + " is missing");
     const ColumnKind* kind = kindOf(name);
     if (!kind) throw Error(file + ": channels: '" + name + "' is no column name");
@@ -263,8 +198,8 @@ Record readDynowareAt(const std::string& file, const std::map<std::string, std::
     targets[c] = {channel, &record.columns[record.names.size()], kind->si};
     record.names.push_back(name);
   }
-  readRows(lines, separator, targets);
-  checkTime(record, number + 1, sample_rate);
+  readRows(reader, targets);
+  checkTime(record, header_lines + 1, sample_rate);
   return record;
 }
 
@@ -333,10 +268,7 @@ void writeCsv(const Record& record, const std::string& file) {
     }
     text += "\n";
   }
-  std::ofstream stream(file, std::ios::binary);
-  stream << text;
-  stream.close();
-  if (!stream) throw Error(file + ": cannot be written");
+  writeText(file, text);
 }
 
 }  // namespace smartmill

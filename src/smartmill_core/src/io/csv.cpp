@@ -40,13 +40,23 @@ bool CsvReader::nextLine(std::string_view* line) {
 bool CsvReader::next(std::vector<std::string_view>* cells) {
   cells->clear();
   unquoted_.clear();
+  if (separator_ == '\t') {  // blanks at the ends of such a line are no cells
+    std::string_view line;
+    if (!nextLine(&line)) return false;
+    for (std::size_t begin = 0; begin <= line.size();) {
+      const std::size_t end = std::min(line.find('\t', begin), line.size());
+      cells->push_back(trimmed(line.substr(begin, end - begin)));
+      begin = end + 1;
+    }
+    return true;
+  }
   number_ += breaks_;
   breaks_ = 0;
   if (rest_.empty()) return false;
   ++number_;
   for (;;) {
     const std::size_t begin = rest_.find_first_not_of(" \t");
-    if (separator_ != '\t' && begin != std::string_view::npos && rest_[begin] == '"') {
+    if (begin != std::string_view::npos && rest_[begin] == '"') {
       rest_.remove_prefix(begin + 1);
       cells->push_back(quotedCell());
     } else {
@@ -142,8 +152,9 @@ NumberTable readNumberTable(const std::string& file) {
       reader.fail(std::to_string(cells.size()) + " values, " + std::to_string(table.names.size()) +
                   " columns are due");
     for (std::size_t c = 0; c < cells.size(); ++c) {
-      table.columns[c].push_back(cells[c].empty() ? std::numeric_limits<double>::quiet_NaN()
-                                                  : reader.number(cells[c], table.names[c]));
+      table.columns[c].push_back(cells[c].empty() || cells[c] == "nan"
+                                     ? std::numeric_limits<double>::quiet_NaN()
+                                     : reader.number(cells[c], table.names[c]));
     }
   }
   return table;

@@ -54,7 +54,7 @@ std::string complaint(const std::string& words, const std::string& script) {
 Gnuplot::Gnuplot(std::string png, int width, int height, int font) : png_(std::move(png)) {
   script_.precision(9);
   script_ << "set terminal pngcairo size " << width << "," << height << " font 'sans," << font
-          << "' noenhanced\nset output " << quoted(png_) << "\nset datafile missing 'nan'\n";
+          << "' noenhanced\nset output " << quoted(png_) << "\n";
 }
 
 void Gnuplot::block(const std::string& name, const std::vector<std::vector<double>>& rows) {

@@ -99,6 +99,19 @@ TEST(Csv, GivesBackWhatWasWritten) {
             std::string::npos);
 }
 
+TEST(Csv, FindsColumnsWithUnitsAndEmptyCells) {
+  const TemporaryFolder folder;
+  const NumberTable table =
+      readNumberTable(folder.write("table.csv", "time[s],fx[N],limit_mm\n0.5,-1.25e3,\n1,nan,2\n"));
+  EXPECT_EQ(table.column("fx")[0], -1250.0);
+  EXPECT_TRUE(std::isnan(table.column("fx")[1]));
+  EXPECT_TRUE(std::isnan(table.column("limit_mm")[0]));
+  EXPECT_THROW(table.column("fy"), Error);
+  EXPECT_THROW(readNumberTable(folder.write("short.csv", "time[s],fx[N]\n0.5\n")), Error);
+  EXPECT_THROW(readNumberTable(folder.write("word.csv", "time[s]\nabc\n")), Error);
+  EXPECT_THROW(readNumberTable(folder.file("absent.csv")), Error);
+}
+
 TEST(Gnuplot, DrawsAPicture) {
   const TemporaryFolder folder;
   const std::string png = folder.file("it's.png");
@@ -113,7 +126,7 @@ TEST(Gnuplot, SaysWhatItDoesNotLikeInOneLine) {
   const TemporaryFolder folder;
   Gnuplot plot(folder.file("a.png"), 200, 100);
   plot << "plott 1\n";
-  EXPECT_EQ(errorOf([&] { plot.draw(); }), folder.file("a.png") + ": gnuplot: line 4: invalid command");
+  EXPECT_EQ(errorOf([&] { plot.draw(); }), folder.file("a.png") + ": gnuplot: line 3: invalid command");
 }
 
 }  // namespace

@@ -63,8 +63,10 @@ struct Options {
   double parameter_tolerance = 1e-12;  ///< relative
   double gradient_tolerance = 1e-10;   ///< in units of the scales
   double trust_radius = 1e4;           ///< of the first step: the larger, the less it is damped
-  bool orthogonal =
-      false;  ///< QR of the Jacobian in place of normal equations: slower, sees twice the digits
+  /// QR of the Jacobian in place of normal equations: slower, sees twice the digits.
+  bool orthogonal = false;
+  /// A second run without the unknowns that press against a bound, beside which Ceres ends early.
+  bool finish_at_bounds = true;
   /// Called after every iteration. @return false to end with the best point so far
   std::function<bool(const Progress&)> progress;
 };

@@ -55,7 +55,7 @@ bool isBlank(const std::vector<std::string_view>& cells);
 struct NumberTable {
   std::string file;
   std::vector<std::string> names;            ///< as in the file
-  std::vector<std::vector<double>> columns;  ///< NaN where a cell is empty
+  std::vector<std::vector<double>> columns;  ///< NaN where a cell is empty or "nan"
 
   bool has(const std::string& name) const;
   /// By name with or without its unit. @throws Error when it is missing.

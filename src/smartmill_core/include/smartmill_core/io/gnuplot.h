@@ -9,7 +9,7 @@ namespace smartmill {
 /// One PNG picture drawn by gnuplot: commands are streamed in, data stand inline as named blocks or in files.
 class Gnuplot {
  public:
-  /// @param size of the picture [pixel]. @param font size [points]; names are shown as they are (noenhanced).
+  /// @param size of the picture [pixel]. @param font size [points]; texts are shown as they are (noenhanced).
   Gnuplot(std::string png, int width, int height, int font = 11);
 
   template <typename T>
@@ -18,7 +18,7 @@ class Gnuplot {
     return *this;
   }
 
-  /// Data block $name: one line a row, what is not finite is left out of the picture (NaN).
+  /// Data block $name: one line a row, what is not finite interrupts a line.
   void block(const std::string& name, const std::vector<std::vector<double>>& rows);
 
   /// Runs gnuplot. @throws Error "PNG: gnuplot: what it complains of", "gnuplot cannot be started".
