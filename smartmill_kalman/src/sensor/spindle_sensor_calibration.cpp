@@ -13,6 +13,7 @@
 #include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_core/modal/modal_fit.h"
 #include "smartmill_core/model/strict_yaml.h"
+#include "smartmill_core/require.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::kalman {
@@ -25,10 +26,6 @@ ModalModel ideal() {
   ModalModel model;
   model.direct = 1.0;
   return model;
-}
-
-void require(bool good, const std::string& key, double value, const char* due) {
-  if (!good) throw Error("spindle sensor: " + key + ": " + std::to_string(value) + ", " + due + " is due");
 }
 
 /// Least squares with standard deviations from the residuals; empty columns must not be given.
@@ -206,8 +203,8 @@ SpindleSensorCalibration SpindleSensorCalibration::table3() {
 
 void SpindleSensorCalibration::validate() const {
   const auto check = [](const std::string& key, const LengthLine& line) {
-    require(std::isfinite(line.slope), key + ".slope", line.slope, "a number");
-    require(std::isfinite(line.offset), key + ".offset", line.offset, "a number");
+    require((key + ".slope").c_str(), line.slope, Range{});
+    require((key + ".offset").c_str(), line.offset, Range{});
   };
   check("x", x);
   check("y", y);
@@ -215,11 +212,11 @@ void SpindleSensorCalibration::validate() const {
   if (yx) check("yx", *yx);
   if (yz) check("yz", *yz);
   if (xz) check("xz", *xz);
-  for (const double p : preload) require(p > 0.0 && std::isfinite(p), "preload_n", p, "above 0 N");
-  require(least_compression >= 0.0, "least_compression_n", least_compression, "at least 0 N");
-  require(range_limit > 0.0, "range_limit_n", range_limit, "above 0 N");
-  require(low_pass >= 0.0 && std::isfinite(low_pass), "low_pass_hz", low_pass, "at least 0 Hz");
-  require(drift_std > 0.0 && std::isfinite(drift_std), "drift_std_n_per_s", drift_std, "above 0 N/s");
+  for (const double p : preload) require("preload_n", p, Range::positive());
+  require("least_compression_n", least_compression, Range::notNegative());
+  if (!(range_limit > 0.0)) throw Error("range_limit_n: above 0 N is due");  // may be infinite
+  require("low_pass_hz", low_pass, Range::notNegative());
+  require("drift_std_n_per_s", drift_std, Range::positive());
 }
 
 std::array<double, 3> pairMeans(const std::array<double, 6>& s) {

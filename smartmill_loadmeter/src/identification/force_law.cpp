@@ -8,6 +8,7 @@
 
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/math/angle.h"
 #include "smartmill_core/units.h"
 #include "smartmill_loadmeter/calibration/fit.h"
 #include "smartmill_loadmeter/identification/runout.h"
@@ -26,10 +27,6 @@ constexpr int SLICES = 8;
 constexpr double LARGEST_OFFSET = 6e-5;      // [m]
 constexpr double LARGEST_UNBALANCE = 500.0;  // [N]
 constexpr double FIT_TOLERANCE = 1e-7;
-
-double wrapped(double angle) {
-  return angle - TWO_PI * std::floor(angle / TWO_PI);
-}
 
 }  // namespace
 

@@ -2,10 +2,11 @@
 
 #include <cmath>
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_core/model/machine_model.h"
 
 namespace smartmill::loadmeter {
@@ -74,14 +75,14 @@ JointFit solve(const Observations& all) {
     a.row(static_cast<Eigen::Index>(i)) = all.rows[i];
     b[static_cast<Eigen::Index>(i)] = all.targets[i];
   }
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(a, Eigen::ComputeThinU | Eigen::ComputeFullV);
-  const Eigen::VectorXd s = svd.singularValues();
-  const Eigen::MatrixXd v = svd.matrixV();
+  const linear::Svd svd = linear::svd(a, true);
+  const Eigen::VectorXd& s = svd.values;
+  const Eigen::MatrixXd& v = svd.v;
   JointFit fit;
   Eigen::Index rank = 0;
   for (Eigen::Index k = 0; k < 6; ++k) {
     if (k < s.size() && s[k] > RANK * s[0]) {
-      fit.found += v.col(k) * (svd.matrixU().col(k).dot(b) / s[k]);
+      fit.found += v.col(k) * (svd.u.col(k).dot(b) / s[k]);
       fit.covariance += v.col(k) * v.col(k).transpose() / (s[k] * s[k]);
       ++rank;
     } else {

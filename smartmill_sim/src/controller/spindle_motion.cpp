@@ -3,18 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "smartmill_core/units.h"
+#include "smartmill_core/math/angle.h"
 
 namespace smartmill::sim {
-namespace {
-
-double wrapped(double angle) {
-  const double rest = std::fmod(angle, units::TWO_PI);
-  const double positive = rest < 0.0 ? rest + units::TWO_PI : rest;
-  return positive < units::TWO_PI ? positive : 0.0;
-}
-
-}  // namespace
 
 SpindleMotion::SpindleMotion(double acceleration)
     : acceleration_(acceleration), phases_{Phase{0.0, 0.0, 0.0, 0.0}} {

@@ -3,21 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
-#include "smartmill_core/error.h"
+#include "smartmill_core/math/linear_algebra.h"
+#include "smartmill_core/require.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::stability {
-namespace {
-
-void require(bool good, const char* what, double value) {
-  if (!good || !std::isfinite(value))
-    throw Error(std::string("turning: ") + what + " " + std::to_string(value) + " is impossible");
-}
-
-}  // namespace
+namespace {}  // namespace
 
 std::complex<double> SecondOrder::response(double w) const {
   return gain * frequency * frequency /
@@ -52,10 +45,9 @@ double worstMargin(const SecondOrder& machine, const SecondOrder& controller) {
   if (mean.minCoeff() <= 0.0) return worst;
   const Eigen::Matrix3d relative =
       mean.cwiseInverse().asDiagonal() * machine.covariance * mean.cwiseInverse().asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(relative);
+  const linear::SymmetricEigensystem axes = linear::symmetricEigensystem(Eigen::MatrixXd(relative));
   for (int k = 0; k < 3; ++k) {
-    const Eigen::Vector3d off =
-        2.0 * std::sqrt(std::max(0.0, axes.eigenvalues()[k])) * axes.eigenvectors().col(k);
+    const Eigen::Vector3d off = 2.0 * std::sqrt(std::max(0.0, axes.values[k])) * axes.vectors.col(k);
     for (const double sign : {-1.0, 1.0}) {
       SecondOrder other = machine;
       other.gain *= std::max(0.05, 1.0 + sign * off[0]);
@@ -69,12 +61,13 @@ double worstMargin(const SecondOrder& machine, const SecondOrder& controller) {
 
 void ControllerParameters::validate() const {
   const double ratio = rate / estimator.sample_rate;
-  require(estimator.sample_rate > 0.0, "estimator sample rate [Hz]", estimator.sample_rate);
-  require(ratio >= 1.0 && std::abs(ratio - std::round(ratio)) < 1e-9, "rate over the estimator's", ratio);
-  require(period > 2.0 / rate, "period [s]", period);
-  require(overlap >= 0.0 && overlap <= 1.0, "overlap", overlap);
-  require(drift >= 0.0, "drift", drift);
-  require(margin > -0.5 && margin < 0.0, "margin", margin);
+  require("estimator sample rate [Hz]", estimator.sample_rate, Range::positive());
+  require(ratio >= 1.0 && std::abs(ratio - std::round(ratio)) < 1e-9, "rate over the estimator's", ratio,
+          "a whole number");
+  require("period [s]", period, Range::above(2.0 / rate));
+  require("overlap", overlap, Range::closed(0.0, 1.0));
+  require("drift", drift, Range::notNegative());
+  require("margin", margin, Range::open(-0.5, 0.0));
 }
 
 AdaptiveChatterController::AdaptiveChatterController(const ControllerParameters& parameters)

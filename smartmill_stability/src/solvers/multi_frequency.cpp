@@ -1,10 +1,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_stability/solvers/delayed_system.h"
 #include "solvers/floquet.h"
 
@@ -122,10 +122,9 @@ class Balance {
 
   /// Eigenvalues larger than one over the depth of interest.
   std::vector<Complex> eigenvalues(double w, double least) const {
-    const Eigen::ComplexEigenSolver<MatrixXcd> solver(matrix(w), false);
     std::vector<Complex> kept;
-    for (Index i = 0; i < solver.eigenvalues().size(); ++i)
-      if (std::abs(solver.eigenvalues()[i]) > least) kept.push_back(solver.eigenvalues()[i]);
+    for (const Complex& value : linear::eigenvalues(matrix(w)))
+      if (std::abs(value) > least) kept.push_back(value);
     return kept;
   }
 

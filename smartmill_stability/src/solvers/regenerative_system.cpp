@@ -3,6 +3,7 @@
 
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/require.h"
 #include "smartmill_stability/solvers/delayed_system.h"
 #include "smartmill_stability/solvers/solver.h"
 #include "solvers/floquet.h"
@@ -12,11 +13,6 @@ namespace {
 
 using units::PI;
 using units::TWO_PI;
-
-void require(bool good, const char* what, double value) {
-  if (!good || !std::isfinite(value))
-    throw Error(std::string("stability: ") + what + " " + std::to_string(value) + " is impossible");
-}
 
 }  // namespace
 
@@ -141,45 +137,47 @@ class Teeth {
 
 void RegenerativeSystem::validate() const {
   for (const SystemMode& mode : modes) {
-    require(mode.frequency > 0.0, "mode frequency [Hz]", mode.frequency);
-    require(mode.damping_ratio > 0.0 && mode.damping_ratio < 1.0, "mode damping ratio", mode.damping_ratio);
+    require("mode frequency [Hz]", mode.frequency, Range::positive());
+    require("mode damping ratio", mode.damping_ratio, Range::open(0.0, 1.0));
     for (const double v : {mode.input[0], mode.input[1], mode.output[0], mode.output[1]})
-      require(true, "mode vector", v);
+      require("mode vector", v, Range{});
   }
-  require(entry >= 0.0, "entry angle [rad]", entry);
-  require(kt >= 0.0, "tangential coefficient [N/m2]", kt);
-  require(kr >= 0.0 && kt + kr > 0.0, "radial coefficient [N/m2]", kr);
-  require(damping_tangential >= 0.0, "tangential process damping [N/m]", damping_tangential);
-  require(damping_radial >= 0.0, "radial process damping [N/m]", damping_radial);
-  require(overlap >= 0.0 && overlap <= 1.0, "overlap", overlap);
+  require("entry angle [rad]", entry, Range::notNegative());
+  require("tangential coefficient [N/m2]", kt, Range::notNegative());
+  require("radial coefficient [N/m2]", kr, Range::notNegative());
+  require(kt + kr > 0.0, "tangential and radial coefficient [N/m2]", kt + kr, "above 0");
+  require("tangential process damping [N/m]", damping_tangential, Range::notNegative());
+  require("radial process damping [N/m]", damping_radial, Range::notNegative());
+  require("overlap", overlap, Range::closed(0.0, 1.0));
   const bool needs_diameter = helix > 0.0 || damping_radial > 0.0 || damping_tangential > 0.0;
-  require(diameter > 0.0 || !needs_diameter, "diameter [m]", diameter);
+  require(diameter > 0.0 || !needs_diameter, "diameter [m]", diameter, "above 0");
   if (chip) {
-    require(cut == Cut::milling, "chip geometry outside milling:", 0.0);
-    require(chip->feed > 0.0, "feed per tooth [m]", chip->feed);
+    if (cut != Cut::milling) throw Error("a chip geometry outside milling is impossible");
+    require("feed per tooth [m]", chip->feed, Range::positive());
     require(chip->radius_offset.empty() || static_cast<int>(chip->radius_offset.size()) == teeth,
-            "number of radius offsets", static_cast<double>(chip->radius_offset.size()));
-    require(chip->serration_amplitude >= 0.0, "serration amplitude [m]", chip->serration_amplitude);
+            "number of radius offsets", static_cast<double>(chip->radius_offset.size()), "one a tooth");
+    require("serration amplitude [m]", chip->serration_amplitude, Range::notNegative());
     require(chip->serration_amplitude == 0.0 || chip->serration_wavelength > 0.0, "serration wavelength [m]",
-            chip->serration_wavelength);
-    require(exit <= TWO_PI + 1e-9, "exit angle beyond a turn with a chip geometry [rad]", exit);
+            chip->serration_wavelength, "above 0");
+    require(exit <= TWO_PI + 1e-9, "exit angle with a chip geometry [rad]", exit, "at most a turn");
   }
   if (cut == Cut::turning) {
-    require(teeth == 1, "number of teeth in turning", teeth);
-    require(helix == 0.0, "helix in turning [rad]", helix);
+    require(teeth == 1, "number of teeth in turning", teeth, "1");
+    require(helix == 0.0, "helix in turning [rad]", helix, "0");
     return;
   }
-  require(teeth >= 1 && teeth <= 20, "number of teeth", teeth);
-  require(exit > entry && exit <= entry + TWO_PI + 1e-9, "exit angle [rad]", exit);
-  require(helix >= 0.0 && helix < 80.0 * PI / 180.0, "helix [rad]", helix);
+  require("number of teeth", teeth, Range::closed(1, 20));
+  require("exit angle [rad]", exit, Range::openLow(entry, entry + TWO_PI + 1e-9));
+  require("helix [rad]", helix, Range::openHigh(0.0, 80.0 * PI / 180.0));
   if (!pitch.empty()) {
-    require(static_cast<int>(pitch.size()) == teeth, "number of pitches", static_cast<double>(pitch.size()));
+    require(static_cast<int>(pitch.size()) == teeth, "number of pitches", static_cast<double>(pitch.size()),
+            "one a tooth");
     double sum = 0.0;
     for (const double p : pitch) {
-      require(p > 0.0, "pitch [rad]", p);
+      require("pitch [rad]", p, Range::positive());
       sum += p;
     }
-    require(std::abs(sum - TWO_PI) < 1e-6, "sum of the pitches [rad]", sum);
+    require(std::abs(sum - TWO_PI) < 1e-6, "sum of the pitches [rad]", sum, "2 pi");
   }
 }
 
@@ -234,8 +232,8 @@ std::array<std::complex<double>, 4> receptance(const std::vector<SystemMode>& mo
 }
 
 DelayedSystem delayedSystem(const RegenerativeSystem& system, double speed, double depth) {
-  require(speed > 0.0, "spindle speed [rad/s]", speed);
-  require(depth >= 0.0, "depth [m]", depth);
+  require("spindle speed [rad/s]", speed, Range::positive());
+  require("depth [m]", depth, Range::notNegative());
   DelayedSystem delayed;
   delayed.modes = system.modes;
   delayed.stiffness = depth * std::hypot(system.kt, system.kr);

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/require.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::stability {
@@ -13,11 +14,6 @@ namespace {
 using Complex = std::complex<double>;
 using units::PI;
 using units::TWO_PI;
-
-void require(const char* what, bool good, double value) {
-  if (!good || !std::isfinite(value))
-    throw Error(std::string("stability: ") + what + " " + std::to_string(value) + " is impossible");
-}
 
 // Eigenvalues of the oriented FRF A0 Phi without its factor teeth / (2 pi), followed from line to line so
 // that branches stay branches.
@@ -94,11 +90,11 @@ std::array<Complex, 4> ToolTipResponse::at(double f) const {
 }
 
 void RegenerativeProcess::validate() const {
-  require("number of teeth", teeth >= 1 && teeth <= 20, teeth);
-  require("entry angle [rad]", entry >= 0.0, entry);
-  require("exit angle [rad]", exit > entry && exit <= TWO_PI + 1e-9, exit);
-  require("tangential coefficient [N/m2]", kt > 0.0, kt);
-  require("ratio kr", kr >= 0.0, kr);
+  require("number of teeth", teeth, Range::closed(1, 20));
+  require("entry angle [rad]", entry, Range::notNegative());
+  require("exit angle [rad]", exit, Range::openLow(entry, TWO_PI + 1e-9));
+  require("tangential coefficient [N/m2]", kt, Range::positive());
+  require("ratio kr", kr, Range::notNegative());
 }
 
 std::array<double, 4> directionalCoefficients(const RegenerativeProcess& process) {

@@ -7,25 +7,19 @@
 #include <string>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/require.h"
 #include "smartmill_core/units.h"
 #include "smartmill_stability/solvers/solver.h"
 
 namespace smartmill::stability {
-namespace {
-
-void require(bool good, const char* what, double value) {
-  if (!good || !std::isfinite(value))
-    throw Error(std::string("turning: ") + what + " " + std::to_string(value) + " is impossible");
-}
-
-}  // namespace
+namespace {}  // namespace
 
 void TurningProcess::validate() const {
-  require(stiffness_ratio > 0.0, "stiffness ratio", stiffness_ratio);
-  require(damping_ratio > 0.0 && damping_ratio < 1.0, "damping ratio", damping_ratio);
-  require(natural_frequency > 0.0, "natural frequency [rad/s]", natural_frequency);
-  require(overlap >= 0.0 && overlap <= 1.0, "overlap", overlap);
-  require(period > 0.0, "period [s]", period);
+  require("stiffness ratio", stiffness_ratio, Range::positive());
+  require("damping ratio", damping_ratio, Range::open(0.0, 1.0));
+  require("natural frequency [rad/s]", natural_frequency, Range::positive());
+  require("overlap", overlap, Range::closed(0.0, 1.0));
+  require("period [s]", period, Range::positive());
 }
 
 double merrittLimit(double damping_ratio) {
@@ -81,8 +75,8 @@ ControlLaw forceFeedbackControl(const SecondOrder& model, const TurningProcess& 
 TurningRun simulateTurning(const TurningProcess& process, double duration, double rate, double noise_rms,
                            unsigned seed, const ControlLaw& law) {
   process.validate();
-  require(duration > 0.0, "duration [s]", duration);
-  require(rate * process.period > 2.0, "rate x period", rate * process.period);
+  require("duration [s]", duration, Range::positive());
+  require("rate x period", rate * process.period, Range::above(2.0));
   const SecondOrder machine{process.stiffness_ratio, process.natural_frequency, process.damping_ratio};
   ModalFilter filter(machine.modal(), rate, Hold::first_order);
   const double direct =
