@@ -29,6 +29,7 @@ std::optional<Eigen::VectorXd> solve(const CampaignCost& cost, const FitOptions&
   solver.iterations = options.iterations;
   solver.function_tolerance = options.tolerance;
   solver.parameter_tolerance = 1e-7;
+  solver.finish_at_bounds = false;  // simulations are dear, and the next round comes back
   solver.progress = [&](const fit::Progress&) { return !cancelled || !cancelled(); };
   std::vector<fit::Parameter> parameters = cost.parameters();
   for (const double radius : {1e4, 1e10}) {

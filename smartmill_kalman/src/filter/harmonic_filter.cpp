@@ -9,6 +9,7 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/modal/state_space.h"
+#include "smartmill_core/require.h"
 #include "smartmill_core/units.h"
 #include "smartmill_kalman/filter/riccati.h"
 
@@ -19,12 +20,6 @@ using Complex = std::complex<double>;
 
 /// A harmonic that a sensor passes by less is not told by it.
 constexpr double LEAST_PASSED = 1e-3;
-
-void requirePositive(const char* key, double value) {
-  if (!(value > 0.0) || !std::isfinite(value)) {
-    throw Error(std::string(key) + ": " + std::to_string(value) + ", above 0 is due");
-  }
-}
 
 /// Steady answer of a mode's two states (StateSpace form) to a force of 1 at w [rad/s].
 std::array<Complex, 2> steady(const Mode& mode, double w) {
@@ -106,8 +101,8 @@ HarmonicGain designHarmonicGain(const ModalModel& sensor, double spindle_speed, 
 std::vector<HarmonicGain> designGains(const ModalModel& sensor, double spindle_speed, double sample_rate,
                                       const HarmonicFilterParameters& parameters) {
   parameters.validate();
-  requirePositive("spindle speed [rad/s]", spindle_speed);
-  requirePositive("sample rate [Hz]", sample_rate);
+  require("spindle speed [rad/s]", spindle_speed, Range::positive());
+  require("sample rate [Hz]", sample_rate, Range::positive());
   const double revolution = units::TWO_PI / spindle_speed;
   const double top = std::min(parameters.bandwidth, 0.45 * sample_rate);
   int harmonics = 0;

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <string>
 
-#include "smartmill_core/error.h"
+#include "smartmill_core/require.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::kalman {
@@ -19,11 +19,6 @@ constexpr double RISE = 1.5;
 /// Standard deviations that the speed may be off, and revolutions that it may stay there.
 constexpr double MOST = 3.0, LOST = 3.0;
 
-void requirePositive(const char* key, double value) {
-  if (!(value > 0.0) || !std::isfinite(value))
-    throw Error(std::string(key) + ": " + std::to_string(value) + ", above 0 is due");
-}
-
 }  // namespace
 
 void SpeedTrackerParameters::validate() const {
@@ -33,7 +28,7 @@ void SpeedTrackerParameters::validate() const {
 SpeedTracker::SpeedTracker(const SpeedTrackerParameters& parameters, double speed, double sample_rate)
     : dt_(1.0 / sample_rate), nominal_(speed), speed_(speed) {
   parameters.validate();
-  requirePositive("spindle speed [rad/s]", speed);
+  require("spindle speed [rad/s]", speed, Range::positive());
   most_variance_ = std::pow(parameters.speed_std * speed, 2);
   const double acceleration = std::pow(parameters.acceleration_std * speed, 2);
   decay_ = std::exp(-dt_ / parameters.acceleration_memory);
