@@ -34,7 +34,7 @@ class SimNode : public testing::Test {
           const std::lock_guard<std::mutex> lock(mutex);
           into->push_back(*m);
         };
-    subscribers.push_back(nh.subscribe<Message>(topic, 10000, add));
+    subscribers.push_back(nh.subscribe<Message>(topic, 0, add));
     return into;
   }
 

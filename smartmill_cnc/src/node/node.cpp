@@ -20,7 +20,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr int QUEUE = 100;
+constexpr int QUEUE = 100000;  // messages: a busy listener catches up instead of losing some
 constexpr int FEEDBACK_EVERY = 5;  // periods
 constexpr std::chrono::seconds LONGEST_WAIT{4};
 

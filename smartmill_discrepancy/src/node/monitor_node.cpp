@@ -12,7 +12,7 @@
 namespace smartmill::discrepancy {
 namespace {
 
-constexpr int QUEUE = 2000;  // 20 s of blocks
+constexpr int QUEUE = 100000;  // messages: a busy node catches up instead of losing some
 
 MonitorParameters readParameters(const ros::NodeHandle& private_nh) {
   ParameterReader reader = ParameterReader::fromServer(private_nh);

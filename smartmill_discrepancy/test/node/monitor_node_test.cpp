@@ -38,10 +38,10 @@ class MonitorNodeTest : public testing::Test {
     std::string model;
     private_nh.getParam("model", model);
     model_ = readMachineModel(model);
-    conditions_ = nh_.advertise<smartmill_msgs::CuttingCondition>("cut/condition", 10);
-    states_ = nh_.advertise<smartmill_msgs::CncState>("cnc/state", 1000);
-    angles_ = nh_.advertise<smartmill_msgs::SpindleAngle>("spindle/angle", 1000);
-    blocks_ = nh_.advertise<smartmill_msgs::SampleBlock>("daq/dynamometer", 1000);
+    conditions_ = nh_.advertise<smartmill_msgs::CuttingCondition>("cut/condition", 0);
+    states_ = nh_.advertise<smartmill_msgs::CncState>("cnc/state", 0);
+    angles_ = nh_.advertise<smartmill_msgs::SpindleAngle>("spindle/angle", 0);
+    blocks_ = nh_.advertise<smartmill_msgs::SampleBlock>("daq/dynamometer", 0);
     results_ = nh_.subscribe<smartmill_msgs::DiscrepancyState>(
         "discrepancy/state", 100,
         boost::function<void(const smartmill_msgs::DiscrepancyState&)>(

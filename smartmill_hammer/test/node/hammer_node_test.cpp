@@ -1,6 +1,7 @@
 // Wiring of hammer_node: one measurement against the closed-form machine, its bag through the offline class,
 // a cancel.
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
@@ -49,9 +50,17 @@ class HammerNode : public testing::Test {
     boost::function<void(const boost::shared_ptr<const Message>&)> write =
         [this, topic](const boost::shared_ptr<const Message>& m) {
           const std::lock_guard<std::mutex> lock(mutex);
+          ++recorded;
           if (bag.isOpen()) bag.write("/smartmill/" + topic, ros::Time::now(), *m);
         };
-    recorders.push_back(nh.subscribe<Message>(topic, 10000, write));
+    recorders.push_back(nh.subscribe<Message>(topic, 0, write));
+  }
+
+  /// Whether every recorder hears somebody, and hears them for a while.
+  bool recording() {
+    const std::lock_guard<std::mutex> lock(mutex);
+    return recorded > 200 && std::all_of(recorders.begin(), recorders.end(),
+                                         [](const ros::Subscriber& s) { return s.getNumPublishers() > 0; });
   }
 
   ros::NodeHandle nh;
@@ -59,6 +68,7 @@ class HammerNode : public testing::Test {
   ros::AsyncSpinner spinner;
   std::mutex mutex;
   rosbag::Bag bag;
+  int recorded = 0;  // messages
   std::vector<ros::Subscriber> recorders;
 };
 
@@ -71,9 +81,9 @@ TEST_F(HammerNode, MeasuresRecordsAndReplaysToTheLastDigit) {
   record<smartmill_msgs::CncState>("cnc/state");
   record<smartmill_msgs::SpindleAngle>("spindle/angle");
   record<smartmill_msgs::MeasureFrfActionGoal>("hammer/measure_frf/goal");
-  ros::WallDuration(1.0).sleep();
+  for (int i = 0; i < 200 && !recording(); ++i) ros::WallDuration(0.1).sleep();
   client.sendGoal(goal());
-  ASSERT_TRUE(client.waitForResult(ros::Duration(90.0)));
+  ASSERT_TRUE(client.waitForResult(ros::Duration(200.0)));
   const auto result = client.getResult();
   ASSERT_TRUE(result);
   ASSERT_EQ(result->code, smartmill_msgs::MeasureFrfResult::OK) << result->message;

@@ -84,9 +84,9 @@ void run() {
   ros::NodeHandle nh;
   ClosedFormMachine machine(42);
   machine.time = toSec(ros::Time::now());
-  auto blocks = nh.advertise<smartmill_msgs::SampleBlock>("daq/hammer", 100);
-  auto angles = nh.advertise<smartmill_msgs::SpindleAngle>("spindle/angle", 100);
-  auto states = nh.advertise<smartmill_msgs::CncState>("cnc/state", 100);
+  auto blocks = nh.advertise<smartmill_msgs::SampleBlock>("daq/hammer", 0);
+  auto angles = nh.advertise<smartmill_msgs::SpindleAngle>("spindle/angle", 0);
+  auto states = nh.advertise<smartmill_msgs::CncState>("cnc/state", 0);
   Motion<smartmill_msgs::JogAction, smartmill_msgs::JogResult> jog(
       nh, "cnc/jog", machine, [](const smartmill_msgs::JogGoalConstPtr& goal) {
         Command c;

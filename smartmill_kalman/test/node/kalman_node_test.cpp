@@ -47,8 +47,8 @@ TEST(KalmanNode, compensatesInTheMachinesFrame) {
   const auto sub3 = nh.subscribe<geometry_msgs::WrenchStamped>(
       names::FORCE_WRENCH, 2000,
       [&](const geometry_msgs::WrenchStamped::ConstPtr& m) { wrenches.push_back(*m); });
-  auto blocks = nh.advertise<smartmill_msgs::SampleBlock>(names::DYNAMOMETER, 2000);
-  auto angles = nh.advertise<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE, 2000);
+  auto blocks = nh.advertise<smartmill_msgs::SampleBlock>(names::DYNAMOMETER, 0);
+  auto angles = nh.advertise<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE, 0);
   ASSERT_TRUE(waitUntil([&] {
     return blocks.getNumSubscribers() > 0 && angles.getNumSubscribers() > 0 && sub1.getNumPublishers() > 0 &&
            sub2.getNumPublishers() > 0 && sub3.getNumPublishers() > 0;
@@ -108,8 +108,8 @@ TEST(KalmanNode, takesSixSensorsInTheSpindle) {
         for (const auto& status : m->status)
           told = told || status.message.find("unloaded or overloaded") != std::string::npos;
       });
-  auto blocks = nh.advertise<smartmill_msgs::SampleBlock>(names::DYNAMOMETER, 2000);
-  auto angles = nh.advertise<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE, 2000);
+  auto blocks = nh.advertise<smartmill_msgs::SampleBlock>(names::DYNAMOMETER, 0);
+  auto angles = nh.advertise<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE, 0);
   ASSERT_TRUE(waitUntil([&] {
     return blocks.getNumSubscribers() > 0 && angles.getNumSubscribers() > 0 && sub1.getNumPublishers() > 0 &&
            sub2.getNumPublishers() > 0 && sub3.getNumPublishers() > 0;

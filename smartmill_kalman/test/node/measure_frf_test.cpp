@@ -52,7 +52,7 @@ bool waitUntil(Done done, double patience = 15.0) {
 class MeasureFrf : public testing::Test {
  protected:
   MeasureFrf() : client(names::MEASURE_SENSOR_FRF, true), spinner(2) {
-    condition = nh.advertise<smartmill_msgs::CuttingCondition>(names::CUTTING_CONDITION, 10, true);
+    condition = nh.advertise<smartmill_msgs::CuttingCondition>(names::CUTTING_CONDITION, 0, true);
     spinner.start();
   }
 
@@ -64,7 +64,7 @@ class MeasureFrf : public testing::Test {
           ++messages[topic];
           if (bag.isOpen()) bag.write(topic[0] == '/' ? topic : "/smartmill/" + topic, ros::Time::now(), *m);
         };
-    subscribers.push_back(nh.subscribe<Message>(topic, 10000, write));
+    subscribers.push_back(nh.subscribe<Message>(topic, 0, write));
   }
   void collect(const std::string& topic, Blocks& blocks) {
     const boost::function<void(const smartmill_msgs::ForceBlock&)> take =
@@ -72,7 +72,7 @@ class MeasureFrf : public testing::Test {
           const std::lock_guard<std::mutex> lock(mutex);
           blocks[m.first_index] = m;
         };
-    subscribers.push_back(nh.subscribe<smartmill_msgs::ForceBlock>(topic, 10000, take));
+    subscribers.push_back(nh.subscribe<smartmill_msgs::ForceBlock>(topic, 0, take));
   }
 
   smartmill_msgs::MeasureFrfResult measure(const std::string& direction, std::uint32_t hits) {
@@ -245,13 +245,13 @@ TEST_F(MeasureFrf, TapsThenCutsAndReplaysToTheLastDigit) {
     std::string topic = c->topic;
     topic.insert(std::string("/smartmill/").size(), "again/");
     if (c->datatype == "smartmill_msgs/SampleBlock") {
-      out[c->topic] = nh.advertise<smartmill_msgs::SampleBlock>(topic, 1000);
+      out[c->topic] = nh.advertise<smartmill_msgs::SampleBlock>(topic, 0);
     } else if (c->datatype == "smartmill_msgs/SpindleAngle") {
-      out[c->topic] = nh.advertise<smartmill_msgs::SpindleAngle>(topic, 1000);
+      out[c->topic] = nh.advertise<smartmill_msgs::SpindleAngle>(topic, 0);
     } else if (c->datatype == "smartmill_msgs/CuttingCondition") {
-      out[c->topic] = nh.advertise<smartmill_msgs::CuttingCondition>(topic, 1000);
+      out[c->topic] = nh.advertise<smartmill_msgs::CuttingCondition>(topic, 0);
     } else if (c->datatype == "smartmill_msgs/MeasureFrfActionGoal") {
-      out[c->topic] = nh.advertise<smartmill_msgs::MeasureFrfActionGoal>(topic, 1000);
+      out[c->topic] = nh.advertise<smartmill_msgs::MeasureFrfActionGoal>(topic, 0);
     }
   }
   ASSERT_EQ(out.size(), 5u);

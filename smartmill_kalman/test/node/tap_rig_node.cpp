@@ -24,9 +24,9 @@ void run() {
   sensor.modes = {{930.0, 0.03, 0.9}};
   sensor.direct = 0.1;
   TapRig rig(TapRig::diagonal(sensor), toSec(ros::Time::now()), 7);
-  auto hammer = nh.advertise<smartmill_msgs::SampleBlock>(names::HAMMER, 1000);
-  auto dynamometer = nh.advertise<smartmill_msgs::SampleBlock>(names::DYNAMOMETER, 1000);
-  auto angle = nh.advertise<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE, 1000);
+  auto hammer = nh.advertise<smartmill_msgs::SampleBlock>(names::HAMMER, 0);
+  auto dynamometer = nh.advertise<smartmill_msgs::SampleBlock>(names::DYNAMOMETER, 0);
+  auto angle = nh.advertise<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE, 0);
   const boost::function<bool(smartmill_msgs::Strike::Request&, smartmill_msgs::Strike::Response&)> strike =
       [&](smartmill_msgs::Strike::Request& request, smartmill_msgs::Strike::Response& response) {
         if (request.point != "force_sensor" || request.direction == "z") {

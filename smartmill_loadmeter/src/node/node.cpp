@@ -16,7 +16,7 @@ namespace smartmill::loadmeter {
 
 namespace {
 
-constexpr int QUEUE = 1000;  // 20 s of controller state
+constexpr int QUEUE = 100000;  // messages: a busy node catches up instead of losing some
 
 MachineModel modelOf(const NodeParameters& parameters) {
   if (parameters.model.empty()) throw Error("model: the path of a smartmill-model/1 file is due");

@@ -35,9 +35,9 @@ TEST(LoadMeterNode, identifiesPublishesAndAnswers) {
   ros::NodeHandle nh;
   ros::AsyncSpinner spinner(1);
   spinner.start();
-  const auto states = nh.advertise<smartmill_msgs::CncState>("cnc/state", 1000);
-  const auto loads = nh.advertise<smartmill_msgs::LoadSample>("cnc/load", 1000);
-  const auto currents = nh.advertise<smartmill_msgs::SampleBlock>("daq/motor_current", 1000);
+  const auto states = nh.advertise<smartmill_msgs::CncState>("cnc/state", 0);
+  const auto loads = nh.advertise<smartmill_msgs::LoadSample>("cnc/load", 0);
+  const auto currents = nh.advertise<smartmill_msgs::SampleBlock>("daq/motor_current", 0);
   geometry_msgs::WrenchStamped force;
   std::mutex force_lock;
   const boost::function<void(const geometry_msgs::WrenchStamped&)> take = [&](const auto& m) {
@@ -45,7 +45,7 @@ TEST(LoadMeterNode, identifiesPublishesAndAnswers) {
     force = m;
   };
   const auto forces = nh.subscribe<geometry_msgs::WrenchStamped>("force/motor_current", 10, take);
-  const auto conditions = nh.advertise<smartmill_msgs::CuttingCondition>("cut/condition", 100, true);
+  const auto conditions = nh.advertise<smartmill_msgs::CuttingCondition>("cut/condition", 0, true);
   Client client("loadmeter/identify_coefficients", false);
   ASSERT_TRUE(client.waitForServer(ros::Duration(20.0)));
   for (int i = 0;

@@ -19,6 +19,7 @@ namespace {
 
 constexpr double TRUTH_STEP = 2.0, TRUTH_END = 6000.0;  // [Hz] lines of the true FRFs
 constexpr double BLOCK_TIME = World::BLOCK / World::SAMPLE_RATE;
+constexpr std::uint32_t QUEUE = 100000;  // messages: a busy listener catches up instead of losing some
 
 template <class Message>
 ros::Publisher resending(ros::NodeHandle& nh, const std::string& topic,
@@ -46,11 +47,11 @@ Node::Node(ros::NodeHandle nh, const ros::NodeHandle& private_nh) : nh_(std::mov
 
   start_ = toSec(ros::Time::now());
   publishTruth();
-  hammer_ = nh_.advertise<smartmill_msgs::SampleBlock>("daq/hammer", 200);
-  dynamometer_ = nh_.advertise<smartmill_msgs::SampleBlock>("daq/dynamometer", 200);
-  angle_ = nh_.advertise<smartmill_msgs::SpindleAngle>("spindle/angle", 400);
-  force_ = nh_.advertise<smartmill_msgs::ForceBlock>("sim/truth/force", 200);
-  vibration_ = nh_.advertise<smartmill_msgs::SampleBlock>("sim/truth/vibration", 200);
+  hammer_ = nh_.advertise<smartmill_msgs::SampleBlock>("daq/hammer", QUEUE);
+  dynamometer_ = nh_.advertise<smartmill_msgs::SampleBlock>("daq/dynamometer", QUEUE);
+  angle_ = nh_.advertise<smartmill_msgs::SpindleAngle>("spindle/angle", QUEUE);
+  force_ = nh_.advertise<smartmill_msgs::ForceBlock>("sim/truth/force", QUEUE);
+  vibration_ = nh_.advertise<smartmill_msgs::SampleBlock>("sim/truth/vibration", QUEUE);
   strike_server_ = nh_.advertiseService("daq/strike", &Node::strike, this);
 
   updater_ = std::make_unique<diagnostic_updater::Updater>(nh_, private_nh);

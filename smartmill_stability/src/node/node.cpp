@@ -14,7 +14,7 @@
 namespace smartmill::stability {
 namespace {
 
-constexpr int QUEUE = 2000;  // 20 s of blocks
+constexpr int QUEUE = 100000;  // messages: a busy node catches up instead of losing some
 
 smartmill_msgs::StabilityPoint toMsg(const ChartPoint& point) {
   smartmill_msgs::StabilityPoint message;

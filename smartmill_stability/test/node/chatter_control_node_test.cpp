@@ -21,13 +21,13 @@ TEST(ChatterControlNode, learnsFromItsStreams) {
   std::mutex mutex;
   std::size_t commands = 0;
   const ros::Subscriber listener = nh.subscribe<smartmill_msgs::SampleBlock>(
-      "control/command", 3000,
+      "control/command", 0,
       boost::function<void(const smartmill_msgs::SampleBlock::ConstPtr&)>([&](const auto& m) {
         const std::lock_guard<std::mutex> lock(mutex);
         commands += m->samples.size();
       }));
-  ros::Publisher angles = nh.advertise<smartmill_msgs::SpindleAngle>("spindle/angle", 10);
-  ros::Publisher blocks = nh.advertise<smartmill_msgs::SampleBlock>("daq/displacement", 1000);
+  ros::Publisher angles = nh.advertise<smartmill_msgs::SpindleAngle>("spindle/angle", 0);
+  ros::Publisher blocks = nh.advertise<smartmill_msgs::SampleBlock>("daq/displacement", 0);
   for (int i = 0; i < 400 && (!angles.getNumSubscribers() || !blocks.getNumSubscribers() ||
                               !listener.getNumPublishers());
        ++i)
