@@ -39,7 +39,7 @@ std::string contentOf(const std::string& file) {
 
 /// Exit code of a command; what it said goes to a file.
 int run(const std::string& command, const std::string& log) {
-  return std::system(("timeout --signal=INT 150 " + command + " >'" + log + "' 2>&1").c_str());
+  return std::system(("timeout --signal=INT 280 " + command + " >'" + log + "' 2>&1").c_str());
 }
 
 TEST(Replay, OfAShortSessionIsTheSameToTheLastDigit) {
@@ -58,7 +58,7 @@ TEST(Replay, OfAShortSessionIsTheSameToTheLastDigit) {
           " out:=" + again,
       log);
   const std::string replayed = contentOf(log);
-  const int code = run("rosrun smartmill_launch compare_bags --most-lost 0.05 " + live + " " + again, log);
+  const int code = run("rosrun smartmill_launch compare_bags " + live + " " + again, log);
   const std::string verdict = contentOf(log);
   EXPECT_EQ(code, 0) << verdict << replayed;
   for (const char* topic :
