@@ -108,6 +108,7 @@ TEST_P(ExampleCampaign, IsExplainedAsItsMakerKnows) {
 
 INSTANTIATE_TEST_SUITE_P(Shared, ExampleCampaign,
                          testing::Values(Example{"none", Verdict::no_disagreement},
+                                         Example{"vibrating_none", Verdict::no_disagreement},
                                          Example{"outside_catalogue", Verdict::unknown_effect},
                                          Example{"stribeck_friction", Verdict::explained},
                                          Example{"cross_talk", Verdict::explained},
