@@ -70,30 +70,53 @@ class Cutter {
   std::optional<BagCut> cut_;
 };
 
+/// Transforms of a whole bag: they hold also for blocks that came before them.
+class BagTransforms {
+ public:
+  explicit BagTransforms(const std::string& path) {
+    BagReader bag(path);
+    for (const bool is_static : {true, false}) {
+      bag.on<tf2_msgs::TFMessage>(is_static ? "/tf_static" : "/tf",
+                                  [this, is_static](const tf2_msgs::TFMessage& message, double) {
+                                    for (const auto& transform : message.transforms)
+                                      buffer_.setTransform(transform, "bag", is_static);
+                                  });
+    }
+    bag.run();
+  }
+  /// Rotation of a frame into the machine's, row-major; nothing when the bag does not tell.
+  std::optional<std::array<double, 9>> toMachine(const std::string& frame) const {
+    if (!buffer_.canTransform(frames::MACHINE, frame, ros::Time(0))) return {};
+    return frames::rotationMatrix(
+        buffer_.lookupTransform(frames::MACHINE, frame, ros::Time(0)).transform.rotation);
+  }
+
+ private:
+  tf2::BufferCore buffer_;
+};
+
+/// A method that wants the whole cut, in place of what came sample by sample.
+void compensateWhole(BagCut& cut, Method method, const SortedCompensation& sorted,
+                     const HarmonicFilterParameters& parameters) {
+  if (method == Method::kalman || method == Method::fixed_lag || !(cut.speed > 0.0)) return;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    cut.compensated[axis] = compensateRecord(method, cut.measured[axis], sorted.sensor(axis), cut.speed,
+                                             cut.sample_rate, parameters);
+  }
+}
+
 }  // namespace
 
 BagSummary compensateBag(const std::string& path, const ForceSensor& sensor, const NodeParameters& parameters,
                          Method method, const std::function<void(BagCut&&)>& done,
                          const std::function<void(double)>& progress) {
   BagSummary summary;
-  tf2::BufferCore transforms;
-  std::string frame = frames::DYNAMOMETER;
+  const BagTransforms transforms(path);
   std::array<double, 9> rotation{{1, 0, 0, 0, 1, 0, 0, 0, 1}};
-  const auto findRotation = [&] {
-    if (!transforms.canTransform(frames::MACHINE, frame, ros::Time(0))) return;
-    rotation = frames::rotationMatrix(
-        transforms.lookupTransform(frames::MACHINE, frame, ros::Time(0)).transform.rotation);
-    summary.rotation_known = true;
-  };
   std::optional<SortedCompensation> sorted;
   Cutter cutter([&](BagCut&& cut) {
     ++summary.cuts;
-    if (method != Method::kalman && method != Method::fixed_lag && cut.speed > 0.0) {
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        cut.compensated[axis] = compensateRecord(method, cut.measured[axis], sorted->sensor(axis), cut.speed,
-                                                 cut.sample_rate, parameters.compensation.filter);
-      }
-    }
+    compensateWhole(cut, method, *sorted, parameters.compensation.filter);
     for (auto* force : {&cut.measured, &cut.compensated}) rotateInPlace(rotation, *force);
     done(std::move(cut));
   });
@@ -106,25 +129,15 @@ BagSummary compensateBag(const std::string& path, const ForceSensor& sensor, con
                                   {},
                                   [&](const SensorResult& result) { summary.identified.push_back(result); }});
   useFiles(*sorted, parameters);
-  {
-    // The rotation holds for the whole bag, also for blocks that came before it.
-    BagReader bag(path);
-    for (const bool is_static : {true, false}) {
-      bag.on<tf2_msgs::TFMessage>(is_static ? "/tf_static" : "/tf",
-                                  [&, is_static](const tf2_msgs::TFMessage& message, double) {
-                                    for (const auto& transform : message.transforms)
-                                      transforms.setTransform(transform, "bag", is_static);
-                                  });
-    }
-    bag.run();
-  }
   BagReader bag(path);
   summary.duration = bag.duration();
   std::size_t blocks = 0;
   bag.on<smartmill_msgs::SampleBlock>(names::DYNAMOMETER, [&](const smartmill_msgs::SampleBlock& m, double) {
     if (blocks++ == 0) {
-      if (!m.header.frame_id.empty()) frame = m.header.frame_id;
-      findRotation();
+      const auto found =
+          transforms.toMachine(m.header.frame_id.empty() ? frames::DYNAMOMETER : m.header.frame_id);
+      summary.rotation_known = found.has_value();
+      rotation = found.value_or(rotation);
     }
     sorted->push(fromMsg(m));
   });
