@@ -5,11 +5,11 @@
 
 #include <cmath>
 #include <cstdio>
-#include <fstream>
 #include <string>
 
 #include "node/bag_charts.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/io/csv.h"
 #include "smartmill_core/program.h"
 #include "smartmill_core/units.h"
 #include "smartmill_stability/chart/picture.h"
@@ -23,35 +23,16 @@ struct Options {
   std::string bag, model, parameters, output, states;
 };
 
-std::ofstream open(const std::string& file) {
-  std::ofstream stream(file);
-  if (!stream) throw Error(file + ": cannot be written");
-  stream.precision(17);  // the node's figures to the last digit
-  return stream;
-}
-
-void finish(std::ofstream& stream, const std::string& file) {
-  stream.close();
-  if (!stream) throw Error(file + ": cannot be written");
-}
-
-/// Empty where there is none.
-std::ostream& cell(std::ostream& stream, double value) {
-  stream << ',';
-  return std::isfinite(value) ? stream << value : stream;
-}
+constexpr int DIGITS = 17;  // the node's figures to the last one
 
 void write(const Chart& chart, const std::string& file) {
-  std::ofstream csv = open(file);
-  csv << "rpm,limit_mm,chatter_hz,torque_limit_mm,power_limit_mm\n";
+  CsvWriter csv("rpm,limit_mm,chatter_hz,torque_limit_mm,power_limit_mm", DIGITS);
   for (std::size_t i = 0; i < chart.limit.depth.size(); ++i) {
-    csv << units::rpmFromRadPerSec(chart.limit.spindle_speed[i]);
-    cell(csv, chart.limit.depth[i] / units::MM);
-    cell(csv, chart.limit.chatter_frequency[i]);
-    cell(csv, chart.torque_depth_limit[i] / units::MM);
-    cell(csv, chart.power_depth_limit[i] / units::MM) << '\n';
+    csv.row(units::rpmFromRadPerSec(chart.limit.spindle_speed[i]), chart.limit.depth[i] / units::MM,
+            chart.limit.chatter_frequency[i], chart.torque_depth_limit[i] / units::MM,
+            chart.power_depth_limit[i] / units::MM);
   }
-  finish(csv, file);
+  csv.save(file);
   drawBeside(file,
              "set xlabel 'Spindle speed [rpm]'\nset ylabel 'Axial depth [mm]'\nset yrange [0:]\n"
              "plot %FILE skip 1 using 1:2 with lines lw 2 title 'stability limit', "
@@ -60,15 +41,10 @@ void write(const Chart& chart, const std::string& file) {
 }
 
 void write(const std::vector<ChatterState>& states, const std::string& file) {
-  std::ofstream csv = open(file);
-  csv << "time_s,condition,valid,chatter,frequency_hz,energy_ratio,severity_n\n";
-  for (const ChatterState& s : states) {
-    csv << s.stamp << ',' << s.condition << ',' << s.valid << ',' << s.chatter;
-    cell(csv, s.frequency);
-    cell(csv, s.energy_ratio);
-    cell(csv, s.severity) << '\n';
-  }
-  finish(csv, file);
+  CsvWriter csv("time_s,condition,valid,chatter,frequency_hz,energy_ratio,severity_n", DIGITS);
+  for (const ChatterState& s : states)
+    csv.row(s.stamp, s.condition, s.valid, s.chatter, s.frequency, s.energy_ratio, s.severity);
+  csv.save(file);
 }
 
 void print(const char* title, const std::vector<ChartPoint>& points) {

@@ -5,10 +5,10 @@
 
 #include <cmath>
 #include <cstdio>
-#include <fstream>
 #include <string>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/io/csv.h"
 #include "smartmill_core/program.h"
 #include "smartmill_stability/chart/picture.h"
 #include "smartmill_stability/chart/uncertainty.h"
@@ -41,20 +41,14 @@ void run(const Request& request) {
                                                      std::fprintf(stderr, "\r%3.0f %% of the draws%s",
                                                                   100.0 * share, share >= 1.0 ? "\n" : "");
                                                  });
-  std::ofstream csv(request.out);
-  csv.precision(8);
-  csv << "rpm,depth_mm,probability,nominal_limit_mm\n";
+  CsvWriter csv("rpm,depth_mm,probability,nominal_limit_mm", 8);
   for (std::size_t s = 0; s < speeds.size(); ++s) {
-    if (s > 0) csv << '\n';  // gnuplot's rows
-    for (std::size_t d = 0; d < depths.size(); ++d) {
-      csv << units::rpmFromRadPerSec(speeds[s]) << ',' << depths[d] / units::MM << ','
-          << chart.probability[s][d] << ',';
-      if (std::isfinite(chart.nominal[s])) csv << chart.nominal[s] / units::MM;
-      csv << '\n';
-    }
+    if (s > 0) csv.gap();  // gnuplot's rows
+    for (std::size_t d = 0; d < depths.size(); ++d)
+      csv.row(units::rpmFromRadPerSec(speeds[s]), depths[d] / units::MM, chart.probability[s][d],
+              chart.nominal[s] / units::MM);
   }
-  csv.close();
-  if (!csv) throw Error(request.out + ": cannot be written");
+  csv.save(request.out);
   stability::drawBeside(
       request.out,
       "set xlabel 'Spindle speed [rpm]'\nset ylabel 'Axial depth [mm]'\nset cblabel 'Probability "

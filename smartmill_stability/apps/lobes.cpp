@@ -5,11 +5,11 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
 #include <string>
 #include <vector>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/io/csv.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/program.h"
 #include "smartmill_core/units.h"
@@ -68,18 +68,14 @@ void traceAll(const Request& request, const stability::FloquetSolver& solver,
   options.max_depth = request.max_depth_mm * units::MM;
   options.levels = 3;  // tips of pockets down to 1/480 of the range of speeds
   const auto curves = stability::traceBoundary(solver, options);
-  std::ofstream csv(request.boundary);
-  csv.precision(8);
-  csv << "curve,rpm,depth_mm,chatter_hz,kind\n";
+  CsvWriter csv("curve,rpm,depth_mm,chatter_hz,kind", 8);
   for (std::size_t c = 0; c < curves.size(); ++c) {
     // A blank line parts the curves for gnuplot.
-    if (c > 0) csv << "\n";
+    if (c > 0) csv.gap();
     for (const stability::BoundaryPoint& p : curves[c].points)
-      csv << c << ',' << units::rpmFromRadPerSec(p.speed) << ',' << p.depth / units::MM << ',' << p.frequency
-          << ',' << nameOf(p.kind) << '\n';
+      csv.row(c, units::rpmFromRadPerSec(p.speed), p.depth / units::MM, p.frequency, nameOf(p.kind));
   }
-  csv.close();
-  if (!csv) throw Error(request.boundary + ": cannot be written");
+  csv.save(request.boundary);
   stability::drawBeside(request.boundary,
                         axes(request.max_depth_mm) +
                             "plot %FILE skip 1 using 2:3 with lines lw 2 title 'boundary', "
@@ -122,23 +118,20 @@ void run(const Request& request) {
   const double max_depth = request.max_depth_mm * units::MM;
   const std::vector<stability::Limit> limits = limitsOf(*solver, speeds, max_depth);
 
-  std::ofstream csv(request.out);
-  csv.precision(8);
-  csv << "rpm,limit_mm,chatter_hz,kind\n";
+  CsvWriter csv("rpm,limit_mm,chatter_hz,kind", 8);
   double least = max_depth, error = 0.0;
   for (std::size_t i = 0; i < speeds.size(); ++i) {
-    csv << units::rpmFromRadPerSec(speeds[i]) << ',';
+    const double rpm = units::rpmFromRadPerSec(speeds[i]);
     const stability::Limit& limit = limits[i];
     if (std::isfinite(limit.depth)) {
-      csv << limit.depth / units::MM << ',' << limit.frequency << ',' << nameOf(limit.kind) << '\n';
+      csv.row(rpm, limit.depth / units::MM, limit.frequency, nameOf(limit.kind));
       least = std::min(least, limit.depth);
       if (std::isfinite(limit.error)) error = std::max(error, limit.error / limit.depth);
     } else {
-      csv << ",,\n";
+      csv.row(rpm, "", "", "");
     }
   }
-  csv.close();
-  if (!csv) throw Error(request.out + ": cannot be written");
+  csv.save(request.out);
   stability::drawBeside(
       request.out, axes(request.max_depth_mm) +
                        "plot %FILE skip 1 using 1:2 with lines lw 2 title 'first loss of stability (" +
