@@ -55,7 +55,9 @@ void BagRecorder::finish() {
 }
 
 void BagRecorder::write(const std::string& topic, Event event) {
-  bag_.write(topic, event.getReceiptTime(), *event.getMessage(), event.getConnectionHeaderPtr());
+  // Simulated time may not have begun.
+  bag_.write(topic, std::max(event.getReceiptTime(), ros::TIME_MIN), *event.getMessage(),
+             event.getConnectionHeaderPtr());
   ++written_;
 }
 
