@@ -6,6 +6,7 @@
 
 #include "controller/focas_reader.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/require.h"
 #include "smartmill_focas/client.h"
 
 namespace smartmill::cnc {
@@ -214,26 +215,14 @@ class FocasController : public Controller {
   std::size_t sent_ = 0;  // [byte]
 };
 
-void check(bool good, const std::string& key, int value, const std::string& due) {
-  if (!good) {
-    throw Error(key + ": " + std::to_string(value) + " is not " + due);
-  }
-}
-
 }  // namespace
 
 void FocasParameters::validate() const {
   if (host.empty()) {
     throw Error("host: is empty");
   }
-  check(port >= 1 && port <= 65535, "port", port, "within 1 .. 65535");
-  check(spindle >= 1, "spindle", spindle, "1 or more");
-  check(marker_macro >= 1 && marker_macro <= 99999, "marker_macro", marker_macro, "within 1 .. 99999");
-  check(orient_macro >= 1 && orient_macro <= 99999, "orient_macro", orient_macro, "within 1 .. 99999");
-  check(marker_macro != orient_macro, "marker_macro", marker_macro, "another variable than orient_macro");
-  if (!(reply_timeout > 0.0) || !std::isfinite(reply_timeout)) {
-    throw Error("reply_timeout: " + fixedDecimals(reply_timeout, 3) + " is not above 0");
-  }
+  checkBounds(*this);
+  require(marker_macro != orient_macro, "marker_macro", marker_macro, "another variable than orient_macro");
 }
 
 std::unique_ptr<Controller> makeFocasController(const FocasParameters& parameters) {

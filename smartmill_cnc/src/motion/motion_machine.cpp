@@ -18,18 +18,7 @@ MotionCode codeOf(const Failure& failure, MotionCode otherwise) {
 }  // namespace
 
 void MotionParameters::validate() const {
-  for (const auto& [key, value] : {std::pair<const char*, double>{"settle_time", settle_time},
-                                   {"standstill_speed", standstill_speed},
-                                   {"stall_timeout", stall_timeout},
-                                   {"stop_timeout", stop_timeout},
-                                   {"open_timeout", open_timeout}}) {
-    if (!(value > 0.0) || !std::isfinite(value)) {
-      throw Error(std::string(key) + ": " + fixedDecimals(value, 3) + " is not above 0");
-    }
-  }
-  if (!(condition_lead >= 0.0 && condition_lead <= 10.0)) {
-    throw Error("condition_lead: " + fixedDecimals(condition_lead, 3) + " is not within 0 .. 10");
-  }
+  checkBounds(*this);
   limits.validate();
 }
 

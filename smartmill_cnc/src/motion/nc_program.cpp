@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/require.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::cnc {
@@ -360,14 +361,9 @@ void MotionLimits::validate() const {
                   shown(travel[i][1]) + "] m: the lower limit comes first");
     }
   }
-  const auto positive = [](const char* key, double value) {
-    if (!(value > 0.0) || !std::isfinite(value)) {
-      throw Error(std::string(key) + ": " + shown(value) + " is not above 0");
-    }
-  };
-  positive("max_feed", max_feed);
-  positive("max_spindle_speed", max_spindle_speed);
-  positive("max_dwell", max_dwell);
+  require("max_feed", max_feed, Range::positive(), "m/s");
+  require("max_spindle_speed", max_spindle_speed, Range::positive(), "rad/s");
+  checkBounds(*this);
 }
 
 NcCheck checkProgram(const std::string& program, const StartPosition& start, const MotionLimits& limits,

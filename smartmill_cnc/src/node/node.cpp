@@ -9,18 +9,19 @@
 #include <utility>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/names.h"
 #include "smartmill_msgs/CncState.h"
 #include "smartmill_msgs/CuttingCondition.h"
 #include "smartmill_msgs/LoadSample.h"
 #include "smartmill_ros/conversions.h"
 #include "smartmill_ros/frames.h"
+#include "smartmill_ros/parameter_reader.h"
 
 namespace smartmill::cnc {
 namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr int QUEUE = 100000;  // messages: a busy listener catches up instead of losing some
 constexpr int FEEDBACK_EVERY = 5;  // periods
 constexpr std::chrono::seconds LONGEST_WAIT{4};
 
@@ -51,21 +52,21 @@ std::string conditionFault(const smartmill_msgs::CuttingCondition& c) {
 }  // namespace
 
 CncNode::CncNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
-    : parameters_([&] {
-        ParameterReader reader = ParameterReader::fromServer(private_nh);
-        return readParameters(reader);
-      }()),
+    : parameters_(ParameterReader::fromServer(private_nh).readAll<NodeParameters>().completed()),
       bridge_(makeFocasController(parameters_.controller), parameters_.reconnect_period, parameters_.motion),
-      diagnostics_(ros::NodeHandle(), private_nh) {
-  state_publisher_ = nh.advertise<smartmill_msgs::CncState>("cnc/state", QUEUE);
-  load_publisher_ = nh.advertise<smartmill_msgs::LoadSample>("cnc/load", QUEUE);
-  condition_publisher_ = nh.advertise<smartmill_msgs::CuttingCondition>("cut/condition", QUEUE, true);
+      shell_(nh, private_nh,
+             "controller " + parameters_.controller.host + ":" + std::to_string(parameters_.controller.port),
+             1.0) {
+  state_publisher_ = nh.advertise<smartmill_msgs::CncState>(names::CNC_STATE, STREAM_QUEUE);
+  load_publisher_ = nh.advertise<smartmill_msgs::LoadSample>(names::CNC_LOAD, STREAM_QUEUE);
+  condition_publisher_ =
+      nh.advertise<smartmill_msgs::CuttingCondition>(names::CUTTING_CONDITION, STREAM_QUEUE, true);
   CuttingCondition none;
   none.stamp = ros::Time::now().toSec();
   condition_publisher_.publish(toMsg(none));
 
   run_program_ = serve<smartmill_msgs::RunProgramAction>(
-      nh, "cnc/run_program",
+      nh, names::RUN_PROGRAM,
       [this](const smartmill_msgs::RunProgramGoal& goal) -> std::optional<Outcome> {
         const std::string fault = conditionFault(goal.condition);
         if (!fault.empty()) {
@@ -86,7 +87,7 @@ CncNode::CncNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
         return feedback;
       });
   jog_ = serve<smartmill_msgs::JogAction>(
-      nh, "cnc/jog",
+      nh, names::JOG,
       [this](const smartmill_msgs::JogGoal& goal) {
         return bridge_.jog(goal.axis, goal.distance, goal.feed);
       },
@@ -96,7 +97,7 @@ CncNode::CncNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
         return feedback;
       });
   orient_ = serve<smartmill_msgs::OrientSpindleAction>(
-      nh, "cnc/orient_spindle",
+      nh, names::ORIENT_SPINDLE,
       [this](const smartmill_msgs::OrientSpindleGoal& goal) { return bridge_.orient(goal.angle); },
       [this] {
         smartmill_msgs::OrientSpindleFeedback feedback;
@@ -104,14 +105,9 @@ CncNode::CncNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
         return feedback;
       });
 
-  arm_service_ = nh.advertiseService("cnc/arm_motion", &CncNode::armMotion, this);
-  macro_service_ = nh.advertiseService("cnc/set_macro", &CncNode::setMacro, this);
-  diagnostics_.setHardwareID("controller " + parameters_.controller.host + ":" +
-                             std::to_string(parameters_.controller.port));
-  diagnostics_.add("controller", this, &CncNode::diagnose);
-  // The updater publishes once a second, when it is asked to.
-  diagnostics_timer_ = nh.createWallTimer(ros::WallDuration(0.2),
-                                          [this](const ros::WallTimerEvent&) { diagnostics_.update(); });
+  arm_service_ = nh.advertiseService(names::ARM_MOTION, &CncNode::armMotion, this);
+  macro_service_ = nh.advertiseService(names::SET_MACRO, &CncNode::setMacro, this);
+  shell_.diagnose("controller", [this](auto& status) { diagnose(status); });
   thread_ = std::thread([this] { run(); });
 }
 

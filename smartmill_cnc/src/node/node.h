@@ -1,7 +1,6 @@
 #pragma once
 
 #include <actionlib/server/action_server.h>
-#include <diagnostic_updater/diagnostic_updater.h>
 #include <ros/ros.h>
 #include <tf2_ros/transform_broadcaster.h>
 
@@ -12,19 +11,21 @@
 #include <thread>
 #include <vector>
 
-#include "node/parameters_ros.h"
+#include "node/parameters.h"
 #include "smartmill_cnc/bridge.h"
 #include "smartmill_msgs/ArmMotion.h"
 #include "smartmill_msgs/JogAction.h"
 #include "smartmill_msgs/OrientSpindleAction.h"
 #include "smartmill_msgs/RunProgramAction.h"
 #include "smartmill_msgs/SetMacro.h"
+#include "smartmill_ros/node_shell.h"
 
 namespace smartmill::cnc {
 
 /// Shell of the Bridge: its thread alone talks to the controller; callbacks hand it their wishes.
 class CncNode {
  public:
+  using Parameters = NodeParameters;
   /// @throws Error naming the parameter that is wrong.
   CncNode(ros::NodeHandle nh, ros::NodeHandle private_nh);
   /// Stops a running motion, says goodbye to the controller.
@@ -70,8 +71,7 @@ class CncNode {
   std::unique_ptr<Server<smartmill_msgs::RunProgramAction>> run_program_;
   std::unique_ptr<Server<smartmill_msgs::JogAction>> jog_;
   std::unique_ptr<Server<smartmill_msgs::OrientSpindleAction>> orient_;
-  diagnostic_updater::Updater diagnostics_;
-  ros::WallTimer diagnostics_timer_;
+  NodeShell shell_;
 
   std::mutex mutex_;  // of what follows
   std::vector<Job> jobs_;

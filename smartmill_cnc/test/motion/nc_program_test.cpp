@@ -133,7 +133,7 @@ TEST(NcProgram, LimitsMustMakeSense) {
     l.validate();
     FAIL();
   } catch (const Error& e) {
-    EXPECT_STREQ(e.what(), "max_feed: 0 is not above 0");
+    EXPECT_STREQ(e.what(), "max_feed: 0 is out of range (> 0 m/s)");
   }
 }
 

@@ -13,6 +13,7 @@
 #include <thread>
 
 #include "../test_machine.h"
+#include "smartmill_core/names.h"
 #include "smartmill_msgs/ArmMotion.h"
 #include "smartmill_msgs/CncState.h"
 #include "smartmill_msgs/CuttingCondition.h"
@@ -32,11 +33,12 @@ constexpr double PATIENCE = 20.0;  // [s] generous: the computer may be slow
 
 class CncNodeTest : public ::testing::Test {
  protected:
-  CncNodeTest() : run_("cnc/run_program", true), jog_("cnc/jog", true), orient_("cnc/orient_spindle", true) {
+  CncNodeTest()
+      : run_(names::RUN_PROGRAM, true), jog_(names::JOG, true), orient_(names::ORIENT_SPINDLE, true) {
     port_ = static_cast<std::uint16_t>(ros::NodeHandle("~").param("port", 18193));
-    subscribers_.push_back(nh_.subscribe("cnc/state", 100, &CncNodeTest::onState, this));
-    subscribers_.push_back(nh_.subscribe("cnc/load", 100, &CncNodeTest::onLoad, this));
-    subscribers_.push_back(nh_.subscribe("cut/condition", 100, &CncNodeTest::onCondition, this));
+    subscribers_.push_back(nh_.subscribe(names::CNC_STATE, 100, &CncNodeTest::onState, this));
+    subscribers_.push_back(nh_.subscribe(names::CNC_LOAD, 100, &CncNodeTest::onLoad, this));
+    subscribers_.push_back(nh_.subscribe(names::CUTTING_CONDITION, 100, &CncNodeTest::onCondition, this));
     subscribers_.push_back(nh_.subscribe("/diagnostics", 100, &CncNodeTest::onDiagnostics, this));
     clock_ = std::thread([this] {
       auto due = std::chrono::steady_clock::now();
@@ -82,7 +84,7 @@ class CncNodeTest : public ::testing::Test {
   std::uint8_t arm(bool on) {
     smartmill_msgs::ArmMotion service;
     service.request.arm = on;
-    EXPECT_TRUE(ros::service::call("cnc/arm_motion", service));
+    EXPECT_TRUE(ros::service::call(names::ARM_MOTION, service));
     return service.response.code;
   }
   /// @return the result of a program. @param then called once after the goal is sent.
@@ -153,7 +155,7 @@ TEST_F(CncNodeTest, StateLoadMacroAndTransform) {
   smartmill_msgs::SetMacro macro;
   macro.request.number = 500;
   macro.request.value = 2.5;
-  ASSERT_TRUE(ros::service::call("cnc/set_macro", macro));
+  ASSERT_TRUE(ros::service::call(names::SET_MACRO, macro));
   EXPECT_EQ(macro.response.code, smartmill_msgs::SetMacro::Response::OK);
   EXPECT_EQ(machine_.get(machine_.macros)[500], 2.5);
   tf2_ros::Buffer buffer;

@@ -4,8 +4,9 @@
 #include <fstream>
 #include <string>
 
-#include "node/parameters_ros.h"
+#include "node/parameters.h"
 #include "smartmill_core/error.h"
+#include "smartmill_ros/testing/shipped_parameters.h"
 
 namespace smartmill::cnc {
 namespace {
@@ -17,8 +18,7 @@ std::string refusal(const std::string& yaml) {
   std::ofstream(file) << yaml;
   std::string message;
   try {
-    ParameterReader reader = ParameterReader::fromFile(file);
-    readParameters(reader);
+    ParameterReader::fromFile(file).readAll<NodeParameters>().completed();
   } catch (const Error& e) {
     message = e.what();
   }
@@ -32,9 +32,9 @@ std::string good() {
 }
 
 TEST(Parameters, ShippedFileIsKnownAndLeavesTheLimitsToTheModel) {
-  ParameterReader reader = ParameterReader::fromFile(SHIPPED);
+  expectShipped<NodeParameters>(SHIPPED, "smartmill_cnc cnc_node");
   try {
-    readParameters(reader);
+    ParameterReader::fromFile(SHIPPED).readAll<NodeParameters>().completed();
     FAIL();
   } catch (const Error& e) {
     EXPECT_NE(std::string(e.what()).find("travel_x"), std::string::npos) << e.what();

@@ -4,16 +4,29 @@
 #include <string>
 
 #include "smartmill_cnc/controller/controller.h"
+#include "smartmill_core/parameters/parameter_table.h"
 
 namespace smartmill::cnc {
 
 struct FocasParameters {
-  std::string host = "127.0.0.1";  ///< controller
-  int port = 8193;                 ///< [-] 1..65535
-  double reply_timeout = 0.5;      ///< [s] for connecting and for every answer
-  int spindle = 1;                 ///< [-] 1-based
-  int marker_macro = 100;          ///< [-] variable that tells the end of a piece of program
-  int orient_macro = 1133;         ///< [-] variable that M119 reads the angle from
+  std::string host = "127.0.0.1";
+  int port = 8193;
+  double reply_timeout = 0.5;
+  int spindle = 1;
+  int marker_macro = 100;
+  int orient_macro = 1133;
+
+  void declare(ParameterTable& table) {
+    table.text("host", host, "controller's name or address; a real one or the simulated one");
+    table.number("port", port, "1", Range::closed(1, 65535), "its FOCAS port");
+    table.number("reply_timeout", reply_timeout, "s", Range::positive(),
+                 "for connecting and for every answer; longer is a lost connection");
+    table.number("spindle", spindle, "1", Range::positive(), "which spindle is the milling spindle, from 1");
+    table.number("marker_macro", marker_macro, "1", Range::closed(1, 99999),
+                 "variable #n that tells the end of a program; programs must leave it alone");
+    table.number("orient_macro", orient_macro, "1", Range::closed(1, 99999),
+                 "variable that M119 reads the spindle's angle from, 0 .. 4095");
+  }
 
   /// @throws Error naming key and value.
   void validate() const;

@@ -15,13 +15,27 @@
 namespace smartmill::cnc {
 
 struct MotionParameters {
-  double settle_time = 0.1;       ///< [s] of standstill that ends a motion
-  double standstill_speed = 0.2;  ///< [rad/s] a spindle slower than this stands
-  double stall_timeout = 60.0;    ///< [s] without any progress (feed hold excepted) end a motion
-  double stop_timeout = 5.0;      ///< [s] a cancelled motion may take to stop
-  double open_timeout = 3.0;      ///< [s] the controller may put off to take programs after a cancelled one
-  double condition_lead = 0.3;    ///< [s] >= 0 by which a cutting condition is told before it begins or ends
+  double condition_lead = 0.3;
+  double settle_time = 0.1;
+  double standstill_speed = 0.2;
+  double stall_timeout = 60.0;
+  double stop_timeout = 5.0;
+  double open_timeout = 3.0;
   MotionLimits limits;
+
+  /// Without the limits, which declare themselves.
+  void declare(ParameterTable& table) {
+    table.number("condition_lead", condition_lead, "s", Range::closed(0.0, 10.0),
+                 "by which a cutting condition is told before it begins or ends");
+    table.number("settle_time", settle_time, "s", Range::positive(), "of standstill that ends a motion");
+    table.number("standstill_speed", standstill_speed, "rad/s", Range::positive(),
+                 "a spindle slower than this stands");
+    table.number("stall_timeout", stall_timeout, "s", Range::positive(),
+                 "without any progress (feed hold excepted) end a motion");
+    table.number("stop_timeout", stop_timeout, "s", Range::positive(), "a cancelled motion may take to stop");
+    table.number("open_timeout", open_timeout, "s", Range::positive(),
+                 "the controller may put off to take programs after a cancelled one");
+  }
 
   /// @throws Error naming key and value.
   void validate() const;

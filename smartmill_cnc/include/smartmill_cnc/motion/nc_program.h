@@ -3,15 +3,23 @@
 #include <array>
 #include <string>
 
+#include "smartmill_core/parameters/parameter_table.h"
+
 namespace smartmill::cnc {
 
 /// What the machine may do; every block is checked against it before anything is sent.
 struct MotionLimits {
   std::array<std::array<double, 2>, 3> travel{};  ///< [m] lowest and highest machine position of x, y, z
-  double max_feed = 0.0;                          ///< [m/s]
-  double max_spindle_speed = 0.0;                 ///< [rad/s]
-  double max_dwell = 60.0;                        ///< [s] of one G4
+  double max_feed = 0.0;
+  double max_spindle_speed = 0.0;
+  double max_dwell = 60.0;
 
+  /// Without the travel.
+  void declare(ParameterTable& table) {
+    table.number("max_feed", max_feed, "m/s", Range::notNegative(), "0: the model's");
+    table.number("max_spindle_speed", max_spindle_speed, "rad/s", Range::notNegative(), "0: the model's");
+    table.number("max_dwell", max_dwell, "s", Range::positive(), "of one G4");
+  }
   /// @throws Error naming key and value.
   void validate() const;
 };

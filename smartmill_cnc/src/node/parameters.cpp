@@ -1,0 +1,78 @@
+#include "node/parameters.h"
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/model/machine_model.h"
+
+namespace smartmill::cnc {
+namespace {
+
+/// Limits that stand in the model and not in the file.
+void fill(NodeParameters& parameters, const MachineModel& model) {
+  MotionLimits& limits = parameters.motion.limits;
+  if (model.axes) {
+    for (std::size_t i = 0; i < 3; ++i) {
+      if (parameters.travel[i].empty()) {
+        parameters.travel[i] = {model.axes->travel[i][0], model.axes->travel[i][1]};
+      }
+    }
+    if (limits.max_feed == 0.0) {
+      limits.max_feed = model.axes->rapid;
+    }
+  }
+  if (model.spindle && model.spindle->max_speed && limits.max_spindle_speed == 0.0) {
+    limits.max_spindle_speed = *model.spindle->max_speed;
+  }
+}
+
+}  // namespace
+
+void NodeParameters::declare(ParameterTable& table) {
+  table.title("Parameters of cnc_node (package smartmill_cnc): the bridge to the controller over FOCAS.");
+  table.section();
+  controller.declare(table);
+  table.section();
+  table.number("rate", rate, "Hz", Range::closed(1.0, 200.0), "of cnc/state and cnc/load");
+  table.number("reconnect_period", reconnect_period, "s", Range::positive(),
+               "between two attempts to connect");
+  motion.declare(table);
+  table.section(
+      "Limits of every motion, checked before anything is sent. What is empty or 0 here comes from the "
+      "machine model's "
+      "axes and spindle sections; a limit that neither states is refused.");
+  table.text("model", model, "path of a smartmill-model/1 file");
+  table.list("travel_x", travel[0], "m", {}, "lowest and highest machine position, e.g. [-0.25, 0.25]");
+  table.list("travel_y", travel[1], "m", {}, "the same of y");
+  table.list("travel_z", travel[2], "m", {}, "the same of z");
+  motion.limits.declare(table);
+}
+
+void NodeParameters::validate() const {
+  checkBounds(*this);
+  controller.validate();
+}
+
+NodeParameters NodeParameters::completed() const {
+  NodeParameters complete = *this;
+  if (!model.empty()) {
+    fill(complete, readMachineModel(model));
+  }
+  const std::string or_model = " (or a model that has it)";
+  MotionLimits& limits = complete.motion.limits;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const std::vector<double>& ends = complete.travel[i];
+    if (ends.size() != 2) {
+      throw Error(std::string("travel_") + "xyz"[i] + ": lowest and highest position [m] are due" + or_model);
+    }
+    limits.travel[i] = {ends[0], ends[1]};
+  }
+  if (limits.max_feed == 0.0) {
+    throw Error("max_feed: a feed above 0 [m/s] is due" + or_model);
+  }
+  if (limits.max_spindle_speed == 0.0) {
+    throw Error("max_spindle_speed: a speed above 0 [rad/s] is due" + or_model);
+  }
+  complete.motion.validate();
+  return complete;
+}
+
+}  // namespace smartmill::cnc

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "smartmill_cnc/bridge.h"
+#include "smartmill_core/parameters/parameter_table.h"
+
+namespace smartmill::cnc {
+
+/// Parameters of cnc_node.
+struct NodeParameters {
+  FocasParameters controller;
+  double rate = 50.0;
+  double reconnect_period = 1.0;
+  MotionParameters motion;
+  std::string model;
+  std::array<std::vector<double>, 3> travel;
+
+  void declare(ParameterTable& table);
+  /// What holds of the file alone. @throws Error naming key and value.
+  void validate() const;
+  /// What the file leaves to the machine model comes from there. @throws Error naming key and value; also on
+  /// a limit that neither states.
+  NodeParameters completed() const;
+};
+
+}  // namespace smartmill::cnc
