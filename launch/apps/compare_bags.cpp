@@ -13,6 +13,7 @@
 #include <smartmill_msgs/ModalModel.h>
 #include <smartmill_msgs/StabilityChart.h>
 #include "smartmill_core/error.h"
+#include "smartmill_core/names.h"
 #include "smartmill_core/program.h"
 #include "smartmill_launch/comparison/topic_comparison.h"
 #include "smartmill_ros/bag_reader.h"
@@ -128,13 +129,13 @@ std::unique_ptr<Topic> topic(const char* name, double slack) {
 int run(const std::string& first, const std::string& second, double slack, double most_lost) {
   // A result that comes once must be in both; of what flows all the time a recorder may miss the ends.
   std::vector<std::unique_ptr<Topic>> topics;
-  topics.push_back(topic<smartmill_msgs::Frf>("tool/frf", 0.0));
-  topics.push_back(topic<smartmill_msgs::ModalModel>("tool/modes", 0.0));
-  topics.push_back(topic<smartmill_msgs::CuttingCoefficients>("material/coefficients", 0.0));
-  topics.push_back(topic<smartmill_msgs::StabilityChart>("stability/chart", 0.0));
-  topics.push_back(topic<smartmill_msgs::ForceBlock>("force/measured", slack));
-  topics.push_back(topic<smartmill_msgs::ForceBlock>("force/compensated", slack));
-  topics.push_back(topic<smartmill_msgs::ChatterState>("chatter/state", slack));
+  topics.push_back(topic<smartmill_msgs::Frf>(names::TOOL_FRF, 0.0));
+  topics.push_back(topic<smartmill_msgs::ModalModel>(names::TOOL_MODES, 0.0));
+  topics.push_back(topic<smartmill_msgs::CuttingCoefficients>(names::COEFFICIENTS, 0.0));
+  topics.push_back(topic<smartmill_msgs::StabilityChart>(names::STABILITY_CHART, 0.0));
+  topics.push_back(topic<smartmill_msgs::ForceBlock>(names::FORCE_MEASURED, slack));
+  topics.push_back(topic<smartmill_msgs::ForceBlock>(names::FORCE_COMPENSATED, slack));
+  topics.push_back(topic<smartmill_msgs::ChatterState>(names::CHATTER_STATE, slack));
   for (const bool is_first : {true, false}) {
     BagReader bag(is_first ? first : second);
     for (const auto& each : topics) each->attach(bag, is_first);
@@ -145,7 +146,7 @@ int run(const std::string& first, const std::string& second, double slack, doubl
   for (const auto& each : topics) {
     const TopicDifference difference = each->comparison.result();
     std::printf("%s\n", difference.text(each->name).c_str());
-    const bool stream = each->name.rfind("force/", 0) == 0 || each->name == "chatter/state";
+    const bool stream = each->name.rfind("force/", 0) == 0 || each->name == names::CHATTER_STATE;
     same = same && (stream ? difference.sameButFor(most_lost) : difference.same());
     common += difference.common;
   }

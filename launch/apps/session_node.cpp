@@ -3,7 +3,8 @@
 #include <cstdlib>
 #include <exception>
 
-#include "../src/session/session.h"
+#include "session/session.h"
+#include "smartmill_ros/node_main.h"
 
 namespace {
 std::atomic<bool> stop{false};
@@ -13,6 +14,7 @@ void onSignal(int) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  if (smartmill::printsParameters<smartmill::session::SessionParameters>(argc, argv)) return 0;
   // Goals must be cancelled before ROS goes: the session handles Ctrl-C itself.
   ros::init(argc, argv, "session", ros::init_options::NoSigintHandler);
   std::signal(SIGINT, onSignal);

@@ -19,6 +19,8 @@
 #include "../src/session/session_parameters.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/machine_model.h"
+#include "smartmill_core/names.h"
+#include "smartmill_ros/parameter_reader.h"
 
 namespace {
 
@@ -64,19 +66,23 @@ TEST(Pipeline, StreamsFlowAtTheirRates) {
           last[topic] = stamp;
         })));
   };
-  listen("daq/hammer", smartmill_msgs::SampleBlock());
-  listen("daq/dynamometer", smartmill_msgs::SampleBlock());
-  listen("spindle/angle", smartmill_msgs::SpindleAngle());
-  listen("cnc/state", smartmill_msgs::CncState());
-  listen("force/compensated", smartmill_msgs::ForceBlock());
-  ASSERT_TRUE(waitFor([&] { return count["cnc/state"] > 100 && count["force/compensated"] > 200; }, 30.0));
+  listen(smartmill::names::HAMMER, smartmill_msgs::SampleBlock());
+  listen(smartmill::names::DYNAMOMETER, smartmill_msgs::SampleBlock());
+  listen(smartmill::names::SPINDLE_ANGLE, smartmill_msgs::SpindleAngle());
+  listen(smartmill::names::CNC_STATE, smartmill_msgs::CncState());
+  listen(smartmill::names::FORCE_COMPENSATED, smartmill_msgs::ForceBlock());
+  ASSERT_TRUE(waitFor(
+      [&] {
+        return count[smartmill::names::CNC_STATE] > 100 && count[smartmill::names::FORCE_COMPENSATED] > 200;
+      },
+      30.0));
   const auto rate = [&](const char* topic) { return (count[topic] - 1) / (last[topic] - first[topic]); };
   // Blocks of 256 samples at 25600 Hz; stamps come from the sample clock, whatever the machine's load is.
-  EXPECT_NEAR(rate("daq/hammer"), 100.0, 1.0);
-  EXPECT_NEAR(rate("daq/dynamometer"), 100.0, 1.0);
-  EXPECT_NEAR(rate("force/compensated"), 100.0, 1.0);
-  EXPECT_GE(rate("spindle/angle"), 100.0);
-  EXPECT_GE(rate("cnc/state"), 20.0);
+  EXPECT_NEAR(rate(smartmill::names::HAMMER), 100.0, 1.0);
+  EXPECT_NEAR(rate(smartmill::names::DYNAMOMETER), 100.0, 1.0);
+  EXPECT_NEAR(rate(smartmill::names::FORCE_COMPENSATED), 100.0, 1.0);
+  EXPECT_GE(rate(smartmill::names::SPINDLE_ANGLE), 100.0);
+  EXPECT_GE(rate(smartmill::names::CNC_STATE), 20.0);
 }
 
 TEST(Pipeline, FramesHangTogether) {
@@ -92,18 +98,20 @@ TEST(Pipeline, AnUnmadeChartIsSaidSo) {
   smartmill_msgs::PredictStability service;
   service.request.spindle_speed = 1000.0;
   service.request.axial_depth = 1e-3;
-  ASSERT_TRUE(ros::service::waitForService("/smartmill/stability/predict", 10000));
-  ASSERT_TRUE(nh.serviceClient<smartmill_msgs::PredictStability>("stability/predict").call(service));
+  ASSERT_TRUE(
+      ros::service::waitForService(smartmill::names::absolute(smartmill::names::PREDICT_STABILITY), 10000));
+  ASSERT_TRUE(
+      nh.serviceClient<smartmill_msgs::PredictStability>(smartmill::names::PREDICT_STABILITY).call(service));
   EXPECT_EQ(service.response.code, smartmill_msgs::PredictStability::Response::NO_CHART);
 }
 
 TEST(ShippedFiles, SessionParametersAndModelsAreRead) {
   const std::string package = ros::package::getPath("smartmill_launch");
-  smartmill::ParameterReader reader = smartmill::ParameterReader::fromFile(package + "/config/session.yaml");
   smartmill::session::SessionParameters parameters;
   // The model comes from the launch file; everything else stands in the YAML.
   try {
-    parameters = smartmill::session::readParameters(reader);
+    parameters = smartmill::ParameterReader::fromFile(package + "/config/session.yaml")
+                     .readAll<smartmill::session::SessionParameters>();
     FAIL() << "a session without a model was accepted";
   } catch (const smartmill::Error& error) {
     EXPECT_EQ(std::string(error.what()).rfind("model: ", 0), 0u) << error.what();

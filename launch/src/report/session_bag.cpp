@@ -6,6 +6,7 @@
 #include <smartmill_msgs/ChatterState.h>
 #include <smartmill_msgs/StabilityChart.h>
 
+#include "smartmill_core/names.h"
 #include "smartmill_core/signal/steady_path.h"
 #include "smartmill_ros/bag_reader.h"
 #include "smartmill_ros/conversions.h"
@@ -22,32 +23,33 @@ class Gatherer {
   explicit Gatherer(SessionRecording& recording) : recording_(recording) {}
 
   void attach(BagReader& bag) {
-    bag.on<smartmill_msgs::Frf>("tool/frf", [this](const auto& m, double) { keep(recording_.frfs, m); });
-    bag.on<smartmill_msgs::Frf>("sim/truth/frf",
+    bag.on<smartmill_msgs::Frf>(names::TOOL_FRF, [this](const auto& m, double) { keep(recording_.frfs, m); });
+    bag.on<smartmill_msgs::Frf>(names::TRUE_FRF,
                                 [this](const auto& m, double) { keep(recording_.true_frfs, m); });
-    bag.on<smartmill_msgs::ModalModel>("tool/modes",
+    bag.on<smartmill_msgs::ModalModel>(names::TOOL_MODES,
                                        [this](const auto& m, double) { keep(recording_.modes, m); });
-    bag.on<smartmill_msgs::ModalModel>("sim/truth/modes",
+    bag.on<smartmill_msgs::ModalModel>(names::TRUE_MODES,
                                        [this](const auto& m, double) { keep(recording_.true_modes, m); });
     bag.on<smartmill_msgs::CuttingCoefficients>(
-        "material/coefficients", [this](const auto& m, double) { recording_.coefficients = fromMsg(m); });
-    bag.on<smartmill_msgs::CuttingCoefficients>("sim/truth/coefficients", [this](const auto& m, double) {
+        names::COEFFICIENTS, [this](const auto& m, double) { recording_.coefficients = fromMsg(m); });
+    bag.on<smartmill_msgs::CuttingCoefficients>(names::TRUE_COEFFICIENTS, [this](const auto& m, double) {
       recording_.true_coefficients = fromMsg(m);
     });
-    bag.on<smartmill_msgs::StabilityChart>("stability/chart", [this](const auto& m, double) { take(m); });
-    bag.on<smartmill_msgs::CuttingCondition>("cut/condition",
+    bag.on<smartmill_msgs::StabilityChart>(names::STABILITY_CHART,
+                                           [this](const auto& m, double) { take(m); });
+    bag.on<smartmill_msgs::CuttingCondition>(names::CUTTING_CONDITION,
                                              [this](const auto& m, double) { take(fromMsg(m)); });
-    bag.on<smartmill_msgs::CncState>("cnc/state", [this](const auto& m, double) { take(fromMsg(m)); });
-    bag.on<smartmill_msgs::ChatterState>("chatter/state", [this](const auto& m, double) { take(m); });
+    bag.on<smartmill_msgs::CncState>(names::CNC_STATE, [this](const auto& m, double) { take(fromMsg(m)); });
+    bag.on<smartmill_msgs::ChatterState>(names::CHATTER_STATE, [this](const auto& m, double) { take(m); });
     const auto force = [&](const char* topic, ForceTrack RecordedCut::*track) {
       bag.on<smartmill_msgs::ForceBlock>(topic, [this, track](const auto& m, double) {
         RecordedCut* cut = cutAt(m.header.stamp.toSec());
         if (cut) (cut->*track).add(fromMsg(m));
       });
     };
-    force("force/measured", &RecordedCut::raw);
-    force("force/compensated", &RecordedCut::compensated);
-    force("sim/truth/force", &RecordedCut::truth);
+    force(names::FORCE_MEASURED, &RecordedCut::raw);
+    force(names::FORCE_COMPENSATED, &RecordedCut::compensated);
+    force(names::TRUE_FORCE, &RecordedCut::truth);
   }
 
  private:

@@ -12,8 +12,10 @@
 #include <boost/function.hpp>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/names.h"
 #include "smartmill_core/units.h"
 #include "smartmill_ros/conversions.h"
+#include "smartmill_ros/parameter_reader.h"
 
 namespace smartmill::session {
 namespace {
@@ -66,17 +68,14 @@ std::string pointText(const Point& point) {
 Session::Session(ros::NodeHandle nh, const ros::NodeHandle& private_nh, const std::atomic<bool>& stop)
     : nh_(std::move(nh)),
       stop_(stop),
-      parameters_([&] {
-        ParameterReader reader = ParameterReader::fromServer(private_nh);
-        return readParameters(reader);
-      }()),
+      parameters_(ParameterReader::fromServer(private_nh).readAll<SessionParameters>()),
       model_(readMachineModel(parameters_.model)),
       plan_(model_, parameters_.plan),
       begin_(ros::WallTime::now()),
-      tool_frf_(nh_, "hammer/measure_frf", false),
-      sensor_frf_(nh_, "kalman/measure_frf", false),
-      identify_(nh_, "loadmeter/identify_coefficients", false),
-      program_(nh_, "cnc/run_program", false) {
+      tool_frf_(nh_, names::MEASURE_TOOL_FRF, false),
+      sensor_frf_(nh_, names::MEASURE_SENSOR_FRF, false),
+      identify_(nh_, names::IDENTIFY_COEFFICIENTS, false),
+      program_(nh_, names::RUN_PROGRAM, false) {
   summary_.tool = parameters_.plan.tool;
   summary_.material = plan_.material();
   const auto subscribe = [this](const char* topic, auto example, auto use) {
@@ -89,18 +88,18 @@ Session::Session(ros::NodeHandle nh, const ros::NodeHandle& private_nh, const st
     heard_[topic] = ros::WallTime(0);
     subscribers_.push_back(nh_.subscribe<Message>(topic, 200, callback));
   };
-  subscribe("cnc/state", smartmill_msgs::CncState(), [this](const auto& m) { state_ = m; });
-  subscribe("daq/hammer", smartmill_msgs::SampleBlock(), [](const auto&) {});
-  subscribe("daq/dynamometer", smartmill_msgs::SampleBlock(), [](const auto&) {});
-  subscribe("spindle/angle", smartmill_msgs::SpindleAngle(), [](const auto&) {});
+  subscribe(names::CNC_STATE, smartmill_msgs::CncState(), [this](const auto& m) { state_ = m; });
+  subscribe(names::HAMMER, smartmill_msgs::SampleBlock(), [](const auto&) {});
+  subscribe(names::DYNAMOMETER, smartmill_msgs::SampleBlock(), [](const auto&) {});
+  subscribe(names::SPINDLE_ANGLE, smartmill_msgs::SpindleAngle(), [](const auto&) {});
   subscribers_.push_back(nh_.subscribe<smartmill_msgs::StabilityChart>(
-      "stability/chart", 10,
+      names::STABILITY_CHART, 10,
       boost::function<void(const smartmill_msgs::StabilityChart&)>([this](const auto& m) {
         const std::lock_guard<std::mutex> lock(mutex_);
         chart_ = m;
       })));
   subscribers_.push_back(nh_.subscribe<smartmill_msgs::ChatterState>(
-      "chatter/state", 1000,
+      names::CHATTER_STATE, 1000,
       boost::function<void(const smartmill_msgs::ChatterState&)>([this](const auto& m) {
         if (!m.valid) return;
         const std::lock_guard<std::mutex> lock(mutex_);
@@ -145,13 +144,13 @@ void Session::job() {
   step("arm motion", [&] { return arm(true, SERVICE_WAIT); });
   for (char direction : parameters_.tool_directions) {
     step(std::string("FRF of the tool in ") + direction, [&] {
-      return measure(tool_frf_, "hammer/measure_frf", POINT_TOOL_TIP, {direction}, parameters_.hits,
+      return measure(tool_frf_, names::MEASURE_TOOL_FRF, POINT_TOOL_TIP, {direction}, parameters_.hits,
                      parameters_.modes);
     });
   }
   for (char direction : parameters_.sensor_directions) {
     step(std::string("taps on the force sensor in ") + direction, [&] {
-      return measure(sensor_frf_, "kalman/measure_frf", POINT_FORCE_SENSOR, {direction},
+      return measure(sensor_frf_, names::MEASURE_SENSOR_FRF, POINT_FORCE_SENSOR, {direction},
                      parameters_.sensor_hits, parameters_.sensor_modes);
     });
   }
@@ -274,10 +273,10 @@ std::string Session::missing() const {
   const auto server = [&](bool there, const char* name) {
     if (!there) add(std::string("action ") + name);
   };
-  server(program_.isServerConnected(), "cnc/run_program");
-  server(tool_frf_.isServerConnected(), "hammer/measure_frf");
-  server(sensor_frf_.isServerConnected(), "kalman/measure_frf");
-  server(identify_.isServerConnected(), "loadmeter/identify_coefficients");
+  server(program_.isServerConnected(), names::RUN_PROGRAM);
+  server(tool_frf_.isServerConnected(), names::MEASURE_TOOL_FRF);
+  server(sensor_frf_.isServerConnected(), names::MEASURE_SENSOR_FRF);
+  server(identify_.isServerConnected(), names::IDENTIFY_COEFFICIENTS);
   const std::lock_guard<std::mutex> lock(mutex_);
   for (const auto& [topic, time] : heard_) {
     if ((ros::WallTime::now() - time).toSec() > FRESH) add("data on " + topic);
@@ -300,7 +299,7 @@ std::string Session::waitReady() {
 std::string Session::arm(bool on, double timeout) {
   smartmill_msgs::ArmMotion service;
   service.request.arm = on;
-  if (!ask("cnc/arm_motion", service, timeout)) throw Error("cnc/arm_motion: no answer");
+  if (!ask(names::ARM_MOTION, service, timeout)) throw Error("cnc/arm_motion: no answer");
   if (service.response.code != smartmill_msgs::ArmMotion::Response::OK) throw Error(service.response.message);
   armed_ = on;
   return service.response.message;
@@ -356,7 +355,7 @@ void Session::runProgram(const std::string& name, const std::string& program,
   goal.name = name;
   goal.program = program;
   if (condition) goal.condition = toMsg(*condition);
-  call(program_, "cnc/run_program", goal, timeout);
+  call(program_, names::RUN_PROGRAM, goal, timeout);
 }
 
 std::string Session::identify(bool reset) {
@@ -364,7 +363,7 @@ std::string Session::identify(bool reset) {
   goal.tool = parameters_.plan.tool;
   goal.material = plan_.material();
   goal.reset = reset;
-  const auto result = call(identify_, "loadmeter/identify_coefficients", goal, parameters_.identify_timeout);
+  const auto result = call(identify_, names::IDENTIFY_COEFFICIENTS, goal, parameters_.identify_timeout);
   if (!reset) {
     coefficients_stamp_ = result.coefficients.header.stamp;
     summary_.coefficients = {fromMsg(result.coefficients)};

@@ -30,41 +30,7 @@ double wholeRpm(double speed) {
   return std::round(units::rpmFromRadPerSec(speed));
 }
 
-void positive(const char* key, double value) {
-  if (!(value > 0.0) || !std::isfinite(value))
-    throw Error(std::string(key) + ": " + shown(value, 6) + " is not above 0");
-}
-
 }  // namespace
-
-void PlanParameters::validate() const {
-  if (tool.empty()) throw Error("tool: a name is due");
-  if (air_speeds.size() < 4) {
-    throw Error("air_speeds: " + std::to_string(air_speeds.size()) + " speeds, 4 or more are due");
-  }
-  if (slot_feeds.size() < 3) {
-    throw Error("slot_feeds: " + std::to_string(slot_feeds.size()) + " feeds, 3 or more are due");
-  }
-  for (double speed : air_speeds) positive("air_speeds", speed);
-  for (double feed : slot_feeds) positive("slot_feeds", feed);
-  if (!(resonance_speed >= 0.0)) throw Error("resonance_speed: " + shown(resonance_speed) + " is below 0");
-  positive("air_time", air_time);
-  positive("slot_speed", slot_speed);
-  positive("slot_depth", slot_depth);
-  positive("slot_time", slot_time);
-  positive("least_slot_time", least_slot_time);
-  positive("stable_time", stable_time);
-  positive("unstable_time", unstable_time);
-  positive("least_revolutions", least_revolutions);
-  positive("resonance_depth", resonance_depth);
-  positive("resonance_feed", resonance_feed);
-  positive("resonance_time", resonance_time);
-  positive("lane_margin", lane_margin);
-  positive("clearance", clearance);
-  positive("safe_height", safe_height);
-  positive("plunge_feed", plunge_feed);
-  positive("spin_up_time", spin_up_time);
-}
 
 double PlannedCut::duration() const {
   return spin_up + dwell + (feed > 0.0 ? (to[0] - from[0]) / feed : 0.0);

@@ -8,6 +8,7 @@
 #include <smartmill_msgs/ChatterState.h>
 #include <smartmill_msgs/StabilityChart.h>
 
+#include "smartmill_core/names.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_core/units.h"
 #include "smartmill_ros/conversions.h"
@@ -61,39 +62,40 @@ class SessionBag : public ::testing::Test {
       bag.write("/smartmill/" + topic, ros::Time(time), message);
     };
     using Kind = CuttingCondition::Kind;
-    put("cut/condition", 10.0, toMsg(condition(10.0, Kind::cut, "resonance")));
-    put("cut/condition", 10.01, toMsg(condition(10.0, Kind::cut, "resonance")));  // latched, said again
-    put("cnc/state", 10.2, toMsg(state(10.2, -0.05, SPEED)));                     // not there yet
-    put("cnc/state", 10.4, toMsg(state(10.4, 0.01, 0.9 * SPEED)));                // not at speed yet
-    put("cnc/state", 10.6, toMsg(state(10.6, 0.02, SPEED)));
-    put("cnc/state", 11.4, toMsg(state(11.4, 0.09, SPEED)));
-    put("cnc/state", 11.6, toMsg(state(11.6, 0.12, SPEED)));  // past its end
-    put("force/compensated", 10.91, toMsg(force(10.9, 2560, 1.0), "machine"));
-    put("sim/truth/force", 10.91, toMsg(force(10.9, 2560, 2.0), "machine"));
+    put(names::CUTTING_CONDITION, 10.0, toMsg(condition(10.0, Kind::cut, "resonance")));
+    put(names::CUTTING_CONDITION, 10.01,
+        toMsg(condition(10.0, Kind::cut, "resonance")));                 // latched, said again
+    put(names::CNC_STATE, 10.2, toMsg(state(10.2, -0.05, SPEED)));       // not there yet
+    put(names::CNC_STATE, 10.4, toMsg(state(10.4, 0.01, 0.9 * SPEED)));  // not at speed yet
+    put(names::CNC_STATE, 10.6, toMsg(state(10.6, 0.02, SPEED)));
+    put(names::CNC_STATE, 11.4, toMsg(state(11.4, 0.09, SPEED)));
+    put(names::CNC_STATE, 11.6, toMsg(state(11.6, 0.12, SPEED)));  // past its end
+    put(names::FORCE_COMPENSATED, 10.91, toMsg(force(10.9, 2560, 1.0), "machine"));
+    put(names::TRUE_FORCE, 10.91, toMsg(force(10.9, 2560, 2.0), "machine"));
     smartmill_msgs::ChatterState window;
     window.condition = "resonance";
     window.valid = 1;
     window.chatter = 1;
     window.frequency = 900.0;
-    put("chatter/state", 11.0, window);
+    put(names::CHATTER_STATE, 11.0, window);
     window.valid = 0;
-    put("chatter/state", 11.1, window);
-    put("cut/condition", 12.0, toMsg(condition(12.0, Kind::none)));
+    put(names::CHATTER_STATE, 11.1, window);
+    put(names::CUTTING_CONDITION, 12.0, toMsg(condition(12.0, Kind::none)));
     // What the filter has held back arrives after the cut's end and belongs to it; what comes after does not.
-    put("force/compensated", 12.05, toMsg(force(11.99, 30464, 1.0), "machine"));
-    put("force/compensated", 12.06, toMsg(force(12.0, 30720, 1.0), "machine"));
+    put(names::FORCE_COMPENSATED, 12.05, toMsg(force(11.99, 30464, 1.0), "machine"));
+    put(names::FORCE_COMPENSATED, 12.06, toMsg(force(12.0, 30720, 1.0), "machine"));
     CoefficientSet set;
     set.stamp = 12.0;
     set.value = set.std_dev = NOT_IDENTIFIED;
     set.value.ktc = 8e8;
-    put("material/coefficients", 12.1, toMsg(set));
+    put(names::COEFFICIENTS, 12.1, toMsg(set));
     set.value.ktc = 8.1e8;
-    put("sim/truth/coefficients", 12.1, toMsg(set));
+    put(names::TRUE_COEFFICIENTS, 12.1, toMsg(set));
     smartmill_msgs::StabilityChart chart;
     chart.spindle_speed = {900.0, 1100.0};
     chart.depth_limit = {1e-3, 2e-3};
     chart.absolute_depth_limit = 1e-3;
-    put("stability/chart", 12.2, chart);
+    put(names::STABILITY_CHART, 12.2, chart);
     bag.close();
   }
 

@@ -7,39 +7,39 @@
 #include <vector>
 
 #include "smartmill_core/model/machine_model.h"
+#include "smartmill_core/parameters/parameter_table.h"
 #include "smartmill_core/signal/streams.h"
 
 namespace smartmill::session {
 
-/// What the job is made of; see config/session.yaml.
+/// What the job is made of.
 struct PlanParameters {
-  std::string tool = "end_mill";  ///< name under which everything about the tool is filed
-  std::string material;           ///< empty: the workpiece's
+  std::string tool = "end_mill";
+  std::string material;
 
-  std::vector<double> air_speeds{314.2, 628.3, 942.5, 1256.6};  ///< [rad/s] > 0, 4 or more
-  double air_time = 1.5;                                        ///< [s] > 0 at speed, of each air cut
+  std::vector<double> air_speeds{314.2, 628.3, 942.5, 1256.6};
+  double air_time = 1.5;
 
-  double slot_speed = 418.9;                                       ///< [rad/s] > 0
-  double slot_depth = 1.0e-3;                                      ///< [m] > 0
-  std::vector<double> slot_feeds{5.0e-5, 1.0e-4, 1.5e-4, 2.0e-4};  ///< [m] a tooth, > 0, 3 or more
-  double slot_time = 2.0;        ///< [s] > 0, longest steady stretch of a slot
-  double least_slot_time = 0.8;  ///< [s] > 0, shortest; the load meter's settling takes 0.2 s of it
+  double slot_speed = 418.9;
+  double slot_depth = 1.0e-3;
+  std::vector<double> slot_feeds{5.0e-5, 1.0e-4, 1.5e-4, 2.0e-4};
+  double slot_time = 2.0, least_slot_time = 0.8;
 
-  double stable_time = 1.0;         ///< [s] > 0, steady stretch of the cut at the recommended point
-  double unstable_time = 0.5;       ///< [s] > 0, of the cut at the unstable point
-  double least_revolutions = 50.0;  ///< [1] of the spindle in a steady stretch that is judged, > 0
+  double stable_time = 1.0, unstable_time = 0.5;
+  double least_revolutions = 50.0;
 
-  double resonance_speed = 1460.8;  ///< [rad/s] of the cut `resonance`; 0: none
-  double resonance_depth = 0.5e-3;  ///< [m] > 0
-  double resonance_feed = 5.0e-5;   ///< [m] a tooth, > 0
-  double resonance_time = 0.8;      ///< [s] > 0
+  double resonance_speed = 1460.84;
+  double resonance_depth = 1.0e-3;
+  double resonance_feed = 1.0e-4;
+  double resonance_time = 0.8;
 
-  double lane_margin = 2.0e-3;   ///< [m] > 0 of stock between two slots
-  double clearance = 2.0e-3;     ///< [m] > 0 between tool and stock when it goes down
-  double safe_height = 10.0e-3;  ///< [m] > 0 above the stock: sideways motion is safe there
-  double plunge_feed = 20.0e-3;  ///< [m/s] > 0
-  double spin_up_time = 3.0;     ///< [s] > 0 to any speed, where the model has no spindle acceleration
+  double lane_margin = 2.0e-3;
+  double clearance = 2.0e-3;
+  double safe_height = 10.0e-3;
+  double plunge_feed = 20.0e-3;
+  double spin_up_time = 3.0;
 
+  void declare(ParameterTable& table);
   /// @throws Error naming key and value.
   void validate() const;
 };

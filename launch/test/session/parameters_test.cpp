@@ -1,0 +1,13 @@
+#include "session/session_parameters.h"
+
+#include "smartmill_ros/testing/shipped_parameters.h"
+
+namespace smartmill::session {
+namespace {
+
+TEST(Parameters, TheShippedFileIsTheTable) {
+  expectShipped<SessionParameters>("config/session.yaml", "smartmill_launch session_node");
+}
+
+}  // namespace
+}  // namespace smartmill::session
