@@ -7,6 +7,7 @@
 #include <rosbag/bag.h>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/names.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_ros/bag_reader.h"
 #include "smartmill_ros/conversions.h"
@@ -143,18 +144,18 @@ TEST_F(Files, bagsAreReadInOrderAndDamagedOnesRefused) {
     for (int i = 0; i < 200; ++i) {
       smartmill_msgs::SampleBlock m = toMsg(block());
       m.first_index = static_cast<std::uint64_t>(i);
-      bag.write("/smartmill/daq/dynamometer", ros::Time(100.0 + i), m);
+      bag.write(names::absolute(names::DYNAMOMETER), ros::Time(100.0 + i), m);
     }
   }
   BagReader reader(path);
   std::vector<std::uint64_t> seen;
-  reader.on<smartmill_msgs::SampleBlock>("daq/dynamometer", [&](const smartmill_msgs::SampleBlock& m,
-                                                                double) { seen.push_back(m.first_index); });
+  reader.on<smartmill_msgs::SampleBlock>(names::DYNAMOMETER, [&](const smartmill_msgs::SampleBlock& m,
+                                                                 double) { seen.push_back(m.first_index); });
   reader.run();
   ASSERT_EQ(seen.size(), 200u);
   EXPECT_EQ(seen.back(), 199u);
-  EXPECT_TRUE(reader.has("daq/dynamometer"));
-  EXPECT_FALSE(reader.has("daq/hammer"));
+  EXPECT_TRUE(reader.has(names::DYNAMOMETER));
+  EXPECT_FALSE(reader.has(names::HAMMER));
   EXPECT_NEAR(reader.duration(), 199.0, 1e-9);
 
   std::filesystem::resize_file(path, std::filesystem::file_size(path) / 2);
