@@ -7,6 +7,9 @@ include(GNUInstallDirs)
 # that says so.
 set(SMARTMILL_TEST_OPTIONS $<$<CONFIG:Release>:-O1> -D_GLIBCXX_ASSERTIONS)
 
+# Nor need a program's: it reads options and turns messages, the thinking is in the libraries.
+set(SMARTMILL_PROGRAM_OPTIONS $<$<CONFIG:Release>:-O1>)
+
 # smartmill_compile_options(TARGET): C++17, the project's warnings, headers in include/ and (private ones) in src/.
 function(smartmill_compile_options target)
   target_compile_features(${target} PUBLIC cxx_std_17)
@@ -46,6 +49,7 @@ function(smartmill_executable name)
   add_executable(${arg_TARGET} ${arg_SOURCES})
   set_target_properties(${arg_TARGET} PROPERTIES OUTPUT_NAME ${name})
   smartmill_compile_options(${arg_TARGET})
+  target_compile_options(${arg_TARGET} PRIVATE ${SMARTMILL_PROGRAM_OPTIONS})
   target_link_libraries(${arg_TARGET} ${catkin_LIBRARIES} ${arg_LIBRARIES})
   install(TARGETS ${arg_TARGET} RUNTIME DESTINATION ${CATKIN_PACKAGE_BIN_DESTINATION})
 endfunction()
