@@ -20,7 +20,8 @@ namespace {
 // Neither a machine nor an integrator follows the model more closely: what the records disagree by below this
 // share of their voltage widens the standard deviations but is no reason to look for a cause.
 constexpr double MODEL_SHARE = 2e-4;
-// chi2 of n degrees of freedom has mean n and variance 2 n: beyond this many deviations with a probability of 1 %.
+// chi2 of n degrees of freedom has mean n and variance 2 n: beyond this many deviations with a probability of
+// 1 %.
 constexpr double UNLIKELY = 2.7;
 // [1] standard deviation of the ripple's variance as the model has it: samples on many phases, on a few.
 constexpr double RIPPLE_SHARE = 0.1, SPARSE_RIPPLE_SHARE = 0.3;

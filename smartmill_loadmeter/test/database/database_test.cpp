@@ -253,8 +253,8 @@ TEST(Database, hundredThousandRecordsAreLookedUpInUnderFiveMilliseconds) {
   EXPECT_LT(times[30], 5e-3);
 }
 
-// The full minute is loadmeter_database crash. Writers tell through a pipe what add() has acknowledged; one after
-// the other is killed and started anew.
+// The full minute is loadmeter_database crash. Writers tell through a pipe what add() has acknowledged; one
+// after the other is killed and started anew.
 TEST(Database, whatWasAcknowledgedSurvivesKilledWriters) {
   const TemporaryFolder folder;
   const std::string file = folder.file("shared.sqlite");

@@ -59,8 +59,8 @@ TEST(LoadMeterIdentification, findsTheTruthWithHonestStandardDeviations) {
   EXPECT_TRUE(kte.honest());
 }
 
-// Readings are taken every 20 ms without the spindle's angle: they meet three phases of a revolution at 4000 rpm, many at
-// 4100. Small feeds lose edge to the runout, so that coefficients by means alone carry its bias.
+// Readings are taken every 20 ms without the spindle's angle: they meet three phases of a revolution at 4000
+// rpm, many at 4100. Small feeds lose edge to the runout, so that coefficients by means alone carry its bias.
 TEST(LoadMeterIdentification, runoutIsToldFromMeansAndRippleOfTheReadings) {
   int inside = 0, runs = 0;
   double worst_beside = 0.0;

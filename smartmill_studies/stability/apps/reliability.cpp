@@ -54,7 +54,8 @@ void run(const Request& request) {
   stability::drawBeside(
       request.out,
       "set xlabel 'Predicted probability of chatter'\nset ylabel 'Observed share'\nset xrange [0:1]\nset "
-      "yrange [0:1]\nset size square\nplot x with lines dt 2 lc 'gray' title 'as predicted', %FILE skip 1 using "
+      "yrange [0:1]\nset size square\nplot x with lines dt 2 lc 'gray' title 'as predicted', %FILE skip 1 "
+      "using "
       "1:2:3:4 with yerrorbars pt 7 lw 2 title 'observed, 95 % of the binomial'");
 }
 

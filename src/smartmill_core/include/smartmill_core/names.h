@@ -4,7 +4,8 @@
 
 namespace smartmill::names {
 
-// Topics, services and actions, relative to the namespace /smartmill; nodes, tools and tests say them by these.
+// Topics, services and actions, relative to the namespace /smartmill; nodes, tools and tests say them by
+// these.
 constexpr const char* NAMESPACE = "/smartmill";
 
 constexpr const char* HAMMER = "daq/hammer";

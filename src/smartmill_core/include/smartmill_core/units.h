@@ -8,10 +8,18 @@ namespace units {
 constexpr double PI = 3.14159265358979323846;
 constexpr double TWO_PI = 2.0 * PI;
 
-constexpr double radPerSecFromRpm(double rpm) { return rpm * TWO_PI / 60.0; }
-constexpr double rpmFromRadPerSec(double speed) { return speed * 60.0 / TWO_PI; }
-constexpr double radFromDeg(double deg) { return deg * PI / 180.0; }
-constexpr double degFromRad(double rad) { return rad * 180.0 / PI; }
+constexpr double radPerSecFromRpm(double rpm) {
+  return rpm * TWO_PI / 60.0;
+}
+constexpr double rpmFromRadPerSec(double speed) {
+  return speed * 60.0 / TWO_PI;
+}
+constexpr double radFromDeg(double deg) {
+  return deg * PI / 180.0;
+}
+constexpr double degFromRad(double rad) {
+  return rad * 180.0 / PI;
+}
 
 constexpr double MM = 1e-3;               // [m]
 constexpr double UM = 1e-6;               // [m]

@@ -8,10 +8,10 @@
 
 namespace smartmill {
 
-/// One measured record: named columns over time. Column names as in formats.md without the unit; values as in the file
-/// (tool_x, tool_y in um there become m here).
+/// One measured record: named columns over time. Column names as in formats.md without the unit; values as in
+/// the file (tool_x, tool_y in um there become m here).
 struct Record {
-  std::vector<std::string> names;            ///< without time; e.g. spindle_angle fx fy fz load_meter hammer tool_x
+  std::vector<std::string> names;  ///< without time; e.g. spindle_angle fx fy fz load_meter hammer tool_x
   std::vector<std::vector<double>> columns;  ///< SI; columns[c][i]
   std::vector<double> time;                  ///< [s]
 
@@ -24,10 +24,13 @@ struct Record {
   std::vector<std::string> notes;  ///< what was left unread, one line each
 };
 
-/// Reads a test's record in the campaign's folder, smartmill CSV or Kistler DynoWare export. Columns in any order.
-/// @throws Error naming file, line and column: missing column, wrong unit, NaN or text for a number, uneven time, no samples.
+/// Reads a test's record in the campaign's folder, smartmill CSV or Kistler DynoWare export. Columns in any
+/// order.
+/// @throws Error naming file, line and column: missing column, wrong unit, NaN or text for a number, uneven
+/// time, no samples.
 Record readRecord(const Campaign& campaign, const CampaignTest& test);
-/// The same, with the forces turned to those on the tool where the model says that its sensor shows the reaction.
+/// The same, with the forces turned to those on the tool where the model says that its sensor shows the
+/// reaction.
 Record readRecord(const Campaign& campaign, const CampaignTest& test, const MachineModel& model);
 Record readCsv(const std::string& file);
 Record readDynoware(const std::string& file, const std::map<std::string, std::string>& channels);

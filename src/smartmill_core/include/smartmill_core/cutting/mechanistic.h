@@ -15,12 +15,13 @@ struct CuttingForce {
 /// Direction of the elementary forces (formats.md): Fx = -Ft cos - Fr sin, Fy = +Ft sin - Fr cos, Fz = +Fa.
 CuttingForce toolForce(double ft, double fr, double fa, double immersion_angle, double radius);
 
-/// Force of a rigid tool without runout at a spindle angle: chip thickness c sin(phi), integrated along the helix in closed form
-/// between the exact entry and exit of each tooth (Dunwoody eq. 3.13..3.15, 5.64..5.67).
+/// Force of a rigid tool without runout at a spindle angle: chip thickness c sin(phi), integrated along the
+/// helix in closed form between the exact entry and exit of each tooth (Dunwoody eq. 3.13..3.15, 5.64..5.67).
 class MechanisticForce {
  public:
   /// @throws Error on an impossible tool, engagement or coefficient, naming it.
-  MechanisticForce(const ToolGeometry& tool, const CuttingCoefficients& coefficients, const Engagement& engagement);
+  MechanisticForce(const ToolGeometry& tool, const CuttingCoefficients& coefficients,
+                   const Engagement& engagement);
 
   /// @param spindle_angle [rad] immersion angle of tooth 1 at its tip.
   CuttingForce at(double spindle_angle) const;

@@ -27,13 +27,15 @@ struct MeanTorqueTest {
 struct IdentifiedCoefficients {
   CuttingCoefficients value;
   CuttingCoefficients std_dev;
-  Eigen::MatrixXd covariance;  ///< 6x6 in the order ktc, krc, kac, kte, kre, kae; NaN rows where not identified
+  Eigen::MatrixXd
+      covariance;  ///< 6x6 in the order ktc, krc, kac, kte, kre, kae; NaN rows where not identified
   int tests = 0;
   double r_squared_x = 0.0, r_squared_y = 0.0, r_squared_z = 0.0;  ///< [1] of the mean forces; NaN for torque
 };
 
 /// Mean-force regression over tests of at least two feeds (all three forces together).
-/// Unweighted when every std is zero: then the standard deviations come from the residuals of each axis' share.
+/// Unweighted when every std is zero: then the standard deviations come from the residuals of each axis'
+/// share.
 /// @throws Error with too few feeds or a rank-deficient plan, naming what is missing.
 IdentifiedCoefficients identifyFromForces(const std::vector<MeanForceTest>& tests);
 

@@ -20,8 +20,8 @@ struct ToolGeometry {
   double lag() const;
 };
 
-/// Radial and axial engagement and feed of a cut. Angles are immersion angles, clockwise from +y; x is the feed direction;
-/// up-milling starts at 0, down-milling ends at pi.
+/// Radial and axial engagement and feed of a cut. Angles are immersion angles, clockwise from +y; x is the
+/// feed direction; up-milling starts at 0, down-milling ends at pi.
 struct Engagement {
   double entry = 0.0;           ///< [rad]
   double exit = 0.0;            ///< [rad] > entry

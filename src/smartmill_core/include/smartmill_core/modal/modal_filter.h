@@ -11,14 +11,16 @@ namespace smartmill {
 enum class Hold { zero_order, first_order };
 
 /// Response of a ModalModel to a sampled input, exact for inputs that are constant (zero order) or linear
-/// (first order) between samples: closed matrix exponential of each 2x2 mode, started at rest. No allocation in step().
+/// (first order) between samples: closed matrix exponential of each 2x2 mode, started at rest. No allocation
+/// in step().
 class ModalFilter {
  public:
   /// @param sample_rate [Hz] > 0. @throws Error on a mode with frequency <= 0 or damping outside (0, 1).
   ModalFilter(const ModalModel& model, double sample_rate, Hold hold);
 
-  /// Output [unit x unit of input] at this sample. First order: the input runs linearly from the last sample's to this one's.
-  /// Zero order: the output at this sample knows the inputs of the samples before (the direct share also this one's).
+  /// Output [unit x unit of input] at this sample. First order: the input runs linearly from the last
+  /// sample's to this one's. Zero order: the output at this sample knows the inputs of the samples before
+  /// (the direct share also this one's).
   double step(double input);
 
   /// step() with an input that came linearly to before and jumps now: output with the new input.

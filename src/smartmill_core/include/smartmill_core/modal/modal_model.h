@@ -18,8 +18,8 @@ struct Mode {
   std::complex<double> response(double f) const;  ///< [unit of the model] at f [Hz]
 };
 
-/// Sum of modes and a direct share: H(f) = direct + sum of Mode::response (Dunwoody eq. 5.5 with K_k / w_k^2 = gain).
-/// Unit m/N (receptance of a tool tip) or 1 (force sensor: measured over applied force).
+/// Sum of modes and a direct share: H(f) = direct + sum of Mode::response (Dunwoody eq. 5.5 with K_k / w_k^2
+/// = gain). Unit m/N (receptance of a tool tip) or 1 (force sensor: measured over applied force).
 struct ModalModel {
   std::vector<Mode> modes;
   double direct = 0.0;  ///< [unit] responds without dynamics

@@ -24,13 +24,15 @@ struct FrequencyResponse {
 };
 
 /// Averages hits into H1, H2, coherence (Dunwoody eq. 4.20..4.27, 4.40).
-/// Standard deviation of H1 from the scatter over hits: |H|^2 (1 - C) / (C (M - 1)), for one hit from the noise given.
+/// Standard deviation of H1 from the scatter over hits: |H|^2 (1 - C) / (C (M - 1)), for one hit from the
+/// noise given.
 class FrfEstimator {
  public:
   /// @param sample_rate [Hz] @param samples a hit
   FrfEstimator(double sample_rate, std::size_t samples);
 
-  /// Adds one hit. @param force [N], response [unit]: samples each, already windowed. @throws Error on wrong length or NaN.
+  /// Adds one hit. @param force [N], response [unit]: samples each, already windowed. @throws Error on wrong
+  /// length or NaN.
   void add(const std::vector<double>& force, const std::vector<double>& response);
 
   int hits() const { return hits_; }

@@ -15,7 +15,8 @@ double median(std::vector<double> values);
 double percentile(std::vector<double> values, double share);
 /// First index of a value that is NaN or infinite; values.size() when all are finite.
 std::size_t firstNotFinite(const std::vector<double>& values);
-/// Longest run of equal extreme values; a run of three or more at the extreme of a noisy record means clipping.
+/// Longest run of equal extreme values; a run of three or more at the extreme of a noisy record means
+/// clipping.
 std::size_t longestRunAtExtreme(const std::vector<double>& values);
 
 }  // namespace smartmill

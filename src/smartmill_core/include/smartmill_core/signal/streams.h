@@ -39,7 +39,16 @@ struct SpindleAngle {
 };
 
 /// Controller mode and state as FOCAS numbers them (statinfo aut, run).
-enum class CncMode : std::uint8_t { mdi = 0, mem = 1, edit = 3, handle = 4, jog = 5, inc = 8, reference = 9, dnc = 10 };
+enum class CncMode : std::uint8_t {
+  mdi = 0,
+  mem = 1,
+  edit = 3,
+  handle = 4,
+  jog = 5,
+  inc = 8,
+  reference = 9,
+  dnc = 10
+};
 enum class CncRun : std::uint8_t { reset = 0, stop = 1, hold = 2, start = 3 };
 
 struct CncState {
@@ -54,11 +63,11 @@ struct CncState {
   std::string alarm_text;
   int program = 0;
   int sequence = 0;
-  std::vector<std::string> axes;        ///< names, order of the fields below
-  std::vector<double> position;         ///< [m] machine
-  std::vector<double> distance_to_go;   ///< [m]
-  double spindle_speed = 0.0;           ///< [rad/s]
-  double feed = 0.0;                    ///< [m/s]
+  std::vector<std::string> axes;       ///< names, order of the fields below
+  std::vector<double> position;        ///< [m] machine
+  std::vector<double> distance_to_go;  ///< [m]
+  double spindle_speed = 0.0;          ///< [rad/s]
+  double feed = 0.0;                   ///< [m/s]
 };
 
 struct LoadSample {
@@ -77,7 +86,7 @@ struct CuttingCondition {
   std::string name;
   std::string material;
   std::string tool_name;
-  ToolGeometry tool;                             ///< even pitch
+  ToolGeometry tool;  ///< even pitch
   Engagement engagement;
   double spindle_speed = 0.0;                    ///< [rad/s] commanded
   std::array<double, 3> steady_from{{0, 0, 0}};  ///< [m] tool centre in the machine frame; from here
@@ -87,9 +96,9 @@ struct CuttingCondition {
 /// One block of force on the tool.
 struct ForceBlock {
   enum class Status : std::uint8_t { measured = 0, compensated = 1, passed_through = 2, settling = 3 };
-  double stamp = 0.0;             ///< [s] of the first sample
-  double sample_rate = 0.0;       ///< [Hz]
-  std::uint64_t first_index = 0;  ///< the sensor's running index
+  double stamp = 0.0;                        ///< [s] of the first sample
+  double sample_rate = 0.0;                  ///< [Hz]
+  std::uint64_t first_index = 0;             ///< the sensor's running index
   std::array<std::vector<double>, 3> force;  ///< [N] x, y, z
   Status status = Status::measured;
 };

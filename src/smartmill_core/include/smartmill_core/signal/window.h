@@ -8,8 +8,8 @@ namespace smartmill {
 /// Hann window of n samples (periodic form).
 std::vector<double> hannWindow(std::size_t n);
 
-/// Force window of Dunwoody eq. 4.17..4.19: one where the hammer touches, cosine tapers beside, zero elsewhere.
-/// Shoulders from the 10 % points around the largest force. Same length as force [N].
+/// Force window of Dunwoody eq. 4.17..4.19: one where the hammer touches, cosine tapers beside, zero
+/// elsewhere. Shoulders from the 10 % points around the largest force. Same length as force [N].
 /// @throws Error when there is no positive peak.
 std::vector<double> impactWindow(const std::vector<double>& force);
 

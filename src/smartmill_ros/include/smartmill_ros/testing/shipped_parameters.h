@@ -10,8 +10,8 @@
 
 namespace smartmill {
 
-/// The shipped file of a node is what the table of its parameters says, to the letter, and is read back without a
-/// fault. @param file seen from the folder of the package, in which tests run
+/// The shipped file of a node is what the table of its parameters says, to the letter, and is read back
+/// without a fault. @param file seen from the folder of the package, in which tests run
 /// @param program that prints it anew with --parameters
 template <class Parameters>
 void expectShipped(const std::string& file, const std::string& program) {
