@@ -311,8 +311,9 @@ double LoadEstimator::scatterEvidence(const RunoutPoint& point) const {
     if (!r.cut) continue;
     const RunoutEffect& effect = effects_[cut++];
     if (!(r.samples > 0.0)) continue;
-    const RunoutEffect::Variance v =
+    RunoutEffect::Variance v =
         effect.variance(point.offset, point.angle, point.solution.ktc(), point.solution.kte());
+    v.ripple *= r.in_cut;
     const double share = r.sparse ? SPARSE_RIPPLE_SHARE : RIPPLE_SHARE;
     for (int i = 0; i <= SIZES; ++i) {
       const double noise = air_variance_ + std::pow(largest * i / SIZES, 2);

@@ -188,6 +188,7 @@ LoadRecord loadRecord(const CampaignTest& test, const Record& record, const Tool
   r.throughout = !test.engage_time;
   r.first = std::min(record.size(), static_cast<std::size_t>(std::ceil(engage / r.dt - 1e-9)));
   r.lead = static_cast<double>(r.first) * r.dt - engage;
+  r.in_cut = 1.0 - static_cast<double>(r.first) / static_cast<double>(record.size());
   r.edge_age =
       test.cut_time_before.value_or(0.0) + 0.5 * (static_cast<double>(record.size()) * r.dt - engage);
   r.engagement = *test.engagement;

@@ -49,6 +49,7 @@ struct LoadRecord {
 
   // How far samples scatter about their response: noise, and ripple where the angle is not known.
   double variance = 0.0;  ///< [V2]
+  double in_cut = 1.0;    ///< [1] share of the samples that show the ripple
   double samples = 0.0;   ///< [1] those that the lag makes alike count once; 0: the scatter is not known
   bool sparse = false;    ///< teeth pass between the samples: they may meet a few phases of the ripple only
   /// [1] share of the power of each harmonic of a revolution that, taken at these times, looks like a level.
