@@ -7,12 +7,12 @@
 #include <Eigen/Core>
 
 #include "smartmill_core/cutting/mechanistic.h"
+#include "smartmill_core/cutting/rigid_cut.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/fit/least_squares.h"
 #include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_core/signal/fourier.h"
 #include "smartmill_core/units.h"
-#include "smartmill_kalman/following/runout_force.h"
 
 namespace smartmill::kalman {
 namespace {
@@ -42,15 +42,30 @@ std::array<ModalModel, 2> moved(const std::array<ModalModel, 2>& from, const Eig
 /// Harmonics of the force for each coefficient alone: tangential and radial, chip and edge.
 Basis harmonicsOf(const ToolGeometry& tool, const Engagement& engagement, const std::vector<double>& radius) {
   const double chip = 1.0 / engagement.feed_per_tooth;
-  const std::array<CuttingCoefficients, TERMS> unit{
-      {{chip, 0, 0, 0, 0, 0}, {0, chip, 0, 0, 0, 0}, {0, 0, 0, 1, 0, 0}, {0, 0, 0, 0, 1, 0}}};
   Basis result;
-  for (std::size_t u = 0; u < TERMS; ++u) {
-    const auto force = revolutionForce(tool, unit[u], engagement, radius, POINTS);
-    for (std::size_t axis = 0; axis < 2; ++axis) {
-      result[u][axis] = fourier(force[axis]);
-      for (Complex& value : result[u][axis]) value *= 2.0 / POINTS;
-      result[u][axis][0] *= 0.5;
+  for (std::size_t direction = 0; direction < 2; ++direction) {
+    CuttingLaw law;
+    if (direction == 0) {
+      law.coefficients.ktc = chip, law.coefficients.kte = 1.0;
+    } else {
+      law.coefficients.krc = chip, law.coefficients.kre = 1.0;
+    }
+    const RigidCut cut(tool, law, engagement, radius);
+    std::array<std::array<std::vector<double>, 2>, 2> force;  // of chip and edge, x and y
+    for (std::size_t i = 0; i < POINTS; ++i) {
+      const auto parts = cut.partsAt(units::TWO_PI * static_cast<double>(i) / POINTS);
+      for (std::size_t part = 0; part < 2; ++part) {
+        force[part][0].push_back(parts[part].fx);
+        force[part][1].push_back(parts[part].fy);
+      }
+    }
+    for (std::size_t part = 0; part < 2; ++part) {
+      for (std::size_t axis = 0; axis < 2; ++axis) {
+        auto& harmonics = result[2 * part + direction][axis];
+        harmonics = fourier(force[part][axis]);
+        for (Complex& value : harmonics) value *= 2.0 / POINTS;
+        harmonics[0] *= 0.5;
+      }
     }
   }
   return result;

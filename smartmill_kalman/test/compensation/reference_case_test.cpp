@@ -5,7 +5,6 @@
 
 #include <gtest/gtest.h>
 
-#include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/signal/fourier.h"
 #include "smartmill_core/units.h"
 #include "smartmill_kalman/compensation/campaign_compensation.h"
@@ -26,41 +25,6 @@ HarmonicFilterParameters all() {
   HarmonicFilterParameters parameters;
   parameters.max_harmonics = 200;
   return parameters;
-}
-
-TEST(RunoutForce, WithoutRunoutIsTheClosedForm) {
-  const ToolGeometry tool{4, 16e-3, units::radFromDeg(30.0), {}};
-  const CuttingCoefficients k{800e6, 250e6, 0.0, 20e3, 20e3, 0.0};
-  const Engagement slot{0.0, units::PI, 2e-3, 6e-5};
-  const RunoutForce numeric(tool, k, slot, 0.0, 0.0);
-  const MechanisticForce closed(tool, k, slot);
-  for (double angle = 0.0; angle < units::TWO_PI; angle += 0.0371) {
-    const CuttingForce force = closed.at(angle);
-    // Table of 16384 points; the edge force jumps at entry: half a point of 20 N/mm over 6 um of height.
-    EXPECT_NEAR(numeric.at(angle)[0], force.fx, 0.15);
-    EXPECT_NEAR(numeric.at(angle)[1], force.fy, 0.15);
-  }
-}
-
-TEST(RunoutForce, RunoutKeepsTheMeanWhileEveryToothCuts) {
-  // As long as no tooth misses, the chip taken a revolution is the feed a revolution whoever takes it: the
-  // mean force stays but for the short stretches near entry and exit where the chip is thinner than the
-  // runout.
-  const ToolGeometry tool{4, 16e-3, units::radFromDeg(30.0), {}};
-  const CuttingCoefficients k{800e6, 250e6, 0.0, 20e3, 20e3, 0.0};
-  const Engagement slot{0.0, units::PI, 2e-3, 6e-5};
-  const CuttingForce mean = MechanisticForce(tool, k, slot).mean();
-  const RunoutForce force(tool, k, slot, 8e-6, 0.5);
-  double x = 0.0, y = 0.0, first = 0.0;
-  for (int i = 0; i < 3600; ++i) {
-    const double angle = units::TWO_PI * i / 3600.0;
-    x += force.at(angle)[0] / 3600.0;
-    y += force.at(angle)[1] / 3600.0;
-    first += force.at(angle)[1] * std::cos(angle) / 1800.0;
-  }
-  EXPECT_NEAR(x, mean.fx, 0.02 * std::abs(mean.fx));
-  EXPECT_NEAR(y, mean.fy, 0.02 * std::abs(mean.fy));
-  EXPECT_GT(std::abs(first), 1.0);  // once a revolution
 }
 
 /// Issue's figures: 0.6 % to 3 kHz and 1.2 % to 5 kHz causal, 0.5 and 1.0 % smoothed, 1.2 and 2.2 % inverse;

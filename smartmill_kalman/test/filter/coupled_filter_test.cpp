@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include "smartmill_core/cutting/rigid_cut.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/modal/modal_filter.h"
 #include "smartmill_core/testing/coverage.h"
@@ -48,8 +49,10 @@ TEST(SensorMatrix, ConditionOfADiagonalMatrixIsTheRatioOfItsGains) {
 TEST(CoupledFilter, TakesTheCrossTalkOut) {
   const SensorMatrix matrix = sensor();
   const double speed = units::radPerSecFromRpm(9000.0);
-  const RunoutForce process({4, 16e-3, units::radFromDeg(30.0), {}}, {800e6, 250e6, 0.0, 20e3, 20e3, 0.0},
-                            {0.0, units::PI, 2e-3, 6e-5}, 8e-6, 0.5);
+  const ToolGeometry tool{4, 16e-3, units::radFromDeg(30.0), {}};
+  CuttingLaw law;
+  law.coefficients = {800e6, 250e6, 0.0, 20e3, 20e3, 0.0};
+  RigidCut process(tool, law, Engagement{0.0, units::PI, 2e-3, 6e-5}, runoutRadii(tool, 8e-6, 0.5));
   std::vector<ModalFilter> path;
   for (const auto& row : matrix.h) {
     for (const ModalModel& h : row) path.emplace_back(h, 4.0 * RATE, Hold::first_order);
@@ -63,8 +66,8 @@ TEST(CoupledFilter, TakesTheCrossTalkOut) {
   for (int i = 0; i < 12800; ++i) {
     std::array<double, 3> measured{}, truth{};
     for (int fine = 3; fine >= 0; --fine) {
-      const auto f = process.at(speed * (i - 0.25 * fine) / RATE);
-      truth = {f[0], f[1], 20.0 + 0.3 * f[1]};
+      const CuttingForce f = process.at(speed * (i - 0.25 * fine) / RATE);
+      truth = {f.fx, f.fy, 20.0 + 0.3 * f.fy};
       measured = {};
       for (std::size_t r = 0; r < 3; ++r) {
         for (std::size_t c = 0; c < 3; ++c) measured[r] += path[3 * r + c].step(truth[c]);

@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "smartmill_core/cutting/rigid_cut.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/signal/fourier.h"
 #include "smartmill_core/units.h"
@@ -18,9 +19,15 @@ const Engagement SLOT{0.0, units::PI, 2e-3, 6e-5};
 
 // Harmonics in closed form: the force of a tool with runout times the sensor's response.
 ModeFollower::Harmonics harmonics(const ModalModel& sensor, double speed, int count) {
-  std::vector<double> radius;
-  for (int k = 0; k < 4; ++k) radius.push_back(8e-6 * std::cos(TOOL.toothAngle(k) - 0.5));
-  const auto force = revolutionForce(TOOL, {800e6, 250e6, 0.0, 20e3, 20e3, 0.0}, SLOT, radius, 8192);
+  CuttingLaw law;
+  law.coefficients = {800e6, 250e6, 0.0, 20e3, 20e3, 0.0};
+  RigidCut cut(TOOL, law, SLOT, runoutRadii(TOOL, 8e-6, 0.5));
+  std::array<std::vector<double>, 2> force;
+  for (int i = 0; i < 8192; ++i) {
+    const CuttingForce f = cut.at(units::TWO_PI * i / 8192.0);
+    force[0].push_back(f.fx);
+    force[1].push_back(f.fy);
+  }
   ModeFollower::Harmonics result;
   for (std::size_t axis = 0; axis < 2; ++axis) {
     const auto line = fourier(force[axis]);

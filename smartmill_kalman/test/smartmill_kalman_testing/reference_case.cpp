@@ -4,6 +4,7 @@
 #include <cmath>
 #include <random>
 
+#include "smartmill_core/cutting/rigid_cut.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/modal/modal_filter.h"
 #include "smartmill_core/signal/fourier.h"
@@ -94,7 +95,9 @@ double ReferenceCase::angleAt(double time) const {
 }
 
 ReferenceRecord simulate(const ReferenceCase& reference) {
-  const RunoutForce force(TOOL, {800e6, 250e6, 0.0, 20e3, 20e3, 0.0}, SLOT, 8e-6, units::radFromDeg(31.0));
+  CuttingLaw law;
+  law.coefficients = {800e6, 250e6, 0.0, 20e3, 20e3, 0.0};
+  RigidCut cut(TOOL, law, SLOT, runoutRadii(TOOL, 8e-6, units::radFromDeg(31.0)));
   const double fine = FINER * reference.sample_rate;
   std::array<MovingSensor, 2> sensor{MovingSensor(fine), MovingSensor(fine)};
   for (MovingSensor& axis : sensor) axis.set(reference.sensor);
@@ -114,7 +117,11 @@ ReferenceRecord simulate(const ReferenceCase& reference) {
     std::array<double, 2> applied{}, measured{};
     for (int step = FINER - 1; step >= 0; --step) {
       const double t = time - step / fine;
-      applied = t >= reference.engage_time ? force.at(reference.angleAt(t)) : std::array<double, 2>{};
+      applied = {};
+      if (t >= reference.engage_time) {
+        const CuttingForce force = cut.at(reference.angleAt(t));
+        applied = {force.fx, force.fy};
+      }
       for (std::size_t axis = 0; axis < 2; ++axis) measured[axis] = sensor[axis].step(applied[axis]);
     }
     record.time.push_back(time);

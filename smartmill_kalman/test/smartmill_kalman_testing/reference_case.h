@@ -9,7 +9,6 @@
 
 #include "smartmill_core/modal/modal_model.h"
 #include "smartmill_kalman/compensation/force_compensation.h"
-#include "smartmill_kalman/following/runout_force.h"
 
 namespace smartmill::kalman {
 

@@ -1,3 +1,5 @@
+#include "smartmill_core/cutting/chip_rule.h"
+
 #include "classes.h"
 
 namespace smartmill::sim {
@@ -13,10 +15,8 @@ class Runout : public Effect {
 
   void setUp(TwinSetup& setup) const override {
     if (!setup.model.tool) return;
-    for (std::size_t j = 0; j < setup.radius_offset.size(); ++j) {
-      setup.radius_offset[j] +=
-          offset_ * std::cos(angle_ - setup.model.tool->toothAngle(static_cast<int>(j)));
-    }
+    const std::vector<double> radii = runoutRadii(*setup.model.tool, offset_, angle_);
+    for (std::size_t j = 0; j < radii.size(); ++j) setup.radius_offset[j] += radii[j];
   }
 
  private:

@@ -14,6 +14,12 @@ constexpr double SAME_PITCH = 1e-12;  // [rad]
 
 }  // namespace
 
+std::vector<double> runoutRadii(const ToolGeometry& tool, double offset, double angle) {
+  std::vector<double> radii;
+  for (int j = 0; j < tool.teeth; ++j) radii.push_back(offset * std::cos(angle - tool.toothAngle(j)));
+  return radii;
+}
+
 ChipRule::ChipRule(const ToolGeometry& tool, std::vector<double> radius_offset)
     : offset_(std::move(radius_offset)), curvature_(tool.diameter > 0.0 ? 1.0 / tool.diameter : 0.0) {
   const auto teeth = static_cast<std::size_t>(tool.teeth);

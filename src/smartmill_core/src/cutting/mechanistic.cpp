@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <string>
 
+#include "smartmill_core/cutting/cutting_law.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/units.h"
 
@@ -49,8 +50,9 @@ double lastCut(const Engagement& e) {
 }  // namespace
 
 CuttingForce toolForce(double ft, double fr, double fa, double immersion_angle, double radius) {
-  const double s = std::sin(immersion_angle), c = std::cos(immersion_angle);
-  return {-ft * c - fr * s, ft * s - fr * c, fa, ft * radius};
+  EdgeForce sum;
+  sum.add(1.0, ft, fr, fa, std::sin(immersion_angle), std::cos(immersion_angle));
+  return {sum.fx, sum.fy, sum.fz, sum.ft * radius};
 }
 
 void validate(const ToolGeometry& tool) {

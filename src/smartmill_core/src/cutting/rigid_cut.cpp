@@ -15,7 +15,8 @@ using units::TWO_PI;
 
 constexpr std::size_t NODES = TURN_NODES;  // linear between them errs by 1e-6 of the integrand
 constexpr double NODE_ANGLE = TURN_NODE_ANGLE;
-constexpr int MOST_JOINS = 3;         // of tables with the factors of one moment
+constexpr int MOST_JOINS = 3;  // of tables with the factors of one moment
+constexpr std::size_t MOST_TEETH = 20;
 constexpr double LEAST_CHIP = 1e-15;  // [m] at the ends of a contact, which still rub
 
 ContactArc arcOf(const Engagement& engagement) {
@@ -30,7 +31,6 @@ CuttingForce forceOf(const double* sum, double radius) {
 
 RigidCut::RigidCut(const ToolGeometry& tool, const CuttingLaw& law, std::vector<double> radius_offset)
     : tool_((validate(tool), tool)), rule_(tool, std::move(radius_offset)), law_(law), lag_(tool.lag()) {
-  tables_.resize(rule_.alike() ? 1 : static_cast<std::size_t>(tool.teeth));
 }
 
 RigidCut::RigidCut(const ToolGeometry& tool, const CuttingLaw& law, const Engagement& engagement,
@@ -72,25 +72,29 @@ std::vector<RigidCut::Row> RigidCut::integrals(std::vector<ChipShape> shapes) co
   return table;
 }
 
-void RigidCut::tabulate() {
+// A pass older than a revolution lies behind what the same tooth left a revolution later, wherever there is a
+// chip.
+void RigidCut::shape() {
+  tables_.clear();
   joined_now_ = false;
-  shapes_.assign(tables_.size(), {});
-  for (std::size_t j = 0; j < tables_.size(); ++j) {
-    // A pass older than a revolution lies behind what the same tooth left a revolution later, wherever there
-    // is a chip.
+  shapes_.assign(rule_.alike() ? 1 : static_cast<std::size_t>(rule_.teeth()), {});
+  for (std::size_t j = 0; j < shapes_.size(); ++j) {
     for (int n = 1; n <= rule_.teeth(); ++n)
       shapes_[j].push_back(rule_.steadyShape(static_cast<int>(j), n, feed_));
-    tables_[j] = integrals(shapes_[j]);
   }
+}
+
+void RigidCut::tabulate() {
+  if (!tables_.empty()) return;
+  for (const std::vector<ChipShape>& shapes : shapes_) tables_.push_back(integrals(shapes));
 }
 
 void RigidCut::engage(const std::vector<ContactArc>& arcs, const std::array<double, 2>& feed) {
   for (const ContactArc& a : arcs) validate(a);
   arcs_ = arcs;
-  if (feed != feed_ || tables_[0].empty()) {
-    feed_ = feed;
-    tabulate();
-  }
+  if (feed == feed_ && !shapes_.empty()) return;
+  feed_ = feed;
+  shape();
 }
 
 void RigidCut::setDepths(const std::vector<double>& depths) {
@@ -107,7 +111,9 @@ void RigidCut::setLaw(const CuttingLaw& law) {
     ++factor_changes_;
   }
   law_ = law;
-  if (!same && !tables_[0].empty()) tabulate();
+  if (same) return;
+  tables_.clear();
+  joined_now_ = false;
 }
 
 void RigidCut::join() {
@@ -154,21 +160,10 @@ void RigidCut::addStraight(const EdgePart& part, Row& sum) const {
   if (thickness > 0.0) add(part.height, thickness, {std::sin(part.to), std::cos(part.to)}, sum);
 }
 
-RigidCut::Row RigidCut::rowAt(double angle) const {
-  Row sum{};
-  forEachEdgePart(arcs_, lag_, rule_.toothAngle(), angle, [&](const EdgePart& part) {
-    if (part.straight) {
-      addStraight(part, sum);
-    } else {
-      addBetween(tables_[tableOf(part.tooth)], part.from, part.to, part.height, sum);
-    }
-  });
-  return sum;
-}
-
 CuttingForce RigidCut::at(double angle) {
   // Factors that change all the time (wear) are not worth a table; a straight edge needs none.
   const bool wanted = factor_changes_ <= MOST_JOINS && lag_ > 0.0 && !arcs_.empty();
+  if (lag_ > 0.0) tabulate();
   if (!joined_now_ && wanted) join();
   Sum sum{};
   Row row{};
@@ -186,18 +181,37 @@ CuttingForce RigidCut::at(double angle) {
   return forceOf(sum.data(), tool_.radius());
 }
 
+void RigidCut::integrate(const std::vector<ChipShape>& shapes, double from, double to, double height,
+                         Row& sum) const {
+  std::array<ChipShape, MOST_TEETH> own;
+  std::copy(shapes.begin(), shapes.end(), own.begin());
+  forEachContact(own.data(), shapes.size(), from, to, [&](const ChipShape& shape, const Stretch& over) {
+    gauss(over, [&](double weight, double s, double c) {
+      add(height * weight, shape.at(s, c), {s, c}, sum);
+    });
+  });
+}
+
 std::array<CuttingForce, 2> RigidCut::partsAt(double angle) const {
-  const Row row = rowAt(angle);
+  Row row{};
+  forEachEdgePart(arcs_, lag_, rule_.toothAngle(), angle, [&](const EdgePart& part) {
+    if (part.straight) {
+      addStraight(part, row);
+    } else {
+      integrate(shapes_[tableOf(part.tooth)], part.from, part.to, part.height, row);
+    }
+  });
   return {forceOf(row.data(), tool_.radius()), forceOf(row.data() + 4, tool_.radius())};
 }
 
 std::array<CuttingForce, 2> RigidCut::meanParts() const {
-  Row sum{};
+  Row row{};
   for (const ContactArc& arc : arcs_) {
-    for (int j = 0; j < rule_.teeth(); ++j)
-      addBetween(tables_[tableOf(j)], arc.entry, std::min(arc.exit, TWO_PI), arc.depth / TWO_PI, sum);
+    // One entry of shapes serves all teeth when they are alike.
+    const double share = arc.depth / TWO_PI * (rule_.alike() ? rule_.teeth() : 1);
+    for (const std::vector<ChipShape>& shapes : shapes_) integrate(shapes, arc.entry, arc.exit, share, row);
   }
-  return {forceOf(sum.data(), tool_.radius()), forceOf(sum.data() + 4, tool_.radius())};
+  return {forceOf(row.data(), tool_.radius()), forceOf(row.data() + 4, tool_.radius())};
 }
 
 }  // namespace smartmill

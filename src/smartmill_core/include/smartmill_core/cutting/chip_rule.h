@@ -9,6 +9,11 @@
 
 namespace smartmill {
 
+/// [m] Radius of each tooth over the nominal one when the cutter's axis lies beside the spindle's: offset
+/// cos(angle - position of the tooth), so that the offset points to a tooth at that angle (effects.md,
+/// runout).
+std::vector<double> runoutRadii(const ToolGeometry& tool, double offset, double angle);
+
 /// Chip thickness [m] of a tooth against one surface, over the immersion angle phi of a piece of its edge:
 /// level + sine sin(phi) + cosine cos(phi) + sine2 sin(2 phi) + cosine2 cos(2 phi).
 struct ChipShape {

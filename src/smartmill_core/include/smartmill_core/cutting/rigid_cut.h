@@ -37,22 +37,24 @@ class RigidCut {
   CuttingForce at(double angle);
   /// Chip of a tooth at an immersion angle [m], <= 0: no contact.
   double chip(int tooth, double phi) const;
-  /// Of the chip coefficients and of the edge coefficients alone.
+  /// What the chip coefficients and what the edge coefficients give alone, the factors of the law left out.
+  /// Without tables: quicker for less than some thousand angles, and to the digit where an edge force begins.
   std::array<CuttingForce, 2> partsAt(double angle) const;
-  /// The same, over a revolution: closed but for the table's integration.
+  /// The mean of these over a revolution.
   std::array<CuttingForce, 2> meanParts() const;
 
  private:
   using Row = std::array<double, 8>;  // fx fy fz ft of the chip, the same of the edge
   using Sum = std::array<double, 4>;  // fx fy fz ft
+  void shape();
   void tabulate();
   std::vector<Row> integrals(std::vector<ChipShape> shapes) const;
   void add(double weight, double thickness, const SineCosine& at, Row& row) const;
   void join();
   Sum joined(const Row& row) const;
-  Row rowAt(double angle) const;
   void addStraight(const EdgePart& part, Row& sum) const;
-  std::size_t tableOf(int tooth) const { return tables_.size() == 1 ? 0 : static_cast<std::size_t>(tooth); }
+  void integrate(const std::vector<ChipShape>& shapes, double from, double to, double height, Row& sum) const;
+  std::size_t tableOf(int tooth) const { return rule_.alike() ? 0 : static_cast<std::size_t>(tooth); }
 
   ToolGeometry tool_;
   ChipRule rule_;
@@ -61,8 +63,8 @@ class RigidCut {
   std::vector<ContactArc> arcs_;
   std::array<double, 2> feed_{{0, 0}};          // [m/rad]
   std::vector<std::vector<ChipShape>> shapes_;  // what a tooth may meet; one entry when all teeth are alike
-  std::vector<std::vector<Row>> tables_;        // the same: integrals from 0 to each node [N/m rad]
-  std::vector<std::vector<Sum>> joined_;        // with the factors of chip and edge, while these stand
+  std::vector<std::vector<Row>> tables_;  // the same: integrals from 0 to each node [N/m rad], when needed
+  std::vector<std::vector<Sum>> joined_;  // with the factors of chip and edge, while these stand
   bool joined_now_ = false;
   int factor_changes_ = 0;
 };
