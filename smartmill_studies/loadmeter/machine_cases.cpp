@@ -4,9 +4,9 @@
 #include <cmath>
 #include <random>
 
+#include "smartmill_core/cutting/rigid_cut.h"
 #include "smartmill_core/units.h"
 #include "smartmill_loadmeter/calibration/machine_calibration.h"
-#include "smartmill_loadmeter/identification/runout.h"
 
 namespace smartmill::loadmeter {
 
@@ -29,10 +29,7 @@ std::vector<double> torqueOverARevolution(const ToolGeometry& tool, const Engage
                                           std::size_t steps) {
   const int slices = tool.helix > 0.0 ? 24 : 1;
   const double dz = e.axial_depth / slices;
-  std::vector<double> radius;
-  for (int t = 0; t < tool.teeth; ++t) {
-    radius.push_back(tool.radius() + offset * std::cos(angle - tool.toothAngle(t)));
-  }
+  const RigidCut cut(tool, {}, e, runoutRadii(tool, offset, angle));
   std::vector<double> torque(steps, 0.0);
   for (std::size_t i = 0; i < steps; ++i) {
     for (int s = 0; s < slices; ++s) {
@@ -41,7 +38,7 @@ std::vector<double> torqueOverARevolution(const ToolGeometry& tool, const Engage
         double phi = TWO_PI * static_cast<double>(i) / static_cast<double>(steps) + tool.toothAngle(t) - lag;
         phi -= TWO_PI * std::floor(phi / TWO_PI);
         if (phi < e.entry || phi > e.exit) continue;
-        const double h = chipThickness(tool, e.feed_per_tooth, std::sin(phi), radius, t);
+        const double h = cut.chip(t, phi);
         if (h > 0.0) torque[i] += (k.ktc * h + k.kte) * dz * tool.radius();
       }
     }

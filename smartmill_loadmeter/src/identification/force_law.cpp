@@ -6,12 +6,11 @@
 #include <numeric>
 #include <utility>
 
-#include "smartmill_core/cutting/mechanistic.h"
+#include "smartmill_core/cutting/rigid_cut.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/math/angle.h"
 #include "smartmill_core/units.h"
 #include "smartmill_loadmeter/calibration/fit.h"
-#include "smartmill_loadmeter/identification/runout.h"
 
 namespace smartmill::loadmeter {
 
@@ -20,10 +19,8 @@ namespace {
 using units::PI;
 using units::TWO_PI;
 
-constexpr double REFERENCE_CHIP = 1e-4;  // [m]
-constexpr double THINNEST_CHIP = 1e-7;   // [m] the power of a size effect has no limit at zero
-constexpr std::size_t ANGLES = 48;       // of a mean revolution
-constexpr int SLICES = 8;
+constexpr double REFERENCE_CHIP = 1e-4;      // [m]
+constexpr std::size_t ANGLES = 48;           // of a mean revolution
 constexpr double LARGEST_OFFSET = 6e-5;      // [m]
 constexpr double LARGEST_UNBALANCE = 500.0;  // [N]
 constexpr double FIT_TOLERANCE = 1e-7;
@@ -197,28 +194,15 @@ Revolution revolutionOf(const CampaignTest& test, const Record& record) {
 void forces(const ToolGeometry& tool, const Engagement& e, const CuttingCoefficients& k, double exponent,
             double offset, double offset_angle, double phase,
             std::array<std::array<double, ANGLES>, 3>* out) {
-  const double dz = e.axial_depth / SLICES;
-  std::vector<double> radius, tooth;
-  for (int t = 0; t < tool.teeth; ++t) tooth.push_back(tool.toothAngle(t));
-  for (int t = 0; t < tool.teeth; ++t) radius.push_back(offset * std::cos(offset_angle - tool.toothAngle(t)));
+  CuttingLaw law;
+  law.coefficients = k;
+  law.size_exponent = exponent;
+  law.size_reference = REFERENCE_CHIP;
+  const RigidCut cut(tool, law, e, runoutRadii(tool, offset, offset_angle));
   for (std::size_t i = 0; i < ANGLES; ++i) {
     const double spindle = TWO_PI * (static_cast<double>(i) + 0.5) / static_cast<double>(ANGLES) + phase;
-    CuttingForce sum;
-    for (int t = 0; t < tool.teeth; ++t) {
-      for (int s = 0; s < SLICES; ++s) {
-        const double phi =
-            wrapped(spindle + tooth[static_cast<std::size_t>(t)] - tool.lag() * (s + 0.5) * dz);
-        if (phi < e.entry || phi > e.exit) continue;
-        const double h = chipThickness(tool, e.feed_per_tooth, std::sin(phi), radius, t);
-        if (h <= 0.0) continue;
-        const double chip =
-            exponent == 0.0 ? h : h * std::pow(std::max(h, THINNEST_CHIP) / REFERENCE_CHIP, -exponent);
-        const CuttingForce f = toolForce((k.ktc * chip + k.kte) * dz, (k.krc * chip + k.kre) * dz,
-                                         (k.kac * chip + k.kae) * dz, phi, tool.radius());
-        sum.fx += f.fx, sum.fy += f.fy, sum.fz += f.fz;
-      }
-    }
-    (*out)[0][i] = sum.fx, (*out)[1][i] = sum.fy, (*out)[2][i] = sum.fz;
+    const auto [chip, edge] = cut.partsAt(spindle);
+    (*out)[0][i] = chip.fx + edge.fx, (*out)[1][i] = chip.fy + edge.fy, (*out)[2][i] = chip.fz + edge.fz;
   }
 }
 

@@ -34,8 +34,8 @@ TEST(Scene, runoutMovesMaterialFromToothToToothWhileAllCut) {
   EXPECT_NE(straight[200], offset[200]);
 }
 
-// Closed form against summed slices, teeth that miss part of their arc among them.
-TEST(RunoutTorque, isTheTorqueOfTheSlicesInClosedForm) {
+// Against summed slices, teeth that miss part of their arc among them.
+TEST(RunoutTorque, isTheTorqueOfTheSlices) {
   for (const double offset : {0.0, 8e-6, 40e-6, 90e-6}) {
     for (const double helix : {0.0, 0.5}) {
       ToolGeometry tool{4, 0.016, helix, {}};
