@@ -265,7 +265,7 @@ ChartMaker::Basis ChartMaker::basis() const {
   basis.process.entry = parameters_.entry;
   basis.process.exit = parameters_.exit;
   basis.process.kt = cutting.ktc;
-  basis.process.kr = std::isfinite(cutting.krc) ? cutting.krc / cutting.ktc : parameters_.kr;
+  basis.process.radial_ratio = std::isfinite(cutting.krc) ? cutting.krc / cutting.ktc : parameters_.kr;
   if (byCollocation()) {
     const RegenerativeSystem system = *this->system({});
     SolverOptions options;

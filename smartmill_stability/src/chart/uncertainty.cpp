@@ -23,14 +23,14 @@ double share(double std_dev, double value, double fallback_percent) {
 }  // namespace
 
 UncertainSystem::UncertainSystem(const RegenerativeSystem& system, std::vector<ModeUncertainty> modes,
-                                 double kt, double kr)
-    : system_(system), modes_(std::move(modes)), kt_(kt), kr_(kr) {
+                                 double kt_share, double kr_share)
+    : system_(system), modes_(std::move(modes)), kt_share_(kt_share), kr_share_(kr_share) {
   system_.validate();
   if (modes_.size() != system_.modes.size())
     throw Error("uncertainty: " + std::to_string(modes_.size()) + " modes are described, the system has " +
                 std::to_string(system_.modes.size()));
   for (const ModeUncertainty& m : modes_)
-    for (const double value : {m.frequency, m.damping, m.gain, kt, kr})
+    for (const double value : {m.frequency, m.damping, m.gain, kt_share, kr_share})
       if (!(value >= 0.0) || !(value < 1.0))
         throw Error("uncertainty: a standard deviation of " + std::to_string(value) +
                     " of the value, 0..1 is due");
@@ -68,8 +68,8 @@ RegenerativeSystem UncertainSystem::draw(std::mt19937_64& random) const {
       mode.output[a] *= size;
     }
   }
-  drawn.kt *= factor(random, kt_);
-  drawn.kr *= factor(random, kr_);
+  drawn.kt *= factor(random, kt_share_);
+  drawn.kr *= factor(random, kr_share_);
   return drawn;
 }
 

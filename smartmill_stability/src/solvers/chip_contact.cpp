@@ -3,7 +3,7 @@
 
 #include <Eigen/LU>
 
-#include "smartmill_core/cutting/tool.h"
+#include "smartmill_core/cutting/chip_rule.h"
 #include "smartmill_core/error.h"
 #include "smartmill_stability/solvers/delayed_system.h"
 #include "solvers/floquet.h"
@@ -53,32 +53,18 @@ class Contact {
       wanted = std::max(wanted, WAVE_SLICES * depth / chip_.serration_wavelength);
     slices_ = std::min(MOST_SLICES, static_cast<int>(std::ceil(wanted)));
     height_ = depth / slices_;
+    bool alike = true;
     for (int s = 0; s < slices_; ++s) {
       const double z = (s + 0.5) * height_;
+      std::vector<double> offset;
       for (int k = 0; k < teeth_; ++k) {
-        double offset = chip_.radius_offset.empty() ? 0.0 : chip_.radius_offset[static_cast<std::size_t>(k)];
-        if (chip_.serration_amplitude > 0.0)
-          offset += chip_.serration_amplitude *
-                    std::sin(TWO_PI * (z / chip_.serration_wavelength + static_cast<double>(k) / teeth_));
-        offset_.push_back(offset);
+        offset.push_back(offsetAt(k, z));
         angle_.push_back(tool.toothAngle(k) - lag * z);
       }
+      const ChipRule rule(tool, offset);
+      addPasses(rule, s == 0);
+      alike = alike && rule.alike();
     }
-    for (int k = 0; k < teeth_; ++k) {
-      double pitch = 0.0;
-      for (int m = 1; m <= teeth_; ++m) {
-        // Tooth k + 1 passed before tooth k.
-        pitch += system.pitchOf((k + m - 1) % teeth_);
-        const double delay = m == teeth_ ? period_ : pitch / speed;
-        std::size_t d = 0;
-        while (d < delays_.size() && std::abs(delays_[d] - delay) > 1e-9 * delay) ++d;
-        if (d == delays_.size()) delays_.push_back(delay);
-        delay_.push_back(d);
-        feed_.push_back(chip_.feed * teeth_ * pitch / TWO_PI);
-      }
-    }
-    bool alike = system.evenPitch();
-    for (const double o : offset_) alike = alike && o == offset_[0];
     solve(chip_.forced_vibration && !alike && !system.modes.empty());
   }
 
@@ -129,6 +115,34 @@ class Contact {
  private:
   std::size_t edge(int s, int k) const { return static_cast<std::size_t>(s * teeth_ + k); }
   std::size_t pass(int k, int m) const { return static_cast<std::size_t>(k * teeth_ + m - 1); }
+  /// The chip of an edge against the tooth m places before it, without vibration.
+  const ChipShape& still(std::size_t e, int m) const {
+    return still_[e * static_cast<std::size_t>(teeth_) + static_cast<std::size_t>(m - 1)];
+  }
+
+  /// [m] radius of tooth k at a height over the nominal one.
+  double offsetAt(int k, double z) const {
+    double offset = chip_.radius_offset.empty() ? 0.0 : chip_.radius_offset[static_cast<std::size_t>(k)];
+    if (chip_.serration_amplitude > 0.0)
+      offset += chip_.serration_amplitude *
+                std::sin(TWO_PI * (z / chip_.serration_wavelength + static_cast<double>(k) / teeth_));
+    return offset;
+  }
+
+  /// Passes of one revolution: the forced vibration comes again with it, so that older ones lie deeper.
+  void addPasses(const ChipRule& rule, bool first_slice) {
+    for (int k = 0; k < teeth_; ++k) {
+      for (int m = 1; m <= teeth_; ++m) {
+        still_.push_back(rule.steadyShape(k, m, {{chip_.feed * teeth_ / TWO_PI, 0.0}}));
+        if (!first_slice) continue;
+        const double delay = rule.turn(k, m) / speed_;
+        std::size_t d = 0;
+        while (d < delays_.size() && std::abs(delays_[d] - delay) > 1e-9 * delay) ++d;
+        if (d == delays_.size()) delays_.push_back(delay);
+        delay_.push_back(d);
+      }
+    }
+  }
 
   /// Chip of a tooth against the one m places before it, at a cell; u: [axis][cell], before: the same a delay
   /// ago.
@@ -136,7 +150,7 @@ class Contact {
     const std::size_t e = edge(s, k), p = pass(k, m);
     const double angle = angle_[e] + TWO_PI * (cell + 0.5) / CELLS;
     const double sine = std::sin(angle), cosine = std::cos(angle);
-    double h = feed_[p] * sine + offset_[e] - offset_[edge(s, (k + m) % teeth_)];
+    double h = still(e, m).at(sine, cosine);
     if (!motion_.empty()) {
       const auto i = static_cast<std::size_t>(cell);
       const auto& before = delayed_motion_[delay_[p]];
@@ -170,7 +184,7 @@ class Contact {
   using Pattern = std::vector<signed char>;  // [edge * CELLS + cell]: 0 no contact, else m
 
   Pattern patternOf() const {
-    Pattern pattern(offset_.size() * CELLS, 0);
+    Pattern pattern(angle_.size() * CELLS, 0);
     for (int s = 0; s < slices_; ++s) {
       for (int k = 0; k < teeth_; ++k) {
         const std::size_t e = edge(s, k);
@@ -222,7 +236,7 @@ class Contact {
           gain[0][i] += d;
           gain[1 + delay_[p]][i] -= d;
           // directional() is force times normal: times the normal again it is the force of a chip of one.
-          const double h = feed_[p] * sine + offset_[e] - offset_[edge(s, (k + m) % teeth_)];
+          const double h = still(e, m).at(sine, cosine);
           force[i] += d * Eigen::Vector2d(sine, cosine) * h;
         }
       }
@@ -293,7 +307,7 @@ class Contact {
   /// over.
   void stretches(const Pattern& pattern) {
     const double width = period_ / CELLS;
-    stretch_.assign(offset_.size(), {});
+    stretch_.assign(angle_.size(), {});
     for (int s = 0; s < slices_; ++s) {
       for (int k = 0; k < teeth_; ++k) {
         const std::size_t e = edge(s, k);
@@ -341,10 +355,11 @@ class Contact {
   ChipGeometry chip_;
   double speed_, period_;
   int teeth_, slices_ = 1;
-  double height_ = 0.0;                 // [m] of a slice
-  std::vector<double> offset_, angle_;  // of each edge: [m], [rad] at time 0
-  std::vector<double> delays_, feed_;   // [s]; [m] of each pass
-  std::vector<std::size_t> delay_;      // of each pass
+  double height_ = 0.0;             // [m] of a slice
+  std::vector<double> angle_;       // [rad] of each edge at time 0
+  std::vector<double> delays_;      // [s]
+  std::vector<ChipShape> still_;    // of each edge against each pass
+  std::vector<std::size_t> delay_;  // of each pass
   VectorXcd spectrum_;
   std::vector<std::vector<double>> motion_;  // [axis][cell] [m]
   std::vector<std::array<std::vector<double>, 2>> delayed_motion_;

@@ -94,20 +94,20 @@ void RegenerativeProcess::validate() const {
   require("entry angle [rad]", entry, Range::notNegative());
   require("exit angle [rad]", exit, Range::openLow(entry, TWO_PI + 1e-9));
   require("tangential coefficient [N/m2]", kt, Range::positive());
-  require("ratio kr", kr, Range::notNegative());
+  require("radial ratio", radial_ratio, Range::notNegative());
 }
 
 std::array<double, 4> directionalCoefficients(const RegenerativeProcess& process) {
   process.validate();
-  // Integrals over immersion of -cos - kr sin and sin - kr cos (force on the tool per Kt h) times sin and cos
+  // Integrals over immersion of -cos - r sin and sin - r cos (force on the tool per Kt h) times sin and cos
   // (h per x and y).
   const double f = process.entry, t = process.exit;
   const double ss = 0.5 * (t - f) - 0.25 * (std::sin(2 * t) - std::sin(2 * f));
   const double cc = 0.5 * (t - f) + 0.25 * (std::sin(2 * t) - std::sin(2 * f));
   const double sc = 0.5 * (std::sin(t) * std::sin(t) - std::sin(f) * std::sin(f));
-  const double kr = process.kr;
+  const double r = process.radial_ratio;
   // Twice the integrals: the factor 1/2 of eq. 6.2 stays in front.
-  return {2.0 * (-sc - kr * ss), 2.0 * (-cc - kr * sc), 2.0 * (ss - kr * sc), 2.0 * (sc - kr * cc)};
+  return {2.0 * (-sc - r * ss), 2.0 * (-cc - r * sc), 2.0 * (ss - r * sc), 2.0 * (sc - r * cc)};
 }
 
 ToolTipResponse responseOf(const ModalModel& x, const ModalModel& y, double low, double high,

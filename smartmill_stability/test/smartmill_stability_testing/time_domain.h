@@ -39,12 +39,11 @@ class TimeDomain {
       tooth_.push_back(static_cast<int>(std::lround(angle / per_step)));
       angle += system.pitchOf(k);
     }
-    surface_.assign(static_cast<std::size_t>(slices),
-                    std::vector<double>(static_cast<std::size_t>(steps_), 0.0));
+    surface_.assign(static_cast<std::size_t>(slices), std::vector<Mark>(static_cast<std::size_t>(steps_)));
     // As if teeth without vibration had passed before.
     for (auto& slice : surface_)
       for (int i = 0; i < steps_; ++i)
-        slice[static_cast<std::size_t>(i)] = -feed_ * std::sin(units::TWO_PI * i / steps_);
+        slice[static_cast<std::size_t>(i)] = {-feed_ * std::sin(units::TWO_PI * i / steps_), -feed_};
   }
 
   /// Radial offset of each tooth [m], outwards.
@@ -95,14 +94,19 @@ class TimeDomain {
         const int offset = tooth_[k];
         const long at = ((count_ + offset - lag_[s]) % steps_ + steps_) % steps_;
         const double phi = units::TWO_PI * static_cast<double>(at) / steps_;
-        double& left = surface_[s][static_cast<std::size_t>(at)];
+        Mark& left = surface_[s][static_cast<std::size_t>(at)];
         if (phi <= system_.entry || phi >= system_.exit) continue;
         const double si = std::sin(phi), co = std::cos(phi);
         const double reach = (u[0] + fed) * si + u[1] * co + (runout_.empty() ? 0.0 : runout_[k]) +
                              (serration_.empty() ? 0.0 : serration_[s][k]);
-        const double chip = reach - left;
+        // The roundness of the tool: beside the feed an older surface lies deeper (formats.md).
+        const double since = fed - left.fed,
+                     last = feed_ * system_.teeth * system_.pitchOf(static_cast<int>(k)) / units::TWO_PI;
+        const double round =
+            system_.diameter > 0.0 ? (since * since - last * last) * co * co / system_.diameter : 0.0;
+        const double chip = reach - left.reach + round;
         if (chip <= 0.0 && may_leave_) continue;
-        if (leave) left = reach;
+        if (leave) left = {reach, fed};
         // The tool sinks in over some turns: a sudden start could throw it into chatter that lives beside the
         // stable cut.
         const double depth = slice_depth_ * std::min(1.0, static_cast<double>(count_) / (RAMP * steps_));
@@ -114,6 +118,11 @@ class TimeDomain {
     return force;
   }
 
+  /// What the last tooth that cut here left, and the feed made then.
+  struct Mark {
+    double reach = 0.0, fed = 0.0;  // [m]
+  };
+
   bool may_leave_;
   RegenerativeSystem system_;
   int steps_;
@@ -122,7 +131,7 @@ class TimeDomain {
   std::vector<int> lag_, tooth_;
   std::vector<double> runout_;
   std::vector<std::vector<double>> serration_;  // [slice][tooth]
-  std::vector<std::vector<double>> surface_;
+  std::vector<std::vector<Mark>> surface_;
   std::array<double, 2> force_{{0.0, 0.0}};
   long count_ = 0;
 };

@@ -21,9 +21,11 @@ struct ModeUncertainty {
 /// independent.
 class UncertainSystem {
  public:
-  /// @param modes one a mode of the system. @param kt, kr [1] shares. @throws Error on a wrong count or a
-  /// negative share.
-  UncertainSystem(const RegenerativeSystem& system, std::vector<ModeUncertainty> modes, double kt, double kr);
+  /// @param modes one a mode of the system. @param kt_share, kr_share [1] standard deviations over the
+  /// values.
+  /// @throws Error on a wrong count or a negative share.
+  UncertainSystem(const RegenerativeSystem& system, std::vector<ModeUncertainty> modes, double kt_share,
+                  double kr_share);
 
   /// Tool tip and cutting coefficients of a model with their standard deviations, where it lacks them the
   /// percents of its section uncertainty_percent. @param system built from the same model: systemModes(x, y)
@@ -35,7 +37,7 @@ class UncertainSystem {
  private:
   RegenerativeSystem system_;
   std::vector<ModeUncertainty> modes_;
-  double kt_, kr_;
+  double kt_share_, kr_share_;
 };
 
 /// Share of drawn systems that are unstable at a speed [rad/s] and depth [m]. @param draws >= 1

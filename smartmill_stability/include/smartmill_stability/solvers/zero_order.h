@@ -13,11 +13,11 @@ namespace smartmill::stability {
 
 /// What regenerates: tooth count, radial engagement and the cutting stiffness per depth.
 struct RegenerativeProcess {
-  int teeth = 0;       ///< 1..20, evenly spaced
-  double entry = 0.0;  ///< [rad] immersion angle, clockwise from +y
-  double exit = 0.0;   ///< [rad] > entry
-  double kt = 0.0;     ///< [N/m2] tangential
-  double kr = 0.0;     ///< [1] radial over tangential
+  int teeth = 0;              ///< 1..20, evenly spaced
+  double entry = 0.0;         ///< [rad] immersion angle, clockwise from +y
+  double exit = 0.0;          ///< [rad] > entry
+  double kt = 0.0;            ///< [N/m2] tangential
+  double radial_ratio = 0.0;  ///< [1] radial over tangential
   /// @throws Error naming the quantity.
   void validate() const;
 };
