@@ -290,8 +290,7 @@ TEST(Twin, leavesOnlyTheNoiseOfIndependentCampaigns) {
 
 // The steps of the integration are no part of the answer.
 TEST(Twin, leavesTheSameWithFinerSteps) {
-  const std::string folder = sharedFolder() + "/campaigns/vibrating_runout";
-  if (!std::filesystem::exists(folder)) GTEST_SKIP() << folder << " is absent";
+  SMARTMILL_SHARED_DATA(folder, "campaigns/vibrating_runout");
   const Campaign campaign = readCampaign(folder);
   MachineModel model = readMachineModel(campaign.modelPath());
   model.effects = hiddenEffects().at("vibrating_runout");
