@@ -258,55 +258,27 @@ TEST(Effects, zeroOffsetIsOnEverySample) {
   EXPECT_EQ(record.column("fz")[2000], -1.0);
 }
 
-std::vector<EffectKind> allEffects() {
-  std::vector<EffectKind> all = effectCatalogue();
-  all.insert(all.end(), furtherEffects().begin(), furtherEffects().end());
-  return all;
-}
-
-// The catalogue (what files may say) and the registry (what the twin runs) are one list.
+// The catalogue (what files may say) and the classes (what the twin runs) are one list.
 TEST(Effects, everyNameOfTheCatalogueHasItsClass) {
-  EXPECT_EQ(effectRegistry().size(), allEffects().size());
-  for (const EffectKind& kind : allEffects()) {
-    ASSERT_NE(findEffectClass(kind.name), nullptr) << kind.name;
-    EXPECT_FALSE(kind.source.empty()) << kind.name;
-    for (const EffectParameter& p : kind.parameters) {
-      if (p.value != EffectValue::number) continue;
-      EXPECT_LT(p.prior.low, p.prior.high) << kind.name << "." << p.key;
-      EXPECT_TRUE(p.range.contains(p.prior.high)) << kind.name << "." << p.key;
-      if (p.prior.scale > 0.0) {
-        EXPECT_LE(p.prior.low, p.prior.neutral);
-        EXPECT_GE(p.prior.high, p.prior.neutral);
-      }
+  EffectKind::Random random(5);
+  for (const EffectKind& kind : effectCatalogue())
+    EXPECT_NO_THROW(makeEffect(drawEffect(kind.name, sensorMill(), random))) << kind.name;
+}
+
+// Where a fit takes an effect for absent it does nothing.
+TEST(Effects, nullValuesChangeNothing) {
+  const MachineModel model = sensorMill();
+  EffectScope scope{model, {"fx", "fy", "fz", "load_meter"}};
+  scope.largest_force = 1000.0;
+  const Record pure = run(model, slotCut(4200.0), 0.03);
+  for (const EffectKind& kind : effectCatalogue()) {
+    for (const EffectForm& form : formsOf(kind, scope)) {
+      EffectForm::Values null;
+      for (const Coordinate& c : form.coordinates) null.push_back(c.null);
+      const Record record = run(with(model, {form.entry(null)}), slotCut(4200.0), 0.03);
+      for (const char* c : {"fx", "fy", "fz", "load_meter"})
+        EXPECT_NEAR(record.column(c)[700], pure.column(c)[700], 1e-9) << form.title() << " " << c;
     }
-  }
-  for (std::size_t i = 1; i < effectRegistry().size(); ++i)
-    EXPECT_LE(effectRegistry()[i - 1].stage, effectRegistry()[i].stage);
-}
-
-/// An effect at the neutral value of its scaled keys, the usual one of the others.
-EffectEntry neutral(const EffectKind& kind) {
-  std::map<std::string, double> numbers;
-  std::map<std::string, std::string> words;
-  for (const EffectParameter& p : kind.parameters) {
-    if (p.value == EffectValue::word) words[p.key] = p.words.front();
-    if (p.value != EffectValue::number) continue;
-    numbers[p.key] = p.prior.scale > 0.0 ? p.prior.neutral : 0.5 * (p.prior.low + p.prior.high);
-    if (!p.choices.empty()) numbers[p.key] = p.choices.front();
-  }
-  return effectEntry(kind.name, numbers, words);
-}
-
-TEST(Effects, neutralValuesChangeNothing) {
-  const Record pure = run(sensorMill(), slotCut(4200.0), 0.03);
-  for (const EffectKind& kind : allEffects()) {
-    // These have no neutral value: they say what the helix, the pitch, the range or the bandwidth is.
-    if (kind.name == "helix" || kind.name == "uneven_pitch" || kind.name == "saturation" ||
-        kind.name == "load_meter_lag")
-      continue;
-    const Record record = run(with(sensorMill(), {neutral(kind)}), slotCut(4200.0), 0.03);
-    for (const char* c : {"fx", "fy", "fz", "load_meter"})
-      EXPECT_NEAR(record.column(c)[700], pure.column(c)[700], 1e-9) << kind.name << " " << c;
   }
 }
 
@@ -324,13 +296,6 @@ TEST(Effects, orderInTheListDoesNotMatter) {
 }
 
 TEST(Effects, entriesAreChecked) {
-  EXPECT_THROW(effectEntry("coolant", {}), Error);
-  EXPECT_THROW(effectEntry("runout", {{"offset_um", 3.0}}), Error);
-  EXPECT_THROW(effectEntry("runout", {{"offset_um", -3.0}, {"angle_deg", 0.0}}), Error);
-  EXPECT_THROW(effectEntry("runout", {{"offset_um", 3.0}, {"angle_deg", 0.0}, {"exponent", 1.0}}), Error);
-  EXPECT_THROW(effectEntry("gain_error", {{"gain", 1.0}}, {{"channel", "fq"}}), Error);
-  EXPECT_THROW(effectEntry("mains_hum", {{"frequency_hz", 55.0}, {"amplitude_n", 1.0}, {"y_ratio", 1.0}}),
-               Error);
   MachineModel model = mill(4, 30.0);
   model.effects.push_back({});
   model.effects[0].name = "runout";

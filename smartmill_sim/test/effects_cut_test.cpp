@@ -122,9 +122,7 @@ TEST(Effects, cuttingSpeedScalesTheChipForceOnly) {
 }
 
 TEST(Effects, unevenPitchSharesTheFeedByPitch) {
-  EffectEntry pitch;
-  pitch.name = "uneven_pitch";
-  pitch.pitch_deg = {157.5, 202.5};
+  const EffectEntry pitch = effectEntry("uneven_pitch", {}, {}, {{"pitch_deg", {157.5, 202.5}}});
   const MachineModel model = with(mill(2, 0.0), {pitch});
   const double depth = 2e-3, feed = 1e-4;
   const Record record = run(model, slotCut(EVEN_RPM, depth, feed), 0.1);
@@ -133,7 +131,7 @@ TEST(Effects, unevenPitchSharesTheFeedByPitch) {
   EXPECT_NEAR(chipOf(at(record, "fz", units::radFromDeg(292.5), EVEN_SPEED), model, depth),
               2 * feed * 202.5 / 360.0, 1e-9);
   EffectEntry wrong = pitch;
-  wrong.pitch_deg = {100.0, 120.0, 140.0};
+  wrong.lists["pitch_deg"] = {100.0, 120.0, 140.0};
   EXPECT_THROW(run(with(mill(2, 0.0), {wrong}), slotCut(EVEN_RPM), 0.1), std::runtime_error);
 }
 

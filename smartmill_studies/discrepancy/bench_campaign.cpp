@@ -22,10 +22,6 @@ double between(Random& random, double low, double high) {
   return std::uniform_real_distribution<double>(low, high)(random);
 }
 
-double eitherSign(Random& random, double value) {
-  return between(random, -1.0, 1.0) < 0.0 ? -value : value;
-}
-
 template <class T>
 T oneOf(Random& random, const std::vector<T>& choices) {
   return choices[std::uniform_int_distribution<std::size_t>(0, choices.size() - 1)(random)];
@@ -125,78 +121,6 @@ MachineModel drawTruth(const MachineModel& nominal, Random& random) {
   std::vector<double> values;
   for (const Coordinate& c : freedom.coordinates()) values.push_back(c.prior_std * normal(random));
   return freedom.apply(nominal, values);
-}
-
-EffectEntry drawEffect(const std::string& name, const MachineModel& machine, Random& random) {
-  EffectEntry e;
-  e.name = name;
-  auto& n = e.numbers;
-  const auto size = [&](double low, double high) { return eitherSign(random, between(random, low, high)); };
-  if (name == "runout")
-    n = {{"offset_um", between(random, 5.0, 25.0)}, {"angle_deg", between(random, 0.0, 360.0)}};
-  if (name == "edge_forces")
-    n = {{"Kte_n_per_mm", between(random, 4.0, 15.0)},
-         {"Kre_n_per_mm", between(random, 4.0, 15.0)},
-         {"Kae_n_per_mm", between(random, 0.5, 4.0)}};
-  if (name == "size_effect")
-    n = {{"exponent", between(random, 0.1, 0.35)}, {"reference_chip_um", between(random, 40.0, 120.0)}};
-  if (name == "tool_wear") n = {{"edge_growth_per_min", between(random, 0.1, 0.8)}};
-  if (name == "cutting_speed")
-    n = {{"exponent", between(random, 0.05, 0.25)}, {"reference_m_per_min", between(random, 100.0, 300.0)}};
-  if (name == "uneven_pitch") {
-    double rest = 360.0;
-    for (int k = 0; k + 1 < machine.tool->teeth; ++k) {
-      e.pitch_deg.push_back(360.0 / machine.tool->teeth + size(1.0, 5.0));
-      rest -= e.pitch_deg.back();
-    }
-    e.pitch_deg.push_back(rest);
-  }
-  if (name == "helix") n = {{"helix_deg", units::degFromRad(machine.tool->helix) + size(3.0, 9.0)}};
-  if (name == "tool_flexibility") {
-    e.flexibility.x.modes = {modeOf(between(random, 800.0, 2200.0), between(random, 0.03, 0.06),
-                                    1e-6 / between(random, 25.0, 50.0))};
-    e.flexibility.y.modes = {modeOf(between(random, 800.0, 2200.0), between(random, 0.03, 0.06),
-                                    1e-6 / between(random, 25.0, 50.0))};
-  }
-  if (name == "process_damping") n = {{"coefficient_n_per_mm", between(random, 150.0, 800.0)}};
-  if (name == "extra_mode") {
-    e.words["axis"] = oneOf<std::string>(random, {"x", "y", "z"});
-    n = {{"frequency_hz", between(random, 300.0, 3500.0)},
-         {"damping_ratio", between(random, 0.01, 0.05)},
-         {"gain", between(random, 0.03, 0.09)}};
-  }
-  if (name == "mass_loading") n = {{"mass_ratio", between(random, 0.08, 0.4)}};
-  if (name == "speed_dependent_mode") n = {{"softening_per_krpm", between(random, 0.004, 0.015)}};
-  if (name == "cross_talk") {
-    for (const char* key : {"xy", "xz", "yx", "yz", "zx", "zy"})
-      n[key] = between(random, 0.0, 1.0) < 0.5 ? size(0.02, 0.08) : 0.0;
-    if (between(random, 0.0, 1.0) < 0.5 || (n["xz"] == 0.0 && n["yx"] == 0.0)) n["xy"] = size(0.02, 0.08);
-  }
-  if (name == "charge_drift") n = {{"rate_n_per_min", size(800.0, 4000.0)}, {"y_ratio", size(0.3, 1.5)}};
-  if (name == "mains_hum")
-    n = {{"frequency_hz", oneOf<double>(random, {50.0, 60.0})},
-         {"amplitude_n", between(random, 2.0, 12.0)},
-         {"y_ratio", size(0.3, 1.2)}};
-  if (name == "unbalance")
-    n = {{"mass_eccentricity_g_mm", between(random, 4.0, 20.0)}, {"angle_deg", between(random, 0.0, 360.0)}};
-  if (name == "channel_delay") {
-    e.words["channel"] = oneOf<std::string>(random, {"fx", "fy", "fz"});
-    n = {{"delay_us", between(random, 30.0, 200.0)}};
-  }
-  if (name == "gain_error") {
-    e.words["channel"] = oneOf<std::string>(random, {"fx", "fy", "fz", "load_meter"});
-    // What the stated uncertainty of the load meter's constant covers is no effect.
-    n = {{"gain", 1.0 + (e.words["channel"] == "load_meter" ? size(0.15, 0.3) : size(0.06, 0.2))}};
-  }
-  if (name == "saturation") n = {{"limit_n", between(random, 150.0, 350.0)}};
-  if (name == "stribeck_friction")
-    n = {{"breakaway_nm", between(random, 0.1, 0.6)}, {"speed_rpm", between(random, 1200.0, 4500.0)}};
-  if (name == "friction_warmup")
-    n = {{"cold_ratio", between(random, 0.2, 0.8)}, {"time_constant_s", between(random, 120.0, 500.0)}};
-  if (name == "load_meter_lag") n = {{"bandwidth_hz", between(random, 1.5, 5.0)}};
-  if (name == "depth_tilt") n = {{"slope_um_per_mm", size(15.0, 60.0)}};
-  if (name == "feed_error") n = {{"ratio", 1.0 + size(0.12, 0.25)}};
-  return e;
 }
 
 OutsideCause drawOutside(Random& random) {

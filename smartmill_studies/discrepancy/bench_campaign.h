@@ -32,9 +32,6 @@ MachineModel drawMachine(std::mt19937_64& random, bool flexible);
 /// The same with every value off by its stated uncertainty.
 MachineModel drawTruth(const MachineModel& nominal, std::mt19937_64& random);
 
-/// An effect of the catalogue with values that a workshop might meet.
-EffectEntry drawEffect(const std::string& name, const MachineModel& machine, std::mt19937_64& random);
-
 OutsideCause drawOutside(std::mt19937_64& random);
 
 /// Writes a campaign of 21 tests (air cuts, taps, slots over feed, speed and depth, up- and down-milling)

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "smartmill_core/math/linear_algebra.h"
+#include "smartmill_core/model/effect_catalogue.h"
 #include "smartmill_discrepancy/explain/evidence_of_members.h"
 #include "smartmill_discrepancy/search/separating_test.h"
 
@@ -52,9 +53,7 @@ std::vector<FoundParameter> parametersOf(const Member& member, const Eigen::Matr
 }
 
 void writeStdDevs(EffectEntry& entry, const std::vector<FoundParameter>& parameters) {
-  for (const FoundParameter& p : parameters) {
-    if (entry.numbers.count(p.key)) entry.std_devs[p.key] = p.std_dev;
-  }
+  for (const FoundParameter& p : parameters) entry.std_devs[p.key] = p.std_dev;
   const auto setModes = [&](const std::string& axis, ModalModel& modes) {
     for (std::size_t k = 0; k < modes.modes.size(); ++k) {
       const std::string name = axis + "[" + std::to_string(k) + "].";

@@ -40,15 +40,9 @@ std::vector<double> valuesFor(const MachineModel& model, TestKind kind) {
     key.insert(key.end(), {s->viscous, s->coulomb, s->load_meter_gain, s->load_meter_bandwidth,
                            s->load_meter_resolution, s->friction_zero_below});
   }
-  for (std::size_t e = 0; e < model.effects.size(); ++e) {
-    const EffectEntry& effect = model.effects[e];
-    if (const sim::EffectClass* known = sim::findEffectClass(effect.name)) {
-      using sim::Stage;
-      const bool of_cut = known->stage == Stage::geometry || known->stage == Stage::motion ||
-                          known->stage == Stage::cutting_law;
-      if (of_cut && kind != TestKind::cut) continue;
-      if (known->stage == Stage::drive && kind == TestKind::tap) continue;
-    }
+  for (const EffectEntry& effect : model.effects) {
+    const EffectKind* known = findEffect(effect.name);
+    if (known && !sim::touches(known->stage, kind)) continue;
     key.push_back(static_cast<double>(std::hash<std::string>()(effect.name)));
     for (const auto& [name, value] : effect.numbers) {
       key.push_back(static_cast<double>(std::hash<std::string>()(name)));
@@ -56,7 +50,10 @@ std::vector<double> valuesFor(const MachineModel& model, TestKind kind) {
     }
     for (const auto& [name, word] : effect.words)
       key.push_back(static_cast<double>(std::hash<std::string>()(name + "=" + word)));
-    key.insert(key.end(), effect.pitch_deg.begin(), effect.pitch_deg.end());
+    for (const auto& [name, list] : effect.lists) {
+      key.push_back(static_cast<double>(std::hash<std::string>()(name)));
+      key.insert(key.end(), list.begin(), list.end());
+    }
     append(key, effect.flexibility.x);
     append(key, effect.flexibility.y);
   }

@@ -6,6 +6,7 @@
 
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/modal/modal_filter.h"
+#include "smartmill_core/model/effect_catalogue.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::discrepancy {
@@ -16,11 +17,8 @@ const std::array<std::string, 2> TIP{{"tool_x", "tool_y"}};
 constexpr std::size_t POINTS = 360;  // a turn
 
 bool actsBehindSensor(const std::string& effect) {
-  for (const char* name : {"extra_mode", "mass_loading", "speed_dependent_mode", "cross_talk", "gain_error",
-                           "channel_delay", "charge_drift", "mains_hum", "saturation"}) {
-    if (effect == name) return true;
-  }
-  return false;
+  const EffectKind* kind = findEffect(effect);
+  return kind && isBehindSensor(kind->stage);
 }
 
 ModalModel oneMode(double frequency, double damping_ratio, double gain) {

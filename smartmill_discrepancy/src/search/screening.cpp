@@ -169,7 +169,7 @@ std::vector<Hypothesis::Probe> modeProbes(const Hypothesis& h, const Projection&
   std::vector<Hypothesis::Probe> found;
   double rate = 0.0;
   for (const TestData& t : runner.data().tests) rate = std::max(rate, t.test.sample_rate);
-  if (h.effect == "extra_mode") {
+  if (h.seek == Hypothesis::Seek::sensor_mode) {
     constexpr double DAMPING = 0.04;
     const auto axis = static_cast<std::size_t>(h.variant.front() - 'x');
     for (const double f : bestFrequencies(
@@ -179,7 +179,7 @@ std::vector<Hypothesis::Probe> modeProbes(const Hypothesis& h, const Projection&
       found.push_back({{std::log(f), d, 0.0}, {{std::log(f), d, 0.01}}, false});
     }
   }
-  if (h.effect == "tool_flexibility") {
+  if (h.seek == Hypothesis::Seek::tip_mode) {
     constexpr double DAMPING = 0.05;
     Hypothesis::Probe probe;
     for (const char a : h.variant) {

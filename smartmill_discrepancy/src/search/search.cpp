@@ -14,6 +14,8 @@
 #include "smartmill_discrepancy/search/refinement.h"
 #include "smartmill_discrepancy/search/screening.h"
 
+#include "smartmill_core/model/effect_catalogue.h"
+
 namespace smartmill::discrepancy {
 namespace {
 

@@ -156,7 +156,7 @@ TEST_F(MonitorNodeTest, warnsOfAHiddenEffectAndOfNothingElse) {
   EXPECT_FALSE(std::filesystem::exists(folder_));
 
   MachineModel hiding = model_;
-  hiding.effects = {sim::effectEntry("runout", {{"offset_um", 12.0}, {"angle_deg", 40.0}})};
+  hiding.effects = {effectEntry("runout", {{"offset_um", 12.0}, {"angle_deg", 40.0}})};
   mill(hiding, "hiding", 1010.0, 4000.0, 1e-3);
   ASSERT_TRUE(wait([&] {
     return gapsOf("hiding").size() == 2 && status_.level == diagnostic_msgs::DiagnosticStatus::WARN;

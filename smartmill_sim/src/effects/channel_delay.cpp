@@ -1,4 +1,4 @@
-#include "classes.h"
+#include "effect_class.h"
 
 namespace smartmill::sim {
 namespace {
@@ -16,10 +16,7 @@ class ChannelDelay : public Effect {
   double delay_;  // [s]
 };
 
+const EffectClass<ChannelDelay> REGISTERED("channel_delay");
+
 }  // namespace
-
-EffectPtr makeChannelDelay(const EffectEntry& entry) {
-  return std::make_unique<ChannelDelay>(entry);
-}
-
 }  // namespace smartmill::sim

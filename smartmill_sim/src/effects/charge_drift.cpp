@@ -1,4 +1,4 @@
-#include "classes.h"
+#include "effect_class.h"
 
 namespace smartmill::sim {
 namespace {
@@ -18,10 +18,7 @@ class ChargeDrift : public Effect {
   double rate_, y_ratio_;  // [N/s], [1]
 };
 
+const EffectClass<ChargeDrift> REGISTERED("charge_drift");
+
 }  // namespace
-
-EffectPtr makeChargeDrift(const EffectEntry& entry) {
-  return std::make_unique<ChargeDrift>(entry);
-}
-
 }  // namespace smartmill::sim

@@ -1,4 +1,4 @@
-#include "classes.h"
+#include "effect_class.h"
 
 namespace smartmill::sim {
 namespace {
@@ -21,10 +21,7 @@ class ChipCoefficients : public Effect {
   double ktc_, krc_, kac_;  // [N/m2]
 };
 
+const EffectClass<ChipCoefficients> REGISTERED("chip_coefficients");
+
 }  // namespace
-
-EffectPtr makeChipCoefficients(const EffectEntry& entry) {
-  return std::make_unique<ChipCoefficients>(entry);
-}
-
 }  // namespace smartmill::sim

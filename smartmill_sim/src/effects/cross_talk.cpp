@@ -1,4 +1,4 @@
-#include "classes.h"
+#include "effect_class.h"
 
 namespace smartmill::sim {
 namespace {
@@ -25,10 +25,7 @@ class CrossTalk : public Effect {
   double xy_, xz_, yx_, yz_, zx_, zy_;  // [1]
 };
 
+const EffectClass<CrossTalk> REGISTERED("cross_talk");
+
 }  // namespace
-
-EffectPtr makeCrossTalk(const EffectEntry& entry) {
-  return std::make_unique<CrossTalk>(entry);
-}
-
 }  // namespace smartmill::sim

@@ -1,4 +1,4 @@
-#include "classes.h"
+#include "effect_class.h"
 
 namespace smartmill::sim {
 namespace {
@@ -19,10 +19,7 @@ class CuttingSpeed : public Effect {
   double exponent_, reference_;  // [1], [m/s]
 };
 
+const EffectClass<CuttingSpeed> REGISTERED("cutting_speed");
+
 }  // namespace
-
-EffectPtr makeCuttingSpeed(const EffectEntry& entry) {
-  return std::make_unique<CuttingSpeed>(entry);
-}
-
 }  // namespace smartmill::sim

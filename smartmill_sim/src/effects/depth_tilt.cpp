@@ -1,4 +1,4 @@
-#include "classes.h"
+#include "effect_class.h"
 
 namespace smartmill::sim {
 namespace {
@@ -14,10 +14,7 @@ class DepthTilt : public Effect {
   double slope_;  // [m/m]
 };
 
+const EffectClass<DepthTilt> REGISTERED("depth_tilt");
+
 }  // namespace
-
-EffectPtr makeDepthTilt(const EffectEntry& entry) {
-  return std::make_unique<DepthTilt>(entry);
-}
-
 }  // namespace smartmill::sim

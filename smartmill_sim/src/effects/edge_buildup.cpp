@@ -1,4 +1,4 @@
-#include "classes.h"
+#include "effect_class.h"
 
 namespace smartmill::sim {
 namespace {
@@ -14,10 +14,7 @@ class EdgeBuildup : public Effect {
   double chip_;  // [m]
 };
 
+const EffectClass<EdgeBuildup> REGISTERED("edge_buildup");
+
 }  // namespace
-
-EffectPtr makeEdgeBuildup(const EffectEntry& entry) {
-  return std::make_unique<EdgeBuildup>(entry);
-}
-
 }  // namespace smartmill::sim

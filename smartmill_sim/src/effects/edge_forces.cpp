@@ -1,4 +1,4 @@
-#include "classes.h"
+#include "effect_class.h"
 
 namespace smartmill::sim {
 namespace {
@@ -21,10 +21,7 @@ class EdgeForces : public Effect {
   double kte_, kre_, kae_;  // [N/m]
 };
 
+const EffectClass<EdgeForces> REGISTERED("edge_forces");
+
 }  // namespace
-
-EffectPtr makeEdgeForces(const EffectEntry& entry) {
-  return std::make_unique<EdgeForces>(entry);
-}
-
 }  // namespace smartmill::sim

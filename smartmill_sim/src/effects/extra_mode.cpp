@@ -1,4 +1,4 @@
-#include "classes.h"
+#include "effect_class.h"
 
 namespace smartmill::sim {
 namespace {
@@ -23,10 +23,7 @@ class ExtraMode : public Effect {
   Mode mode_;
 };
 
+const EffectClass<ExtraMode> REGISTERED("extra_mode");
+
 }  // namespace
-
-EffectPtr makeExtraMode(const EffectEntry& entry) {
-  return std::make_unique<ExtraMode>(entry);
-}
-
 }  // namespace smartmill::sim

@@ -1,4 +1,4 @@
-#include "classes.h"
+#include "effect_class.h"
 
 namespace smartmill::sim {
 namespace {
@@ -14,10 +14,7 @@ class FeedError : public Effect {
   double ratio_;  // [1]
 };
 
+const EffectClass<FeedError> REGISTERED("feed_error");
+
 }  // namespace
-
-EffectPtr makeFeedError(const EffectEntry& entry) {
-  return std::make_unique<FeedError>(entry);
-}
-
 }  // namespace smartmill::sim

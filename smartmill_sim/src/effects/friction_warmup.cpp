@@ -1,4 +1,4 @@
-#include "classes.h"
+#include "effect_class.h"
 
 namespace smartmill::sim {
 namespace {
@@ -17,10 +17,7 @@ class FrictionWarmup : public Effect {
   double cold_, constant_;  // [1], [s]
 };
 
+const EffectClass<FrictionWarmup> REGISTERED("friction_warmup");
+
 }  // namespace
-
-EffectPtr makeFrictionWarmup(const EffectEntry& entry) {
-  return std::make_unique<FrictionWarmup>(entry);
-}
-
 }  // namespace smartmill::sim

@@ -1,4 +1,4 @@
-#include "classes.h"
+#include "effect_class.h"
 
 namespace smartmill::sim {
 namespace {
@@ -16,10 +16,7 @@ class GainError : public Effect {
   double gain_;  // [1] shown over true
 };
 
+const EffectClass<GainError> REGISTERED("gain_error");
+
 }  // namespace
-
-EffectPtr makeGainError(const EffectEntry& entry) {
-  return std::make_unique<GainError>(entry);
-}
-
 }  // namespace smartmill::sim

@@ -1,4 +1,4 @@
-#include "classes.h"
+#include "effect_class.h"
 
 namespace smartmill::sim {
 namespace {
@@ -16,10 +16,7 @@ class Helix : public Effect {
   double helix_;  // [rad]
 };
 
+const EffectClass<Helix> REGISTERED("helix");
+
 }  // namespace
-
-EffectPtr makeHelix(const EffectEntry& entry) {
-  return std::make_unique<Helix>(entry);
-}
-
 }  // namespace smartmill::sim

@@ -1,4 +1,4 @@
-#include "classes.h"
+#include "effect_class.h"
 
 namespace smartmill::sim {
 namespace {
@@ -16,10 +16,7 @@ class LoadMeterLag : public Effect {
   double bandwidth_;  // [Hz]
 };
 
+const EffectClass<LoadMeterLag> REGISTERED("load_meter_lag");
+
 }  // namespace
-
-EffectPtr makeLoadMeterLag(const EffectEntry& entry) {
-  return std::make_unique<LoadMeterLag>(entry);
-}
-
 }  // namespace smartmill::sim

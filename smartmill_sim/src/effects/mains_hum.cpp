@@ -1,4 +1,4 @@
-#include "classes.h"
+#include "effect_class.h"
 
 namespace smartmill::sim {
 namespace {
@@ -23,10 +23,7 @@ class MainsHum : public Effect {
   Tone tone_;
 };
 
+const EffectClass<MainsHum> REGISTERED("mains_hum");
+
 }  // namespace
-
-EffectPtr makeMainsHum(const EffectEntry& entry) {
-  return std::make_unique<MainsHum>(entry);
-}
-
 }  // namespace smartmill::sim

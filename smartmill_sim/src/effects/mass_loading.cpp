@@ -1,4 +1,4 @@
-#include "classes.h"
+#include "effect_class.h"
 
 namespace smartmill::sim {
 namespace {
@@ -18,10 +18,7 @@ class MassLoading : public Effect {
   double ratio_;  // [1] added over modal mass
 };
 
+const EffectClass<MassLoading> REGISTERED("mass_loading");
+
 }  // namespace
-
-EffectPtr makeMassLoading(const EffectEntry& entry) {
-  return std::make_unique<MassLoading>(entry);
-}
-
 }  // namespace smartmill::sim

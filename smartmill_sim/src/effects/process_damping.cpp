@@ -1,4 +1,4 @@
-#include "classes.h"
+#include "effect_class.h"
 
 namespace smartmill::sim {
 namespace {
@@ -16,10 +16,7 @@ class ProcessDamping : public Effect {
   double coefficient_;  // [N/m]
 };
 
+const EffectClass<ProcessDamping> REGISTERED("process_damping");
+
 }  // namespace
-
-EffectPtr makeProcessDamping(const EffectEntry& entry) {
-  return std::make_unique<ProcessDamping>(entry);
-}
-
 }  // namespace smartmill::sim

@@ -1,6 +1,5 @@
+#include "effect_class.h"
 #include "smartmill_core/cutting/chip_rule.h"
-
-#include "classes.h"
 
 namespace smartmill::sim {
 namespace {
@@ -23,10 +22,7 @@ class Runout : public Effect {
   double offset_, angle_;  // [m], [rad]
 };
 
+const EffectClass<Runout> REGISTERED("runout");
+
 }  // namespace
-
-EffectPtr makeRunout(const EffectEntry& entry) {
-  return std::make_unique<Runout>(entry);
-}
-
 }  // namespace smartmill::sim

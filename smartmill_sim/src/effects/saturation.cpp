@@ -1,4 +1,4 @@
-#include "classes.h"
+#include "effect_class.h"
 
 namespace smartmill::sim {
 namespace {
@@ -16,10 +16,7 @@ class Saturation : public Effect {
   double limit_;  // [N]
 };
 
+const EffectClass<Saturation> REGISTERED("saturation");
+
 }  // namespace
-
-EffectPtr makeSaturation(const EffectEntry& entry) {
-  return std::make_unique<Saturation>(entry);
-}
-
 }  // namespace smartmill::sim

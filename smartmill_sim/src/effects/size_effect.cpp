@@ -1,4 +1,4 @@
-#include "classes.h"
+#include "effect_class.h"
 
 namespace smartmill::sim {
 namespace {
@@ -18,10 +18,7 @@ class SizeEffect : public Effect {
   double exponent_, reference_;  // [1], [m]
 };
 
+const EffectClass<SizeEffect> REGISTERED("size_effect");
+
 }  // namespace
-
-EffectPtr makeSizeEffect(const EffectEntry& entry) {
-  return std::make_unique<SizeEffect>(entry);
-}
-
 }  // namespace smartmill::sim

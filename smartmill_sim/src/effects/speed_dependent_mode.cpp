@@ -1,4 +1,4 @@
-#include "classes.h"
+#include "effect_class.h"
 
 namespace smartmill::sim {
 namespace {
@@ -18,10 +18,7 @@ class SpeedDependentMode : public Effect {
   double softening_;  // [1] per 1000 rpm
 };
 
+const EffectClass<SpeedDependentMode> REGISTERED("speed_dependent_mode");
+
 }  // namespace
-
-EffectPtr makeSpeedDependentMode(const EffectEntry& entry) {
-  return std::make_unique<SpeedDependentMode>(entry);
-}
-
 }  // namespace smartmill::sim

@@ -1,4 +1,4 @@
-#include "classes.h"
+#include "effect_class.h"
 
 namespace smartmill::sim {
 namespace {
@@ -22,10 +22,7 @@ class SpindleOrder : public Effect {
   std::array<double, 3> size_, angle_;  // [N], [rad]
 };
 
+const EffectClass<SpindleOrder> REGISTERED("spindle_order");
+
 }  // namespace
-
-EffectPtr makeSpindleOrder(const EffectEntry& entry) {
-  return std::make_unique<SpindleOrder>(entry);
-}
-
 }  // namespace smartmill::sim

@@ -1,4 +1,4 @@
-#include "classes.h"
+#include "effect_class.h"
 
 namespace smartmill::sim {
 namespace {
@@ -19,10 +19,7 @@ class StribeckFriction : public Effect {
   double breakaway_, speed_;  // [N m], [rad/s]
 };
 
+const EffectClass<StribeckFriction> REGISTERED("stribeck_friction");
+
 }  // namespace
-
-EffectPtr makeStribeckFriction(const EffectEntry& entry) {
-  return std::make_unique<StribeckFriction>(entry);
-}
-
 }  // namespace smartmill::sim

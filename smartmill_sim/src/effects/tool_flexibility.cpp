@@ -1,4 +1,4 @@
-#include "classes.h"
+#include "effect_class.h"
 
 namespace smartmill::sim {
 namespace {
@@ -18,10 +18,7 @@ class ToolFlexibility : public Effect {
   ToolTip modes_;
 };
 
+const EffectClass<ToolFlexibility> REGISTERED("tool_flexibility");
+
 }  // namespace
-
-EffectPtr makeToolFlexibility(const EffectEntry& entry) {
-  return std::make_unique<ToolFlexibility>(entry);
-}
-
 }  // namespace smartmill::sim

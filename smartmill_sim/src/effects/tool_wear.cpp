@@ -1,4 +1,4 @@
-#include "classes.h"
+#include "effect_class.h"
 
 namespace smartmill::sim {
 namespace {
@@ -16,10 +16,7 @@ class ToolWear : public Effect {
   double growth_;  // [1/s]
 };
 
+const EffectClass<ToolWear> REGISTERED("tool_wear");
+
 }  // namespace
-
-EffectPtr makeToolWear(const EffectEntry& entry) {
-  return std::make_unique<ToolWear>(entry);
-}
-
 }  // namespace smartmill::sim

@@ -1,4 +1,4 @@
-#include "classes.h"
+#include "effect_class.h"
 
 namespace smartmill::sim {
 namespace {
@@ -20,10 +20,7 @@ class Unbalance : public Effect {
   double mass_eccentricity_, angle_;  // [kg m], [rad]
 };
 
+const EffectClass<Unbalance> REGISTERED("unbalance");
+
 }  // namespace
-
-EffectPtr makeUnbalance(const EffectEntry& entry) {
-  return std::make_unique<Unbalance>(entry);
-}
-
 }  // namespace smartmill::sim

@@ -1,4 +1,4 @@
-#include "classes.h"
+#include "effect_class.h"
 
 namespace smartmill::sim {
 namespace {
@@ -7,8 +7,7 @@ namespace {
 class UnevenPitch : public Effect {
  public:
   explicit UnevenPitch(const EffectEntry& entry) {
-    for (const double p : entry.pitch_deg) pitch_.push_back(units::radFromDeg(p));
-    if (pitch_.empty()) throw Error("pitch_deg is missing");
+    for (const double p : listOf(entry, "pitch_deg")) pitch_.push_back(units::radFromDeg(p));
   }
 
   void setUp(TwinSetup& setup) const override {
@@ -23,10 +22,7 @@ class UnevenPitch : public Effect {
   std::vector<double> pitch_;  // [rad]
 };
 
+const EffectClass<UnevenPitch> REGISTERED("uneven_pitch");
+
 }  // namespace
-
-EffectPtr makeUnevenPitch(const EffectEntry& entry) {
-  return std::make_unique<UnevenPitch>(entry);
-}
-
 }  // namespace smartmill::sim

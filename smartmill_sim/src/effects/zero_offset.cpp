@@ -1,4 +1,4 @@
-#include "classes.h"
+#include "effect_class.h"
 
 namespace smartmill::sim {
 namespace {
@@ -19,10 +19,7 @@ class ZeroOffset : public Effect {
   double x_, y_, z_;  // [N]
 };
 
+const EffectClass<ZeroOffset> REGISTERED("zero_offset");
+
 }  // namespace
-
-EffectPtr makeZeroOffset(const EffectEntry& entry) {
-  return std::make_unique<ZeroOffset>(entry);
-}
-
 }  // namespace smartmill::sim

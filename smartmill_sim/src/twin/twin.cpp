@@ -83,11 +83,11 @@ std::vector<double> contactForce(const std::vector<double>& hammer) {
 CuttingMachine::Clock clockOf(const MachineModel& model, const CampaignTest& test, const Record& record) {
   for (const EffectEntry& effect : model.effects) {
     const EffectKind* kind = findEffect(effect.name);
-    if (!kind) continue;
+    if (!kind || !touches(kind->stage, test.kind)) continue;
+    const bool shows = kind->stage != Stage::drive || record.has("load_meter");
     const char* lacks = nullptr;
-    if (kind->needs_start_time && record.has("load_meter") && !test.start_time) lacks = "start_time_s";
-    if (kind->needs_cut_time && test.kind == TestKind::cut && !test.cut_time_before)
-      lacks = "cut_time_before_s";
+    if (kind->has(EffectNeed::start_time) && shows && !test.start_time) lacks = "start_time_s";
+    if (kind->has(EffectNeed::cut_time) && !test.cut_time_before) lacks = "cut_time_before_s";
     if (lacks)
       throw Error("test " + test.name + ": " + lacks + " is missing (effect " + effect.name + " needs it)");
   }

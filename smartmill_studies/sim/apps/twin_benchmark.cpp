@@ -36,7 +36,7 @@ MachineModel mill(bool flexible) {
 void simulateSlot(benchmark::State& state) {
   MachineModel model = mill(state.range(0) != 0);
   if (state.range(1) != 0)
-    model.effects.push_back(sim::effectEntry("runout", {{"offset_um", 8.0}, {"angle_deg", 30.0}}));
+    model.effects.push_back(effectEntry("runout", {{"offset_um", 8.0}, {"angle_deg", 30.0}}));
   CampaignTest test;
   test.kind = TestKind::cut;
   test.sample_rate = 25600.0;

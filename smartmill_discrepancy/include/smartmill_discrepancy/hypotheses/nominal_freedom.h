@@ -3,8 +3,8 @@
 #include <functional>
 #include <vector>
 
+#include "smartmill_core/model/effect_form.h"
 #include "smartmill_core/model/machine_model.h"
-#include "smartmill_discrepancy/hypotheses/coordinate.h"
 
 namespace smartmill::discrepancy {
 

@@ -2,33 +2,20 @@
 
 #include <array>
 #include <cstddef>
-#include <map>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "smartmill_core/campaign/campaign.h"
 #include "smartmill_core/cutting/cutting_law.h"
 #include "smartmill_core/model/effect_catalogue.h"
 #include "smartmill_core/model/machine_model.h"
 
 namespace smartmill::sim {
 
-/// Where in the twin an effect acts, in the order in which the stages pass.
-enum class Stage {
-  geometry,       ///< of the tool: radii, pitch, helix
-  motion,         ///< where the tool is in the work: feed, depth
-  cutting_law,    ///< from chip to force
-  structure,      ///< modes of the tool tip
-  sensor,         ///< modes of the force sensor
-  sensor_force,   ///< force on the sensor besides cutting
-  drive,          ///< spindle friction and load meter
-  sensor_output,  ///< measured channels, before they are late
-  delay,          ///< lateness of one channel
-  signal          ///< measured channels at last, before the noise
-};
-const char* stageName(Stage stage);
+using Stage = EffectStage;
 
-/// Channels of the measuring chain.
+/// Channels of the measuring chain: places in measuredChannels().
 enum ChannelIndex : std::size_t {
   FX,
   FY,
@@ -81,7 +68,8 @@ struct Tone {
 };
 
 /// One physical cause that a nominal model may lack: an entry of a model's `effects:`. A class overrides the
-/// hooks of its stage; effects of one stage act in the order of the registry.
+/// hooks of its stage; effects act in the order of the catalogue (smartmill_core/model/effect_catalogue.h),
+/// which declares them.
 class Effect {
  public:
   virtual ~Effect() = default;
@@ -98,18 +86,11 @@ class Effect {
   virtual Tone* tone() { return nullptr; }
 };
 
-/// One registration: the class behind a name of the catalogue (smartmill_core/model/effect_catalogue.h has
-/// its keys, units, bounds, priors and source).
-struct EffectClass {
-  std::string name;
-  Stage stage;
-  std::unique_ptr<Effect> (*make)(const EffectEntry& entry);
-};
+/// Whether a test of this kind knows of effects of a stage: a tap has no chip, no turning spindle.
+bool touches(Stage stage, TestKind kind);
 
-/// All effects that the twin runs, in the order in which they act.
-const std::vector<EffectClass>& effectRegistry();
-/// nullptr when no effect has this name.
-const EffectClass* findEffectClass(const std::string& name);
+/// The class of an entry's name. @throws Error on a name without class, a key that is missing.
+std::unique_ptr<Effect> makeEffect(const EffectEntry& entry);
 
 /// The effects of one model, in the order in which they act.
 class EffectSet {
@@ -133,12 +114,7 @@ class EffectSet {
     std::unique_ptr<Effect> effect;
   };
   std::vector<Member> effects_;
-  std::array<bool, 10> has_{};
+  std::array<bool, static_cast<std::size_t>(Stage::signal) + 1> has_{};
 };
-
-/// An entry of a model's effects: from values by key (shop units, as in the file).
-/// @throws Error on an unknown name or key, a missing key, a value out of range.
-EffectEntry effectEntry(const std::string& name, const std::map<std::string, double>& numbers,
-                        const std::map<std::string, std::string>& words = {});
 
 }  // namespace smartmill::sim

@@ -1,29 +1,45 @@
 #include "smartmill_core/model/effect_catalogue.h"
 
-#include <utility>
+#include <algorithm>
+#include <cmath>
+
+#include "smartmill_core/units.h"
+
+// One entry an effect: this is the place to add one. Ranges of a fit are those of its coordinates, wider than
+// what a workshop meets; draws are what it meets.
 
 namespace smartmill {
 
 namespace {
 
-// A number that is neutral (0 unless said) where the effect is absent.
-EffectParameter number(const char* key, const char* unit, Range range, EffectPrior prior) {
+using Forms = std::vector<EffectForm>;
+using Need = EffectNeed;
+using Random = EffectKind::Random;
+using Scope = EffectScope;
+using Seek = EffectForm::Seek;
+using Stage = EffectStage;
+
+const Range NOT_NEGATIVE = Range::notNegative(), POSITIVE = Range::positive();
+const std::vector<std::string> AXES{"x", "y", "z"};
+
+// ---- keys
+
+EffectParameter number(const char* key, const char* unit, const Range& range = {}) {
   EffectParameter p;
   p.key = key;
   p.unit = unit;
   p.range = range;
-  p.prior = prior;
   return p;
 }
 
-EffectParameter orZero(const char* key, const char* unit, EffectPrior prior) {
-  EffectParameter p = number(key, unit, {}, prior);
+EffectParameter orZero(const char* key, const char* unit) {
+  EffectParameter p = number(key, unit);
   p.optional = true;
   return p;
 }
 
 EffectParameter angle(const char* key) {
-  return number(key, "deg", {}, {0.0, 360.0, 0.0, 0.0, true});
+  return number(key, "deg").drawn(0.0, 360.0);
 }
 
 EffectParameter angleOrZero(const char* key) {
@@ -32,149 +48,461 @@ EffectParameter angleOrZero(const char* key) {
   return p;
 }
 
-EffectParameter oneOf(const char* key, std::vector<std::string> words) {
-  EffectParameter p;
-  p.key = key;
-  p.unit = "1";
+EffectParameter oneOf(const char* key, const std::vector<std::string>& words) {
+  EffectParameter p = number(key, "1");
   p.value = EffectValue::word;
-  p.words = std::move(words);
+  p.words = words;
+  return p;
+}
+
+EffectParameter oneOfNumbers(const char* key, const char* unit, const std::vector<double>& choices) {
+  EffectParameter p = number(key, unit);
+  p.choices = choices;
+  return p;
+}
+
+EffectParameter perTooth(const char* key, const char* unit, const Range& range, std::optional<double> sum) {
+  EffectParameter p = number(key, unit, range);
+  p.value = EffectValue::list;
+  p.sum = sum;
   return p;
 }
 
 EffectParameter modes(const char* key) {
-  EffectParameter p;
-  p.key = key;
-  p.unit = "modes";
+  EffectParameter p = number(key, "modes");
   p.value = EffectValue::modes;
   p.optional = true;
   return p;
 }
 
-EffectParameter pitches() {
-  EffectParameter p = number("pitch_deg", "deg", Range::positive(), {-30.0, 30.0, 0.0, 3.0});
-  p.value = EffectValue::pitch;
-  return p;
+// ---- forms
+
+std::function<Forms(const Scope&)> always(const EffectForm& form) {
+  return [form](const Scope&) { return Forms{form}; };
 }
 
-EffectParameter mainsFrequency() {
-  EffectParameter p = number("frequency_hz", "Hz", {}, {50.0, 60.0});
-  p.choices = {50.0, 60.0};
-  return p;
+// What is added takes away no more than the model has: no edge pulls.
+EffectCoordinates added(const char* key, double stated, FitRange range) {
+  range.low = -stated;
+  return amplitude(key, range);
 }
 
-EffectKind timed(EffectKind kind, bool start_time, bool cut_time) {
-  kind.needs_start_time = start_time;
-  kind.needs_cut_time = cut_time;
-  return kind;
+Forms addedEdgeForces(const Scope& scope) {
+  const CuttingCoefficients k = scope.nominal.cutting.value_or(CuttingCoefficients{});
+  const FitRange range{0.0, 200.0, 0.005, 20.0};
+  return {EffectForm({added("Kte_n_per_mm", k.kte / units::N_PER_MM, range),
+                      added("Kre_n_per_mm", k.kre / units::N_PER_MM, range),
+                      added("Kae_n_per_mm", k.kae / units::N_PER_MM, range)})
+              .straight({2.0})};
+}
+
+Forms flexibility(const Scope&) {
+  return {EffectForm({tipMode('x')}).named("x").sought(Seek::tip_mode),
+          EffectForm({tipMode('y')}).named("y").sought(Seek::tip_mode),
+          EffectForm({tipMode('x'), tipMode('y')}).named("xy").sought(Seek::tip_mode)};
+}
+
+// The direct share gives the gain; how large that is, a nominal model may not know well.
+Forms extraModes(const Scope& scope) {
+  Forms forms;
+  for (std::size_t a = 0; a < AXES.size(); ++a) {
+    if (scope.channels.count("f" + AXES[a]) == 0) continue;
+    const double most = std::max(scope.nominal.force_sensor.axis[a].direct, 0.2);
+    const EffectForm mode =
+        EffectForm(
+            {logarithm("frequency_hz", {std::log(20.0), std::log(12000.0), 2.5e-06, 1.5}, 1.0,
+                       std::log(800.0)),
+             logarithm("damping_ratio", {std::log(0.001), std::log(0.6), 0.00025, 1.0}, 1.0, std::log(0.03)),
+             amplitude("gain", {-most, most, 2.5e-05, 0.2})})
+            .word("axis", AXES[a])
+            .sought(Seek::sensor_mode);
+    forms.push_back(EffectForm(mode).named(AXES[a]));
+    forms.push_back(EffectForm(mode).named(AXES[a] + ", second").onlyAfter(AXES[a]));
+  }
+  return forms;
+}
+
+Forms crossTalk(const Scope&) {
+  std::vector<EffectCoordinates> pairs;
+  for (const char* pair : {"xy", "xz", "yx", "yz", "zx", "zy"})
+    pairs.push_back(amplitude(pair, {-0.9, 0.9, 0.002, 0.1}));
+  return {EffectForm(pairs).straight({0.01})};
+}
+
+Forms gainErrors(const Scope& scope) {
+  Forms forms;
+  for (const std::string& channel : scope.channels) {
+    forms.push_back(EffectForm({logarithm("gain", {std::log(0.05), std::log(5.0), 1e-4, 0.2})})
+                        .straight({0.02})
+                        .word("channel", channel)
+                        .named(channel));
+  }
+  return forms;
+}
+
+Forms channelDelays(const Scope& scope) {
+  Forms forms;
+  for (const std::string& channel : scope.channels) {
+    EffectForm form =
+        channel == "load_meter"
+            ? EffectForm({amplitude("delay_us", {0.0, 2e5, 2.0, 10000.0})}).straight({500.0, 5000.0, 30000.0})
+            : EffectForm({amplitude("delay_us", {0.0, 5000.0, 0.02, 200.0})})
+                  .straight({10.0, 60.0, 150.0, 400.0});
+    forms.push_back(form.word("channel", channel).named(channel));
+  }
+  return forms;
+}
+
+Forms hums(const Scope&) {
+  Forms forms;
+  for (const double frequency : {50.0, 60.0}) {
+    // The twin takes each record's phase from the record, for which the amplitude must not be zero.
+    forms.push_back(EffectForm({amplitude("amplitude_n", {0.0, 1e4, 0.0005, 10.0}),
+                                amplitude("y_ratio", {-20.0, 20.0, 0.000125, 1.0}, 0.5)})
+                        .probe({0.0, 0.6}, {{2.0, 0.6}})
+                        .probe({0.0, -0.6}, {{2.0, -0.6}})
+                        .number("frequency_hz", frequency)
+                        .named(frequency == 50.0 ? "50 Hz" : "60 Hz"));
+  }
+  return forms;
+}
+
+Forms saturations(const Scope& scope) {
+  const double most = scope.largest_force;
+  return {EffectForm({amplitude("limit_n", {0.02 * most, 8.0 * most, 1e-5 * most, 4.0 * most}, 4.0 * most)})
+              .startingAt({0.99 * most})
+              .startingAt({0.97 * most})};
+}
+
+// ---- draws
+
+double between(Random& random, double low, double high) {
+  return std::uniform_real_distribution<double>(low, high)(random);
+}
+
+double eitherSign(Random& random, double low, double high) {
+  const double size = between(random, low, high);
+  return std::bernoulli_distribution(0.5)(random) ? size : -size;
+}
+
+void drawPitches(const MachineModel& machine, Random& random, EffectEntry& entry) {
+  std::vector<double>& pitch = entry.lists["pitch_deg"];
+  double rest = 360.0;
+  for (int k = 0; k + 1 < machine.tool->teeth; ++k) {
+    pitch.push_back(360.0 / machine.tool->teeth + eitherSign(random, 1.0, 5.0));
+    rest -= pitch.back();
+  }
+  pitch.push_back(rest);
+}
+
+void drawHelix(const MachineModel& machine, Random& random, EffectEntry& entry) {
+  entry.numbers["helix_deg"] = units::degFromRad(machine.tool->helix) + eitherSign(random, 3.0, 9.0);
+}
+
+void drawTipModes(const MachineModel&, Random& random, EffectEntry& entry) {
+  for (ModalModel* axis : {&entry.flexibility.x, &entry.flexibility.y}) {
+    Mode mode;
+    mode.frequency = between(random, 800.0, 2200.0);
+    mode.damping_ratio = between(random, 0.03, 0.06);
+    mode.gain = 1.0 / (units::N_PER_UM * between(random, 25.0, 50.0));
+    axis->modes = {mode};
+  }
+}
+
+void drawCrossTalk(const MachineModel&, Random& random, EffectEntry& entry) {
+  for (auto& [pair, share] : entry.numbers) {
+    if (std::bernoulli_distribution(0.5)(random)) share = 0.0;
+  }
+  if (entry.numbers["xz"] == 0.0 && entry.numbers["yx"] == 0.0)
+    entry.numbers["xy"] = eitherSign(random, 0.02, 0.08);
+}
+
+// What the stated uncertainty of the load meter's constant covers is no effect.
+void drawLargerLoadGain(const MachineModel&, Random& random, EffectEntry& entry) {
+  if (entry.words["channel"] == "load_meter") entry.numbers["gain"] = 1.0 + eitherSign(random, 0.15, 0.3);
+}
+
+// ---- entries, in the order in which they act
+
+std::vector<EffectKind> geometryAndMotion() {
+  return {
+      {"uneven_pitch",
+       Stage::geometry,
+       "teeth not evenly spaced; each tooth takes its pitch's share of the feed",
+       "Budak 2003",
+       {perTooth("pitch_deg", "deg", POSITIVE, 360.0)},
+       {Need::cuts, Need::several_teeth},
+       [](const Scope& s) {
+         return Forms{
+             EffectForm({pitches("pitch_deg", *s.nominal.tool, {-30.0, 30.0, 5e-4, 5.0})}).straight({0.5})};
+       },
+       drawPitches},
+      {"runout",
+       Stage::geometry,
+       "tooth j cuts at radius R + offset cos(angle - position of tooth j)",
+       "Kline & DeVor 1983; Dunwoody 6.1",
+       {number("offset_um", "um", NOT_NEGATIVE).drawn(5.0, 25.0), angle("angle_deg")},
+       {Need::cuts},
+       always(EffectForm({planar("offset_um", "angle_deg", 200.0, 5e-4, 20.0)}).straight({1.0}))},
+      {"helix",
+       Stage::geometry,
+       "another helix angle than nominal",
+       "Dunwoody eq. 5.64",
+       {number("helix_deg", "deg", {0.0, 80.0, false, true})},
+       {Need::cuts},
+       [](const Scope& s) {
+         const double helix = units::degFromRad(s.nominal.tool->helix);
+         return Forms{EffectForm({amplitude("helix_deg", {0.0, 75.0, 0.0025, 8.0}, helix)})
+                          .straight({helix > 60.0 ? -1.0 : 1.0})};
+       },
+       drawHelix},
+      {"feed_error",
+       Stage::motion,
+       "actual feed over commanded feed",
+       "feed drive or override away from the commanded feed",
+       {number("ratio", "1", POSITIVE).drawnOnBothSides(0.12, 0.25, 1.0)},
+       {Need::cuts},
+       always(EffectForm({logarithm("ratio", {std::log(0.2), std::log(5.0), 1e-4, 0.2})}).straight({0.02}))},
+      {"depth_tilt",
+       Stage::motion,
+       "the axial depth changes along the feed path from engagement",
+       "stock or table not level along the feed",
+       {number("slope_um_per_mm", "um/mm").drawnOnBothSides(15.0, 60.0)},
+       {Need::cuts},
+       always(EffectForm({amplitude("slope_um_per_mm", {-900.0, 900.0, 0.0125, 50.0})}).straight({5.0}))},
+  };
+}
+
+std::vector<EffectKind> cuttingLawAndStructure() {
+  return {
+      {"edge_forces",
+       Stage::cutting_law,
+       "adds to the edge coefficients",
+       "Dunwoody eq. 2.1; Armarego & Deshpande 1991",
+       {orZero("Kte_n_per_mm", "N/mm").drawn(4.0, 15.0), orZero("Kre_n_per_mm", "N/mm").drawn(4.0, 15.0),
+        orZero("Kae_n_per_mm", "N/mm").drawn(0.5, 4.0)},
+       {Need::cuts},
+       addedEdgeForces},
+      {"size_effect",
+       Stage::cutting_law,
+       "Kc multiplied by (h / reference)^-exponent",
+       "Kienzle 1952",
+       {number("exponent", "1").drawn(0.1, 0.35),
+        number("reference_chip_um", "um", POSITIVE).drawn(40.0, 120.0)},
+       {Need::cuts},
+       // A level without a slope cannot be written: each point has some slope.
+       always(EffectForm({powerLaw("exponent", "reference_chip_um", 60.0, 1.0, 3000.0)})
+                  .probe({0.0, 0.0}, {{0.02, 0.0}, {0.02, 0.01}}))},
+      {"cutting_speed",
+       Stage::cutting_law,
+       "Kc multiplied by (v / reference)^-exponent",
+       "Altintas, Manufacturing Automation, 2.4",
+       {number("exponent", "1").drawn(0.05, 0.25),
+        number("reference_m_per_min", "m/min", POSITIVE).drawn(100.0, 300.0)},
+       {Need::cuts},
+       always(EffectForm({powerLaw("exponent", "reference_m_per_min", 150.0, 1.0, 5000.0)})
+                  .probe({0.0, 0.0}, {{0.02, 0.0}, {0.02, 0.01}}))},
+      {"chip_coefficients",
+       Stage::cutting_law,
+       "adds to the chip coefficients",
+       "Dunwoody eq. 2.1: coefficients of another material, or of a regression that runout had bent",
+       {orZero("Ktc_n_per_mm2", "N/mm2").drawnOnBothSides(120.0, 300.0),
+        orZero("Krc_n_per_mm2", "N/mm2").drawnOnBothSides(50.0, 110.0),
+        orZero("Kac_n_per_mm2", "N/mm2").drawnOnBothSides(30.0, 90.0)},
+       {Need::cuts},
+       nullptr},
+      {"edge_buildup",
+       Stage::cutting_law,
+       "edge coefficients multiplied by 1 - exp(-h / chip)",
+       "Endres, DeVor & Kapoor 1995: ploughing needs some chip to build up",
+       {number("chip_um", "um", NOT_NEGATIVE).drawn(8.0, 40.0)},
+       {Need::cuts},
+       nullptr},
+      {"tool_wear",
+       Stage::cutting_law,
+       "edge coefficients (added ones too) multiplied by 1 + growth x cutting time of the edge",
+       "Teitenberg, Bayoumi & Yucesan 1992",
+       {number("edge_growth_per_min", "1/min").drawn(0.1, 0.8)},
+       {Need::cuts, Need::cut_time},
+       always(EffectForm({amplitude("edge_growth_per_min", {-0.2, 20.0, 0.000125, 1.0})}).straight({0.1}))},
+      {"process_damping",
+       Stage::cutting_law,
+       "radial force C v_r / v_c per mm of engaged edge, v_r the velocity into the work; tangential 0.3 of "
+       "it",
+       "Tunc & Budak 2012; Altintas, Eynian & Onozuka 2008",
+       {number("coefficient_n_per_mm", "N/mm").drawn(150.0, 800.0)},
+       {Need::cuts, Need::flexible_tool},
+       always(EffectForm({amplitude("coefficient_n_per_mm", {-1e4, 1e6, 0.125, 2000.0})})
+                  .straight({50.0, 300.0, 1500.0}))},
+      {"tool_flexibility",
+       Stage::structure,
+       "modes added to the tool tip's: it vibrates and the chip regenerates",
+       "Dunwoody 2.2; Altintas & Budak 1995",
+       {modes("x"), modes("y")},
+       {Need::cuts},
+       flexibility,
+       drawTipModes},
+  };
+}
+
+std::vector<EffectKind> sensor() {
+  return {
+      {"mass_loading",
+       Stage::sensor,
+       "the first sensor mode of each axis falls by 1/sqrt(1 + ratio), damping ratio unchanged",
+       "Dunwoody 5.2: workpiece mass on the dynamometer",
+       {number("mass_ratio", "1", {-1.0, Range().high, true, false}).drawn(0.08, 0.4)},
+       {Need::forces, Need::sensor_modes},
+       // In logarithms the mass does just what the modes' stated frequencies do, all at once. A light mode
+       // answers in proportion only while it moves by less than its width.
+       always(EffectForm({logarithmOfOnePlus("mass_ratio", {std::log(0.4), std::log(4.0), 5e-05, 0.3})})
+                  .straight({0.01, 0.05, 0.12, 0.2, 0.3, 0.45, 0.7, -0.05, -0.12, -0.25}))},
+      {"speed_dependent_mode",
+       Stage::sensor,
+       "the first sensor mode of each axis falls linearly with spindle speed",
+       "Cao & Altintas 2007: bearing preload falls with speed",
+       {number("softening_per_krpm", "1/krpm").drawn(0.004, 0.015)},
+       {Need::forces, Need::sensor_modes},
+       always(EffectForm({amplitude("softening_per_krpm", {-0.04, 0.04, 5e-06, 0.02})})
+                  .straight({0.001, 0.003, 0.006, 0.01, 0.015, 0.025, -0.003, -0.01}))},
+      {"extra_mode",
+       Stage::sensor,
+       "one more mode in the force sensor; its gain is taken from the direct share",
+       "Dunwoody eq. 5.5",
+       {oneOf("axis", AXES), number("frequency_hz", "Hz", POSITIVE).drawn(300.0, 3500.0),
+        number("damping_ratio", "1", {0.0, 1.0, true, true}).drawn(0.01, 0.05),
+        number("gain", "1").drawn(0.03, 0.09)},
+       {Need::forces},
+       extraModes},
+      {"unbalance",
+       Stage::sensor_force,
+       "m e omega^2 on the sensor: x sin(a), y cos(a), a = spindle angle + angle; the tip does not move",
+       "ISO 21940-11",
+       {number("mass_eccentricity_g_mm", "g mm", NOT_NEGATIVE).drawn(4.0, 20.0), angle("angle_deg")},
+       {Need::forces},
+       always(
+           EffectForm({planar("mass_eccentricity_g_mm", "angle_deg", 5000.0, 5e-4, 30.0)}).straight({1.0}))},
+      {"spindle_order",
+       Stage::sensor_force,
+       "x_n sin(order x spindle angle + x_deg) and so on, on the sensor while the spindle turns",
+       "bearings, drive and draw bar: lines locked to the spindle angle",
+       {number("order", "1", POSITIVE).drawn(0.35, 12.0), orZero("x_n", "N").drawn(2.0, 8.0),
+        orZero("y_n", "N").drawn(2.0, 8.0), orZero("z_n", "N").drawn(2.0, 8.0), angleOrZero("x_deg"),
+        angleOrZero("y_deg"), angleOrZero("z_deg")},
+       {Need::forces},
+       nullptr},
+  };
+}
+
+std::vector<EffectKind> drive() {
+  return {
+      {"stribeck_friction",
+       Stage::drive,
+       "spindle friction breakaway x exp(-(n / speed)^2) more",
+       "Armstrong-Helouvry, Dupont & Canudas de Wit 1994",
+       {number("breakaway_nm", "N m").drawn(0.1, 0.6),
+        number("speed_rpm", "rpm", POSITIVE).drawn(1200.0, 4500.0)},
+       {Need::load_meter},
+       always(EffectForm({amplitude("breakaway_nm", {-20.0, 20.0, 0.000125, 0.5}),
+                          logarithm("speed_rpm", {std::log(50.0), std::log(30000.0), 2.5e-4, 1.0}, 1.0,
+                                    std::log(1200.0))})
+                  .scaled(0.05, {400.0, 1200.0, 3500.0}))},
+      {"friction_warmup",
+       Stage::drive,
+       "spindle friction (Stribeck's too) multiplied by 1 + cold x exp(-start_time / constant)",
+       "Dunwoody 3.2.1: friction falls while the spindle warms up",
+       {number("cold_ratio", "1").drawn(0.2, 0.8),
+        number("time_constant_s", "s", POSITIVE).drawn(120.0, 500.0)},
+       {Need::load_meter, Need::start_time},
+       always(EffectForm({amplitude("cold_ratio", {-0.9, 20.0, 0.000125, 0.5}),
+                          logarithm("time_constant_s", {std::log(2.0), std::log(20000.0), 2.5e-4, 1.0}, 1.0,
+                                    std::log(250.0))})
+                  .scaled(0.05, {80.0, 250.0, 700.0}))},
+      {"load_meter_lag",
+       Stage::drive,
+       "bandwidth of the load meter, in place of the nominal one",
+       "Dunwoody 3.2.1: first-order load meter",
+       {number("bandwidth_hz", "Hz", POSITIVE).drawn(1.5, 5.0)},
+       {Need::load_meter},
+       [](const Scope& s) {
+         return Forms{EffectForm({logarithm("bandwidth_hz", {std::log(0.01), std::log(20.0), 0.000125, 0.7},
+                                            s.nominal.spindle->load_meter_bandwidth)})
+                          .straight({-0.1, -0.5, -1.2, 0.4})};
+       }},
+  };
+}
+
+std::vector<EffectKind> channels() {
+  return {
+      {"cross_talk",
+       Stage::sensor_output,
+       "xy: share of the y signal in the x channel, and so on",
+       "Kistler, data sheets of multi-component dynamometers",
+       {orZero("xy", "1").drawnOnBothSides(0.02, 0.08), orZero("xz", "1").drawnOnBothSides(0.02, 0.08),
+        orZero("yx", "1").drawnOnBothSides(0.02, 0.08), orZero("yz", "1").drawnOnBothSides(0.02, 0.08),
+        orZero("zx", "1").drawnOnBothSides(0.02, 0.08), orZero("zy", "1").drawnOnBothSides(0.02, 0.08)},
+       {Need::forces},
+       crossTalk,
+       drawCrossTalk},
+      {"gain_error",
+       Stage::sensor_output,
+       "one channel's sensitivity is wrong: it shows gain times the value",
+       "calibration of one channel",
+       {oneOf("channel", measuredChannels()).drawnFromFirst(4),
+        number("gain", "1").drawnOnBothSides(0.06, 0.2, 1.0)},
+       {},
+       gainErrors,
+       drawLargerLoadGain},
+      {"channel_delay",
+       Stage::delay,
+       "one channel is late",
+       "filters and converters of one channel",
+       {oneOf("channel", measuredChannels()).drawnFromFirst(3),
+        number("delay_us", "us", NOT_NEGATIVE).drawn(30.0, 200.0)},
+       {},
+       channelDelays},
+      {"zero_offset",
+       Stage::signal,
+       "a constant on each force channel",
+       "Kistler, charge amplifiers: zero after the last reset",
+       {orZero("x_n", "N").drawnOnBothSides(2.0, 15.0), orZero("y_n", "N").drawnOnBothSides(2.0, 15.0),
+        orZero("z_n", "N").drawnOnBothSides(2.0, 15.0)},
+       {Need::forces},
+       nullptr},
+      {"charge_drift",
+       Stage::signal,
+       "linear drift from the start of each record: rate on fx, y_ratio of it on fy",
+       "Kistler, charge amplifiers: drift of the insulation",
+       {number("rate_n_per_min", "N/min").drawnOnBothSides(800.0, 4000.0),
+        number("y_ratio", "1").drawnOnBothSides(0.3, 1.5)},
+       {Need::forces},
+       // The two need both: a rate of zero on x leaves y without its ratio.
+       always(EffectForm({sizes("rate_n_per_min", "y_ratio", {-1e5, 1e5, 0.025, 500.0})})
+                  .probe({0.0, 0.0}, {{20.0, 0.0}, {20.0, 20.0}}))},
+      {"mains_hum",
+       Stage::signal,
+       "sine on fx, y_ratio of it in phase on fy; the phase of each record is found in the record",
+       "coupling of the mains into the charge lines",
+       {oneOfNumbers("frequency_hz", "Hz", {50.0, 60.0}), number("amplitude_n", "N").drawn(2.0, 12.0),
+        number("y_ratio", "1").drawnOnBothSides(0.3, 1.2)},
+       {Need::plane_forces},
+       hums},
+      {"saturation",
+       Stage::signal,
+       "fx, fy and fz clipped at plus and minus the limit",
+       "range of the charge amplifier",
+       {number("limit_n", "N", POSITIVE).drawn(150.0, 350.0)},
+       {Need::forces},
+       saturations},
+  };
 }
 
 std::vector<EffectKind> makeCatalogue() {
-  const Range positive = Range::positive(), not_negative = Range::notNegative();
-  const std::vector<std::string> axes{"x", "y", "z"};
-  const std::vector<std::string> channels{"fx",     "fy",     "fz",           "load_meter",
-                                          "tool_x", "tool_y", "displacement", "acceleration"};
-  const EffectPrior share{-0.3, 0.3, 0.0, 0.05};
-  return {
-      {"runout",
-       {number("offset_um", "um", not_negative, {0.0, 80.0, 0.0, 15.0}), angle("angle_deg")},
-       "Kline & DeVor 1983; Dunwoody 6.1"},
-      {"edge_forces",
-       {orZero("Kte_n_per_mm", "N/mm", {-60.0, 60.0, 0.0, 10.0}),
-        orZero("Kre_n_per_mm", "N/mm", {-60.0, 60.0, 0.0, 10.0}),
-        orZero("Kae_n_per_mm", "N/mm", {-30.0, 30.0, 0.0, 3.0})},
-       "Dunwoody eq. 2.1; Armarego & Deshpande 1991"},
-      {"size_effect",
-       {number("exponent", "1", {}, {-0.2, 0.8, 0.0, 0.2}),
-        number("reference_chip_um", "um", positive, {5.0, 300.0})},
-       "Kienzle 1952"},
-      timed({"tool_wear",
-             {number("edge_growth_per_min", "1/min", {}, {-0.5, 5.0, 0.0, 0.5})},
-             "Teitenberg, Bayoumi & Yucesan 1992"},
-            false, true),
-      {"cutting_speed",
-       {number("exponent", "1", {}, {-0.3, 0.6, 0.0, 0.15}),
-        number("reference_m_per_min", "m/min", positive, {20.0, 2000.0})},
-       "Altintas, Manufacturing Automation, 2.4"},
-      {"uneven_pitch", {pitches()}, "Budak 2003"},
-      {"helix", {number("helix_deg", "deg", {0.0, 80.0, false, true}, {0.0, 65.0})}, "Dunwoody eq. 5.64"},
-      {"tool_flexibility", {modes("x"), modes("y")}, "Dunwoody 2.2; Altintas & Budak 1995"},
-      {"process_damping",
-       {number("coefficient_n_per_mm", "N/mm", {}, {0.0, 5000.0, 0.0, 300.0})},
-       "Tunc & Budak 2012; Altintas, Eynian & Onozuka 2008"},
-      {"extra_mode",
-       {oneOf("axis", axes), number("frequency_hz", "Hz", positive, {100.0, 8000.0}),
-        number("damping_ratio", "1", {0.0, 1.0, true, true}, {0.002, 0.3}),
-        number("gain", "1", {}, {-0.5, 0.5, 0.0, 0.1})},
-       "Dunwoody eq. 5.5"},
-      {"mass_loading",
-       {number("mass_ratio", "1", {-1.0, Range().high, true, false}, {-0.3, 1.0, 0.0, 0.15})},
-       "Dunwoody 5.2: workpiece mass on the dynamometer"},
-      {"speed_dependent_mode",
-       {number("softening_per_krpm", "1/krpm", {}, {-0.02, 0.04, 0.0, 0.005})},
-       "Cao & Altintas 2007: bearing preload falls with speed"},
-      {"cross_talk",
-       {orZero("xy", "1", share), orZero("xz", "1", share), orZero("yx", "1", share),
-        orZero("yz", "1", share), orZero("zx", "1", share), orZero("zy", "1", share)},
-       "Kistler, data sheets of multi-component dynamometers"},
-      {"charge_drift",
-       {number("rate_n_per_min", "N/min", {}, {-5000.0, 5000.0, 0.0, 500.0}),
-        number("y_ratio", "1", {}, {-3.0, 3.0, 0.0, 1.0})},
-       "Kistler, charge amplifiers: drift of the insulation"},
-      {"mains_hum",
-       {mainsFrequency(), number("amplitude_n", "N", {}, {0.0, 100.0, 0.0, 5.0}),
-        number("y_ratio", "1", {}, {-3.0, 3.0, 0.0, 1.0})},
-       "coupling of the mains into the charge lines"},
-      {"unbalance",
-       {number("mass_eccentricity_g_mm", "g mm", not_negative, {0.0, 200.0, 0.0, 15.0}), angle("angle_deg")},
-       "ISO 21940-11: force m e omega^2"},
-      {"channel_delay",
-       {oneOf("channel", channels), number("delay_us", "us", not_negative, {0.0, 2000.0, 0.0, 100.0})},
-       "filters and converters of one channel"},
-      {"gain_error",
-       {oneOf("channel", channels), number("gain", "1", {}, {0.3, 2.0, 1.0, 0.1})},
-       "calibration of one channel"},
-      {"saturation", {number("limit_n", "N", positive, {5.0, 5000.0})}, "range of the charge amplifier"},
-      {"stribeck_friction",
-       {number("breakaway_nm", "N m", {}, {-0.5, 3.0, 0.0, 0.3}),
-        number("speed_rpm", "rpm", positive, {100.0, 10000.0})},
-       "Armstrong-Helouvry, Dupont & Canudas de Wit 1994"},
-      timed({"friction_warmup",
-             {number("cold_ratio", "1", {}, {-0.5, 3.0, 0.0, 0.3}),
-              number("time_constant_s", "s", positive, {20.0, 5000.0})},
-             "Dunwoody 3.2.1: friction falls while the spindle warms up"},
-            true, false),
-      {"load_meter_lag",
-       {number("bandwidth_hz", "Hz", positive, {0.3, 50.0})},
-       "Dunwoody 3.2.1: first-order load meter"},
-      {"depth_tilt",
-       {number("slope_um_per_mm", "um/mm", {}, {-300.0, 300.0, 0.0, 20.0})},
-       "stock or table not level along the feed"},
-      {"feed_error",
-       {number("ratio", "1", positive, {0.5, 1.5, 1.0, 0.08})},
-       "feed drive or override away from the commanded feed"},
-  };
-}
-
-std::vector<EffectKind> makeFurther() {
-  const EffectPrior force{-300.0, 300.0, 0.0, 20.0};
-  return {
-      {"chip_coefficients",
-       {orZero("Ktc_n_per_mm2", "N/mm2", {-2000.0, 2000.0, 0.0, 150.0}),
-        orZero("Krc_n_per_mm2", "N/mm2", {-1500.0, 1500.0, 0.0, 100.0}),
-        orZero("Kac_n_per_mm2", "N/mm2", {-1000.0, 1000.0, 0.0, 100.0})},
-       "Dunwoody eq. 2.1: coefficients of another material, or of a regression that runout had bent"},
-      {"edge_buildup",
-       {number("chip_um", "um", Range::notNegative(), {0.0, 150.0, 0.0, 15.0})},
-       "Endres, DeVor & Kapoor 1995: ploughing needs some chip to build up"},
-      {"spindle_order",
-       {number("order", "1", Range::positive(), {0.1, 60.0}), orZero("x_n", "N", force),
-        orZero("y_n", "N", force), orZero("z_n", "N", force), angleOrZero("x_deg"), angleOrZero("y_deg"),
-        angleOrZero("z_deg")},
-       "bearings, drive and draw bar: lines locked to the spindle angle"},
-      {"zero_offset",
-       {orZero("x_n", "N", force), orZero("y_n", "N", force), orZero("z_n", "N", force)},
-       "Kistler, charge amplifiers: zero after the last reset"},
-  };
+  std::vector<EffectKind> all;
+  for (std::vector<EffectKind> part :
+       {geometryAndMotion(), cuttingLawAndStructure(), sensor(), drive(), channels()})
+    all.insert(all.end(), part.begin(), part.end());
+  return all;
 }
 
 }  // namespace
@@ -182,27 +510,6 @@ std::vector<EffectKind> makeFurther() {
 const std::vector<EffectKind>& effectCatalogue() {
   static const std::vector<EffectKind> CATALOGUE = makeCatalogue();
   return CATALOGUE;
-}
-
-const std::vector<EffectKind>& furtherEffects() {
-  static const std::vector<EffectKind> FURTHER = makeFurther();
-  return FURTHER;
-}
-
-const EffectKind* findEffect(const std::string& name) {
-  for (const std::vector<EffectKind>* list : {&effectCatalogue(), &furtherEffects()}) {
-    for (const EffectKind& kind : *list) {
-      if (kind.name == name) return &kind;
-    }
-  }
-  return nullptr;
-}
-
-const EffectParameter* findParameter(const EffectKind& kind, const std::string& key) {
-  for (const EffectParameter& parameter : kind.parameters) {
-    if (parameter.key == key) return &parameter;
-  }
-  return nullptr;
 }
 
 }  // namespace smartmill

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <fstream>
 #include <limits>
+#include <numeric>
 #include <sstream>
 
 #include "smartmill_core/cutting/coefficient_set.h"
@@ -57,13 +58,14 @@ std::vector<Mode> readModes(const StrictYaml& parent, const std::string& key, Mo
   return modes;
 }
 
-std::vector<double> readPitch(const StrictYaml& map, const std::string& key, std::size_t teeth) {
-  const std::vector<double> pitch = map.numbers(key, teeth, POSITIVE);
-  double sum = 0.0;
-  for (const double p : pitch) sum += p;
-  if (std::abs(sum - 360.0) > PITCH_SUM_TOLERANCE_DEG)
-    map.fail(key, "the pitches sum to " + yamlNumber(sum) + ", 360 is due");
-  return pitch;
+// One value a tooth (any number of teeth: 0). @param sum of pitches
+std::vector<double> readPerTooth(const StrictYaml& map, const std::string& key, std::size_t teeth,
+                                 const Range& range, std::optional<double> sum) {
+  const std::vector<double> list = map.numbers(key, teeth, range);
+  const double is = std::accumulate(list.begin(), list.end(), 0.0);
+  if (sum && std::abs(is - *sum) > PITCH_SUM_TOLERANCE_DEG)
+    map.fail(key, "the pitches sum to " + yamlNumber(is) + ", " + shortNumber(*sum) + " is due");
+  return list;
 }
 
 void readTool(const StrictYaml& map, MachineModel& model) {
@@ -72,7 +74,8 @@ void readTool(const StrictYaml& map, MachineModel& model) {
   tool.diameter = map.number("diameter_mm", POSITIVE) * units::MM;
   tool.helix = units::radFromDeg(map.number("helix_deg", HELIX_DEG));
   if (map.has("pitch_deg")) {
-    for (const double p : readPitch(map, "pitch_deg", static_cast<std::size_t>(tool.teeth))) {
+    for (const double p :
+         readPerTooth(map, "pitch_deg", static_cast<std::size_t>(tool.teeth), POSITIVE, 360.0)) {
       tool.pitch.push_back(units::radFromDeg(p));
     }
   }
@@ -207,9 +210,7 @@ EffectEntry readEffect(const StrictYaml& map, const MachineModel& model) {
           break;
         }
         const double value = map.number(p.key, p.range);
-        bool allowed = p.choices.empty();
-        for (const double choice : p.choices) allowed = allowed || value == choice;
-        if (!allowed) map.fail(p.key, yamlNumber(value) + " is out of range (50 or 60)");
+        if (!p.allows(value)) map.fail(p.key, yamlNumber(value) + " is out of range (" + p.rangeText() + ")");
         effect.numbers[p.key] = value;
         if (map.has(p.key + "_std")) effect.std_devs[p.key] = map.number(p.key + "_std", NOT_NEGATIVE);
         break;
@@ -217,10 +218,14 @@ EffectEntry readEffect(const StrictYaml& map, const MachineModel& model) {
       case EffectValue::word:
         effect.words[p.key] = map.oneOf(p.key, p.words);
         break;
-      case EffectValue::pitch:
-        effect.pitch_deg =
-            readPitch(map, p.key, model.tool ? static_cast<std::size_t>(model.tool->teeth) : 0);
+      case EffectValue::list: {
+        const std::size_t teeth = model.tool ? static_cast<std::size_t>(model.tool->teeth) : 0;
+        effect.lists[p.key] = readPerTooth(map, p.key, teeth, p.range, p.sum);
+        if (!map.has(p.key + "_std")) break;
+        const std::vector<double> stds = map.numbers(p.key + "_std", teeth, NOT_NEGATIVE);
+        for (std::size_t k = 0; k < stds.size(); ++k) effect.std_devs[itemOf(p.key, k)] = stds[k];
         break;
+      }
       case EffectValue::modes:
         (p.key == "x" ? effect.flexibility.x : effect.flexibility.y).modes =
             readModes(map, p.key, ModeKind::stiffness);
@@ -306,9 +311,18 @@ void writeEffect(std::ostream& out, const EffectEntry& effect) {
         if (value != effect.words.end()) out << "  " << p.key << ": " << yamlWord(value->second) << "\n";
         break;
       }
-      case EffectValue::pitch:
-        out << "  " << p.key << ": " << list(effect.pitch_deg, 1.0) << "\n";
+      case EffectValue::list: {
+        const auto values = effect.lists.find(p.key);
+        if (values == effect.lists.end()) break;
+        out << "  " << p.key << ": " << list(values->second, 1.0) << "\n";
+        std::vector<double> stds;
+        for (std::size_t k = 0; k < values->second.size(); ++k) {
+          const auto std_dev = effect.std_devs.find(itemOf(p.key, k));
+          if (std_dev != effect.std_devs.end()) stds.push_back(std_dev->second);
+        }
+        if (stds.size() == values->second.size()) out << "  " << p.key << "_std: " << list(stds, 1.0) << "\n";
         break;
+      }
       case EffectValue::modes:
         writeModes(out, "  ", p.key, (p.key == "x" ? effect.flexibility.x : effect.flexibility.y).modes,
                    ModeKind::stiffness);

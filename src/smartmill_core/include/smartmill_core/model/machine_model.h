@@ -78,15 +78,14 @@ struct Workpiece {
   Axes3 low{{0, 0, 0}}, high{{0, 0, 0}};  ///< [m] corners in machine coordinates of the tool tip
 };
 
-/// One entry of effects: a name and keys of effects.md with their values as in the file (shop units);
-/// lists (pitch_deg) and modes (tool_flexibility) beside the numbers.
+/// One entry of effects: a name and keys of the catalogue with their values as in the file (shop units).
 struct EffectEntry {
   std::string name;
   std::map<std::string, double> numbers;
-  std::map<std::string, double> std_devs;    ///< of keys with _std beside them
-  std::map<std::string, std::string> words;  ///< channel, axis
-  std::vector<double> pitch_deg;
-  ToolTip flexibility;
+  std::map<std::string, double> std_devs;  ///< of keys with _std beside them; of lists' items: pitch_deg[0]
+  std::map<std::string, std::string> words;          ///< channel, axis
+  std::map<std::string, std::vector<double>> lists;  ///< one value a tooth: pitch_deg
+  ToolTip flexibility;                               ///< modes
 };
 
 /// How well the nominal values are known, one standard deviation [percent].

@@ -1,0 +1,295 @@
+#include "smartmill_core/model/effect_catalogue.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <fstream>
+#include <set>
+#include <sstream>
+
+#include <gtest/gtest.h>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/testing/temporary_folder.h"
+#include "smartmill_core/units.h"
+
+namespace smartmill {
+namespace {
+
+constexpr int DRAWS = 20;
+
+MachineModel mill(int teeth) {
+  MachineModel m;
+  m.tool = ToolGeometry{teeth, 16e-3, units::radFromDeg(35.0), {}};
+  m.cutting = CuttingCoefficients{800e6, 300e6, 200e6, 20e3, 25e3, 3e3};
+  for (ModalModel& axis : m.force_sensor.axis) {
+    Mode mode;
+    mode.frequency = 1200.0;
+    mode.damping_ratio = 0.03;
+    mode.gain = 0.9;
+    axis.modes = {mode};
+    axis.direct = 0.1;
+  }
+  Mode tip;
+  tip.frequency = 1100.0;
+  tip.damping_ratio = 0.04;
+  tip.gain = 1.0 / 30e6;
+  m.tool_tip.x.modes = {tip};
+  Spindle s;
+  s.viscous = 4e-4;
+  s.coulomb = 0.05;
+  s.load_meter_gain = 4e-4;
+  s.load_meter_bandwidth = 7.0;
+  s.load_meter_resolution = 3e-4;
+  m.spindle = s;
+  return m;
+}
+
+EffectScope scopeOf(const MachineModel& model) {
+  EffectScope scope{model, {"fx", "fy", "fz", "load_meter"}};
+  scope.cuts = scope.start_times = scope.cut_times = true;
+  scope.largest_force = 600.0;
+  return scope;
+}
+
+// Digits that files keep.
+void expectSame(const EffectEntry& a, const EffectEntry& b, double tolerance) {
+  EXPECT_EQ(a.name, b.name);
+  EXPECT_EQ(a.words, b.words) << a.name;
+  const auto x = numbersOf(a), y = numbersOf(b);
+  ASSERT_EQ(x.size(), y.size()) << a.name;
+  for (std::size_t k = 0; k < x.size(); ++k) {
+    EXPECT_EQ(x[k].first, y[k].first);
+    EXPECT_NEAR(x[k].second, y[k].second, tolerance * std::max(1.0, std::abs(x[k].second)))
+        << a.name << "." << x[k].first;
+  }
+}
+
+TEST(EffectCatalogue, everyEntryIsWhole) {
+  const MachineModel model = mill(4);
+  std::set<std::string> names;
+  for (const EffectKind& kind : effectCatalogue()) {
+    EXPECT_TRUE(names.insert(kind.name).second) << kind.name << " stands twice";
+    EXPECT_EQ(findEffect(kind.name), &kind);
+    EXPECT_FALSE(kind.says.empty()) << kind.name;
+    EXPECT_FALSE(kind.source.empty()) << kind.name;
+    EXPECT_FALSE(kind.parameters.empty()) << kind.name;
+    EXPECT_EQ(formsOf(kind, scopeOf(model)).empty(), kind.forms == nullptr) << kind.name;
+    EXPECT_FALSE(lackingFor(kind, scopeOf(model))) << kind.name;
+  }
+  EXPECT_EQ(findEffect("magic"), nullptr);
+  // In the order in which they act.
+  EXPECT_TRUE(std::is_sorted(effectCatalogue().begin(), effectCatalogue().end(),
+                             [](const EffectKind& a, const EffectKind& b) { return a.stage < b.stage; }));
+}
+
+// The names and keys of the contract with the programs of others (effects.md beside the repository).
+TEST(EffectCatalogue, holdsTheNamesThatOtherProgramsUse) {
+  const std::vector<std::pair<std::string, std::vector<std::string>>> contract{
+      {"runout", {"offset_um", "angle_deg"}},
+      {"edge_forces", {"Kte_n_per_mm", "Kre_n_per_mm", "Kae_n_per_mm"}},
+      {"size_effect", {"exponent", "reference_chip_um"}},
+      {"tool_wear", {"edge_growth_per_min"}},
+      {"cutting_speed", {"exponent", "reference_m_per_min"}},
+      {"uneven_pitch", {"pitch_deg"}},
+      {"helix", {"helix_deg"}},
+      {"tool_flexibility", {"x", "y"}},
+      {"process_damping", {"coefficient_n_per_mm"}},
+      {"extra_mode", {"axis", "frequency_hz", "damping_ratio", "gain"}},
+      {"mass_loading", {"mass_ratio"}},
+      {"speed_dependent_mode", {"softening_per_krpm"}},
+      {"cross_talk", {"xy", "xz", "yx", "yz", "zx", "zy"}},
+      {"charge_drift", {"rate_n_per_min", "y_ratio"}},
+      {"mains_hum", {"frequency_hz", "amplitude_n", "y_ratio"}},
+      {"unbalance", {"mass_eccentricity_g_mm", "angle_deg"}},
+      {"channel_delay", {"channel", "delay_us"}},
+      {"gain_error", {"channel", "gain"}},
+      {"saturation", {"limit_n"}},
+      {"stribeck_friction", {"breakaway_nm", "speed_rpm"}},
+      {"friction_warmup", {"cold_ratio", "time_constant_s"}},
+      {"load_meter_lag", {"bandwidth_hz"}},
+      {"depth_tilt", {"slope_um_per_mm"}},
+      {"feed_error", {"ratio"}},
+      {"chip_coefficients", {"Ktc_n_per_mm2", "Krc_n_per_mm2", "Kac_n_per_mm2"}},
+      {"edge_buildup", {"chip_um"}},
+      {"spindle_order", {"order", "x_n", "y_n", "z_n", "x_deg", "y_deg", "z_deg"}},
+      {"zero_offset", {"x_n", "y_n", "z_n"}}};
+  for (const auto& [name, keys] : contract) {
+    const EffectKind* kind = findEffect(name);
+    ASSERT_NE(kind, nullptr) << name;
+    std::vector<std::string> own;
+    for (const EffectParameter& p : kind->parameters) own.push_back(p.key);
+    EXPECT_EQ(own, keys) << name;
+  }
+  EXPECT_EQ(findEffect("saturation")->parameters.at(0).unit, "N");
+}
+
+TEST(EffectCatalogue, fitsLookInsideTheirBounds) {
+  for (const int teeth : {2, 3, 4}) {
+    const MachineModel model = mill(teeth);
+    for (const EffectKind& kind : effectCatalogue()) {
+      for (const EffectForm& form : formsOf(kind, scopeOf(model))) {
+        const std::string name = form.title();
+        EXPECT_EQ(form.effect, kind.name);
+        EXPECT_EQ(form.probes.empty(), form.seek != EffectForm::Seek::nothing) << name;
+        for (const Coordinate& c : form.coordinates) {
+          EXPECT_LT(c.low, c.high) << name << " " << c.name;
+          EXPECT_LE(c.low, c.null) << name << " " << c.name;
+          EXPECT_GE(c.high, c.null) << name << " " << c.name;
+          EXPECT_GT(c.prior_std, 0.0) << name << " " << c.name;
+          EXPECT_GT(c.step, 0.0) << name << " " << c.name;
+          EXPECT_LT(c.step, c.prior_std) << name << " " << c.name;
+        }
+        for (const EffectForm::Probe& probe : form.probes) {
+          for (const EffectForm::Values& point : probe.points) {
+            ASSERT_EQ(point.size(), form.coordinates.size()) << name;
+            for (std::size_t c = 0; c < point.size(); ++c) {
+              EXPECT_GE(point[c], form.coordinates[c].low) << name;
+              EXPECT_LE(point[c], form.coordinates[c].high) << name;
+            }
+            // What a probe says, a file may say.
+            const EffectEntry e = form.entry(point);
+            EXPECT_NO_THROW(effectEntry(e.name, e.numbers, e.words, e.lists)) << name;
+          }
+        }
+      }
+    }
+  }
+}
+
+// What a bench draws is an entry that files may hold, and comes back from a file as it was written.
+TEST(EffectCatalogue, drawnEntriesComeBackFromFiles) {
+  const TemporaryFolder folder;
+  EffectKind::Random random(7);
+  for (const int teeth : {2, 3, 4}) {
+    for (const EffectKind& kind : effectCatalogue()) {
+      for (int k = 0; k < DRAWS / 4; ++k) {
+        MachineModel model = mill(teeth);
+        const EffectEntry drawn = drawEffect(kind.name, model, random);
+        EXPECT_NO_THROW(effectEntry(drawn.name, drawn.numbers, drawn.words, drawn.lists)) << kind.name;
+        model.effects = {drawn};
+        writeMachineModel(model, folder.file("drawn.yaml"));
+        const MachineModel read = readMachineModel(folder.file("drawn.yaml"));
+        ASSERT_EQ(read.effects.size(), 1u);
+        expectSame(read.effects.front(), drawn, 1e-9);
+      }
+    }
+  }
+}
+
+// Some form of the effect can say every drawn entry, with coordinates that lie inside its bounds; and the
+// coordinates come back from the entry that they make.
+TEST(EffectCatalogue, coordinatesAndEntriesAreEachOthersInverse) {
+  EffectKind::Random random(11);
+  for (const int teeth : {2, 3, 4, 6}) {
+    const MachineModel model = mill(teeth);
+    for (const EffectKind& kind : effectCatalogue()) {
+      const std::vector<EffectForm> forms = formsOf(kind, scopeOf(model));
+      for (int k = 0; k < DRAWS && kind.forms; ++k) {
+        const EffectEntry drawn = drawEffect(kind.name, model, random);
+        bool said = false;
+        for (const EffectForm& form : forms) {
+          if (form.entry(form.values(drawn)).words != drawn.words) continue;
+          const EffectForm::Values values = form.values(drawn);
+          bool inside = true;
+          for (std::size_t c = 0; c < values.size(); ++c)
+            inside = inside && values[c] >= form.coordinates[c].low && values[c] <= form.coordinates[c].high;
+          const auto again = numbersOf(form.entry(values)), numbers = numbersOf(drawn);
+          bool same = inside && again.size() == numbers.size();
+          for (std::size_t n = 0; same && n < numbers.size(); ++n)
+            same = std::abs(again[n].second - numbers[n].second) <
+                   1e-8 * std::max(1.0, std::abs(numbers[n].second));
+          if (!same) continue;  // another frequency, another axis
+          said = true;
+          const EffectForm::Values back = form.values(form.entry(values));
+          for (std::size_t c = 0; c < values.size(); ++c)
+            EXPECT_NEAR(back[c], values[c], 1e-9 * std::max(1.0, std::abs(values[c]))) << form.title();
+        }
+        EXPECT_TRUE(said) << kind.name << " with " << teeth << " teeth";
+      }
+    }
+  }
+}
+
+// A vector of which one direction is known must not have a pole at zero: closed forms of the coordinates.
+TEST(EffectCoordinates, areWhatTheySay) {
+  EffectForm vector({planar("size", "angle_deg", 10.0, 1e-3, 1.0)});
+  EXPECT_NEAR(vector.entry({-3.0, -4.0}).numbers.at("size"), 5.0, 1e-12);
+  EXPECT_NEAR(vector.entry({0.0, -4.0}).numbers.at("angle_deg"), 270.0, 1e-12);
+
+  // At the middle the level says everything, whatever the exponent: (x / reference)^-exponent = exp(level).
+  EffectForm power({powerLaw("exponent", "reference", 60.0, 1.0, 3000.0)});
+  for (const double exponent : {0.1, 0.4}) {
+    const EffectEntry e = power.entry({exponent, 0.05});
+    EXPECT_NEAR(std::pow(60.0 / e.numbers.at("reference"), -e.numbers.at("exponent")), std::exp(0.05), 1e-12);
+  }
+
+  // Contrasts are orthonormal and know no mean.
+  for (const int teeth : {2, 3, 5}) {
+    const EffectForm list({contrasts("offset", teeth, {-10.0, 10.0, 1e-3, 1.0})});
+    ASSERT_EQ(list.coordinates.size(), static_cast<std::size_t>(teeth - 1));
+    for (std::size_t a = 0; a < list.coordinates.size(); ++a) {
+      EffectForm::Values values(list.coordinates.size(), 0.0);
+      values[a] = 2.0;
+      double sum = 0.0, squares = 0.0;
+      const EffectEntry e = list.entry(values);
+      for (const double v : e.lists.at("offset")) {
+        sum += v;
+        squares += v * v;
+      }
+      EXPECT_NEAR(sum, 0.0, 1e-12);
+      EXPECT_NEAR(squares, 4.0, 1e-12);
+    }
+    EffectEntry level;
+    level.lists["offset"].assign(static_cast<std::size_t>(teeth), 3.0);
+    for (const double v : list.values(level)) EXPECT_NEAR(v, 0.0, 1e-12);
+  }
+
+  const EffectForm pitch({pitches("pitch_deg", *mill(3).tool, {-30.0, 30.0, 1e-3, 5.0})});
+  const std::vector<std::pair<std::string, double>> degrees = numbersOf(pitch.entry({4.0, -1.0}));
+  ASSERT_EQ(degrees.size(), 3u);
+  EXPECT_EQ(degrees[2].first, "pitch_deg[2]");
+  for (std::size_t k = 0; k < 3; ++k)
+    EXPECT_NEAR(degrees[k].second, (std::array<double, 3>{{124.0, 119.0, 117.0}})[k], 1e-9);
+}
+
+TEST(EffectCatalogue, tellsWhyACampaignCannotSpeakOfAnEffect) {
+  MachineModel model = mill(1);
+  model.tool_tip = {};
+  EffectScope scope = scopeOf(model);
+  scope.start_times = scope.cut_times = false;
+  const auto lacking = [&](const char* name) { return lackingFor(*findEffect(name), scope); };
+  EXPECT_EQ(lacking("tool_wear").value(), "cut_time_before_s is not stated");
+  EXPECT_EQ(lacking("friction_warmup").value(), "start_time_s is not stated");
+  EXPECT_EQ(lacking("process_damping").value(), "the model's tool is rigid");
+  EXPECT_EQ(lacking("uneven_pitch").value(), "");  // one tooth
+  EXPECT_FALSE(lacking("runout"));
+  scope.cuts = false;
+  EXPECT_EQ(lacking("tool_wear").value(), "");  // no word of what nobody asked for
+}
+
+TEST(EffectEntry, isChecked) {
+  EXPECT_THROW(effectEntry("coolant", {}), Error);
+  EXPECT_THROW(effectEntry("runout", {{"offset_um", 3.0}}), Error);
+  EXPECT_THROW(effectEntry("runout", {{"offset_um", -3.0}, {"angle_deg", 0.0}}), Error);
+  EXPECT_THROW(effectEntry("runout", {{"offset_um", 3.0}, {"angle_deg", 0.0}, {"exponent", 1.0}}), Error);
+  EXPECT_THROW(effectEntry("gain_error", {{"gain", 1.0}}, {{"channel", "fq"}}), Error);
+  EXPECT_THROW(effectEntry("mains_hum", {{"frequency_hz", 55.0}, {"amplitude_n", 1.0}, {"y_ratio", 1.0}}),
+               Error);
+  EXPECT_THROW(effectEntry("uneven_pitch", {}), Error);
+  EXPECT_THROW(effectEntry("uneven_pitch", {}, {}, {{"pitch_deg", {-90.0, 450.0}}}), Error);
+  EXPECT_THROW(drawEffect("coolant", mill(2), *std::make_unique<EffectKind::Random>(1)), Error);
+}
+
+// docs/effects.md is made from the catalogue: rosrun smartmill_studies sim_effect_table docs/effects.md
+TEST(EffectTable, isThatOfTheDocument) {
+  std::ifstream file(SMARTMILL_DOCS_FOLDER "/effects.md");
+  ASSERT_TRUE(file.good());
+  std::ostringstream text;
+  text << file.rdbuf();
+  EXPECT_EQ(withEffectTable(text.str()), text.str());
+  EXPECT_THROW(withEffectTable("no table"), Error);
+}
+
+}  // namespace
+}  // namespace smartmill
