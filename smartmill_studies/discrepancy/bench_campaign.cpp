@@ -193,10 +193,11 @@ void writeBenchCampaign(const MachineModel& nominal, const BenchTruth& truth, co
       const double t = static_cast<double>(i) / test.sample_rate;
       if (truth.outside) {
         const OutsideCause& o = *truth.outside;
+        // Locked to the spindle or the same in every record, order and level would be effects.
         const double wave = o.kind == "tone" ? std::sin(units::TWO_PI * o.place * t + own_phase)
                             : o.kind == "order"
-                                ? (tap ? 0.0 : std::sin(o.place * (test.spindle_speed * t + phase)))
-                            : o.kind == "level" ? 1.0
+                                ? (tap ? 0.0 : std::sin(o.place * test.spindle_speed * t + own_phase))
+                            : o.kind == "level" ? std::cos(own_phase)
                                                 : std::exp(-t / o.place);
         shown[sim::channelOf(o.channel)] += o.amplitude * wave;
       }

@@ -6,6 +6,7 @@
 
 #include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_discrepancy/search/mode_probes.h"
+#include "smartmill_discrepancy/search/order_probes.h"
 
 namespace smartmill::discrepancy {
 namespace {
@@ -161,44 +162,85 @@ std::vector<double> bestFrequencies(const Projection& projection, const std::vec
   return best;
 }
 
-// Where to try a mode whose frequency nobody knows.
-// tip: best frequencies of the tool's axes, once found.
-std::vector<Hypothesis::Probe> modeProbes(const Hypothesis& h, const Projection& projection,
-                                          const ModeProbes& probes, const TwinRunner& runner,
-                                          std::map<char, std::vector<double>>& tip) {
-  std::vector<Hypothesis::Probe> found;
-  double rate = 0.0;
-  for (const TestData& t : runner.data().tests) rate = std::max(rate, t.test.sample_rate);
-  if (h.seek == Hypothesis::Seek::sensor_mode) {
+// Where to try an effect of which nobody knows the place: frequency of a mode, order of a line.
+class Seeker {
+ public:
+  using Probes = std::vector<Hypothesis::Probe>;
+
+  Seeker(const Projection& projection, const TwinRunner& runner, const MachineModel& model, const Fit& now)
+      : projection_(projection), runner_(runner), model_(model), now_(now), probes_(runner, model) {}
+
+  Probes probesOf(const Hypothesis& h) {
+    switch (h.seek) {
+      case Hypothesis::Seek::nothing:
+        return h.probes;
+      case Hypothesis::Seek::sensor_mode:
+        return sensorModes(static_cast<std::size_t>(h.variant.front() - 'x'));
+      case Hypothesis::Seek::tip_mode:
+        return tipModes(h.variant);
+      case Hypothesis::Seek::spindle_order:
+        return orders(h.coordinates.size());
+    }
+    return {};
+  }
+
+ private:
+  Probes sensorModes(std::size_t axis) const {
     constexpr double DAMPING = 0.04;
-    const auto axis = static_cast<std::size_t>(h.variant.front() - 'x');
+    double rate = 0.0;
+    for (const TestData& t : runner_.data().tests) rate = std::max(rate, t.test.sample_rate);
+    Probes found;
     for (const double f : bestFrequencies(
-             projection, ModeProbes::grid(60.0, 0.42 * rate, 1.06),
-             [&](double at) { return probes.sensorMode(axis, at, DAMPING); }, false, runner.threads())) {
+             projection_, ModeProbes::grid(60.0, 0.42 * rate, 1.06),
+             [&](double at) { return probes_.sensorMode(axis, at, DAMPING); }, false, runner_.threads())) {
       const double d = std::log(DAMPING);
       found.push_back({{std::log(f), d, 0.0}, {{std::log(f), d, 0.01}}, false});
     }
+    return found;
   }
-  if (h.seek == Hypothesis::Seek::tip_mode) {
+
+  Probes tipModes(const std::string& axes) {
     constexpr double DAMPING = 0.05;
     Hypothesis::Probe probe;
-    for (const char a : h.variant) {
-      if (tip.count(a) == 0) {
-        tip[a] = bestFrequencies(
-            projection, ModeProbes::grid(200.0, 6000.0, 1.08),
-            [&](double at) { return probes.tipMode(a == 'x' ? 0 : 1, at, DAMPING); }, true, runner.threads());
+    for (const char a : axes) {
+      if (tip_.count(a) == 0) {
+        tip_[a] = bestFrequencies(
+            projection_, ModeProbes::grid(200.0, 6000.0, 1.08),
+            [&](double at) { return probes_.tipMode(a == 'x' ? 0 : 1, at, DAMPING); }, true,
+            runner_.threads());
       }
-      const double f = tip[a].empty() ? 1200.0 : tip[a].front();
+      const double f = tip_[a].empty() ? 1200.0 : tip_[a].front();
       for (const double v : {std::log(f), std::log(DAMPING), 0.0}) probe.null.push_back(v);
     }
-    for (std::size_t k = 2; k < probe.null.size(); k += 3) {
-      probe.points.push_back(probe.null);
-      probe.points.back()[k] = 1.0;
-    }
-    found.push_back(probe);
+    for (std::size_t k = 2; k < probe.null.size(); k += 3) addPoint(probe, k);
+    return {probe};
   }
-  return found;
-}
+
+  // The order, then sizes.
+  Probes orders(std::size_t coordinates) const {
+    Probes found;
+    for (const double order : bestOrders(runner_, model_, now_.residual, 2)) {
+      Hypothesis::Probe probe;
+      probe.null.assign(coordinates, 0.0);
+      probe.null.front() = order;
+      for (std::size_t k = 1; k < coordinates; ++k) addPoint(probe, k);
+      found.push_back(probe);
+    }
+    return found;
+  }
+
+  static void addPoint(Hypothesis::Probe& probe, std::size_t coordinate) {
+    probe.points.push_back(probe.null);
+    probe.points.back()[coordinate] = 1.0;
+  }
+
+  const Projection& projection_;
+  const TwinRunner& runner_;
+  const MachineModel& model_;
+  const Fit& now_;
+  const ModeProbes probes_;
+  std::map<char, std::vector<double>> tip_;  // best frequencies of the tool's axes, once found
+};
 
 bool isMember(const FitState& state, const std::string& effect, const std::string& variant) {
   return std::any_of(state.members.begin(), state.members.end(), [&](const Member& m) {
@@ -242,8 +284,8 @@ std::vector<double> startOf(const Hypothesis& h, const Hypothesis::Probe& probe,
 std::vector<Promise> screen(const Fitter& fitter, const Fit& now, const NominalTangents& tangents,
                             const std::vector<Hypothesis>& tried) {
   const Projection projection(fitter, now, tangents);
-  const ModeProbes mode_probes(fitter.runner(), fitter.model(now.state));
-  std::map<char, std::vector<double>> tip;
+  const MachineModel model = fitter.model(now.state);
+  Seeker seeker(projection, fitter.runner(), model, now);
   std::vector<Promise> promises;
   for (const Hypothesis& h : tried) {
     if (isMember(now.state, h.effect, h.variant) ||
@@ -251,8 +293,7 @@ std::vector<Promise> screen(const Fitter& fitter, const Fit& now, const NominalT
       continue;
     Promise best;
     best.hypothesis = &h;
-    for (const Hypothesis::Probe& probe :
-         h.probes.empty() ? modeProbes(h, projection, mode_probes, fitter.runner(), tip) : h.probes) {
+    for (const Hypothesis::Probe& probe : seeker.probesOf(h)) {
       const Eigen::MatrixXd columns = columnsOf(fitter, now.state, h, probe, projection.base());
       if (!columns.allFinite() || columns.squaredNorm() == 0.0) continue;
       Eigen::VectorXd amplitudes;

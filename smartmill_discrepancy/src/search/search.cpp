@@ -9,12 +9,11 @@
 #include <utility>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/model/effect_catalogue.h"
 #include "smartmill_discrepancy/results/formatted.h"
 #include "smartmill_discrepancy/search/evidence.h"
 #include "smartmill_discrepancy/search/refinement.h"
 #include "smartmill_discrepancy/search/screening.h"
-
-#include "smartmill_core/model/effect_catalogue.h"
 
 namespace smartmill::discrepancy {
 namespace {

@@ -96,6 +96,14 @@ Forms addedEdgeForces(const Scope& scope) {
               .straight({2.0})};
 }
 
+Forms addedChipCoefficients(const Scope& scope) {
+  const CuttingCoefficients k = scope.nominal.cutting.value_or(CuttingCoefficients{});
+  return {EffectForm({added("Ktc_n_per_mm2", k.ktc / units::N_PER_MM2, {0.0, 4000.0, 0.05, 300.0}),
+                      added("Krc_n_per_mm2", k.krc / units::N_PER_MM2, {0.0, 3000.0, 0.05, 200.0}),
+                      added("Kac_n_per_mm2", k.kac / units::N_PER_MM2, {0.0, 3000.0, 0.05, 200.0})})
+              .straight({10.0})};
+}
+
 Forms flexibility(const Scope&) {
   return {EffectForm({tipMode('x')}).named("x").sought(Seek::tip_mode),
           EffectForm({tipMode('y')}).named("y").sought(Seek::tip_mode),
@@ -224,7 +232,7 @@ void drawLargerLoadGain(const MachineModel&, Random& random, EffectEntry& entry)
 
 // ---- entries, in the order in which they act
 
-std::vector<EffectKind> geometryAndMotion() {
+std::vector<EffectKind> geometry() {
   return {
       {"uneven_pitch",
        Stage::geometry,
@@ -256,6 +264,11 @@ std::vector<EffectKind> geometryAndMotion() {
                           .straight({helix > 60.0 ? -1.0 : 1.0})};
        },
        drawHelix},
+  };
+}
+
+std::vector<EffectKind> motion() {
+  return {
       {"feed_error",
        Stage::motion,
        "actual feed over commanded feed",
@@ -273,7 +286,7 @@ std::vector<EffectKind> geometryAndMotion() {
   };
 }
 
-std::vector<EffectKind> cuttingLawAndStructure() {
+std::vector<EffectKind> chipAndEdge() {
   return {
       {"edge_forces",
        Stage::cutting_law,
@@ -310,14 +323,15 @@ std::vector<EffectKind> cuttingLawAndStructure() {
         orZero("Krc_n_per_mm2", "N/mm2").drawnOnBothSides(50.0, 110.0),
         orZero("Kac_n_per_mm2", "N/mm2").drawnOnBothSides(30.0, 90.0)},
        {Need::cuts},
-       nullptr},
+       addedChipCoefficients},
       {"edge_buildup",
        Stage::cutting_law,
        "edge coefficients multiplied by 1 - exp(-h / chip)",
        "Endres, DeVor & Kapoor 1995: ploughing needs some chip to build up",
        {number("chip_um", "um", NOT_NEGATIVE).drawn(8.0, 40.0)},
        {Need::cuts},
-       nullptr},
+       always(
+           EffectForm({amplitude("chip_um", {0.0, 300.0, 0.0025, 20.0})}).straight({1.0, 5.0, 15.0, 40.0}))},
       {"tool_wear",
        Stage::cutting_law,
        "edge coefficients (added ones too) multiplied by 1 + growth x cutting time of the edge",
@@ -325,6 +339,11 @@ std::vector<EffectKind> cuttingLawAndStructure() {
        {number("edge_growth_per_min", "1/min").drawn(0.1, 0.8)},
        {Need::cuts, Need::cut_time},
        always(EffectForm({amplitude("edge_growth_per_min", {-0.2, 20.0, 0.000125, 1.0})}).straight({0.1}))},
+  };
+}
+
+std::vector<EffectKind> vibration() {
+  return {
       {"process_damping",
        Stage::cutting_law,
        "radial force C v_r / v_c per mm of engaged edge, v_r the velocity into the work; tangential 0.3 of "
@@ -342,11 +361,6 @@ std::vector<EffectKind> cuttingLawAndStructure() {
        {Need::cuts},
        flexibility,
        drawTipModes},
-  };
-}
-
-std::vector<EffectKind> sensor() {
-  return {
       {"mass_loading",
        Stage::sensor,
        "the first sensor mode of each axis falls by 1/sqrt(1 + ratio), damping ratio unchanged",
@@ -374,6 +388,11 @@ std::vector<EffectKind> sensor() {
         number("gain", "1").drawn(0.03, 0.09)},
        {Need::forces},
        extraModes},
+  };
+}
+
+std::vector<EffectKind> sensorForce() {
+  return {
       {"unbalance",
        Stage::sensor_force,
        "m e omega^2 on the sensor: x sin(a), y cos(a), a = spindle angle + angle; the tip does not move",
@@ -390,7 +409,11 @@ std::vector<EffectKind> sensor() {
         orZero("y_n", "N").drawn(2.0, 8.0), orZero("z_n", "N").drawn(2.0, 8.0), angleOrZero("x_deg"),
         angleOrZero("y_deg"), angleOrZero("z_deg")},
        {Need::forces},
-       nullptr},
+       always(
+           EffectForm({amplitude("order", {0.05, 60.0, 2e-4, 20.0}, 1.0),
+                       planar("x_n", "x_deg", 2000.0, 5e-4, 20.0), planar("y_n", "y_deg", 2000.0, 5e-4, 20.0),
+                       planar("z_n", "z_deg", 2000.0, 5e-4, 20.0)})
+               .sought(Seek::spindle_order))},
   };
 }
 
@@ -432,7 +455,7 @@ std::vector<EffectKind> drive() {
   };
 }
 
-std::vector<EffectKind> channels() {
+std::vector<EffectKind> sensorOutput() {
   return {
       {"cross_talk",
        Stage::sensor_output,
@@ -461,6 +484,11 @@ std::vector<EffectKind> channels() {
         number("delay_us", "us", NOT_NEGATIVE).drawn(30.0, 200.0)},
        {},
        channelDelays},
+  };
+}
+
+std::vector<EffectKind> signal() {
+  return {
       {"zero_offset",
        Stage::signal,
        "a constant on each force channel",
@@ -468,7 +496,10 @@ std::vector<EffectKind> channels() {
        {orZero("x_n", "N").drawnOnBothSides(2.0, 15.0), orZero("y_n", "N").drawnOnBothSides(2.0, 15.0),
         orZero("z_n", "N").drawnOnBothSides(2.0, 15.0)},
        {Need::forces},
-       nullptr},
+       always(EffectForm({amplitude("x_n", {-2000.0, 2000.0, 5e-4, 30.0}),
+                          amplitude("y_n", {-2000.0, 2000.0, 5e-4, 30.0}),
+                          amplitude("z_n", {-2000.0, 2000.0, 5e-4, 30.0})})
+                  .straight({1.0}))},
       {"charge_drift",
        Stage::signal,
        "linear drift from the start of each record: rate on fx, y_ratio of it on fy",
@@ -499,8 +530,8 @@ std::vector<EffectKind> channels() {
 
 std::vector<EffectKind> makeCatalogue() {
   std::vector<EffectKind> all;
-  for (std::vector<EffectKind> part :
-       {geometryAndMotion(), cuttingLawAndStructure(), sensor(), drive(), channels()})
+  for (const auto& part :
+       {geometry(), motion(), chipAndEdge(), vibration(), sensorForce(), drive(), sensorOutput(), signal()})
     all.insert(all.end(), part.begin(), part.end());
   return all;
 }

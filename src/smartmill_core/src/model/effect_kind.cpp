@@ -135,7 +135,7 @@ std::optional<std::string> lackingFor(const EffectKind& kind, const EffectScope&
 }
 
 std::vector<EffectForm> formsOf(const EffectKind& kind, const EffectScope& scope) {
-  std::vector<EffectForm> forms = kind.forms ? kind.forms(scope) : std::vector<EffectForm>{};
+  std::vector<EffectForm> forms = kind.forms(scope);
   for (EffectForm& form : forms) form.effect = kind.name;
   return forms;
 }
