@@ -66,9 +66,9 @@ bool describe(const CampaignCost& cost, const Eigen::VectorXd& at, double sample
     fit.penalty += cost.precision(k) * std::pow(at[c] - cost.coordinates()[k].null, 2);
     information(c, c) += cost.precision(k);
   }
-  std::size_t own = 0;
-  for (const Member& m : fit.state.members) own += m.values.size();
-  fit.bic = fit.chi2 + fit.penalty + static_cast<double>(own) * std::log(samples);
+  fit.bic = fit.chi2 + fit.penalty;
+  for (const Member& m : fit.state.members)
+    fit.bic += static_cast<double>(m.values.size()) * std::log(samples) + m.hypothesis->handicap;
   fit.covariance = linear::inverseSymmetric(information);
   return true;
 }

@@ -31,7 +31,7 @@ struct Fit {
   FitState state;
   double chi2 = 0.0;             ///< sum of squares of residuals over noise
   double penalty = 0.0;          ///< of the priors
-  double bic = 0.0;              ///< chi2 + penalty + effect coordinates x ln(samples)
+  double bic = 0.0;              ///< chi2 + penalty + effect coordinates x ln(samples) + handicaps
   std::vector<double> residual;  ///< (measured - simulated) / noise at the state; empty unless converged
   /// Covariance of nominal coordinates, then members' in their order: inverse of Fisher information with
   /// priors.

@@ -136,7 +136,10 @@ std::optional<std::string> lackingFor(const EffectKind& kind, const EffectScope&
 
 std::vector<EffectForm> formsOf(const EffectKind& kind, const EffectScope& scope) {
   std::vector<EffectForm> forms = kind.forms(scope);
-  for (EffectForm& form : forms) form.effect = kind.name;
+  for (EffectForm& form : forms) {
+    form.effect = kind.name;
+    form.handicap = kind.handicap;
+  }
   return forms;
 }
 

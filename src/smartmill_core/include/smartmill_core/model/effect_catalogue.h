@@ -111,7 +111,8 @@ struct EffectKind {
   std::function<std::vector<EffectForm>(const EffectScope&)> forms;
   /// Draws what the keys' own draws do not: lists, modes, what depends on the machine.
   std::function<void(const MachineModel&, Random&, EffectEntry&)> draw = {};
-  /// [BIC] by which another effect is preferred that explains as much.
+  /// [BIC] that the effect must explain beyond what another one does: of two that no record tells apart the
+  /// commoner one is named.
   double handicap = 0.0;
 
   bool has(EffectNeed need) const;

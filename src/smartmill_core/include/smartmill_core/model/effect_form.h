@@ -104,6 +104,7 @@ struct EffectForm {
   std::vector<Coordinate> coordinates;
   std::vector<Probe> probes;
   Seek seek = Seek::nothing;
+  double handicap = 0.0;  ///< [BIC] of the effect
 
   std::string title() const { return variant.empty() ? effect : effect + " (" + variant + ")"; }
   /// values.size() == coordinates.size()
