@@ -41,11 +41,18 @@ inline const std::string& wordOf(const EffectEntry& entry, const char* key) {
   return found->second;
 }
 
-/// One value a tooth.
+/// One value a tooth [shop unit].
 inline const std::vector<double>& listOf(const EffectEntry& entry, const char* key) {
   const auto found = entry.lists.find(key);
   if (found == entry.lists.end() || found->second.empty()) throw Error(std::string(key) + " is missing");
   return found->second;
+}
+
+/// @throws Error when a list has not one value for each tooth.
+inline void checkTeeth(const char* effect, std::size_t values, const ToolGeometry& tool) {
+  if (values != static_cast<std::size_t>(tool.teeth))
+    throw Error(std::string(effect) + ": " + std::to_string(values) + " values for " +
+                std::to_string(tool.teeth) + " teeth");
 }
 
 }  // namespace smartmill::sim

@@ -12,9 +12,7 @@ class UnevenPitch : public Effect {
 
   void setUp(TwinSetup& setup) const override {
     if (!setup.model.tool) return;
-    if (pitch_.size() != static_cast<std::size_t>(setup.model.tool->teeth))
-      throw Error("uneven_pitch: " + std::to_string(pitch_.size()) + " pitches for " +
-                  std::to_string(setup.model.tool->teeth) + " teeth");
+    checkTeeth("uneven_pitch", pitch_.size(), *setup.model.tool);
     setup.model.tool->pitch = pitch_;
   }
 
