@@ -44,6 +44,28 @@ TEST(Effects, runoutBeyondTheFeedLeavesTheCutToOneTooth) {
   EXPECT_EQ(at(record, "fz", 1.5 * PI, EVEN_SPEED), 0.0);
 }
 
+TEST(Effects, toothRadiusMovesChipFromToothToTooth) {
+  const std::vector<double> offsets{-9.0, 4.0, 8.0};  // um; their mean does not act
+  const MachineModel model =
+      with(mill(3, 0.0), {effectEntry("tooth_radius", {}, {}, {{"offset_um", offsets}})});
+  const double speed = RATE / 360.0 * TWO_PI, depth = 2e-3, feed = 1e-4;
+  const Record record = run(model, slotCut(RATE / 360.0 * 60.0, depth, feed), 0.1);
+  for (std::size_t j = 0; j < 3; ++j) {
+    const double angle = units::radFromDeg(90.0 - 120.0 * static_cast<double>(j) + (j > 0 ? 360.0 : 0.0));
+    const double chip = chipOf(at(record, "fz", angle, speed), model, depth);
+    EXPECT_NEAR(chip, feed + 1e-6 * (offsets[j] - offsets[(j + 1) % 3]), 1e-9) << j;
+  }
+  // Three teeth: the same as a runout, which no record can tell from it.
+  std::vector<double> cosine;
+  for (int j = 0; j < 3; ++j) cosine.push_back(7.0 * std::cos(units::radFromDeg(200.0 - 120.0 * j)));
+  const EffectEntry runout = effectEntry("runout", {{"offset_um", 7.0}, {"angle_deg", 200.0}}),
+                    teeth = effectEntry("tooth_radius", {}, {}, {{"offset_um", cosine}});
+  const Record a = run(with(mill(3, 30.0), {runout}), slotCut(EVEN_RPM), 0.1),
+               b = run(with(mill(3, 30.0), {teeth}), slotCut(EVEN_RPM), 0.1);
+  for (std::size_t i = 0; i < a.size(); i += 97) EXPECT_NEAR(a.column("fx")[i], b.column("fx")[i], 1e-9);
+  EXPECT_THROW(run(with(mill(2, 0.0), {teeth}), slotCut(EVEN_RPM), 0.1), std::runtime_error);
+}
+
 TEST(Effects, edgeForcesAddToTheMeans) {
   const double depth = 2e-3;
   const Record without = run(mill(4, 30.0), slotCut(EVEN_RPM, depth), 5 * REVOLUTION);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "smartmill_core/units.h"
 
@@ -203,6 +204,16 @@ void drawPitches(const MachineModel& machine, Random& random, EffectEntry& entry
   pitch.push_back(rest);
 }
 
+// One tooth is shorter, the others about alike.
+void drawTeeth(const MachineModel& machine, Random& random, EffectEntry& entry) {
+  const auto teeth = static_cast<std::size_t>(machine.tool->teeth);
+  std::vector<double>& offset = entry.lists["offset_um"];
+  for (std::size_t k = 0; k < teeth; ++k) offset.push_back(between(random, -3.0, 3.0));
+  offset[std::uniform_int_distribution<std::size_t>(0, teeth - 1)(random)] -= between(random, 8.0, 30.0);
+  const double mean = std::accumulate(offset.begin(), offset.end(), 0.0) / static_cast<double>(teeth);
+  for (double& o : offset) o -= mean;
+}
+
 void drawHelix(const MachineModel& machine, Random& random, EffectEntry& entry) {
   entry.numbers["helix_deg"] = units::degFromRad(machine.tool->helix) + eitherSign(random, 3.0, 9.0);
 }
@@ -252,6 +263,19 @@ std::vector<EffectKind> geometry() {
        {number("offset_um", "um", NOT_NEGATIVE).drawn(5.0, 25.0), angle("angle_deg")},
        {Need::cuts},
        always(EffectForm({planar("offset_um", "angle_deg", 200.0, 5e-4, 20.0)}).straight({1.0}))},
+      {"tooth_radius",
+       Stage::geometry,
+       "tooth j cuts at radius R + offset[j]: a chipped, re-ground or badly seated insert; only differences "
+       "act",
+       "Sutherland & DeVor 1986: chip load of teeth of unequal radii",
+       {perTooth("offset_um", "um", {}, {})},
+       {Need::cuts, Need::several_teeth},
+       [](const Scope& s) {
+         return Forms{EffectForm({contrasts("offset_um", s.nominal.tool->teeth, {-200.0, 200.0, 5e-4, 20.0})})
+                          .straight({1.0})};
+       },
+       drawTeeth,
+       20.0},  // up to three teeth no record tells it from runout
       {"helix",
        Stage::geometry,
        "another helix angle than nominal",
