@@ -9,7 +9,7 @@ namespace {
 
 constexpr int UPDATE_STEPS = 16;           // between looks at what changes slowly with time
 constexpr double SENSOR_TOLERANCE = 1e-5;  // share by which a sensor mode moves before its filter follows
-constexpr double LEAST_DEPTH = 1e-9;       // [m] a tilted cut that would end in air
+constexpr double LEAST_DEPTH = 1e-9;       // [m] a cut that would end in air
 
 ModalModel firstModeAt(ModalModel axis, double factor) {
   if (!axis.modes.empty()) axis.modes.front().frequency *= factor;
@@ -81,18 +81,22 @@ void CuttingMachine::engage(const std::vector<ContactArc>& arcs, const ToolMotio
   engaged_ = arcs_.empty() != arcs.empty();
   jump_ = 1.0 - rise;
   arcs_ = arcs;
-  std::vector<ContactArc> tilted = arcs;
-  for (ContactArc& a : tilted) {
-    if (state_.depth_slope != 0.0) a.depth = std::max(a.depth + state_.depth_slope * feed_path_, LEAST_DEPTH);
-  }
-  if (process_) process_->engage(tilted, fed(now));
-  if (rigid_) rigid_->engage(tilted, feedOf(fed(now)));
+  std::vector<ContactArc> actual = arcs;
+  for (ContactArc& a : actual) a.depth = actualDepth(a.depth);
+  depth_extra_ = state_.depth_extra;
+  if (process_) process_->engage(actual, fed(now));
+  if (rigid_) rigid_->engage(actual, feedOf(fed(now)));
 }
 
-void CuttingMachine::setTiltedDepths() {
+double CuttingMachine::actualDepth(double commanded) const {
+  const double error = state_.depth_extra + state_.depth_slope * feed_path_;
+  return error == 0.0 ? commanded : std::max(commanded + error, LEAST_DEPTH);
+}
+
+void CuttingMachine::setActualDepths() {
   std::vector<double> depths;
-  for (const ContactArc& a : arcs_)
-    depths.push_back(std::max(a.depth + state_.depth_slope * feed_path_, LEAST_DEPTH));
+  for (const ContactArc& a : arcs_) depths.push_back(actualDepth(a.depth));
+  depth_extra_ = state_.depth_extra;
   if (process_) process_->setDepths(depths);
   if (rigid_) rigid_->setDepths(depths);
 }
@@ -100,7 +104,7 @@ void CuttingMachine::setTiltedDepths() {
 void CuttingMachine::setDepth(double depth, double passed_over) {
   for (ContactArc& a : arcs_) a.depth = depth;
   feed_path_ += passed_over;
-  setTiltedDepths();
+  setActualDepths();
 }
 
 void CuttingMachine::resetLoadMeter(double spindle_speed) {
@@ -150,7 +154,8 @@ void CuttingMachine::step(const Input& input, Output& out) {
   if (!effects_.empty() && (steps_to_update_ <= 0 || input.motion.speed != now_.speed)) {
     update(input);
     steps_to_update_ = UPDATE_STEPS;
-    if (state_.depth_slope != 0.0 && cutting()) setTiltedDepths();
+    const bool moved = state_.depth_slope != 0.0 || state_.depth_extra != depth_extra_;
+    if (moved && cutting()) setActualDepths();
   }
   --steps_to_update_;
   now_.angle = input.motion.angle;

@@ -54,6 +54,7 @@ struct TwinState {
   CuttingLaw law;
   double radius = 0.0;            ///< [m] of the tool
   double feed_ratio = 1.0;        ///< [1] actual over commanded feed
+  double depth_extra = 0.0;       ///< [m] of the axial depth besides the commanded one
   double depth_slope = 0.0;       ///< [m/m] of the axial depth along the feed path from engagement
   double sensor_frequency = 1.0;  ///< [1] on the first mode of each axis of the force sensor
   double friction_extra = 0.0;    ///< [N m] spindle friction besides the model's

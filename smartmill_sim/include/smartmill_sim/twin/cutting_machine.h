@@ -85,7 +85,8 @@ class CuttingMachine {
 
  private:
   void update(const Input& input);
-  void setTiltedDepths();
+  double actualDepth(double commanded) const;  // [m]
+  void setActualDepths();
   ToolMotion fed(const ToolMotion& commanded) const;
 
   EffectSet effects_;
@@ -99,7 +100,8 @@ class CuttingMachine {
   std::optional<RigidCut> rigid_;  // instead of the process: steady, no modes
   bool vibrates_ = false;
   std::optional<std::size_t> probe_;
-  std::vector<ContactArc> arcs_;                     // as engaged, without tilt
+  std::vector<ContactArc> arcs_;                     // as commanded
+  double depth_extra_ = 0.0;                         // [m] that the depths hold now
   double feed_path_ = 0.0;                           // [m] since engagement
   std::optional<std::array<double, 2>> feed_start_;  // [m] where feed errors begin to count
   std::vector<ModalFilter> tip_;                     // x, y
