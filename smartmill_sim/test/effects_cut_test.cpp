@@ -189,6 +189,19 @@ TEST(Effects, depthTiltFollowsTheFeedPathFromEngagement) {
   EXPECT_NEAR(depthAt(20.25), 2e-3 - 30e-3 * 18.25 * 2e-4, 1e-8);
 }
 
+TEST(Effects, thermalGrowthDeepensCutsTowardsItsAsymptote) {
+  const MachineModel model =
+      with(mill(2, 0.0), {effectEntry("thermal_growth", {{"growth_um", 60.0}, {"time_constant_s", 200.0}})});
+  CampaignTest test = slotCut(EVEN_RPM, 2e-3, 1e-4);
+  for (const double start : {0.0, 150.0, 1e5}) {
+    test.start_time = start;
+    const double fz = at(run(model, test, 0.1), "fz", 0.5 * PI, EVEN_SPEED);
+    EXPECT_NEAR(fz / (200e6 * 1e-4 + 3e3), 2e-3 + 60e-6 * (1.0 - std::exp(-start / 200.0)), 1e-12) << start;
+  }
+  test.start_time.reset();
+  EXPECT_THROW(run(model, test, 0.1), std::runtime_error);
+}
+
 // A flexible tool bends by mean force over stiffness; regeneration does not change the mean chip.
 TEST(Effects, toolFlexibilityBendsTheTool) {
   EffectEntry flexible;

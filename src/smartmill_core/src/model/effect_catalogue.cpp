@@ -307,6 +307,17 @@ std::vector<EffectKind> motion() {
        {number("slope_um_per_mm", "um/mm").drawnOnBothSides(15.0, 60.0)},
        {Need::cuts},
        always(EffectForm({amplitude("slope_um_per_mm", {-900.0, 900.0, 0.0125, 50.0})}).straight({5.0}))},
+      {"thermal_growth",
+       Stage::motion,
+       "the axial depth of a cut grows by growth x (1 - exp(-start_time / constant))",
+       "Ramesh, Mannan & Poo 2000: spindle and tool grow while they warm up",
+       {number("growth_um", "um").drawn(30.0, 120.0),
+        number("time_constant_s", "s", POSITIVE).drawn(120.0, 500.0)},
+       {Need::cuts, Need::start_time},
+       always(EffectForm({amplitude("growth_um", {-2000.0, 2000.0, 0.0125, 50.0}),
+                          logarithm("time_constant_s", {std::log(2.0), std::log(20000.0), 2.5e-4, 1.0}, 1.0,
+                                    std::log(250.0))})
+                  .scaled(10.0, {80.0, 250.0, 700.0}))},
   };
 }
 
