@@ -267,7 +267,7 @@ std::vector<EffectKind> geometry() {
        Stage::geometry,
        "tooth j cuts at radius R + offset[j]: a chipped, re-ground or badly seated insert; only differences "
        "act",
-       "Sutherland & DeVor 1986: chip load of teeth of unequal radii",
+       "Kline & DeVor 1983, with a radius for each tooth",
        {perTooth("offset_um", "um", {}, {})},
        {Need::cuts, Need::several_teeth},
        [](const Scope& s) {

@@ -110,6 +110,8 @@ TEST(EffectCatalogue, holdsTheNamesThatOtherProgramsUse) {
       {"load_meter_lag", {"bandwidth_hz"}},
       {"depth_tilt", {"slope_um_per_mm"}},
       {"feed_error", {"ratio"}},
+      {"tooth_radius", {"offset_um"}},
+      {"thermal_growth", {"growth_um", "time_constant_s"}},
       {"chip_coefficients", {"Ktc_n_per_mm2", "Krc_n_per_mm2", "Kac_n_per_mm2"}},
       {"edge_buildup", {"chip_um"}},
       {"spindle_order", {"order", "x_n", "y_n", "z_n", "x_deg", "y_deg", "z_deg"}},
