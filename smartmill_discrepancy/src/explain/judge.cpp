@@ -72,19 +72,22 @@ void writeStdDevs(EffectEntry& entry, const std::vector<FoundParameter>& paramet
 // Other effects in the place of a member.
 void addAlternatives(const Workbench& bench, const SearchOptions& options, const SearchResult& found,
                      std::size_t member, FoundEffect* effect, Explanation* result) {
+  constexpr double SAME = 0.3;  // of the noise, by which predictions of one thing under two names may differ
   const Fitter& exact = bench.exact();
+  const FitState& best = found.best.state;
   for (const Rival& rival : found.rivals) {
     if (rival.member != member) continue;
-    effect->confidence =
-        std::min(effect->confidence, confidenceBetween(exact, found.best.state, rival.state));
+    effect->confidence = std::min(effect->confidence, confidenceBetween(exact, best, rival.state));
     effect->alternatives.emplace_back(rival.effect, rival.delta_bic);
     // What would not be enough to name an effect is not enough to tell it from another.
     const double alike = std::min(options.least_gain, 0.5 * effect->delta_bic);
     if (rival.delta_bic <= effect->delta_bic - alike) continue;
+    const auto test = separatingTest(bench.data(), exact.model(best), exact.model(rival.state));
+    const bool differs = test && test->difference > SAME;
+    // With more freedom and no other prediction anywhere it is but a wider name.
+    if (!differs && rival.state.members.back().values.size() > best.members[member].values.size()) continue;
     result->not_separable.push_back({effect->name, rival.effect});
-    if (!result->suggested_test)
-      result->suggested_test =
-          separatingTest(bench.data(), exact.model(found.best.state), exact.model(rival.state));
+    if (differs && !result->suggested_test) result->suggested_test = test->text;
   }
 }
 

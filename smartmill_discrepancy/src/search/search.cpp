@@ -120,6 +120,7 @@ class Search {
   void dropNeedless();
   void stepBack(const Fit& before, const Hypothesis* newest);
   void finish();
+  void takeBetterRivals();
 
   NominalTangents linearise(const FitState& where);
   Fit refit(const Fit& from, const FitOptions& options) const;
@@ -201,8 +202,6 @@ bool Search::worthFitting(const Round& round, const Promise& promise, double lar
     return false;
   if (fitted >= options_.fitted_per_round) return false;
   if (fitted >= 2 && promise.gain < 0.02 * largest) return false;
-  // Nothing that is left could make another hypothesis better.
-  if (fitted >= 2 && excess(round.best) < 0.01 * excess(now_)) return false;
   // One that leaves next to nothing can be bettered only by one that promises about as much.
   return !(excess(round.best) < 0.02 * excess(now_) && promise.gain < 0.5 * round.best_promise);
 }
@@ -331,7 +330,28 @@ void Search::finish() {
     options_.say("  not needed any more: " + result_.best.state.members[m].hypothesis->title());
     refined = refine(bench_, without(result_.best.state, m), options_, &result_);
   }
+  if (refined) takeBetterRivals();
   for (const Member& m : result_.best.state.members) options_.say("found " + describe(m));
+}
+
+// A round compares fits that have not settled; which of two that explain as much is better shows only now.
+void Search::takeBetterRivals() {
+  constexpr int SWAPS = 3;
+  for (int swap = 0; swap < SWAPS; ++swap) {
+    const auto ahead = [&](const Rival& r) { return r.delta_bic - result_.contribution[r.member]; };
+    const auto best = std::max_element(result_.rivals.begin(), result_.rivals.end(),
+                                       [&](const Rival& a, const Rival& b) { return ahead(a) < ahead(b); });
+    if (best == result_.rivals.end() || ahead(*best) <= 0.0) return;
+    const Hypothesis& old = *result_.best.state.members[best->member].hypothesis;
+    const Hypothesis& better = *best->state.members.back().hypothesis;
+    options_.say("  better in the place of " + old.title() + ": " + better.title());
+    for (Rung& r : result_.ladder) {
+      if (r.tried.effect == old.effect && r.tried.variant == old.variant) r.tried.taken = false;
+      if (r.tried.effect == better.effect && r.tried.variant == better.variant) r.tried.taken = true;
+    }
+    const FitState state = best->state;
+    if (!refine(bench_, state, options_, &result_)) return;
+  }
 }
 
 SearchResult Search::run() {

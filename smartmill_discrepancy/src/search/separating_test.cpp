@@ -31,9 +31,9 @@ double separation(const Dataset& data, const CampaignTest& test, const MachineMo
 
 }  // namespace
 
-std::optional<std::string> separatingTest(const Dataset& data, const MachineModel& a, const MachineModel& b) {
-  std::optional<std::string> best;
-  double largest = 0.0;
+std::optional<SeparatingTest> separatingTest(const Dataset& data, const MachineModel& a,
+                                             const MachineModel& b) {
+  std::optional<SeparatingTest> best;
   for (const TestData& t : data.tests) {
     if (t.test.kind == TestKind::tap) continue;
     for (const double speed : {0.4, 1.0, 1.8}) {
@@ -53,10 +53,10 @@ std::optional<std::string> separatingTest(const Dataset& data, const MachineMode
           } catch (const Error&) {
             continue;  // the twin does not run this one
           }
-          if (value <= largest) continue;
-          largest = value;
+          if (value <= (best ? best->difference : 0.0)) continue;
+          best = SeparatingTest{"", value};
           if (test.engagement) {
-            best = formatted(
+            best->text = formatted(
                 "a cut at %.0f rpm, %.3g mm a tooth, %.3g mm deep, from %.0f to %.0f deg: the two "
                 "predictions "
                 "differ there by %.2g times the noise",
@@ -64,7 +64,7 @@ std::optional<std::string> separatingTest(const Dataset& data, const MachineMode
                 test.engagement->axial_depth * 1e3, units::degFromRad(test.engagement->entry),
                 units::degFromRad(test.engagement->exit), value);
           } else {
-            best =
+            best->text =
                 formatted("an air cut at %.0f rpm: the two predictions differ there by %.2g times the noise",
                           units::rpmFromRadPerSec(test.spindle_speed), value);
           }

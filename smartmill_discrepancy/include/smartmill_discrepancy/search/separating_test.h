@@ -8,7 +8,13 @@
 
 namespace smartmill::discrepancy {
 
+/// A test that would tell two models apart.
+struct SeparatingTest {
+  std::string text;         ///< for people
+  double difference = 0.0;  ///< [1] RMS of what the predictions differ by, over the noise
+};
+
 /// The cut or air cut, among variations of the campaign's tests, in which two models differ most.
-std::optional<std::string> separatingTest(const Dataset& data, const MachineModel& a, const MachineModel& b);
+std::optional<SeparatingTest> separatingTest(const Dataset& data, const MachineModel& a, const MachineModel& b);
 
 }  // namespace smartmill::discrepancy
