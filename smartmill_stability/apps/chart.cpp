@@ -12,6 +12,7 @@
 #include "smartmill_core/io/csv.h"
 #include "smartmill_core/program.h"
 #include "smartmill_core/units.h"
+#include "smartmill_ros/parameter_options.h"
 #include "smartmill_stability/chart/picture.h"
 
 namespace {
@@ -20,7 +21,8 @@ using namespace smartmill;             // NOLINT
 using namespace smartmill::stability;  // NOLINT
 
 struct Options {
-  std::string bag, model, parameters, output, states;
+  std::string bag, model, output, states;
+  NodeParameters parameters;
 };
 
 constexpr int DIGITS = 17;  // the node's figures to the last one
@@ -58,12 +60,9 @@ void print(const char* title, const std::vector<ChartPoint>& points) {
 }
 
 void run(const Options& o) {
-  NodeParameters parameters;
-  parameters.model = o.model;
-  if (!o.parameters.empty()) {
-    ParameterReader reader = ParameterReader::fromFile(o.parameters);
-    parameters = readParameters(reader, o.model);
-  }
+  NodeParameters parameters = o.parameters;
+  if (!o.model.empty()) parameters.model = o.model;
+  parameters.validate();
   if (parameters.model.empty()) throw Error(o.bag + ": a bag needs the machine's model (--model)");
   const bool terminal = isatty(STDERR_FILENO);
   const auto progress = [terminal](double share) {
@@ -97,8 +96,12 @@ int main(int argc, char** argv) {
   Options o;
   line.option("BAG", o.bag, "recording with tool/frf, material/coefficients, cuts").required();
   line.option("--model", o.model, "machine model file: tool and spindle limits (default: the parameter)");
-  line.option("--params", o.parameters, "parameter file of the node (launch/config/stability.yaml)");
   line.option("-o,--out", o.output, "CSV of the chart; a picture of the same name with .png beside it");
   line.option("--states", o.states, "CSV of the chatter verdicts");
-  return runProgram(line, argc, argv, [&] { run(o); });
+  const ParameterTable table = tableOf(o.parameters);
+  ParameterOptions parameters(line, table, "launch/config/stability.yaml");
+  return runProgram(line, argc, argv, [&] {
+    parameters.apply();
+    run(o);
+  });
 }

@@ -1,17 +1,6 @@
-#include <exception>
-
 #include "node/node.h"
+#include "smartmill_ros/node_main.h"
 
 int main(int argc, char** argv) {
-  ros::init(argc, argv, "stability");
-  // They outlive the node: the last line could not be logged after the last handle has shut ROS down.
-  const ros::NodeHandle nh, private_nh("~");
-  try {
-    smartmill::stability::StabilityNode node(nh, private_nh);
-    ros::spin();
-  } catch (const std::exception& e) {
-    ROS_FATAL_STREAM(e.what());
-    return 1;
-  }
-  return 0;
+  return smartmill::runNode<smartmill::stability::StabilityNode>(argc, argv, "stability");
 }

@@ -16,15 +16,7 @@ namespace {
 constexpr double NO_LIMIT = std::numeric_limits<double>::infinity();
 /// Points nearer than this share of their speed belong to one pocket or valley.
 constexpr double SAME_POCKET = 0.03;
-/// A point for a check must lie at least so far above the limit, else its outcome would say nothing.
-constexpr double CLEARLY_UNSTABLE = 1.5;
 constexpr int LINES_BEYOND = 20;  // speeds on each side that the margin needs
-
-void bound(bool good, const char* key, double value, const char* range) {
-  if (!good || !std::isfinite(value)) {
-    throw Error(std::string(key) + ": " + std::to_string(value) + " is out of range (" + range + ")");
-  }
-}
 
 /// Worst value over the speeds within the margin on both sides, up to the next speed of the grid.
 double around(const StabilityLimit& limit, std::size_t k, double margin,
@@ -57,30 +49,6 @@ std::vector<ChartPoint> pick(std::vector<ChartPoint> points, int count,
 }
 
 }  // namespace
-
-void ChartParameters::validate() const {
-  bound(entry >= 0.0 && entry < units::TWO_PI, "entry_angle", entry, "0 <= value < 2 pi rad");
-  bound(exit > entry && exit <= units::TWO_PI, "exit_angle", exit, "entry_angle < value <= 2 pi rad");
-  bound(feed_per_tooth > 0.0, "feed_per_tooth", feed_per_tooth, "> 0 m");
-  bound(kr >= 0.0, "kr", kr, ">= 0");
-  bound(speed_low > 0.0, "speed_low", speed_low, "> 0 rad/s");
-  bound(speed_high == 0.0 || speed_high > speed_low, "speed_high", speed_high, "above speed_low, or 0");
-  bound(speeds >= 2 && speeds <= 100000, "speeds", speeds, "2..100000");
-  bound(frequency_low >= 0.0, "frequency_low", frequency_low, ">= 0 Hz");
-  bound(frequency_high > frequency_low, "frequency_high", frequency_high, "above frequency_low");
-  bound(modes_error > 0.0, "modes_error", modes_error, "> 0");
-  if (method != "auto" && method != "collocation" && method != "zero_order")
-    throw Error("method: '" + method + "' is unknown (auto, collocation or zero_order)");
-  bound(line_error > 0.0, "line_error", line_error, "> 0");
-  bound(max_depth > 0.0, "max_depth", max_depth, "> 0 m");
-  bound(depth_margin >= 0.0 && depth_margin < 1.0, "depth_margin", depth_margin, "0 <= value < 1");
-  bound(speed_margin >= 0.0 && speed_margin < 0.2, "speed_margin", speed_margin, "0 <= value < 0.2");
-  bound(load_share > 0.0 && load_share <= 1.0, "load_share", load_share, "0 < value <= 1");
-  bound(recommended >= 0 && recommended <= 100, "recommended", recommended, "0..100");
-  bound(unstable_factor >= CLEARLY_UNSTABLE && unstable_factor <= 5.0, "unstable_factor", unstable_factor,
-        "1.5..5");
-  bound(unstable >= 0 && unstable <= 100, "unstable", unstable, "0..100");
-}
 
 namespace {
 
@@ -369,7 +337,7 @@ void ChartMaker::proposeUnstable(Chart& chart, const StabilityLimit& wide) const
     const double highest =
         around(wide, k + static_cast<std::size_t>(linesBeyond()), parameters_.speed_margin, std::greater<>());
     const double proposed = std::min(parameters_.unstable_factor * highest, carried(chart, k));
-    if (!std::isfinite(proposed) || proposed < CLEARLY_UNSTABLE * highest) continue;
+    if (!std::isfinite(proposed) || proposed < ChartParameters::CLEARLY_UNSTABLE * highest) continue;
     valleys.push_back(point(speeds[k], proposed, depth[k], chart.limit.chatter_frequency[k]));
   }
   // A check beside the recommended cut tells most: nearly the same speed, another outcome.

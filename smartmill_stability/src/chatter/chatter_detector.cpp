@@ -4,6 +4,8 @@
 #include <cmath>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/names.h"
+#include "smartmill_core/require.h"
 #include "smartmill_core/signal/fourier.h"
 #include "smartmill_core/signal/interpolate.h"
 #include "smartmill_core/signal/steady_path.h"
@@ -12,13 +14,6 @@
 
 namespace smartmill::stability {
 namespace {
-
-constexpr double RESTART = 1.0;  // [s] backward jump that tells of a bag started again
-
-void bound(bool good, const char* key, double value, const char* range) {
-  if (!good)
-    throw Error(std::string(key) + ": " + std::to_string(value) + " is out of range (" + range + ")");
-}
 
 /// What a window of whole turns holds, summed over the axes.
 class WindowContent {
@@ -104,17 +99,9 @@ class WindowContent {
 }  // namespace
 
 void ChatterParameters::validate() const {
-  bound(revolutions >= 4 && revolutions <= 200, "revolutions", revolutions, "4..200");
-  bound(hop_revolutions >= 1 && hop_revolutions <= revolutions, "hop_revolutions", hop_revolutions,
-        "1..revolutions");
-  bound(energy_ratio > 0.0 && energy_ratio < 1.0, "energy_ratio", energy_ratio, "0 < value < 1");
-  bound(least_severity >= 0.0 && std::isfinite(least_severity), "least_severity", least_severity, ">= 0 N");
-  bound(alternation_ratio > 0.0 && alternation_ratio <= 1.0, "alternation_ratio", alternation_ratio,
-        "0 < value <= 1");
-  bound(path_tolerance > 0.0 && path_tolerance <= 1.0, "path_tolerance", path_tolerance, "0 < value <= 1 m");
-  bound(settle_revolutions >= 0.0 && settle_revolutions <= 1000.0, "settle_revolutions", settle_revolutions,
-        "0..1000");
-  bound(maximum_gap > 0.0 && maximum_gap <= 60.0, "maximum_gap", maximum_gap, "0 < value <= 60 s");
+  checkBounds(*this);
+  require(hop_revolutions <= revolutions, "chatter_hop_revolutions", hop_revolutions,
+          "at most chatter_revolutions");
 }
 
 ChatterDetector::ChatterDetector(const ChatterParameters& parameters, Output output)
@@ -319,42 +306,26 @@ SortedDetection::SortedDetection(const ChatterParameters& parameters, double hol
                                  ChatterDetector::Output output)
     : detector_(parameters, std::move(output)),
       sorter_(hold_back),
-      conditions_(sorter_.addEvents("cut/condition")),
-      states_(sorter_.addRegular("cnc/state")),
-      angles_(sorter_.addRegular("spindle/angle")),
-      blocks_(sorter_.addRegular("force/compensated")) {
-}
-
-void SortedDetection::watch(double stamp) {
-  if (stamp < newest_ - RESTART) {
-    sorter_.reset();
-    detector_.reset();
-    newest_ = stamp;
-    // The condition of the new run may have come before its first sample.
-    if (last_condition_ && last_condition_->stamp <= stamp + RESTART)
-      push(CuttingCondition(*last_condition_));
-  }
-  newest_ = std::max(newest_, stamp);
+      conditions_(sorter_.addLatched(names::CUTTING_CONDITION)),
+      states_(sorter_.addRegular(names::CNC_STATE)),
+      angles_(sorter_.addRegular(names::SPINDLE_ANGLE)),
+      blocks_(sorter_.addRegular(names::FORCE_COMPENSATED)) {
+  sorter_.onRestart([this] { detector_.reset(); });
 }
 
 void SortedDetection::push(const CuttingCondition& condition) {
-  // A latched condition is older than the data around it: no restart.
-  last_condition_ = condition;
   sorter_.push(conditions_, condition.stamp, [this, condition] { detector_.handle(condition); });
 }
 
 void SortedDetection::push(const CncState& state) {
-  watch(state.stamp);
   sorter_.push(states_, state.stamp, [this, state] { detector_.handle(state); });
 }
 
 void SortedDetection::push(const SpindleAngle& angle) {
-  watch(angle.stamp);
   sorter_.push(angles_, angle.stamp, [this, angle] { detector_.handle(angle); });
 }
 
 void SortedDetection::push(const ForceBlock& block) {
-  watch(block.stamp);
   sorter_.push(blocks_, block.stamp, [this, block] { detector_.handle(block); });
 }
 

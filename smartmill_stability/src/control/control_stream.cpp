@@ -9,10 +9,7 @@
 namespace smartmill::stability {
 
 void ControlStreamParameters::validate() const {
-  if (!(integrator_corner > 0.0))
-    throw Error("integrator_corner: " + std::to_string(integrator_corner) + " is out of range (> 0 Hz)");
-  if (!(speed_tolerance > 0.0))
-    throw Error("speed_tolerance: " + std::to_string(speed_tolerance) + " is out of range (> 0)");
+  checkBounds(*this);
   controller.validate();
 }
 

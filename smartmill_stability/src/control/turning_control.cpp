@@ -60,14 +60,11 @@ double worstMargin(const SecondOrder& machine, const SecondOrder& controller) {
 }
 
 void ControllerParameters::validate() const {
+  checkBounds(*this);
   const double ratio = rate / estimator.sample_rate;
-  require("estimator sample rate [Hz]", estimator.sample_rate, Range::positive());
   require(ratio >= 1.0 && std::abs(ratio - std::round(ratio)) < 1e-9, "rate over the estimator's", ratio,
           "a whole number");
   require("period [s]", period, Range::above(2.0 / rate));
-  require("overlap", overlap, Range::closed(0.0, 1.0));
-  require("drift", drift, Range::notNegative());
-  require("margin", margin, Range::open(-0.5, 0.0));
 }
 
 AdaptiveChatterController::AdaptiveChatterController(const ControllerParameters& parameters)

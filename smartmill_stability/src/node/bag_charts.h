@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "node/parameters_ros.h"
+#include "node/parameters.h"
 
 namespace smartmill::stability {
 

@@ -1,9 +1,9 @@
 #pragma once
 
-#include <diagnostic_updater/diagnostic_updater.h>
-#include <ros/ros.h>
+#include <ros/node_handle.h>
+#include <ros/publisher.h>
 
-#include "smartmill_ros/conversions.h"
+#include "smartmill_ros/node_shell.h"
 #include "smartmill_stability/control/control_stream.h"
 
 namespace smartmill::stability {
@@ -12,19 +12,18 @@ namespace smartmill::stability {
 /// out.
 class ControlNode {
  public:
+  using Parameters = ControlStreamParameters;
   /// @throws Error on a wrong parameter.
   ControlNode(ros::NodeHandle nh, ros::NodeHandle private_nh);
 
  private:
   void publish(const LearntMachine& learnt);
+  void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
+  NodeShell shell_;
   ControlStream stream_;
   LearntMachine last_;
-  std::string problem_;
   ros::Publisher command_, machine_;
-  ros::Subscriber displacement_, angle_;
-  diagnostic_updater::Updater diagnostics_;
-  ros::WallTimer timer_;
 };
 
 }  // namespace smartmill::stability

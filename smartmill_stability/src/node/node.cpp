@@ -3,18 +3,22 @@
 #include <smartmill_msgs/ChatterAdvice.h>
 #include <smartmill_msgs/ChatterState.h>
 #include <smartmill_msgs/StabilityChart.h>
-#include <boost/function.hpp>
 
-#include <type_traits>
-
+#include "node/wiring.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/machine_model.h"
-#include "smartmill_ros/conversions.h"
+#include "smartmill_ros/parameter_reader.h"
 
 namespace smartmill::stability {
 namespace {
 
-constexpr int QUEUE = 100000;  // messages: a busy node catches up instead of losing some
+constexpr double WATCH_PERIOD = 0.2;  // [s]
+
+NodeParameters read(const ros::NodeHandle& private_nh) {
+  NodeParameters parameters = ParameterReader::fromServer(private_nh).readAll<NodeParameters>();
+  if (parameters.model.empty()) throw Error("model: the path of a smartmill-model/1 file is due");
+  return parameters;
+}
 
 smartmill_msgs::StabilityPoint toMsg(const ChartPoint& point) {
   smartmill_msgs::StabilityPoint message;
@@ -51,10 +55,8 @@ smartmill_msgs::StabilityChart toMsg(const Chart& chart, const ChartParameters& 
 }  // namespace
 
 StabilityNode::StabilityNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
-    : parameters_([&] {
-        ParameterReader reader = ParameterReader::fromServer(private_nh);
-        return readParameters(reader);
-      }()),
+    : parameters_(read(private_nh)),
+      shell_(nh, private_nh, "none", parameters_.input_timeout),
       maker_(parameters_.chart, readMachineModel(parameters_.model)),
       detection_(parameters_.chatter, parameters_.hold_back,
                  [this](const ChatterState& state) {
@@ -69,47 +71,31 @@ StabilityNode::StabilityNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
           parameters_.chart.speed_low, maker_.highestSpeed(), maker_.teeth(),
           [this](const CuttingCondition& condition) { return maker_.system(condition.engagement); },
           [this](const ChatterAdvice& advice) { publish(advice); }),
-      last_input_(ros::WallTime::now()),
-      diagnostics_(ros::NodeHandle(), private_nh) {
-  chart_ = nh.advertise<smartmill_msgs::StabilityChart>("stability/chart", 1, true);
-  chatter_ = nh.advertise<smartmill_msgs::ChatterState>("chatter/state", 100);
-  advice_ = nh.advertise<smartmill_msgs::ChatterAdvice>("chatter/advice", 10, true);
-  predict_ = nh.advertiseService("stability/predict", &StabilityNode::predict, this);
-  subscribe<smartmill_msgs::Frf>(nh, "tool/frf", &StabilityNode::measured);
-  subscribe<smartmill_msgs::ModalModel>(nh, "tool/modes", &StabilityNode::measured);
-  subscribe<smartmill_msgs::CuttingCoefficients>(nh, "material/coefficients", &StabilityNode::measured);
-  subscribe<smartmill_msgs::CuttingCondition>(nh, "cut/condition", &StabilityNode::stream);
-  subscribe<smartmill_msgs::CncState>(nh, "cnc/state", &StabilityNode::stream);
-  subscribe<smartmill_msgs::SpindleAngle>(nh, "spindle/angle", &StabilityNode::stream);
-  if (parameters_.chatter_signal == "force") {
-    subscribe<smartmill_msgs::ForceBlock>(nh, "force/compensated", &StabilityNode::stream);
-  } else {
-    const std::string topic = "daq/" + parameters_.chatter_signal;
-    subscribe<smartmill_msgs::SampleBlock>(nh, topic.c_str(), &StabilityNode::stream);
-  }
-  diagnostics_.setHardwareID("none");
-  diagnostics_.add("stability chart", this, &StabilityNode::diagnoseChart);
-  diagnostics_.add("chatter detection", this, &StabilityNode::diagnoseChatter);
-  timer_ = nh.createWallTimer(ros::WallDuration(0.2), [this](const ros::WallTimerEvent&) { watch(); });
+      chart_(nh.advertise<smartmill_msgs::StabilityChart>(names::STABILITY_CHART, 1, true)),
+      chatter_(nh.advertise<smartmill_msgs::ChatterState>(names::CHATTER_STATE, STREAM_QUEUE)),
+      advice_(nh.advertise<smartmill_msgs::ChatterAdvice>(names::CHATTER_ADVICE, 10, true)),
+      predict_(nh.advertiseService(names::PREDICT_STABILITY, &StabilityNode::predict, this)) {
+  listen();
+  shell_.diagnose("stability chart", [this](auto& status) { diagnoseChart(status); });
+  shell_.diagnose("chatter detection", [this](auto& status) { diagnoseChatter(status); });
+  shell_.every(WATCH_PERIOD, [this] { watch(); });
 }
 
-template <typename Message>
-void StabilityNode::subscribe(ros::NodeHandle& nh, const char* topic,
-                              void (StabilityNode::*use)(const Message&)) {
-  const boost::function<void(const Message&)> callback = [this, use](const Message& message) {
-    try {
-      (this->*use)(message);
-    } catch (const Error& error) {
-      ROS_ERROR_THROTTLE(5.0, "%s", error.what());
-    }
-  };
-  subscribers_.push_back(
-      nh.subscribe<Message>(topic, QUEUE, callback, ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay()));
+void StabilityNode::listen() {
+  Inputs& inputs = shell_.inputs();
+  connectMeasured(inputs, [this](const auto& found) { measured(found); });
+  inputs.on<smartmill_msgs::CuttingCondition>(
+      names::CUTTING_CONDITION, [this](const smartmill_msgs::CuttingCondition& message, double) {
+        const CuttingCondition condition = fromMsg(message);
+        advisor_.handle(condition);
+        detection_.push(condition);
+      });
+  connect(inputs, parameters_, detection_);
 }
 
-template <typename Message>
-void StabilityNode::measured(const Message& message) {
-  maker_.handle(fromMsg(message));
+template <typename Measured>
+void StabilityNode::measured(const Measured& measured) {
+  maker_.handle(measured);
   chart_problem_.clear();
   if (!maker_.missing().empty()) return;
   try {
@@ -118,14 +104,6 @@ void StabilityNode::measured(const Message& message) {
     chart_problem_ = error.what();
     throw;
   }
-}
-
-template <typename Message>
-void StabilityNode::stream(const Message& message) {
-  last_input_ = ros::WallTime::now();
-  flushed_ = false;
-  if constexpr (std::is_same_v<Message, smartmill_msgs::CuttingCondition>) advisor_.handle(fromMsg(message));
-  detection_.push(fromMsg(message));
 }
 
 void StabilityNode::publish(const ChatterState& state) {
@@ -194,11 +172,7 @@ bool StabilityNode::predict(smartmill_msgs::PredictStability::Request& request,
 
 void StabilityNode::watch() {
   // End of data: nothing more will come to release what waits.
-  if (!flushed_ && (ros::WallTime::now() - last_input_).toSec() > parameters_.input_timeout) {
-    detection_.flush();
-    flushed_ = true;
-  }
-  diagnostics_.update();
+  if (shell_.inputs().any().ended()) detection_.flush();
 }
 
 void StabilityNode::diagnoseChart(diagnostic_updater::DiagnosticStatusWrapper& status) {
@@ -213,8 +187,7 @@ void StabilityNode::diagnoseChart(diagnostic_updater::DiagnosticStatusWrapper& s
 }
 
 void StabilityNode::diagnoseChatter(diagnostic_updater::DiagnosticStatusWrapper& status) {
-  const double silent = (ros::WallTime::now() - last_input_).toSec();
-  if (silent > parameters_.input_timeout) {
+  if (shell_.inputs().any().dead()) {
     status.summary(diagnostic_msgs::DiagnosticStatus::STALE, "no input");
   } else if (last_state_.chatter) {
     status.summary(diagnostic_msgs::DiagnosticStatus::WARN, "chatter in " + last_state_.condition);

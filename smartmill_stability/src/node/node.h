@@ -1,13 +1,14 @@
 #pragma once
 
 #include <string>
-#include <vector>
 
-#include <diagnostic_updater/diagnostic_updater.h>
-#include <ros/ros.h>
+#include <ros/node_handle.h>
+#include <ros/publisher.h>
+#include <ros/service_server.h>
 #include <smartmill_msgs/PredictStability.h>
 
-#include "node/parameters_ros.h"
+#include "node/parameters.h"
+#include "smartmill_ros/node_shell.h"
 #include "smartmill_stability/chatter/chatter_advice.h"
 
 namespace smartmill::stability {
@@ -17,16 +18,14 @@ namespace smartmill::stability {
 /// chatter/state and chatter/advice out.
 class StabilityNode {
  public:
+  using Parameters = NodeParameters;
   /// @throws Error on a wrong parameter or model.
   StabilityNode(ros::NodeHandle nh, ros::NodeHandle private_nh);
 
  private:
-  template <typename Message>
-  void subscribe(ros::NodeHandle& nh, const char* topic, void (StabilityNode::*use)(const Message&));
-  template <typename Message>
-  void measured(const Message& message);
-  template <typename Message>
-  void stream(const Message& message);
+  void listen();
+  template <typename Measured>
+  void measured(const Measured& measured);
   void publish(const ChatterState& state);
   void publish(const ChatterAdvice& advice);
   bool predict(smartmill_msgs::PredictStability::Request& request,
@@ -36,19 +35,15 @@ class StabilityNode {
   void diagnoseChatter(diagnostic_updater::DiagnosticStatusWrapper& status);
 
   NodeParameters parameters_;
+  NodeShell shell_;
   ChartMaker maker_;
   SortedDetection detection_;
   ChatterAdvisor advisor_;
   std::string chart_problem_;  // why the last chart could not be made
   ChatterState last_state_;
-  ros::WallTime last_input_;
-  bool flushed_ = true;
 
   ros::Publisher chart_, chatter_, advice_;
   ros::ServiceServer predict_;
-  std::vector<ros::Subscriber> subscribers_;
-  diagnostic_updater::Updater diagnostics_;
-  ros::WallTimer timer_;
 };
 
 }  // namespace smartmill::stability

@@ -25,6 +25,7 @@ ChartMaker filled(ChartParameters parameters, double step = 1.0) {
 ChartParameters slot() {
   ChartParameters parameters;
   parameters.speed_low = units::radPerSecFromRpm(5000.0);
+  parameters.method = "auto";  // by collocation where a test gives modes
   return parameters;
 }
 
@@ -233,7 +234,7 @@ TEST(ChartMaker, refusesBadParametersByKey) {
     return "";
   };
   EXPECT_EQ(message([](ChartParameters&) {}), "");
-  EXPECT_NE(message([](ChartParameters& p) { p.exit = -1.0; }).find("exit_angle: -1.0"), std::string::npos);
+  EXPECT_NE(message([](ChartParameters& p) { p.exit = -1.0; }).find("exit_angle: -1 "), std::string::npos);
   EXPECT_NE(message([](ChartParameters& p) { p.depth_margin = 1.0; }).find("depth_margin"),
             std::string::npos);
   EXPECT_NE(message([](ChartParameters& p) { p.kr = std::nan(""); }).find("kr"), std::string::npos);

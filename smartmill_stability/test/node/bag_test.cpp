@@ -3,8 +3,11 @@
 #include <rosbag/bag.h>
 
 #include "node/bag_charts.h"
+#include "smartmill_core/names.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_ros/conversions.h"
+#include "smartmill_ros/testing/shipped_parameters.h"
+#include "smartmill_stability/control/control_stream.h"
 #include "smartmill_stability_testing/benchmark.h"
 #include "smartmill_stability_testing/cutting_scene.h"
 
@@ -17,12 +20,12 @@ using ::testing::HasSubstr;
 class Recorder {
  public:
   explicit Recorder(const std::string& file) : bag_(file, rosbag::bagmode::Write) {}
-  void operator()(const CuttingCondition& c) { write("cut/condition", toMsg(c)); }
-  void operator()(const CncState& s) { write("cnc/state", toMsg(s)); }
-  void operator()(const SpindleAngle& a) { write("spindle/angle", toMsg(a)); }
-  void operator()(const ForceBlock& b) { write("force/compensated", toMsg(b, "machine")); }
-  void operator()(const MeasuredFrf& f) { write("tool/frf", toMsg(f)); }
-  void operator()(const CoefficientSet& s) { write("material/coefficients", toMsg(s)); }
+  void operator()(const CuttingCondition& c) { write(names::CUTTING_CONDITION, toMsg(c)); }
+  void operator()(const CncState& s) { write(names::CNC_STATE, toMsg(s)); }
+  void operator()(const SpindleAngle& a) { write(names::SPINDLE_ANGLE, toMsg(a)); }
+  void operator()(const ForceBlock& b) { write(names::FORCE_COMPENSATED, toMsg(b, "machine")); }
+  void operator()(const MeasuredFrf& f) { write(names::TOOL_FRF, toMsg(f)); }
+  void operator()(const CoefficientSet& s) { write(names::COEFFICIENTS, toMsg(s)); }
 
  private:
   template <typename Message>
@@ -86,25 +89,18 @@ TEST(Bag, saysWhatIsMissing) {
   EXPECT_EQ(found.missing, "FRF in y, tangential coefficient");
 }
 
-TEST(Parameters, theShippedFileIsReadWholeAndHoldsTheDefaults) {
-  ParameterReader reader = ParameterReader::fromFile(LAUNCH_CONFIG_FOLDER "/stability.yaml");
-  const NodeParameters shipped = readParameters(reader, "machine.yaml");
-  const NodeParameters defaults;
-  EXPECT_EQ(shipped.chart.speeds, defaults.chart.speeds);
-  EXPECT_EQ(shipped.chart.exit, defaults.chart.exit);
-  EXPECT_EQ(shipped.chart.max_depth, defaults.chart.max_depth);
-  EXPECT_EQ(shipped.chatter.revolutions, defaults.chatter.revolutions);
-  EXPECT_EQ(shipped.chatter.energy_ratio, defaults.chatter.energy_ratio);
-  EXPECT_EQ(shipped.hold_back, defaults.hold_back);
+TEST(Parameters, theShippedFilesAreTheTables) {
+  expectShipped<NodeParameters>(LAUNCH_CONFIG_FOLDER "/stability.yaml", "smartmill_stability stability_node");
+  EXPECT_NO_THROW(NodeParameters().validate());
+  expectShipped<ControlStreamParameters>("config/chatter_control.yaml",
+                                         "smartmill_stability chatter_control_node");
 }
 
 TEST(Parameters, wrongTypesUnknownKeysAndRangesAreNamed) {
   const TemporaryFolder folder;
   const auto error = [&](const std::string& text) {
-    return errorOf([&] {
-      ParameterReader reader = ParameterReader::fromFile(folder.write("p.yaml", text));
-      readParameters(reader, "machine.yaml");
-    });
+    return errorOf(
+        [&] { ParameterReader::fromFile(folder.write("p.yaml", text)).readAll<NodeParameters>(); });
   };
   EXPECT_THAT(error("max_depth: 2e-2\n"), HasSubstr("max_depth"));
   EXPECT_THAT(error("max_depht: 0.02\n"), HasSubstr("max_depht"));

@@ -7,6 +7,7 @@
 #include <smartmill_msgs/SampleBlock.h>
 #include <smartmill_msgs/SpindleAngle.h>
 
+#include "smartmill_core/names.h"
 #include "smartmill_core/units.h"
 #include "smartmill_ros/conversions.h"
 #include "smartmill_stability_testing/control_streams.h"
@@ -21,13 +22,13 @@ TEST(ChatterControlNode, learnsFromItsStreams) {
   std::mutex mutex;
   std::size_t commands = 0;
   const ros::Subscriber listener = nh.subscribe<smartmill_msgs::SampleBlock>(
-      "control/command", 0,
+      names::CONTROL_COMMAND, 0,
       boost::function<void(const smartmill_msgs::SampleBlock::ConstPtr&)>([&](const auto& m) {
         const std::lock_guard<std::mutex> lock(mutex);
         commands += m->samples.size();
       }));
-  ros::Publisher angles = nh.advertise<smartmill_msgs::SpindleAngle>("spindle/angle", 0);
-  ros::Publisher blocks = nh.advertise<smartmill_msgs::SampleBlock>("daq/displacement", 0);
+  ros::Publisher angles = nh.advertise<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE, 0);
+  ros::Publisher blocks = nh.advertise<smartmill_msgs::SampleBlock>(names::DISPLACEMENT, 0);
   for (int i = 0; i < 400 && (!angles.getNumSubscribers() || !blocks.getNumSubscribers() ||
                               !listener.getNumPublishers());
        ++i)
@@ -38,7 +39,7 @@ TEST(ChatterControlNode, learnsFromItsStreams) {
   ros::WallDuration(0.5).sleep();  // another topic keeps no order with this one
   for (const SampleBlock& block : displacementBlocks(process, 2.1, 100)) blocks.publish(toMsg(block));
   const auto machine =
-      ros::topic::waitForMessage<smartmill_msgs::ModalModel>("control/machine", nh, ros::Duration(20.0));
+      ros::topic::waitForMessage<smartmill_msgs::ModalModel>(names::CONTROL_MACHINE, nh, ros::Duration(20.0));
   ASSERT_TRUE(machine);
   ASSERT_EQ(machine->modes.size(), 1u);
   const ModalModel model = fromMsg(*machine).model;

@@ -8,6 +8,7 @@
 #include <smartmill_msgs/PredictStability.h>
 #include <smartmill_msgs/StabilityChart.h>
 
+#include "smartmill_core/names.h"
 #include "smartmill_ros/conversions.h"
 #include "smartmill_stability_testing/benchmark.h"
 #include "smartmill_stability_testing/cutting_scene.h"
@@ -25,7 +26,7 @@ class StabilityNode : public ::testing::Test {
     PredictStability call;
     call.request.spindle_speed = units::radPerSecFromRpm(rpm);
     call.request.axial_depth = depth;
-    auto client = nh_.serviceClient<PredictStability>("stability/predict");
+    auto client = nh_.serviceClient<PredictStability>(names::PREDICT_STABILITY);
     EXPECT_TRUE(client.waitForExistence(ros::Duration(20.0)));
     EXPECT_TRUE(client.call(call));
     return call.response;
@@ -47,15 +48,15 @@ TEST_F(StabilityNode, publishesTheChartAndAnswers) {
   EXPECT_EQ(predict(10000.0, 0.05e-3).code, PredictStability::Response::NO_CHART);
   EXPECT_NE(predict(10000.0, 0.05e-3).message.find("FRF in x, FRF in y, tangential"), std::string::npos);
 
-  const auto frfs = publisher<smartmill_msgs::Frf>("tool/frf");
-  const auto sets = publisher<smartmill_msgs::CuttingCoefficients>("material/coefficients");
+  const auto frfs = publisher<smartmill_msgs::Frf>(names::TOOL_FRF);
+  const auto sets = publisher<smartmill_msgs::CuttingCoefficients>(names::COEFFICIENTS);
   frfs.publish(toMsg(frf("x", 1.0)));
   frfs.publish(toMsg(frf("y", 1.0)));
   sets.publish(toMsg(coefficients()));
 
   // Latched: who comes late gets it.
-  const auto chart =
-      ros::topic::waitForMessage<smartmill_msgs::StabilityChart>("stability/chart", nh_, ros::Duration(10.0));
+  const auto chart = ros::topic::waitForMessage<smartmill_msgs::StabilityChart>(names::STABILITY_CHART, nh_,
+                                                                                ros::Duration(10.0));
   ASSERT_TRUE(chart);
   EXPECT_EQ(chart->tool, "end_mill");
   EXPECT_EQ(chart->material, "aluminium");
@@ -77,16 +78,16 @@ TEST_F(StabilityNode, findsChatterInReplayedForce) {
   std::mutex mutex;
   std::vector<smartmill_msgs::ChatterState> states;
   const ros::Subscriber subscriber = nh_.subscribe<smartmill_msgs::ChatterState>(
-      "chatter/state", 0,
+      names::CHATTER_STATE, 0,
       boost::function<void(const smartmill_msgs::ChatterState::ConstPtr&)>(
           [&](const smartmill_msgs::ChatterState::ConstPtr& state) {
             const std::lock_guard<std::mutex> lock(mutex);
             states.push_back(*state);
           }));
-  const auto conditions = publisher<smartmill_msgs::CuttingCondition>("cut/condition");
-  const auto cnc = publisher<smartmill_msgs::CncState>("cnc/state");
-  const auto angles = publisher<smartmill_msgs::SpindleAngle>("spindle/angle");
-  const auto forces = publisher<smartmill_msgs::ForceBlock>("force/compensated");
+  const auto conditions = publisher<smartmill_msgs::CuttingCondition>(names::CUTTING_CONDITION);
+  const auto cnc = publisher<smartmill_msgs::CncState>(names::CNC_STATE);
+  const auto angles = publisher<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE);
+  const auto forces = publisher<smartmill_msgs::ForceBlock>(names::FORCE_COMPENSATED);
   for (int i = 0; i < 200 && !subscriber.getNumPublishers(); ++i) ros::WallDuration(0.05).sleep();
 
   struct Sink {
@@ -135,8 +136,8 @@ TEST_F(StabilityNode, findsChatterInReplayedForce) {
   EXPECT_GT(chatter, 10);
   // Two straight teeth of the model: the fastest speed below 2200 rad/s at which they pass in step with the
   // chatter.
-  const auto advice =
-      ros::topic::waitForMessage<smartmill_msgs::ChatterAdvice>("chatter/advice", nh_, ros::Duration(5.0));
+  const auto advice = ros::topic::waitForMessage<smartmill_msgs::ChatterAdvice>(names::CHATTER_ADVICE, nh_,
+                                                                                ros::Duration(5.0));
   ASSERT_TRUE(advice);
   EXPECT_EQ(advice->condition, "cut_1");
   EXPECT_GT(toSec(advice->header.stamp), 200.0);

@@ -8,6 +8,7 @@
 #include "smartmill_core/cutting/coefficient_set.h"
 #include "smartmill_core/modal/results.h"
 #include "smartmill_core/model/machine_model.h"
+#include "smartmill_core/parameters/parameter_table.h"
 #include "smartmill_core/units.h"
 #include "smartmill_stability/solvers/solver.h"
 #include "smartmill_stability/solvers/zero_order.h"
@@ -16,30 +17,28 @@ namespace smartmill::stability {
 
 /// What a chart is asked for.
 struct ChartParameters {
-  double entry = 0.0;               ///< [rad] 0..2 pi
-  double exit = units::PI;          ///< [rad] > entry
-  double feed_per_tooth = 0.1e-3;   ///< [m] > 0, to which torque, power and removal rate belong
-  double kr = 0.3;                  ///< [1] >= 0, radial over tangential where Krc was not identified
-  double speed_low = 200.0;         ///< [rad/s] > 0
-  double speed_high = 0.0;          ///< [rad/s] > speed_low; 0: the spindle's highest speed
-  int speeds = 1500;                ///< [1] 2..100000
-  double frequency_low = 50.0;      ///< [Hz] >= 0, lines of measured FRFs below say little and are left out
-  double frequency_high = 10000.0;  ///< [Hz] > frequency_low
-  double line_error = 0.05;  ///< [1] > 0, lines with a standard deviation above this share of the FRF's peak
-                             ///< are left out: the hammer's spectrum has zeros
-  /// auto: collocation where modes of x and y are known and fit well, else zero_order; collocation;
-  /// zero_order.
-  std::string method = "auto";
-  double modes_error = 0.1;       ///< [1] > 0, relative error of the fit up to which auto trusts the modes
-  bool use_modes = false;         ///< zero_order from fitted modes instead of the measured FRFs
-  double max_depth = 0.02;        ///< [m] > 0, no deeper cut is recommended or proposed
-  double depth_margin = 0.2;      ///< [1] 0 <= value < 1, recommended depths stay this share below the limit
-  double speed_margin = 0.01;     ///< [1] 0 <= value < 0.2, and below it for speeds this much off
-  double load_share = 0.9;        ///< [1] 0 < value <= 1, of the spindle's torque and power that is used
-  int recommended = 5;            ///< [1] 0..100 points
-  double unstable_factor = 1.75;  ///< [1] 1.5..5, depth of the points for a check over the limit
-  int unstable = 5;               ///< [1] 0..100 points
+  /// A point for a check must lie at least so far above the limit, else its outcome would say nothing. [1]
+  static constexpr double CLEARLY_UNSTABLE = 1.5;
 
+  double entry = 0.0, exit = units::PI;
+  double feed_per_tooth = 1.0e-4;
+  double kr = 0.3;
+  double speed_low = 200.0, speed_high = 0.0;
+  int speeds = 1500;
+  double frequency_low = 50.0, frequency_high = 10000.0;
+  double line_error = 0.05;
+  std::string method = "zero_order";
+  double modes_error = 0.1;
+  bool use_modes = false;
+  double max_depth = 0.02;
+  double depth_margin = 0.2;
+  double speed_margin = 0.01;
+  double load_share = 0.9;
+  int recommended = 5;
+  double unstable_factor = 1.75;
+  int unstable = 5;
+
+  void declare(ParameterTable& table);
   /// @throws Error naming key and value.
   void validate() const;
 };

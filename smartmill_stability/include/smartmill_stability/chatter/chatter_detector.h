@@ -8,25 +8,42 @@
 #include <string>
 #include <vector>
 
+#include "smartmill_core/parameters/parameter_table.h"
 #include "smartmill_core/signal/stream_sorter.h"
 #include "smartmill_core/signal/streams.h"
 
 namespace smartmill::stability {
 
 struct ChatterParameters {
-  int revolutions =
-      16;  ///< [1] 4..200, length of the window: longer tells nearer frequencies from the harmonics
-  int hop_revolutions = 8;    ///< [1] 1..revolutions, between two verdicts
-  double energy_ratio = 0.1;  ///< [1] 0 < value < 1, chatter above
-  double least_severity =
-      5.0;  ///< [N] >= 0, and above this force outside the harmonics (or [unit] of the signal)
-  /// [1] 0 < value <= 1, flip of an even number of teeth above: energy at odd multiples of half the tooth
-  /// passing frequency, which runout excites as well; 1: never
+  int revolutions = 16, hop_revolutions = 8;
+  double energy_ratio = 0.1;
+  double least_severity = 5.0;
   double alternation_ratio = 0.1;
-  double path_tolerance = 1e-3;   ///< [m] > 0, distance of the tool from the steady part of the cut
-  double settle_revolutions = 4;  ///< [1] >= 0, dropped after the tool came into full engagement
-  double maximum_gap = 0.2;       ///< [s] > 0, longer without controller state or angle: not steady
+  double settle_revolutions = 4.0;
+  double path_tolerance = 1.0e-3;
+  double maximum_gap = 0.2;
 
+  void declare(ParameterTable& table) {
+    table.number("chatter_revolutions", revolutions, "1", Range::closed(4, 200),
+                 "of the spindle in a window: a longer one tells nearer frequencies from the harmonics");
+    table.number("chatter_hop_revolutions", hop_revolutions, "1", Range::positive(),
+                 "between two verdicts, at most chatter_revolutions");
+    table.number("chatter_energy_ratio", energy_ratio, "1", Range::open(0.0, 1.0),
+                 "energy outside the spindle's harmonics over all: chatter above");
+    table.number("chatter_least_severity", least_severity, "N", Range::notNegative(),
+                 "and above this force outside the harmonics (or in the signal's unit)");
+    table.number(
+        "chatter_alternation_ratio", alternation_ratio, "1", Range::openLow(0.0, 1.0),
+        "flip of an even number of teeth above: energy that alternates from tooth to tooth over all; 1: "
+        "never. Runout of a tool with two teeth alternates too: 0.02 at 5 % of the feed, with the square of "
+        "it");
+    table.number("settle_revolutions", settle_revolutions, "1", Range::closed(0.0, 1000.0),
+                 "dropped after the tool came into full engagement");
+    table.number("path_tolerance", path_tolerance, "m", Range::openLow(0.0, 1.0),
+                 "distance of the tool from the steady part of the cut");
+    table.number("maximum_gap", maximum_gap, "s", Range::openLow(0.0, 60.0),
+                 "longer without controller state or spindle angle: not steady");
+  }
   /// @throws Error naming key and value.
   void validate() const;
 };
@@ -115,13 +132,9 @@ class SortedDetection {
   std::size_t late() const { return sorter_.late(); }
 
  private:
-  void watch(double stamp);
-
   ChatterDetector detector_;
   StreamSorter sorter_;
   StreamSorter::Stream conditions_, states_, angles_, blocks_;
-  double newest_ = 0.0;
-  std::optional<CuttingCondition> last_condition_;  // by arrival
 };
 
 }  // namespace smartmill::stability

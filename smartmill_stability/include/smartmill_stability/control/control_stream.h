@@ -11,11 +11,27 @@
 namespace smartmill::stability {
 
 struct ControlStreamParameters {
-  std::string deflection_channel = "deflection";  ///< of the machine [m], or its acceleration [m/s2]
-  std::string tool_channel = "tool";              ///< displacement that the actuator made [m]
-  double integrator_corner = 2.0;                 ///< [Hz] > 0, of an acceleration's integration
-  double speed_tolerance = 1e-3;    ///< [1] > 0, change of the spindle speed from which all is learnt anew
+  std::string deflection_channel = "deflection";
+  std::string tool_channel = "tool";
+  double integrator_corner = 2.0;
+  double speed_tolerance = 1.0e-3;
   ControllerParameters controller;  ///< rate and period come from the streams
+
+  void declare(ParameterTable& table) {
+    table.title(
+        "Parameters of chatter_control_node (turning). Its streams: daq/displacement (SampleBlock with the "
+        "two "
+        "channels below) and spindle/angle.");
+    table.section();
+    table.text("deflection_channel", deflection_channel,
+               "of machine and workpiece [m], or its acceleration [m/s2]");
+    table.text("tool_channel", tool_channel, "displacement that the actuator made [m]");
+    table.number("integrator_corner", integrator_corner, "Hz", Range::positive(),
+                 "of an acceleration's integration");
+    table.number("speed_tolerance", speed_tolerance, "1", Range::positive(),
+                 "change of the spindle speed from which all is learnt anew");
+    controller.declare(table);
+  }
   /// @throws Error naming key and value.
   void validate() const;
 };

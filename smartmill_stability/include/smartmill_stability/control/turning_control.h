@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 
 #include "smartmill_core/modal/modal_filter.h"
+#include "smartmill_core/parameters/parameter_table.h"
 
 namespace smartmill::stability {
 
@@ -26,12 +27,24 @@ struct SecondOrder {
 
 /// Kim's spectral estimate: blocks of a segment under a Hamming window.
 struct EstimatorParameters {
-  double sample_rate = 1000.0;    ///< [Hz] of the segment's samples
-  int segment = 2048;             ///< [1] samples
-  int block = 512;                ///< [1] samples under one window, half overlapping; <= segment
-  double least_signal = 30.0;     ///< [1] power of a line over the noise floor from which it is used
-  double frequency_low = 5.0;     ///< [Hz] of the lines looked at
-  double frequency_high = 150.0;  ///< [Hz]; the noise floor is taken above
+  double sample_rate = 1000.0;
+  int segment = 2048;
+  int block = 512;
+  double least_signal = 30.0;
+  double frequency_low = 5.0, frequency_high = 150.0;
+
+  void declare(ParameterTable& table) {
+    table.section("Estimate: segments of 2.048 s at 1 ms, Hamming window, 512 points, half overlapping.");
+    table.number("estimator_rate", sample_rate, "Hz", Range::positive(),
+                 "the streams' rate is a whole multiple of it");
+    table.number("segment", segment, "1", Range::atLeast(16), "samples");
+    table.number("block", block, "1", Range::atLeast(16), "samples under one window, at most segment");
+    table.number("least_signal", least_signal, "1", Range::positive(),
+                 "power of a line over the noise floor from which it is used");
+    table.number("frequency_low", frequency_low, "Hz", Range::notNegative(), "of the lines looked at");
+    table.number("frequency_high", frequency_high, "Hz", Range::positive(),
+                 "above frequency_low; the noise floor is taken above");
+  }
 };
 
 /// What one segment shows.
@@ -64,10 +77,22 @@ struct ControllerParameters {
   EstimatorParameters estimator;
   double rate = 10000.0;  ///< [Hz] of the control loop, a whole multiple of the estimator's
   double period = 0.1;    ///< [s] of a revolution
-  double overlap = 1.0;   ///< [1] mu
-  double chip = 1e-4;     ///< [m] nominal chip thickness
-  double drift = 0.01;    ///< [1] relative change a segment that the machine is granted, >= 0
-  double margin = -0.4;   ///< [1] least worstMargin of a controller that is let in, -0.5 < value < 0
+  double overlap = 1.0;
+  double chip = 1.0e-4;
+  double drift = 0.01;
+  double margin = -0.4;
+
+  void declare(ParameterTable& table) {
+    table.internal("rate", rate, "Hz", Range::positive());
+    table.internal("period", period, "s", Range::positive());
+    table.number("overlap", overlap, "1", Range::closed(0.0, 1.0), "of the cut with the one before (mu)");
+    table.number("chip", chip, "m", {}, "nominal chip thickness");
+    table.number("drift", drift, "1", Range::notNegative(),
+                 "change of the machine a segment that is granted");
+    table.number("margin", margin, "1", Range::open(-0.5, 0.0),
+                 "real part that a new controller must keep at two standard deviations");
+    estimator.declare(table);
+  }
   /// @throws Error naming key and value.
   void validate() const;
 };
