@@ -18,6 +18,8 @@
 #include <smartmill_msgs/Strike.h>
 #include <boost/function.hpp>
 
+#include "smartmill_core/names.h"
+
 namespace smartmill {
 namespace {
 
@@ -70,13 +72,13 @@ class SimNode : public testing::Test {
 };
 
 TEST_F(SimNode, blocksHaveNoHolesAndShareOneClock) {
-  const auto hammer_ = collect<smartmill_msgs::SampleBlock>("daq/hammer");
+  const auto hammer_ = collect<smartmill_msgs::SampleBlock>(names::HAMMER);
   auto& hammer = *hammer_;
-  const auto dynamometer_ = collect<smartmill_msgs::SampleBlock>("daq/dynamometer");
+  const auto dynamometer_ = collect<smartmill_msgs::SampleBlock>(names::DYNAMOMETER);
   auto& dynamometer = *dynamometer_;
-  const auto truth_ = collect<smartmill_msgs::ForceBlock>("sim/truth/force");
+  const auto truth_ = collect<smartmill_msgs::ForceBlock>(names::TRUE_FORCE);
   auto& truth = *truth_;
-  const auto angle_ = collect<smartmill_msgs::SpindleAngle>("spindle/angle");
+  const auto angle_ = collect<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE);
   auto& angle = *angle_;
   ASSERT_TRUE(until([&] {
     return hammer.size() > 100 && dynamometer.size() > 100 && truth.size() > 100 && angle.size() > 200;
@@ -105,12 +107,12 @@ TEST_F(SimNode, blocksHaveNoHolesAndShareOneClock) {
 }
 
 TEST_F(SimNode, aBlowOnTheSensorIsSeenByBoth) {
-  const auto hammer_ = collect<smartmill_msgs::SampleBlock>("daq/hammer");
+  const auto hammer_ = collect<smartmill_msgs::SampleBlock>(names::HAMMER);
   auto& hammer = *hammer_;
-  const auto dynamometer_ = collect<smartmill_msgs::SampleBlock>("daq/dynamometer");
+  const auto dynamometer_ = collect<smartmill_msgs::SampleBlock>(names::DYNAMOMETER);
   auto& dynamometer = *dynamometer_;
   ASSERT_TRUE(until([&] { return hammer.size() > 2 && dynamometer.size() > 2; }));
-  EXPECT_EQ(strike("daq/strike", "force_sensor", "z").response.code, smartmill_msgs::Strike::Response::OK);
+  EXPECT_EQ(strike(names::STRIKE, "force_sensor", "z").response.code, smartmill_msgs::Strike::Response::OK);
   double peak = 0.0, force = 0.0;
   EXPECT_TRUE(until([&] {
     for (const auto& b : hammer) {
@@ -125,11 +127,11 @@ TEST_F(SimNode, aBlowOnTheSensorIsSeenByBoth) {
 }
 
 TEST_F(SimNode, aBlowThatCannotBeIsRefusedInOneLine) {
-  const auto nonsense = strike("daq/strike", "moon", "x");
+  const auto nonsense = strike(names::STRIKE, "moon", "x");
   EXPECT_EQ(nonsense.response.code, smartmill_msgs::Strike::Response::FAILED);
   EXPECT_NE(nonsense.response.message.find("moon"), std::string::npos);
   // The model has no hammer station.
-  EXPECT_EQ(strike("daq/strike", "tool", "x").response.code, smartmill_msgs::Strike::Response::FAILED);
+  EXPECT_EQ(strike(names::STRIKE, "tool", "x").response.code, smartmill_msgs::Strike::Response::FAILED);
 }
 
 TEST_F(SimNode, anOperatorIsAskedAndHits) {
@@ -149,9 +151,9 @@ TEST_F(SimNode, anOperatorIsAskedAndHits) {
 }
 
 TEST_F(SimNode, lateSubscribersGetAllOfTheTruth) {
-  const auto modes_ = collect<smartmill_msgs::ModalModel>("sim/truth/modes");
+  const auto modes_ = collect<smartmill_msgs::ModalModel>(names::TRUE_MODES);
   auto& modes = *modes_;
-  const auto frfs_ = collect<smartmill_msgs::Frf>("sim/truth/frf");
+  const auto frfs_ = collect<smartmill_msgs::Frf>(names::TRUE_FRF);
   auto& frfs = *frfs_;
   ASSERT_TRUE(until([&] { return modes.size() >= 5 && frfs.size() >= 5; }));
   const std::lock_guard<std::mutex> lock(mutex);

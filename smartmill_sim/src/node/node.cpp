@@ -1,4 +1,4 @@
-#include "node.h"
+#include "node/node.h"
 
 #include <chrono>
 #include <cmath>
@@ -11,8 +11,10 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/modal/results.h"
+#include "smartmill_core/names.h"
 #include "smartmill_ros/conversions.h"
 #include "smartmill_ros/frames.h"
+#include "smartmill_ros/parameter_reader.h"
 
 namespace smartmill::sim {
 namespace {
@@ -21,24 +23,30 @@ constexpr double TRUTH_STEP = 2.0, TRUTH_END = 6000.0;  // [Hz] lines of the tru
 constexpr double BLOCK_TIME = World::BLOCK / World::SAMPLE_RATE;
 constexpr std::uint32_t QUEUE = 100000;  // messages: a busy listener catches up instead of losing some
 
-template <class Message>
-ros::Publisher resending(ros::NodeHandle& nh, const std::string& topic,
-                         const std::vector<Message>& messages) {
-  // A latched topic would keep the last message only.
-  return nh.advertise<Message>(topic, 10, [&messages](const ros::SingleSubscriberPublisher& to) {
-    for (const Message& message : messages) to.publish(message);
-  });
+NodeParameters read(const ros::NodeHandle& private_nh) {
+  NodeParameters parameters = ParameterReader::fromServer(private_nh).readAll<NodeParameters>();
+  if (parameters.model.empty()) throw Error("model: the path of a smartmill-model/1 file is due");
+  if (ros::Time::isSimTime())
+    throw Error("/use_sim_time is set: the simulated machine runs by the real clock");
+  return parameters;
 }
 
 }  // namespace
 
-Node::Node(ros::NodeHandle nh, const ros::NodeHandle& private_nh) : nh_(std::move(nh)) {
-  ParameterReader reader = ParameterReader::fromServer(private_nh);
-  parameters_ = readParameters(reader);
-  if (ros::Time::isSimTime())
-    throw Error("/use_sim_time is set: the simulated machine runs by the real clock");
-  model_ = readMachineModel(parameters_.model);
-  world_ = std::make_unique<World>(model_, parameters_.world);
+Node::Node(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
+    : nh_(std::move(nh)),
+      parameters_(read(private_nh)),
+      model_(readMachineModel(parameters_.model)),
+      world_(std::make_unique<World>(model_, parameters_.world)),
+      hammer_(nh_.advertise<smartmill_msgs::SampleBlock>(names::HAMMER, STREAM_QUEUE)),
+      dynamometer_(nh_.advertise<smartmill_msgs::SampleBlock>(names::DYNAMOMETER, STREAM_QUEUE)),
+      angle_(nh_.advertise<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE, STREAM_QUEUE)),
+      force_(nh_.advertise<smartmill_msgs::ForceBlock>(names::TRUE_FORCE, STREAM_QUEUE)),
+      vibration_(nh_.advertise<smartmill_msgs::SampleBlock>(names::TRUE_VIBRATION, STREAM_QUEUE)),
+      coefficients_(nh_.advertise<smartmill_msgs::CuttingCoefficients>(names::TRUE_COEFFICIENTS, 1, true)),
+      frf_(nh_, names::TRUE_FRF),
+      modes_(nh_, names::TRUE_MODES),
+      shell_(nh_, private_nh, "simulated mill", 1.0) {
   focas::ServerOptions options;
   options.port = static_cast<std::uint16_t>(parameters_.port);
   options.bind_address = parameters_.bind;
@@ -47,18 +55,8 @@ Node::Node(ros::NodeHandle nh, const ros::NodeHandle& private_nh) : nh_(std::mov
 
   start_ = toSec(ros::Time::now());
   publishTruth();
-  hammer_ = nh_.advertise<smartmill_msgs::SampleBlock>("daq/hammer", QUEUE);
-  dynamometer_ = nh_.advertise<smartmill_msgs::SampleBlock>("daq/dynamometer", QUEUE);
-  angle_ = nh_.advertise<smartmill_msgs::SpindleAngle>("spindle/angle", QUEUE);
-  force_ = nh_.advertise<smartmill_msgs::ForceBlock>("sim/truth/force", QUEUE);
-  vibration_ = nh_.advertise<smartmill_msgs::SampleBlock>("sim/truth/vibration", QUEUE);
-  strike_server_ = nh_.advertiseService("daq/strike", &Node::strike, this);
-
-  updater_ = std::make_unique<diagnostic_updater::Updater>(nh_, private_nh);
-  updater_->setHardwareID("simulated mill");
-  updater_->add("simulated machine", this, &Node::diagnose);
-  diagnostics_timer_ = nh_.createWallTimer(ros::WallDuration(1.0),
-                                           [this](const ros::WallTimerEvent&) { updater_->force_update(); });
+  strike_server_ = nh_.advertiseService(names::STRIKE, &Node::strike, this);
+  shell_.diagnose("simulated machine", [this](auto& status) { diagnose(status); });
   thread_ = std::thread([this] { run(); });
 }
 
@@ -74,7 +72,7 @@ void Node::addTruth(const std::string& point, const std::string& direction, cons
   m.direction = direction;
   m.unit = point == POINT_TOOL_TIP ? "m/N" : "1";
   m.model = modes;
-  true_modes_.push_back(toMsg(m));
+  modes_.publish(point + direction, toMsg(m));
   MeasuredFrf f;
   f.stamp = start_;
   f.point = point;
@@ -84,7 +82,7 @@ void Node::addTruth(const std::string& point, const std::string& direction, cons
     f.frf.frequency.push_back(line);
     f.frf.value.push_back(modes.response(line));
   }
-  true_frfs_.push_back(toMsg(f));
+  frf_.publish(point + direction, toMsg(f));
 }
 
 void Node::publishTruth() {
@@ -92,9 +90,6 @@ void Node::publishTruth() {
   addTruth(POINT_TOOL_TIP, "y", model_.tool_tip.y);
   for (std::size_t axis = 0; axis < 3; ++axis)
     addTruth(POINT_FORCE_SENSOR, std::string(1, "xyz"[axis]), model_.force_sensor.axis[axis]);
-  modes_ = resending(nh_, "sim/truth/modes", true_modes_);
-  frf_ = resending(nh_, "sim/truth/frf", true_frfs_);
-  coefficients_ = nh_.advertise<smartmill_msgs::CuttingCoefficients>("sim/truth/coefficients", 1, true);
   CoefficientSet set;
   set.stamp = start_;
   set.material = model_.workpiece ? model_.workpiece->material : "";

@@ -4,18 +4,18 @@
 #include <memory>
 #include <string>
 #include <thread>
-#include <vector>
 
-#include <diagnostic_updater/diagnostic_updater.h>
 #include <ros/ros.h>
 #include <smartmill_msgs/Frf.h>
 #include <smartmill_msgs/ModalModel.h>
 #include <smartmill_msgs/Strike.h>
 
-#include "parameters_ros.h"
+#include "node/parameters.h"
 #include "smartmill_core/modal/modal_model.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_focas/server.h"
+#include "smartmill_ros/kept_topic.h"
+#include "smartmill_ros/node_shell.h"
 #include "smartmill_sim/world/world.h"
 
 namespace smartmill::sim {
@@ -24,6 +24,7 @@ namespace smartmill::sim {
 /// behind daq/strike, truth on sim/truth/*. Paced by the clock.
 class Node {
  public:
+  using Parameters = NodeParameters;
   /// @throws Error on bad parameters, a bad model file or a port in use.
   Node(ros::NodeHandle nh, const ros::NodeHandle& private_nh);
   ~Node();
@@ -45,12 +46,11 @@ class Node {
   std::unique_ptr<focas::Server> server_;
 
   double start_ = 0.0;  // [s] stamp of sample 0
-  ros::Publisher hammer_, dynamometer_, angle_, force_, vibration_, coefficients_, frf_, modes_;
-  std::vector<smartmill_msgs::Frf> true_frfs_;
-  std::vector<smartmill_msgs::ModalModel> true_modes_;
+  ros::Publisher hammer_, dynamometer_, angle_, force_, vibration_, coefficients_;
+  KeptTopic<smartmill_msgs::Frf> frf_;
+  KeptTopic<smartmill_msgs::ModalModel> modes_;
   ros::ServiceServer strike_server_;
-  std::unique_ptr<diagnostic_updater::Updater> updater_;
-  ros::WallTimer diagnostics_timer_;
+  NodeShell shell_;
   std::atomic<double> load_{0.0};  // [1] share of real time that the twin needs
   std::atomic<std::uint64_t> lost_{0};
 

@@ -30,21 +30,10 @@ bool same(const std::vector<ContactArc>& a, const std::vector<ContactArc>& b) {
   });
 }
 
-void inRange(const char* key, double value, double low, double high) {
-  if (!(value >= low && value <= high)) {
-    throw Error(std::string(key) + ": " + std::to_string(value) + " is not in " + std::to_string(low) + ".." +
-                std::to_string(high));
-  }
-}
-
 }  // namespace
 
 void WorldOptions::validate() const {
-  inRange("substeps", substeps, 1, 64);
-  inRange("tap_peak", tap_peak, 1.0, 1e5);
-  inRange("tap_contact", tap_contact, 1e-5, 1e-2);
-  inRange("operator_delay", operator_delay, 0.0, 60.0);
-  inRange("force_scatter", force_scatter, 0.0, 0.5);
+  checkBounds(*this);
 }
 
 class World::Impl {

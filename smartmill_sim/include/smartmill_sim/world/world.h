@@ -7,19 +7,30 @@
 #include <vector>
 
 #include "smartmill_core/model/machine_model.h"
+#include "smartmill_core/parameters/parameter_table.h"
 #include "smartmill_core/signal/streams.h"
 #include "smartmill_sim/controller/controller.h"
 
 namespace smartmill::sim {
 
 struct WorldOptions {
-  std::uint64_t seed = 1;       ///< of noise and scatter
-  int substeps = 4;             ///< [1] integration steps a sample, 1..64
-  double tap_peak = 300.0;      ///< [N] > 0 of a blow on the workpiece
-  double tap_contact = 0.4e-3;  ///< [s] > 0
-  double operator_delay = 0.0;  ///< [s] >= 0; above 0 a person hits the workpiece, so long after being asked
-  double force_scatter = 0.05;  ///< [1] 0..0.5 standard deviation of a blow's peak over its nominal value
+  std::uint64_t seed = 1;
+  int substeps = 4;
+  double tap_peak = 300.0;
+  double tap_contact = 4.0e-4;
+  double operator_delay = 0.0;
+  double force_scatter = 0.05;
 
+  void declare(ParameterTable& table) {
+    table.number("seed", seed, "1", Range::notNegative(), "of noise and scatter");
+    table.number("substeps", substeps, "1", Range::closed(1, 64), "integration steps a sample of 1/25600 s");
+    table.number("tap_peak", tap_peak, "N", Range::closed(1.0, 1e5), "of a blow on the workpiece");
+    table.number("tap_contact", tap_contact, "s", Range::closed(1e-5, 1e-2), "of a blow on the workpiece");
+    table.number("operator_delay", operator_delay, "s", Range::closed(0.0, 60.0),
+                 "above 0 a person hits the workpiece, so long after being asked; 0: automatic");
+    table.number("force_scatter", force_scatter, "1", Range::closed(0.0, 0.5),
+                 "standard deviation of a blow's peak over its nominal value");
+  }
   /// @throws Error naming key and value.
   void validate() const;
 };

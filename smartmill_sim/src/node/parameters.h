@@ -1,0 +1,33 @@
+#pragma once
+
+#include <string>
+
+#include "smartmill_core/parameters/parameter_table.h"
+#include "smartmill_sim/world/world.h"
+
+namespace smartmill::sim {
+
+/// Parameters of sim_node.
+struct NodeParameters {
+  std::string model;
+  int port = 8193;
+  std::string bind = "127.0.0.1";
+  WorldOptions world;
+  double most_behind = 0.25;
+
+  void declare(ParameterTable& table) {
+    table.title(
+        "Parameters of sim_node (package smartmill_sim): the simulated machine. SI units throughout.");
+    table.atLaunch("model", model, "path of a smartmill-model/1 file");
+    table.section();
+    table.number("port", port, "1", Range::closed(0, 65535), "FOCAS port of the controller, 0: any free one");
+    table.text("bind", bind, "address it listens on");
+    world.declare(table);
+    table.number("most_behind", most_behind, "s", Range::atLeast(0.05),
+                 "of lag behind the clock; beyond it samples are lost, as a real device loses them");
+  }
+  /// @throws Error naming key and value.
+  void validate() const { checkBounds(*this); }
+};
+
+}  // namespace smartmill::sim

@@ -1,0 +1,14 @@
+#include "../src/node/parameters.h"
+
+#include "smartmill_ros/testing/shipped_parameters.h"
+
+namespace smartmill::sim {
+namespace {
+
+TEST(Parameters, TheShippedFileIsTheTable) {
+  expectShipped<NodeParameters>("../launch/config/sim.yaml", "smartmill_sim sim_node");
+  EXPECT_NO_THROW(NodeParameters().validate());
+}
+
+}  // namespace
+}  // namespace smartmill::sim
