@@ -13,6 +13,7 @@
 #include "smartmill_core/units.h"
 #include "smartmill_loadmeter/database/database.h"
 #include "smartmill_loadmeter/identification/campaign_identification.h"
+#include "smartmill_ros/parameter_options.h"
 
 namespace {
 
@@ -20,7 +21,8 @@ using namespace smartmill;             // NOLINT
 using namespace smartmill::loadmeter;  // NOLINT
 
 struct Options {
-  std::string source_path, source, model, means = "all", output, parameters, database;
+  std::string source_path, source, model, means = "all", output, database;
+  NodeParameters parameters;
   std::string tool, material;
   double rake = NAN, depth_percent = 0.0, runout_um = 0.0;
   bool spindle_uncertainty = false, plain_friction = false;
@@ -160,11 +162,8 @@ void run(const Options& o) {
   if (std::filesystem::path(o.source_path).extension() == ".bag") {
     if (o.source == "force")
       throw Error(o.source_path + ": a bag gives coefficients from the load meter only");
-    NodeParameters parameters;
-    if (!o.parameters.empty()) {
-      ParameterReader reader = ParameterReader::fromFile(o.parameters);
-      parameters = readParameters(reader);
-    }
+    const NodeParameters& parameters = o.parameters;
+    parameters.validate();
     const std::string model_file = o.model.empty() ? parameters.model : o.model;
     if (model_file.empty()) throw Error(o.source_path + ": a bag needs the machine's model (--model)");
     const bool terminal = isatty(STDERR_FILENO);
@@ -231,11 +230,15 @@ int main(int argc, char** argv) {
       .within(0.0, 100.0);
   line.flag("--plain-friction", o.plain_friction,
             "load_meter of a campaign: Coulomb and viscous friction only, nothing added by evidence");
-  line.option("--params", o.parameters, "bag: parameter file of the node (launch/config/loadmeter.yaml)");
   line.option("--database", o.database, "SQLite file of the machine that keeps the result");
   line.option("--tool", o.tool, "name of the tool, for the database");
   line.option("--material", o.material, "workpiece material, for the database");
   line.option("--rake", o.rake, "[deg] normal rake of the tool, for the database");
   line.option("-o,--output", o.output, "writes the coefficients as a model file's cutting section");
-  return runProgram(line, argc, argv, [&] { run(o); });
+  const ParameterTable table = tableOf(o.parameters);
+  ParameterOptions parameters(line, table, "launch/config/loadmeter.yaml, for a bag");
+  return runProgram(line, argc, argv, [&] {
+    parameters.apply();
+    run(o);
+  });
 }

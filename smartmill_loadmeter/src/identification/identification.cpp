@@ -13,13 +13,6 @@ namespace smartmill::loadmeter {
 
 namespace {
 
-void require(bool good, const char* key, double value, const char* due) {
-  if (good) return;
-  char text[160];
-  std::snprintf(text, sizeof text, "%s: %g is out of range (%s)", key, value, due);
-  throw Error(text);
-}
-
 std::string countOf(std::size_t n, const char* what) {
   return std::to_string(n) + " " + what + (n == 1 ? "" : "s");
 }
@@ -27,19 +20,8 @@ std::string countOf(std::size_t n, const char* what) {
 }  // namespace
 
 void IdentificationParameters::validate() const {
-  require(speed_tolerance > 0.0 && speed_tolerance < 0.5, "speed_tolerance", speed_tolerance,
-          "0 < value < 0.5");
-  require(settle_time_constants >= 5.0 && settle_time_constants <= 1000.0, "settle_time_constants",
-          settle_time_constants, "5 <= value <= 1000");
-  require(guard_time >= 0.0 && guard_time <= 10.0, "guard_time", guard_time, "0 <= value <= 10");
-  require(path_tolerance > 0.0 && path_tolerance <= 1.0, "path_tolerance", path_tolerance, "0 < value <= 1");
-  require(minimum_readings >= 2, "minimum_readings", minimum_readings, ">= 2");
-  require(production_memory > 0.0 && production_memory <= 1e7, "production_memory", production_memory,
-          "0 < value <= 1e7");
-  require(largest_runout >= 0.0 && largest_runout <= 1e-3, "largest_runout", largest_runout,
-          "0 <= value <= 0.001");
+  checkBounds(*this);
   motor.validate();
-  require(maximum_gap > 0.0 && maximum_gap <= 60.0, "maximum_gap", maximum_gap, "0 < value <= 60");
 }
 
 LoadMeterIdentification::LoadMeterIdentification(const MachineModel& model,

@@ -24,17 +24,10 @@ bool MotorParameters::any() const {
 }
 
 void MotorParameters::validate() const {
-  const auto require = [](bool good, const char* key, double value, const char* due) {
-    char text[120];
-    std::snprintf(text, sizeof text, "%s: %g is out of range (%s)", key, value, due);
-    if (!good) throw Error(text);
-  };
-  for (const double p : phase_per_metre)
-    require(p >= 0.0 && p < 1e7, "motor_phase_per_metre", p, "0 <= value < 1e7");
-  require(phase_per_revolution >= 0.0 && phase_per_revolution <= 1000.0, "motor_phase_per_revolution",
-          phase_per_revolution, "0 <= value <= 1000");
-  require(smallest_velocity > 0.0 && smallest_velocity <= 0.1, "motor_smallest_velocity", smallest_velocity,
-          "0 < value <= 0.1");
+  MotorParameters copy = *this;
+  ParameterTable table;
+  table.part("motor_", copy);
+  table.check();
 }
 
 void MotorRecord::clear() {

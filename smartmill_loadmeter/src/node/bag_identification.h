@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "parameters_ros.h"
+#include "node/parameters.h"
 #include "smartmill_core/model/machine_model.h"
 
 namespace smartmill::loadmeter {

@@ -1,22 +1,18 @@
-#include "node.h"
+#include "node/node.h"
 
 #include <geometry_msgs/WrenchStamped.h>
-#include <boost/function.hpp>
 
+#include "node/wiring.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/units.h"
-#include "smartmill_msgs/CncState.h"
-#include "smartmill_msgs/CuttingCoefficients.h"
-#include "smartmill_msgs/CuttingCondition.h"
-#include "smartmill_msgs/LoadSample.h"
-#include "smartmill_msgs/SampleBlock.h"
-#include "smartmill_ros/conversions.h"
+#include "smartmill_ros/frames.h"
+#include "smartmill_ros/parameter_reader.h"
 
 namespace smartmill::loadmeter {
 
 namespace {
 
-constexpr int QUEUE = 100000;  // messages: a busy node catches up instead of losing some
+constexpr double WATCH_PERIOD = 0.2;  // [s]
 
 MachineModel modelOf(const NodeParameters& parameters) {
   if (parameters.model.empty()) throw Error("model: the path of a smartmill-model/1 file is due");
@@ -26,15 +22,12 @@ MachineModel modelOf(const NodeParameters& parameters) {
 }  // namespace
 
 LoadMeterNode::LoadMeterNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
-    : parameters_([&] {
-        ParameterReader reader = ParameterReader::fromServer(private_nh);
-        return readParameters(reader);
-      }()),
+    : parameters_(ParameterReader::fromServer(private_nh).readAll<NodeParameters>()),
+      shell_(nh, private_nh, "spindle load meter", parameters_.input_timeout),
       identification_(modelOf(parameters_), parameters_.identification, parameters_.hold_back),
       database_(parameters_.database),
-      diagnostics_(ros::NodeHandle(), private_nh),
       server_(
-          nh, "loadmeter/identify_coefficients", [this](Server::GoalHandle handle) { goal(handle); },
+          nh, names::IDENTIFY_COEFFICIENTS, [this](Server::GoalHandle handle) { goal(handle); },
           [this](Server::GoalHandle handle) { cancel(handle); }, false) {
   identification_.identification().onResult([this](const IdentifyResult& result) { finish(result); });
   identification_.identification().onTest([this](const LoadTest& test) {
@@ -42,27 +35,16 @@ LoadMeterNode::LoadMeterNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
              test.voltage.mean, test.voltage.std_dev, test.speed, test.readings);
     feedback();
   });
-  publisher_ = nh.advertise<smartmill_msgs::CuttingCoefficients>("material/coefficients", 1, true);
-  const auto subscribe = [&](const char* topic, auto example) {
-    using Message = decltype(example);
-    const boost::function<void(const Message&)> callback = [this](const Message& m) { input(m); };
-    subscribers_.push_back(nh.subscribe<Message>(topic, QUEUE, callback, ros::VoidConstPtr(),
-                                                 ros::TransportHints().tcpNoDelay()));
-  };
-  subscribe("cnc/state", smartmill_msgs::CncState());
-  subscribe("cnc/load", smartmill_msgs::LoadSample());
-  subscribe("cut/condition", smartmill_msgs::CuttingCondition());
+  publisher_ = nh.advertise<smartmill_msgs::CuttingCoefficients>(names::COEFFICIENTS, 1, true);
   if (!parameters_.motor_calibration.empty()) {
     identification_.identification().setMotors(readMotorCalibration(parameters_.motor_calibration));
     identification_.identification().onMotorForce([this](const MotorForce& force) { publish(force); });
-    force_publisher_ = nh.advertise<geometry_msgs::WrenchStamped>("force/motor_current", 10, true);
-    subscribe("daq/motor_current", smartmill_msgs::SampleBlock());
+    force_publisher_ = nh.advertise<geometry_msgs::WrenchStamped>(names::FORCE_OF_MOTORS, 10, true);
   }
-  find_service_ = nh.advertiseService("loadmeter/find_coefficients", &LoadMeterNode::find, this);
-  diagnostics_.setHardwareID("spindle load meter");
-  diagnostics_.add("load meter", this, &LoadMeterNode::diagnose);
-  last_input_ = ros::WallTime::now();
-  timer_ = nh.createWallTimer(ros::WallDuration(0.2), [this](const ros::WallTimerEvent&) { watch(); });
+  connect(shell_.inputs(), parameters_, identification_);
+  find_service_ = nh.advertiseService(names::FIND_COEFFICIENTS, &LoadMeterNode::find, this);
+  shell_.diagnose("load meter", [this](auto& status) { diagnose(status); });
+  shell_.every(WATCH_PERIOD, [this] { watch(); });
   server_.start();
 }
 
@@ -70,7 +52,7 @@ LoadMeterNode::LoadMeterNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
 void LoadMeterNode::publish(const MotorForce& force) {
   geometry_msgs::WrenchStamped message;
   message.header.stamp = fromSec(force.stamp);
-  message.header.frame_id = "machine";
+  message.header.frame_id = frames::MACHINE;
   const auto valueOf = [](const std::optional<Estimate>& e) { return e ? e->value : NOT_A_NUMBER; };
   message.wrench.force.x = valueOf(force.force[0]);
   message.wrench.force.y = valueOf(force.force[1]);
@@ -80,17 +62,6 @@ void LoadMeterNode::publish(const MotorForce& force) {
   force_publisher_.publish(message);
   last_force_ = "'" + force.name + "': " + force.text();
   ROS_INFO("motors, test %s", last_force_.c_str());
-}
-
-template <typename Message>
-void LoadMeterNode::input(const Message& message) {
-  last_input_ = ros::WallTime::now();
-  any_input_ = true;
-  try {
-    identification_.push(fromMsg(message));
-  } catch (const Error& error) {
-    ROS_ERROR_THROTTLE(5.0, "%s", error.what());
-  }
 }
 
 void LoadMeterNode::goal(Server::GoalHandle handle) {
@@ -180,24 +151,20 @@ bool LoadMeterNode::find(smartmill_msgs::FindCoefficients::Request& request,
 
 // Liveness only: when every input has fallen silent nothing more can come before what waits.
 void LoadMeterNode::watch() {
-  diagnostics_.update();
-  if ((ros::WallTime::now() - last_input_).toSec() < parameters_.input_timeout) return;
+  if (!shell_.inputs().any().dead()) return;
   if (!waiting_.empty()) ROS_WARN_THROTTLE(5.0, "no controller state or load any more: using what has come");
-  try {
-    identification_.flush();
-  } catch (const Error& error) {
-    ROS_ERROR("%s", error.what());
-  }
+  identification_.flush();
 }
 
 void LoadMeterNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
-  const double silent = (ros::WallTime::now() - last_input_).toSec();
-  if (!any_input_) {
-    status.summary(diagnostic_msgs::DiagnosticStatus::WARN, "waiting for cnc/state and cnc/load");
-  } else if (silent > parameters_.input_timeout) {
-    status.summaryf(diagnostic_msgs::DiagnosticStatus::ERROR, "no input for %.1f s", silent);
+  using Level = diagnostic_msgs::DiagnosticStatus;
+  const Watchdog& inputs = shell_.inputs().any();
+  if (!inputs.ever()) {
+    status.summary(Level::WARN, "waiting for cnc/state and cnc/load");
+  } else if (inputs.dead()) {
+    status.summaryf(Level::ERROR, "no input for %.1f s", inputs.silent());
   } else {
-    status.summary(diagnostic_msgs::DiagnosticStatus::OK, "listening");
+    status.summary(Level::OK, "listening");
   }
   LoadMeterIdentification& identification = identification_.identification();
   status.add("air cuts", identification.airCuts().size());

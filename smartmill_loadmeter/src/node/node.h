@@ -1,24 +1,25 @@
 #pragma once
 
 #include <actionlib/server/action_server.h>
-#include <diagnostic_updater/diagnostic_updater.h>
 #include <ros/ros.h>
 
 #include <cstdint>
 #include <map>
 
-#include "parameters_ros.h"
+#include "node/parameters.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_loadmeter/database/database.h"
 #include "smartmill_loadmeter/identification/sorted_identification.h"
 #include "smartmill_msgs/FindCoefficients.h"
 #include "smartmill_msgs/IdentifyCoefficientsAction.h"
+#include "smartmill_ros/node_shell.h"
 
 namespace smartmill::loadmeter {
 
 /// Shell around SortedIdentification: topics in, action and service at the front, coefficients out.
 class LoadMeterNode {
  public:
+  using Parameters = NodeParameters;
   /// @throws Error on a wrong parameter, model or database.
   LoadMeterNode(ros::NodeHandle nh, ros::NodeHandle private_nh);
 
@@ -34,23 +35,17 @@ class LoadMeterNode {
   void publish(const MotorForce& force);
   void watch();
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
-  template <typename Message>
-  void input(const Message& message);
 
   NodeParameters parameters_;
+  NodeShell shell_;
   SortedIdentification identification_;
   CoefficientDatabase database_;
   std::map<std::uint64_t, Server::GoalHandle> waiting_;
   std::uint64_t next_id_ = 1;
-  ros::WallTime last_input_;
-  bool any_input_ = false;
   std::string last_message_, last_force_;
 
   ros::Publisher publisher_, force_publisher_;
-  std::vector<ros::Subscriber> subscribers_;
   ros::ServiceServer find_service_;
-  diagnostic_updater::Updater diagnostics_;
-  ros::WallTimer timer_;
   Server server_;
 };
 

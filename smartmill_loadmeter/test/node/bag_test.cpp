@@ -10,6 +10,7 @@
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_msgs/IdentifyCoefficientsActionGoal.h"
 #include "smartmill_ros/conversions.h"
+#include "smartmill_ros/testing/shipped_parameters.h"
 
 namespace smartmill::loadmeter {
 namespace {
@@ -117,25 +118,13 @@ TEST(Bag, aRunoutIsToldAsOnTheRunningMachine) {
 }
 
 TEST(Parameters, theShippedFileIsTheDefaultsAndWrongOnesAreNamed) {
-  ParameterReader reader = ParameterReader::fromFile(std::string(LAUNCH_CONFIG_FOLDER) + "/loadmeter.yaml");
-  const NodeParameters p = readParameters(reader);
-  const IdentificationParameters defaults;
-  EXPECT_EQ(p.identification.speed_tolerance, defaults.speed_tolerance);
-  EXPECT_EQ(p.identification.settle_time_constants, defaults.settle_time_constants);
-  EXPECT_EQ(p.identification.guard_time, defaults.guard_time);
-  EXPECT_EQ(p.identification.path_tolerance, defaults.path_tolerance);
-  EXPECT_EQ(p.identification.minimum_readings, defaults.minimum_readings);
-  EXPECT_EQ(p.identification.largest_runout, defaults.largest_runout);
-  EXPECT_EQ(p.identification.maximum_gap, defaults.maximum_gap);
-  EXPECT_EQ(p.identification.production_memory, defaults.production_memory);
-  EXPECT_EQ(p.hold_back, NodeParameters().hold_back);
-  EXPECT_EQ(p.input_timeout, NodeParameters().input_timeout);
+  expectShipped<NodeParameters>(std::string(LAUNCH_CONFIG_FOLDER) + "/loadmeter.yaml",
+                                "smartmill_loadmeter loadmeter_node");
+  EXPECT_NO_THROW(NodeParameters().validate());
   const TemporaryFolder folder;
   const auto messageOf = [&](const std::string& text) {
-    return errorOf([&] {
-      ParameterReader bad = ParameterReader::fromFile(folder.write("p.yaml", text));
-      readParameters(bad);
-    });
+    return errorOf(
+        [&] { ParameterReader::fromFile(folder.write("p.yaml", text)).readAll<NodeParameters>(); });
   };
   EXPECT_THAT(messageOf("path_tolerance: 1e-3\n"), HasSubstr("path_tolerance"));
   EXPECT_THAT(messageOf("path_tolerance: -1.0\n"), HasSubstr("path_tolerance: -1 is out of range"));

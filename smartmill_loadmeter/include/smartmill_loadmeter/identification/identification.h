@@ -18,17 +18,34 @@
 namespace smartmill::loadmeter {
 
 struct IdentificationParameters {
-  double speed_tolerance = 0.02;       ///< [1] share of the commanded speed within which it counts as reached
-  double settle_time_constants = 8.0;  ///< [1] >= 5, waited after a change; 8 leave 0.03 % of a step
-  double guard_time =
-      0.05;  ///< [s] >= 0, readings dropped before steadiness is lost (stamps are replies' times)
-  double path_tolerance = 1.0e-3;     ///< [m] distance from the line of the steady cut
-  int minimum_readings = 10;          ///< [1] >= 2, of a test
-  double production_memory = 1800.0;  ///< [s] > 0 of cutting after which a production cut counts 1/e
-  double largest_runout = 3.0e-5;     ///< [m] >= 0, offset of the cutter axis that may be; 0: none
-  MotorParameters motor;              ///< of daq/motor_current
-  double maximum_gap = 0.5;           ///< [s] > 0, without controller state or load: steadiness is lost
+  double speed_tolerance = 0.02;
+  double settle_time_constants = 8.0;
+  double guard_time = 0.05;
+  double path_tolerance = 1.0e-3;
+  int minimum_readings = 10;
+  double maximum_gap = 0.5;
+  double production_memory = 1800.0;
+  double largest_runout = 3.0e-5;
+  MotorParameters motor;  ///< of daq/motor_current
 
+  /// Without the motors', whose keys have a prefix.
+  void declare(ParameterTable& table) {
+    table.number("speed_tolerance", speed_tolerance, "1", Range::open(0.0, 0.5),
+                 "share of the commanded spindle speed within which it counts as reached");
+    table.number("settle_time_constants", settle_time_constants, "1", Range::closed(5.0, 1000.0),
+                 "time constants of the load meter waited for after a change; 8 leave 0.03 % of a step");
+    table.number("guard_time", guard_time, "s", Range::closed(0.0, 10.0),
+                 "readings dropped before steadiness is lost (stamps are replies' times)");
+    table.number("path_tolerance", path_tolerance, "m", Range::openLow(0.0, 1.0),
+                 "distance from the line between steady_from and steady_to");
+    table.number("minimum_readings", minimum_readings, "1", Range::atLeast(2), "steady readings of a test");
+    table.number("maximum_gap", maximum_gap, "s", Range::openLow(0.0, 60.0),
+                 "without controller state or load steadiness is lost");
+    table.number("production_memory", production_memory, "s", Range::openLow(0.0, 1e7),
+                 "of cutting after which a production cut counts 1/e in the running estimate");
+    table.number("largest_runout", largest_runout, "m", Range::closed(0.0, 1e-3),
+                 "offset of the cutter axis that may be; 0.0: none is looked for");
+  }
   /// @throws Error naming key and value.
   void validate() const;
 };

@@ -42,7 +42,6 @@ class SortedIdentification {
   LoadMeterIdentification identification_;
   StreamSorter sorter_;
   StreamSorter::Stream states_, loads_, motors_, conditions_, goals_;
-  std::vector<double> last_;  // [s] newest stamp of each stream
   double newest_ = 0.0;
 };
 

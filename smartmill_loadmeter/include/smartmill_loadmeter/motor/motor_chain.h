@@ -6,19 +6,27 @@
 #include <string>
 #include <vector>
 
+#include "smartmill_core/parameters/parameter_table.h"
 #include "smartmill_core/signal/streams.h"
 #include "smartmill_loadmeter/motor/joint.h"
 #include "smartmill_loadmeter/motor/motor_calibration.h"
 
 namespace smartmill::loadmeter {
 
+/// How the currents of the motors tell where they stand: electrical periods by travel and by revolution.
 struct MotorParameters {
-  /// [1/m] electrical periods of the phase current to a metre of travel, X, Y, Z: pole pairs over the screw's
-  /// lead; 0: no current of that motor.
   std::array<double, 3> phase_per_metre{{0.0, 0.0, 0.0}};
-  double phase_per_revolution = 0.0;  ///< [1] electrical periods to a revolution of the spindle; 0: none
-  double smallest_velocity = 1e-4;    ///< [m/s] > 0, below which an axis stands still
+  double phase_per_revolution = 0.0;
+  double smallest_velocity = 1.0e-4;
 
+  void declare(ParameterTable& table) {
+    table.list("phase_per_metre", phase_per_metre, "1/m", Range::openHigh(0.0, 1e7),
+               "electrical periods to a metre of X, Y, Z (pole pairs / lead); 0: none");
+    table.number("phase_per_revolution", phase_per_revolution, "1", Range::closed(0.0, 1000.0),
+                 "electrical periods to a revolution of the spindle; 0: none");
+    table.number("smallest_velocity", smallest_velocity, "m/s", Range::openLow(0.0, 0.1),
+                 "below it an axis stands still: its force is not observable");
+  }
   bool any() const;
   /// @throws Error naming key and value.
   void validate() const;

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <string>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/parameters/parameter_table.h"
+#include "smartmill_loadmeter/identification/identification.h"
+
+namespace smartmill::loadmeter {
+
+/// Parameters of loadmeter_node and of `coefficients` on a bag.
+struct NodeParameters {
+  std::string model;
+  std::string database;
+  IdentificationParameters identification;
+  std::string motor_calibration;
+  double hold_back = 0.05;
+  double input_timeout = 3.0;
+
+  void declare(ParameterTable& table) {
+    table.title(
+        "Parameters of loadmeter_node (package smartmill_loadmeter): cutting coefficients from the spindle's "
+        "load "
+        "meter.");
+    table.atLaunch("model", model,
+                   "path of a smartmill-model/1 file; its spindle section tells what the load meter shows");
+    table.section();
+    table.text("database", database,
+               "path of the SQLite file that keeps what this machine identifies; empty: this run only");
+    identification.declare(table);
+    table.section("Motor currents.");
+    table.text("motor_calibration", motor_calibration,
+               "path of what `calibrate --standard-cuts` wrote; empty: daq/motor_current is not used");
+    table.part("motor_", identification.motor);
+    table.section("Streams.");
+    table.number("hold_back", hold_back, "s", Range::notNegative(),
+                 "an event may arrive after its stamp and still be in order");
+    table.number("input_timeout", input_timeout, "s", Range::positive(),
+                 "without any input: data has ended, or its source is stale");
+  }
+  /// @throws Error naming key and value.
+  void validate() const {
+    checkBounds(*this);
+    identification.validate();
+    if (!motor_calibration.empty() && !identification.motor.any())
+      throw Error("motor_phase_per_metre: all 0, and motor_phase_per_revolution too: no current can be read");
+  }
+};
+
+}  // namespace smartmill::loadmeter
