@@ -5,13 +5,13 @@
 #include <cmath>
 #include <utility>
 
+#include "smartmill_core/names.h"
 #include "smartmill_core/signal/steady_path.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::discrepancy {
 namespace {
 
-constexpr double RESTARTED = 1.0;         // [s] a jump back of stamps: a bag was restarted
 constexpr double SPEED_TOLERANCE = 0.02;  // of the stated speed, within which the spindle is there
 constexpr double ANGLE_TOLERANCE = 0.02;  // [rad] from an even turn
 constexpr double CONFIRMED = 0.05;  // [s] of steady motion beyond a stretch: a controller's state may be old
@@ -180,21 +180,13 @@ SortedStretches::SortedStretches(const StretchParameters& parameters, double hol
                                  std::function<void(const Stretch&)> deliver)
     : recorder_(parameters, std::move(deliver)),
       sorter_(hold_back),
-      conditions_(sorter_.addEvents("cut/condition")),
-      states_(sorter_.addRegular("cnc/state")),
-      angles_(sorter_.addRegular("spindle/angle")),
-      blocks_(sorter_.addRegular("daq/dynamometer")),
+      conditions_(sorter_.addLatched(names::CUTTING_CONDITION)),
+      states_(sorter_.addRegular(names::CNC_STATE)),
+      angles_(sorter_.addRegular(names::SPINDLE_ANGLE)),
+      blocks_(sorter_.addRegular(names::DYNAMOMETER)),
       // Absent from some machines: waited for only by the hold-back.
-      loads_(sorter_.addEvents("cnc/load")) {
-}
-
-void SortedStretches::watch(double stamp) {
-  if (stamp < newest_ - RESTARTED) {
-    sorter_.reset();
-    recorder_.reset();
-    newest_ = stamp;
-  }
-  newest_ = std::max(newest_, stamp);
+      loads_(sorter_.addUnawaited(names::CNC_LOAD)) {
+  sorter_.onRestart([this] { recorder_.reset(); });
 }
 
 void SortedStretches::push(const CuttingCondition& condition) {
@@ -202,7 +194,6 @@ void SortedStretches::push(const CuttingCondition& condition) {
 }
 
 void SortedStretches::push(const CncState& state) {
-  watch(state.stamp);
   sorter_.push(states_, state.stamp, [this, state] { recorder_.handle(state); });
 }
 

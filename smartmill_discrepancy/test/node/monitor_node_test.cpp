@@ -18,6 +18,7 @@
 #include <smartmill_msgs/SampleBlock.h>
 #include <smartmill_msgs/SpindleAngle.h>
 
+#include "smartmill_core/names.h"
 #include "smartmill_core/units.h"
 #include "smartmill_discrepancy/data/dataset.h"
 #include "smartmill_ros/conversions.h"
@@ -38,12 +39,12 @@ class MonitorNodeTest : public testing::Test {
     std::string model;
     private_nh.getParam("model", model);
     model_ = readMachineModel(model);
-    conditions_ = nh_.advertise<smartmill_msgs::CuttingCondition>("cut/condition", 0);
-    states_ = nh_.advertise<smartmill_msgs::CncState>("cnc/state", 0);
-    angles_ = nh_.advertise<smartmill_msgs::SpindleAngle>("spindle/angle", 0);
-    blocks_ = nh_.advertise<smartmill_msgs::SampleBlock>("daq/dynamometer", 0);
+    conditions_ = nh_.advertise<smartmill_msgs::CuttingCondition>(names::CUTTING_CONDITION, 0);
+    states_ = nh_.advertise<smartmill_msgs::CncState>(names::CNC_STATE, 0);
+    angles_ = nh_.advertise<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE, 0);
+    blocks_ = nh_.advertise<smartmill_msgs::SampleBlock>(names::DYNAMOMETER, 0);
     results_ = nh_.subscribe<smartmill_msgs::DiscrepancyState>(
-        "discrepancy/state", 100,
+        names::DISCREPANCY_STATE, 100,
         boost::function<void(const smartmill_msgs::DiscrepancyState&)>(
             [this](const auto& m) { gaps_.push_back(m); }));
     diagnostics_ = nh_.subscribe<diagnostic_msgs::DiagnosticArray>(

@@ -9,8 +9,15 @@
 namespace smartmill::discrepancy {
 
 struct LiveGapOptions {
-  double limit = 1.5;       ///< [1] > 1, gap above which the model does not fit
-  double load_step = 1e-4;  ///< [1] >= 0, smallest step in which the controller tells the load
+  double limit = 1.5;
+  double load_step = 1.0e-4;
+
+  void declare(ParameterTable& table) {
+    table.number("limit", limit, "1", Range::above(1.0),
+                 "gap (RMS difference over noise; 1 is the noise floor) above which the model does not fit");
+    table.number("load_step", load_step, "1", Range::notNegative(),
+                 "of full scale: smallest step in which the controller tells the spindle's load");
+  }
 };
 
 /// Gap of a running machine (topic discrepancy/state).

@@ -8,6 +8,7 @@
 
 #include "smartmill_core/campaign/campaign.h"
 #include "smartmill_core/campaign/record.h"
+#include "smartmill_core/parameters/parameter_table.h"
 #include "smartmill_core/signal/stream_sorter.h"
 #include "smartmill_core/signal/streams.h"
 
@@ -30,9 +31,18 @@ struct Stretch {
 };
 
 struct StretchParameters {
-  double length = 0.3;           ///< [s] of a stretch, > 0.1
-  double settle = 0.15;          ///< [s] left out after a machine has come to steady motion, >= 0
-  double path_tolerance = 1e-4;  ///< [m] beside the condition's line, > 0
+  double length = 0.3;
+  double settle = 0.15;
+  double path_tolerance = 1.0e-4;
+
+  void declare(ParameterTable& table) {
+    table.number("length", length, "s", Range::openLow(0.1, 60.0),
+                 "of a stretch of steady cutting that is judged at once");
+    table.number("settle", settle, "s", Range::notNegative(),
+                 "left out after the machine has come to steady motion: the vibrations of the entry");
+    table.number("path_tolerance", path_tolerance, "m", Range::positive(),
+                 "beside the condition's line that is still steady");
+  }
 };
 
 /// Cuts the streams of a running machine into stretches of equal length: condition, controller state, spindle
@@ -86,12 +96,9 @@ class SortedStretches {
   void flush() { sorter_.flush(); }
 
  private:
-  void watch(double stamp);
-
   StretchRecorder recorder_;
   StreamSorter sorter_;
   StreamSorter::Stream conditions_, states_, angles_, blocks_, loads_;
-  double newest_ = -1e300;
 };
 
 }  // namespace smartmill::discrepancy
