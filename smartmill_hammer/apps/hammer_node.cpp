@@ -1,4 +1,4 @@
-#include "../src/node/hammer_server.h"
+#include "node/hammer_server.h"
 #include "smartmill_ros/node_main.h"
 
 int main(int argc, char** argv) {

@@ -21,6 +21,7 @@
 
 #include "../../src/node/bag_replay.h"
 #include "../closed_form_machine.h"
+#include "smartmill_core/names.h"
 
 namespace smartmill {
 namespace hammer {
@@ -30,7 +31,7 @@ using Client = actionlib::SimpleActionClient<smartmill_msgs::MeasureFrfAction>;
 
 class HammerNode : public testing::Test {
  protected:
-  HammerNode() : client("hammer/measure_frf", true), spinner(2) { spinner.start(); }
+  HammerNode() : client(names::MEASURE_TOOL_FRF, true), spinner(2) { spinner.start(); }
 
   smartmill_msgs::MeasureFrfGoal goal() const {
     smartmill_msgs::MeasureFrfGoal g;
@@ -77,10 +78,10 @@ TEST_F(HammerNode, MeasuresRecordsAndReplaysToTheLastDigit) {
   const std::string folder = testing::TempDir();
   const std::string bag_file = folder + "smartmill_hammer_node_test.bag";
   bag.open(bag_file, rosbag::bagmode::Write);
-  record<smartmill_msgs::SampleBlock>("daq/hammer");
-  record<smartmill_msgs::CncState>("cnc/state");
-  record<smartmill_msgs::SpindleAngle>("spindle/angle");
-  record<smartmill_msgs::MeasureFrfActionGoal>("hammer/measure_frf/goal");
+  record<smartmill_msgs::SampleBlock>(names::HAMMER);
+  record<smartmill_msgs::CncState>(names::CNC_STATE);
+  record<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE);
+  record<smartmill_msgs::MeasureFrfActionGoal>(names::goals(names::MEASURE_TOOL_FRF));
   for (int i = 0; i < 200 && !recording(); ++i) ros::WallDuration(0.1).sleep();
   client.sendGoal(goal());
   ASSERT_TRUE(client.waitForResult(ros::Duration(200.0)));
@@ -99,8 +100,8 @@ TEST_F(HammerNode, MeasuresRecordsAndReplaysToTheLastDigit) {
   // Subscribers that come late get it too.
   smartmill_msgs::FrfConstPtr frf;
   smartmill_msgs::ModalModelConstPtr modes;
-  frf = ros::topic::waitForMessage<smartmill_msgs::Frf>("tool/frf", nh, ros::Duration(5.0));
-  modes = ros::topic::waitForMessage<smartmill_msgs::ModalModel>("tool/modes", nh, ros::Duration(5.0));
+  frf = ros::topic::waitForMessage<smartmill_msgs::Frf>(names::TOOL_FRF, nh, ros::Duration(5.0));
+  modes = ros::topic::waitForMessage<smartmill_msgs::ModalModel>(names::TOOL_MODES, nh, ros::Duration(5.0));
   ASSERT_TRUE(frf && modes);
   EXPECT_EQ(frf->real, result->frf.real);
   EXPECT_EQ(modes->direction, "x");

@@ -16,6 +16,7 @@
 #include <smartmill_msgs/Strike.h>
 
 #include "../closed_form_machine.h"
+#include "smartmill_core/names.h"
 #include "smartmill_ros/conversions.h"
 
 namespace smartmill {
@@ -84,11 +85,11 @@ void run() {
   ros::NodeHandle nh;
   ClosedFormMachine machine(42);
   machine.time = toSec(ros::Time::now());
-  auto blocks = nh.advertise<smartmill_msgs::SampleBlock>("daq/hammer", 0);
-  auto angles = nh.advertise<smartmill_msgs::SpindleAngle>("spindle/angle", 0);
-  auto states = nh.advertise<smartmill_msgs::CncState>("cnc/state", 0);
+  auto blocks = nh.advertise<smartmill_msgs::SampleBlock>(names::HAMMER, 0);
+  auto angles = nh.advertise<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE, 0);
+  auto states = nh.advertise<smartmill_msgs::CncState>(names::CNC_STATE, 0);
   Motion<smartmill_msgs::JogAction, smartmill_msgs::JogResult> jog(
-      nh, "cnc/jog", machine, [](const smartmill_msgs::JogGoalConstPtr& goal) {
+      nh, names::JOG, machine, [](const smartmill_msgs::JogGoalConstPtr& goal) {
         Command c;
         c.kind = Command::Kind::jog;
         c.axis = goal->axis;
@@ -97,14 +98,14 @@ void run() {
         return c;
       });
   Motion<smartmill_msgs::OrientSpindleAction, smartmill_msgs::OrientSpindleResult> orient(
-      nh, "cnc/orient_spindle", machine, [](const smartmill_msgs::OrientSpindleGoalConstPtr& goal) {
+      nh, names::ORIENT_SPINDLE, machine, [](const smartmill_msgs::OrientSpindleGoalConstPtr& goal) {
         Command c;
         c.kind = Command::Kind::orient;
         c.angle = goal->angle;
         return c;
       });
   Motion<smartmill_msgs::RunProgramAction, smartmill_msgs::RunProgramResult> program(
-      nh, "cnc/run_program", machine, [&machine](const smartmill_msgs::RunProgramGoalConstPtr& goal) {
+      nh, names::RUN_PROGRAM, machine, [&machine](const smartmill_msgs::RunProgramGoalConstPtr& goal) {
         Command c;
         c.kind = Command::Kind::move;
         c.path = parse(goal->program, machine.position);
@@ -119,7 +120,7 @@ void run() {
         response.code = smartmill_msgs::Strike::Response::OK;
         return true;
       };
-  const auto service = nh.advertiseService("daq/strike", strike);
+  const auto service = nh.advertiseService(names::STRIKE, strike);
   bool every_other = false;
   const auto timer = nh.createWallTimer(ros::WallDuration(0.005), [&](const ros::WallTimerEvent&) {
     while (machine.time < toSec(ros::Time::now())) {
