@@ -15,6 +15,7 @@ struct SeparatingTest {
 };
 
 /// The cut or air cut, among variations of the campaign's tests, in which two models differ most.
-std::optional<SeparatingTest> separatingTest(const Dataset& data, const MachineModel& a, const MachineModel& b);
+std::optional<SeparatingTest> separatingTest(const Dataset& data, const MachineModel& a,
+                                             const MachineModel& b);
 
 }  // namespace smartmill::discrepancy

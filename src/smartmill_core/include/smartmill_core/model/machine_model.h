@@ -82,8 +82,8 @@ struct Workpiece {
 struct EffectEntry {
   std::string name;
   std::map<std::string, double> numbers;
-  std::map<std::string, double> std_devs;  ///< of keys with _std beside them; of lists' items: pitch_deg[0]
-  std::map<std::string, std::string> words;          ///< channel, axis
+  std::map<std::string, double> std_devs;    ///< of keys with _std beside them; of lists' items: pitch_deg[0]
+  std::map<std::string, std::string> words;  ///< channel, axis
   std::map<std::string, std::vector<double>> lists;  ///< one value a tooth: pitch_deg
   ToolTip flexibility;                               ///< modes
 };
