@@ -22,13 +22,14 @@ ModalModel sensor() {
 // Lines 5 Hz apart with circular noise of the given total standard deviation.
 FrequencyResponse measured(const ModalModel& model, double std_dev, unsigned seed) {
   std::mt19937 random(seed);
-  std::normal_distribution<double> part(0.0, std_dev / std::sqrt(2.0));
+  std::normal_distribution<double> normal;
+  const auto part = [&] { return std_dev / std::sqrt(2.0) * normal(random); };
   FrequencyResponse frf;
   for (double f = 5.0; f <= 4000.0; f += 5.0) {
     frf.frequency.push_back(f);
     frf.value.push_back(model.response(f));
     if (std_dev > 0.0) {
-      frf.value.back() += std::complex<double>(part(random), part(random));
+      frf.value.back() += std::complex<double>(part(), part());
       frf.std_dev.push_back(std_dev);
     }
   }

@@ -21,9 +21,9 @@ using Complex = std::complex<double>;
 
 std::vector<double> noise(std::size_t n, double rms, unsigned seed) {
   std::mt19937 random(seed);
-  std::normal_distribution<double> normal(0.0, rms);
+  std::normal_distribution<double> normal;
   std::vector<double> values(n);
-  for (double& value : values) value = normal(random);
+  for (double& value : values) value = rms * normal(random);
   return values;
 }
 
