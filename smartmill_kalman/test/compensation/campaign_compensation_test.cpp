@@ -75,7 +75,7 @@ class Measures : public testing::TestWithParam<bool> {
 };
 
 // With --identify the modes come from the taps and the sense from `measures`: force on the tool comes out,
-// whatever the sensor shows, to 1.5 % (issue 4, identified sensor).
+// whatever the sensor shows, to 1.5 % (identified sensor).
 TEST_P(Measures, IdentifiedSensorGivesTheForceOnTheTool) {
   EXPECT_EQ(measuresWorkpiece(campaign, ""), workpiece);
   const auto sensor = identifySensor(campaign, {100.0, 5000.0, 4});

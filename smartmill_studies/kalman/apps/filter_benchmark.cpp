@@ -31,7 +31,7 @@ void blockStructured(benchmark::State& state) {
     sample = 1.0 - sample;
     benchmark::DoNotOptimize(filter.step(sample));
   }
-  // How many times faster than a plain augmented filter in Python, 44 us a sample (figure of issue 4).
+  // How many times faster than a plain augmented filter in Python, 44 us a sample.
   state.counters["python_44us_over"] =
       benchmark::Counter(44e-6, benchmark::Counter::kIsIterationInvariantRate);
 }
