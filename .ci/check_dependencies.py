@@ -3,13 +3,15 @@
 import re
 import sys
 
-from packages import includes, packages, report, text
+from packages import includes, packages, report, system_includes, text
 
 # First folder of a header, or name that CMake finds: name in package.xml. None: no package has to be declared.
 HEADERS = {
     "Eigen": "eigen", "ceres": "libceres-dev", "fftw3.h": "fftw3", "gsl": "libgsl", "yaml-cpp": "yaml-cpp",
     "nlohmann": "nlohmann-json-dev", "CLI": "cli11", "sqlite3.h": "sqlite3", "benchmark": "benchmark",
-    "rapidcheck": "rapidcheck", "rapidcheck.h": "rapidcheck", "ros": "roscpp",
+    "rapidcheck": "rapidcheck", "rapidcheck.h": "rapidcheck", "ros": "roscpp", "boost": "boost",
+    "glog": "libgoogle-glog-dev", "unsupported": "eigen", "gtest": None, "gmock": None,
+    "arpa": None, "netinet": None, "sys": None,
 }
 FOUND = {
     "Eigen3": "eigen", "Ceres": "libceres-dev", "GSL": "libgsl", "SQLite3": "sqlite3", "CLI11": "cli11",
@@ -55,8 +57,12 @@ def asked(package, ours):
     for path in package.files:
         test = "test" in path.relative_to(package.folder).parts
         if path.suffix in (".cpp", ".h"):
+            kinds = TEST if test else BUILD
             for header in includes(path):
-                yield path, package_of_header(header, ours), TEST if test else BUILD
+                yield path, package_of_header(header, ours), kinds
+            for header in system_includes(path):
+                if header.split("/")[0] not in HEADERS and package_of_header(header, ours) is None:
+                    yield path, f"the package of {header}", kinds
         elif path.name == "CMakeLists.txt":
             for name in packages_found(text(path)):
                 yield path, FOUND.get(name, name), TEST

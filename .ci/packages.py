@@ -46,6 +46,11 @@ def includes(path):
     return INCLUDE.findall(text(path))
 
 
+def system_includes(path):
+    """Headers of folders in angle brackets."""
+    return [h for h in re.findall(r"^\s*#\s*include\s*<([^>]+)>", text(path), re.MULTILINE) if "/" in h]
+
+
 def report(name, faults):
     """Prints the faults and returns the exit code."""
     for fault in faults:
