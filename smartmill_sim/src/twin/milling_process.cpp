@@ -208,10 +208,13 @@ bool MillingProcess::gather(int tooth, const Stretch& cell, bool& certain) {
     // Older than the history none has vibrated, and a tooth is only farther than a turn later.
     unknown = delay.known ? 0 : unknown + 1;
     if (behind > reach) continue;
-    const ChipShape shape = chip(pass, delay.displacement);
-    if (bounds(shape - first, cell).low >= 0.0) continue;
-    if (bounds(shape, cell).high <= 0.0) return false;
-    shapes_.push_back(shape);
+    const double x = then[0] - delay.displacement[0], y = then[1] - delay.displacement[1];
+    ChipShape over_first = pass.behind;
+    over_first.sine += x;
+    over_first.cosine += y;
+    if (bounds(over_first, pass.bend + std::abs(x) + std::abs(y), cell).low >= 0.0) continue;
+    shapes_.push_back(chip(pass, delay.displacement));
+    if (bounds(shapes_.back(), cell).high <= 0.0) return false;
   }
   certain = certain && shapes_.size() == 1;
   return true;

@@ -60,7 +60,7 @@ inline double zeroOf(const ChipShape& shape, const Stretch& over, double left, d
     (rises == (value > 0.0) ? high : low) = at;
     double next = slope != 0.0 ? at - value / slope : low;
     if (!(next >= low && next <= high)) next = 0.5 * (low + high);
-    const bool close = std::abs(next - at) < 1e-9;
+    const bool close = std::abs(next - at) < 1e-5;  // and the next one nearer by its square
     at = next;
     if (close) break;
   }
