@@ -216,7 +216,7 @@ std::optional<RegenerativeSystem> ChartMaker::system(const Engagement& engagemen
   system.entry = given ? engagement.entry : parameters_.entry;
   system.exit = given ? engagement.exit : parameters_.exit;
   system.kt = cutting.ktc;
-  system.kr = std::isfinite(cutting.krc) ? cutting.krc : parameters_.kr * cutting.ktc;
+  system.kr = std::isfinite(cutting.krc) ? cutting.krc : parameters_.radial_ratio * cutting.ktc;
   return system;
 }
 
@@ -233,7 +233,8 @@ ChartMaker::Basis ChartMaker::basis() const {
   basis.process.entry = parameters_.entry;
   basis.process.exit = parameters_.exit;
   basis.process.kt = cutting.ktc;
-  basis.process.radial_ratio = std::isfinite(cutting.krc) ? cutting.krc / cutting.ktc : parameters_.kr;
+  basis.process.radial_ratio =
+      std::isfinite(cutting.krc) ? cutting.krc / cutting.ktc : parameters_.radial_ratio;
   if (byCollocation()) {
     const RegenerativeSystem system = *this->system({});
     SolverOptions options;

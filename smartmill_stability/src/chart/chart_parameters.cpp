@@ -31,7 +31,7 @@ void ChartParameters::declare(ParameterTable& table) {
                "above entry_angle; 0 .. pi is a slot");
   table.number("feed_per_tooth", feed_per_tooth, "m", Range::positive(),
                "torque, power and removal rate belong to it");
-  table.number("kr", kr, "1", Range::notNegative(),
+  table.number("kr", radial_ratio, "1", Range::notNegative(),
                "radial over tangential coefficient where the radial one was not identified");
   table.section("The chart.");
   table.number("speed_low", speed_low, "rad/s", Range::positive(), "lowest");

@@ -1,10 +1,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/LU>
+#include <Eigen/Core>
 
 #include "smartmill_core/cutting/chip_rule.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_stability/solvers/delayed_system.h"
 #include "solvers/floquet.h"
 
@@ -211,17 +212,16 @@ class Contact {
     stretches(pattern);
   }
 
-  /// The forced vibration with a contact given; `share` of the way there.
-  void move(const Pattern& pattern, double share) {
-    double highest = 0.0;
-    for (const SystemMode& mode : system_.modes) highest = std::max(highest, mode.frequency);
-    const int most = std::min(90, static_cast<int>(std::ceil(2.0 * highest * period_)) + 8);
-    const Index n = 2 * most + 1;
-    const std::size_t kinds = 1 + delays_.size();
-    // Feedback [kind][cell] and constant force [cell].
-    std::vector<std::vector<Eigen::Matrix2d>> gain(
-        kinds, std::vector<Eigen::Matrix2d>(CELLS, Eigen::Matrix2d::Zero()));
-    std::vector<Eigen::Vector2d> force(CELLS, Eigen::Vector2d::Zero());
+  /// Feedback [kind][cell], now and of each delay, and constant force [cell] of a contact.
+  struct Action {
+    std::vector<std::vector<Eigen::Matrix2d>> gain;
+    std::vector<Eigen::Vector2d> force;
+  };
+
+  Action actionOf(const Pattern& pattern) const {
+    Action action{std::vector<std::vector<Eigen::Matrix2d>>(
+                      1 + delays_.size(), std::vector<Eigen::Matrix2d>(CELLS, Eigen::Matrix2d::Zero())),
+                  std::vector<Eigen::Vector2d>(CELLS, Eigen::Vector2d::Zero())};
     for (int s = 0; s < slices_; ++s) {
       for (int k = 0; k < teeth_; ++k) {
         const std::size_t e = edge(s, k);
@@ -232,31 +232,45 @@ class Contact {
           const double angle = angle_[e] + TWO_PI * (cell + 0.5) / CELLS;
           const double sine = std::sin(angle), cosine = std::cos(angle);
           const Eigen::Matrix2d d = inArc(e, cell) * height_ * directional(system_.kt, system_.kr, angle);
-          const std::size_t p = pass(k, m);
-          gain[0][i] += d;
-          gain[1 + delay_[p]][i] -= d;
+          action.gain[0][i] += d;
+          action.gain[1 + delay_[pass(k, m)]][i] -= d;
           // directional() is force times normal: times the normal again it is the force of a chip of one.
-          const double h = still(e, m).at(sine, cosine);
-          force[i] += d * Eigen::Vector2d(sine, cosine) * h;
+          action.force[i] += d * Eigen::Vector2d(sine, cosine) * still(e, m).at(sine, cosine);
         }
       }
     }
-    std::vector<Complex> turn(CELLS);  // exp(-2 pi i j / CELLS)
-    for (int j = 0; j < CELLS; ++j) turn[static_cast<std::size_t>(j)] = std::polar(1.0, -TWO_PI * j / CELLS);
-    const auto at = [&](long j) { return turn[static_cast<std::size_t>(((j % CELLS) + CELLS) % CELLS)]; };
-    // Fourier coefficients -2 most .. 2 most of the gains.
-    std::vector<std::vector<Eigen::Matrix2cd>> c(
-        kinds,
-        std::vector<Eigen::Matrix2cd>(static_cast<std::size_t>(4 * most + 1), Eigen::Matrix2cd::Zero()));
-    for (std::size_t q = 0; q < kinds; ++q) {
+    return action;
+  }
+
+  /// exp(-2 pi i j / CELLS).
+  static Complex turn(long j) {
+    static const std::vector<Complex> TURN = [] {
+      std::vector<Complex> turn;
+      for (int k = 0; k < CELLS; ++k) turn.push_back(std::polar(1.0, -TWO_PI * k / CELLS));
+      return turn;
+    }();
+    return TURN[static_cast<std::size_t>(((j % CELLS) + CELLS) % CELLS)];
+  }
+
+  /// Fourier coefficient j of values at the cells' middles, which stand half a cell on.
+  template <class Result, class Value>
+  static Result coefficient(const std::vector<Value>& values, int j) {
+    Result sum = Result::Zero();
+    for (int i = 0; i < CELLS; ++i)
+      sum += turn(static_cast<long>(j) * i) * values[static_cast<std::size_t>(i)];
+    return sum * std::polar(1.0 / CELLS, -PI * j / CELLS);
+  }
+
+  /// Harmonics -most .. most of the vibration that a contact forces.
+  VectorXcd balance(const Action& action, int most) const {
+    const Index n = 2 * most + 1;
+    std::vector<std::vector<Eigen::Matrix2cd>> c;  // of the gains, -2 most .. 2 most
+    for (const auto& gain : action.gain) {
+      c.emplace_back(static_cast<std::size_t>(4 * most + 1));
       for (int j = 0; j <= 2 * most; ++j) {
-        Eigen::Matrix2cd sum = Eigen::Matrix2cd::Zero();
-        for (int i = 0; i < CELLS; ++i)
-          sum += at(static_cast<long>(j) * i) * gain[q][static_cast<std::size_t>(i)];
-        // Cells' middles stand half a cell on.
-        sum *= std::polar(1.0 / CELLS, -PI * j / CELLS);
-        c[q][static_cast<std::size_t>(2 * most + j)] = sum;
-        c[q][static_cast<std::size_t>(2 * most - j)] = sum.conjugate();
+        const auto sum = coefficient<Eigen::Matrix2cd>(gain, j);
+        c.back()[static_cast<std::size_t>(2 * most + j)] = sum;
+        c.back()[static_cast<std::size_t>(2 * most - j)] = sum.conjugate();
       }
     }
     MatrixXcd matrix = MatrixXcd::Identity(2 * n, 2 * n);
@@ -265,11 +279,7 @@ class Contact {
       const auto g = receptance(system_.modes, r / period_);
       Eigen::Matrix2cd answer;
       answer << g[0], g[1], g[2], g[3];
-      Eigen::Vector2cd f = Eigen::Vector2cd::Zero();
-      for (int i = 0; i < CELLS; ++i)
-        f += (at(static_cast<long>(r) * i) * std::polar(1.0 / CELLS, -PI * r / CELLS)) *
-             force[static_cast<std::size_t>(i)];
-      right.segment<2>(2 * (r + most)) = answer * f;
+      right.segment<2>(2 * (r + most)) = answer * coefficient<Eigen::Vector2cd>(action.force, r);
       for (int l = -most; l <= most; ++l) {
         const auto k = static_cast<std::size_t>(2 * most + r - l);
         Eigen::Matrix2cd sum = c[0][k];
@@ -278,29 +288,36 @@ class Contact {
         matrix.block<2, 2>(2 * (r + most), 2 * (l + most)) -= answer * sum;
       }
     }
-    VectorXcd found = matrix.partialPivLu().solve(right);
+    return linear::solve(matrix, right);
+  }
+
+  /// The forced vibration a delay ago, at the cells: [axis][cell].
+  std::vector<std::vector<double>> seriesAt(double delay, int most) const {
+    std::vector<std::vector<double>> u(2, std::vector<double>(CELLS, 0.0));
+    for (int r = 0; r <= most; ++r) {
+      const Complex shift = std::polar(r == 0 ? 1.0 : 2.0, TWO_PI * r * (0.5 / CELLS - delay / period_));
+      const Complex x = shift * spectrum_[2 * (r + most)], y = shift * spectrum_[2 * (r + most) + 1];
+      for (int i = 0; i < CELLS; ++i) {
+        const Complex wave = std::conj(turn(static_cast<long>(r) * i));
+        u[0][static_cast<std::size_t>(i)] += (x * wave).real();
+        u[1][static_cast<std::size_t>(i)] += (y * wave).real();
+      }
+    }
+    return u;
+  }
+
+  /// The forced vibration with a contact given; `share` of the way there.
+  void move(const Pattern& pattern, double share) {
+    double highest = 0.0;
+    for (const SystemMode& mode : system_.modes) highest = std::max(highest, mode.frequency);
+    const int most = std::min(90, static_cast<int>(std::ceil(2.0 * highest * period_)) + 8);
+    VectorXcd found = balance(actionOf(pattern), most);
     if (!found.allFinite()) return;
     if (spectrum_.size() == found.size() && share < 1.0) found = share * found + (1.0 - share) * spectrum_;
     spectrum_ = found;
-    const auto seriesAt = [&](double delay, std::array<std::vector<double>, 2>& u) {
-      for (auto& axis : u) axis.assign(CELLS, 0.0);
-      for (int r = 0; r <= most; ++r) {
-        const Complex shift = std::polar(r == 0 ? 1.0 : 2.0, TWO_PI * r * (0.5 / CELLS - delay / period_));
-        const Complex x = shift * found[2 * (r + most)], y = shift * found[2 * (r + most) + 1];
-        for (int i = 0; i < CELLS; ++i) {
-          const Complex wave = std::conj(at(static_cast<long>(r) * i));
-          u[0][static_cast<std::size_t>(i)] += (x * wave).real();
-          u[1][static_cast<std::size_t>(i)] += (y * wave).real();
-        }
-      }
-    };
-    motion_.resize(2);
-    std::array<std::vector<double>, 2> u;
-    seriesAt(0.0, u);
-    motion_[0] = u[0];
-    motion_[1] = u[1];
-    delayed_motion_.resize(delays_.size());
-    for (std::size_t d = 0; d < delays_.size(); ++d) seriesAt(delays_[d], delayed_motion_[d]);
+    motion_ = seriesAt(0.0, most);
+    delayed_motion_.clear();
+    for (const double delay : delays_) delayed_motion_.push_back(seriesAt(delay, most));
   }
 
   /// Cells joined to stretches; their ends where the chip goes through zero or another tooth's surface takes
@@ -361,9 +378,9 @@ class Contact {
   std::vector<ChipShape> still_;    // of each edge against each pass
   std::vector<std::size_t> delay_;  // of each pass
   VectorXcd spectrum_;
-  std::vector<std::vector<double>> motion_;  // [axis][cell] [m]
-  std::vector<std::array<std::vector<double>, 2>> delayed_motion_;
-  std::vector<std::vector<Stretch>> stretch_;  // of each edge
+  std::vector<std::vector<double>> motion_;                       // [axis][cell] [m]
+  std::vector<std::vector<std::vector<double>>> delayed_motion_;  // [delay][axis][cell]
+  std::vector<std::vector<Stretch>> stretch_;                     // of each edge
 };
 
 }  // namespace

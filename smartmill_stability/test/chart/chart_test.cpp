@@ -14,7 +14,7 @@ namespace smartmill::stability {
 namespace {
 
 ChartMaker filled(ChartParameters parameters, double step = 1.0) {
-  parameters.kr = 1.0 / 3.0;
+  parameters.radial_ratio = 1.0 / 3.0;
   ChartMaker maker(parameters, machine());
   maker.handle(frf("x", step));
   maker.handle(frf("y", step));
@@ -47,7 +47,7 @@ TEST(ChartMaker, measuredFrfsGiveTheBenchmarksLimits) {
 TEST(ChartMaker, linesThatTheHammerDidNotExciteMakeNoPocket) {
   const Chart clean = filled(slot()).chart();
   ChartParameters parameters = slot();
-  parameters.kr = 1.0 / 3.0;
+  parameters.radial_ratio = 1.0 / 3.0;
   ChartMaker maker(parameters, machine());
   for (const char* direction : {"x", "y"}) {
     MeasuredFrf noisy = frf(direction, 1.0);
@@ -73,7 +73,7 @@ TEST(ChartMaker, linesThatTheHammerDidNotExciteMakeNoPocket) {
 
 TEST(ChartMaker, modesGiveTheSameChartAsTheirFrf) {
   ChartParameters parameters = slot();
-  parameters.kr = 1.0 / 3.0;
+  parameters.radial_ratio = 1.0 / 3.0;
   parameters.method = "zero_order";
   parameters.use_modes = true;
   parameters.frequency_high = 4000.0;
@@ -92,7 +92,7 @@ TEST(ChartMaker, modesGiveTheSameChartAsTheirFrf) {
 }
 
 ChartMaker fromModes(ChartParameters parameters, double relative_error) {
-  parameters.kr = 1.0 / 3.0;
+  parameters.radial_ratio = 1.0 / 3.0;
   ChartMaker maker(parameters, machine());
   for (const char* direction : {"x", "y"}) {
     maker.handle(frf(direction, 1.0));
@@ -193,7 +193,7 @@ TEST(ChartMaker, aWeakSpindleHoldsTheRecommendationDown) {
   MachineModel weak = machine();
   weak.spindle->rated_torque = 0.8;
   ChartParameters parameters = slot();
-  parameters.kr = 1.0 / 3.0;
+  parameters.radial_ratio = 1.0 / 3.0;
   parameters.speed_high = 1500.0;
   ChartMaker maker(parameters, weak);
   maker.handle(frf("x", 1.0));
@@ -237,7 +237,7 @@ TEST(ChartMaker, refusesBadParametersByKey) {
   EXPECT_NE(message([](ChartParameters& p) { p.exit = -1.0; }).find("exit_angle: -1 "), std::string::npos);
   EXPECT_NE(message([](ChartParameters& p) { p.depth_margin = 1.0; }).find("depth_margin"),
             std::string::npos);
-  EXPECT_NE(message([](ChartParameters& p) { p.kr = std::nan(""); }).find("kr"), std::string::npos);
+  EXPECT_NE(message([](ChartParameters& p) { p.radial_ratio = std::nan(""); }).find("kr"), std::string::npos);
   EXPECT_NE(message([](ChartParameters& p) { p.speed_low = 1e5; }).find("speed_high"), std::string::npos);
   MachineModel without = machine();
   without.tool.reset();

@@ -37,7 +37,7 @@ class Recorder {
 
 NodeParameters parameters() {
   NodeParameters p;
-  p.chart.kr = 1.0 / 3.0;
+  p.chart.radial_ratio = 1.0 / 3.0;
   p.chart.speed_low = 500.0;
   p.chart.speeds = 300;
   return p;

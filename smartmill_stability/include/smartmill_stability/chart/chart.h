@@ -22,7 +22,7 @@ struct ChartParameters {
 
   double entry = 0.0, exit = units::PI;
   double feed_per_tooth = 1.0e-4;
-  double kr = 0.3;
+  double radial_ratio = 0.3;
   double speed_low = 200.0, speed_high = 0.0;
   int speeds = 1500;
   double frequency_low = 50.0, frequency_high = 10000.0;
