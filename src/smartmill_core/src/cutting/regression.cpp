@@ -41,81 +41,87 @@ struct Fit {
   Eigen::VectorXd residual;  // unweighted
 };
 
-// Least squares of rows X beta = y in groups (fx, fy, fz or torque). With sigma of every row: weighted,
-// covariance from sigma, scaled up where the scatter says that sigma was too small. Without: unweighted, one
-// variance a group from its residuals and its share of the degrees of freedom, carried through the solution.
-Fit leastSquares(const Eigen::MatrixXd& x, const Eigen::VectorXd& y, const Eigen::VectorXd& sigma,
-                 const std::vector<int>& group) {
-  const bool weighted = sigma.maxCoeff() > 0.0;
-  if (weighted && !(sigma.minCoeff() > 0.0)) {
-    throw Error("regression of coefficients: some tests state a standard deviation and some do not");
+// Rows X beta = y over their standard deviations (none: as they are), columns scaled to unit length.
+struct Scaled {
+  Eigen::MatrixXd a;
+  Eigen::VectorXd b;
+  Eigen::VectorXd scale;  // of each column
+  bool weighted;
+};
+
+Scaled scaled(const Eigen::MatrixXd& x, const Eigen::VectorXd& y, const Eigen::VectorXd& sigma) {
+  Scaled s{x, y, {}, sigma.maxCoeff() > 0.0};
+  if (s.weighted) {
+    if (!(sigma.minCoeff() > 0.0))
+      throw Error("regression of coefficients: some tests state a standard deviation and some do not");
+    s.a = sigma.cwiseInverse().asDiagonal() * s.a;
+    s.b = s.b.cwiseQuotient(sigma);
   }
-  const Eigen::Index n = x.rows(), p = x.cols();
-  Eigen::MatrixXd a = x;
-  Eigen::VectorXd b = y;
-  if (weighted) {
-    a = sigma.cwiseInverse().asDiagonal() * a;
-    b = b.cwiseQuotient(sigma);
-  }
-  // Columns differ by the chip thickness in metres: scaled to unit length the 6x6 normal matrix is well
-  // conditioned and the second pass on the residual takes the rounding out.
-  Eigen::VectorXd scale = a.colwise().norm().transpose();
-  if (!(scale.minCoeff() > 0.0)) {
+  s.scale = s.a.colwise().norm().transpose();
+  if (!(s.scale.minCoeff() > 0.0)) {
     throw Error("regression of coefficients: the tests say nothing about one of them");
   }
-  a = a * scale.cwiseInverse().asDiagonal();
-  const Eigen::MatrixXd normal = a.transpose() * a;
+  s.a = s.a * s.scale.cwiseInverse().asDiagonal();
+  return s;
+}
+
+// Covariance from the residuals of unweighted rows: one variance a group from its residuals and its share of
+// the degrees of freedom, carried through the solution. @param inverse of the normal matrix
+Eigen::MatrixXd covarianceOfGroups(const Eigen::MatrixXd& a, const Eigen::VectorXd& rest,
+                                   const Eigen::MatrixXd& inverse, const std::vector<int>& group) {
+  const Eigen::Index n = a.rows(), p = a.cols();
+  const int groups = *std::max_element(group.begin(), group.end()) + 1;
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(groups), freedom = Eigen::VectorXd::Zero(groups);
+  std::vector<Eigen::MatrixXd> normal(static_cast<std::size_t>(groups), Eigen::MatrixXd::Zero(p, p));
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const int g = group[static_cast<std::size_t>(i)];
+    sum[g] += rest[i] * rest[i];
+    freedom[g] += 1.0 - (a.row(i) * inverse * a.row(i).transpose())(0, 0);
+    normal[static_cast<std::size_t>(g)] += a.row(i).transpose() * a.row(i);
+  }
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(p, p);
+  // A group that a coefficient does not touch must not spoil it with NaN.
+  for (int g = 0; g < groups; ++g) {
+    const double variance = freedom[g] > 1e-6 ? sum[g] / freedom[g] : NOT_KNOWN;
+    const Eigen::MatrixXd part = inverse * normal[static_cast<std::size_t>(g)] * inverse;
+    for (Eigen::Index i = 0; i < p; ++i) {
+      for (Eigen::Index j = 0; j < p; ++j) {
+        if (std::abs(part(i, j)) > 1e-12 * inverse.diagonal().maxCoeff())
+          covariance(i, j) += part(i, j) * variance;
+      }
+    }
+  }
+  return covariance;
+}
+
+// Least squares of rows X beta = y in groups (fx, fy, fz). With sigma of every row: weighted, covariance from
+// sigma, scaled up where the scatter says that sigma was too small. Without: unweighted,
+// covarianceOfGroups().
+Fit leastSquares(const Eigen::MatrixXd& x, const Eigen::VectorXd& y, const Eigen::VectorXd& sigma,
+                 const std::vector<int>& group) {
+  // Columns differ by the chip thickness in metres: scaled to unit length the 6x6 normal matrix is well
+  // conditioned and the second pass on the residual takes the rounding out.
+  const Scaled s = scaled(x, y, sigma);
+  const Eigen::Index n = x.rows(), p = x.cols();
+  const Eigen::MatrixXd normal = s.a.transpose() * s.a;
   const Eigen::LDLT<Eigen::MatrixXd> solver(normal);
   if (solver.info() != Eigen::Success || solver.vectorD().minCoeff() < 1e-10) {
     throw Error(
         "regression of coefficients: the tests do not separate the coefficients (chip thickness hardly "
         "differs)");
   }
-  Eigen::VectorXd beta = solver.solve(a.transpose() * b);
-  beta += solver.solve(a.transpose() * (b - a * beta));
+  Eigen::VectorXd beta = solver.solve(s.a.transpose() * s.b);
+  beta += solver.solve(s.a.transpose() * (s.b - s.a * beta));
   const Eigen::MatrixXd inverse = solver.solve(Eigen::MatrixXd::Identity(p, p));
 
   Fit fit;
-  fit.value = beta.cwiseQuotient(scale);
+  fit.value = beta.cwiseQuotient(s.scale);
   fit.residual = y - x * fit.value;
-  const Eigen::VectorXd rest = b - a * beta;
-  Eigen::MatrixXd covariance;
-  if (weighted) {
-    const double chi2 = n > p ? rest.squaredNorm() / static_cast<double>(n - p) : 1.0;
-    covariance = inverse * std::max(1.0, chi2);
-  } else {
-    const int groups = *std::max_element(group.begin(), group.end()) + 1;
-    Eigen::VectorXd sum = Eigen::VectorXd::Zero(groups), freedom = Eigen::VectorXd::Zero(groups);
-    for (Eigen::Index i = 0; i < n; ++i) {
-      const int g = group[static_cast<std::size_t>(i)];
-      sum[g] += rest[i] * rest[i];
-      freedom[g] += 1.0 - (a.row(i) * inverse * a.row(i).transpose())(0, 0);
-    }
-    Eigen::VectorXd variance(n);
-    for (Eigen::Index i = 0; i < n; ++i) {
-      const int g = group[static_cast<std::size_t>(i)];
-      variance[i] = freedom[g] > 1e-6 ? sum[g] / freedom[g] : NOT_KNOWN;
-    }
-    covariance = Eigen::MatrixXd::Zero(p, p);
-    // A group that a coefficient does not touch must not spoil it with NaN.
-    for (int g = 0; g < groups; ++g) {
-      Eigen::MatrixXd part = Eigen::MatrixXd::Zero(p, p);
-      double v = 0.0;
-      for (Eigen::Index i = 0; i < n; ++i) {
-        if (group[static_cast<std::size_t>(i)] != g) continue;
-        part += a.row(i).transpose() * a.row(i);
-        v = variance[i];
-      }
-      part = inverse * part * inverse;
-      for (Eigen::Index i = 0; i < p; ++i) {
-        for (Eigen::Index j = 0; j < p; ++j) {
-          if (std::abs(part(i, j)) > 1e-12 * inverse.diagonal().maxCoeff())
-            covariance(i, j) += part(i, j) * v;
-        }
-      }
-    }
-  }
-  fit.covariance = scale.cwiseInverse().asDiagonal() * covariance * scale.cwiseInverse().asDiagonal();
+  const Eigen::VectorXd rest = s.b - s.a * beta;
+  const double chi2 = n > p ? rest.squaredNorm() / static_cast<double>(n - p) : 1.0;
+  const Eigen::MatrixXd covariance = s.weighted ? Eigen::MatrixXd(inverse * std::max(1.0, chi2))
+                                                : covarianceOfGroups(s.a, rest, inverse, group);
+  fit.covariance = s.scale.cwiseInverse().asDiagonal() * covariance * s.scale.cwiseInverse().asDiagonal();
   return fit;
 }
 
@@ -176,44 +182,6 @@ IdentifiedCoefficients identifyFromForces(const std::vector<MeanForceTest>& test
   result.r_squared_x = rSquared(y, fit.residual, 0, 3);
   result.r_squared_y = rSquared(y, fit.residual, 1, 3);
   result.r_squared_z = rSquared(y, fit.residual, 2, 3);
-  return result;
-}
-
-IdentifiedCoefficients identifyFromTorque(const std::vector<MeanTorqueTest>& tests) {
-  const Eigen::Index n = static_cast<Eigen::Index>(tests.size());
-  Eigen::MatrixXd x(n, 2);
-  Eigen::VectorXd y(n), sigma(n);
-  std::vector<double> chips;
-  for (std::size_t t = 0; t < tests.size(); ++t) {
-    const auto matrix = meanForceMatrix(tests[t].tool, tests[t].engagement);
-    chips.push_back(meanChip(matrix));
-    const Eigen::Index row = static_cast<Eigen::Index>(t);
-    x(row, 0) = matrix[3][0];
-    x(row, 1) = matrix[3][3];
-    checkFinite(tests[t].torque, "the mean torque", t);
-    checkFinite(tests[t].torque_std, "the standard deviation of the mean torque", t);
-    y[row] = tests[t].torque;
-    sigma[row] = tests[t].torque_std;
-  }
-  if (differentChips(chips) < 3) {
-    throw Error("coefficients from torque: " + std::to_string(tests.size()) + " tests at " +
-                std::to_string(differentChips(chips)) + " different feeds; at least three are due");
-  }
-  const Fit fit = leastSquares(x, y, sigma, std::vector<int>(tests.size(), 0));
-  IdentifiedCoefficients result;
-  result.tests = static_cast<int>(tests.size());
-  result.value = NOT_IDENTIFIED;
-  result.std_dev = result.value;
-  result.value.ktc = fit.value[0];
-  result.value.kte = fit.value[1];
-  result.std_dev.ktc = std::sqrt(fit.covariance(0, 0));
-  result.std_dev.kte = std::sqrt(fit.covariance(1, 1));
-  result.covariance = Eigen::MatrixXd::Constant(6, 6, NOT_KNOWN);
-  const Eigen::Index at[2] = {0, 3};
-  for (Eigen::Index i = 0; i < 2; ++i) {
-    for (Eigen::Index j = 0; j < 2; ++j) result.covariance(at[i], at[j]) = fit.covariance(i, j);
-  }
-  result.r_squared_x = result.r_squared_y = result.r_squared_z = NOT_KNOWN;
   return result;
 }
 

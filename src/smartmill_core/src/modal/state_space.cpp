@@ -22,15 +22,6 @@ StateSpace stateSpace(const ModalModel& model) {
   return system;
 }
 
-StateSpace discretise(const StateSpace& continuous, double dt) {
-  const Eigen::Index n = continuous.a.rows(), m = continuous.b.cols();
-  Eigen::MatrixXd joint = Eigen::MatrixXd::Zero(n + m, n + m);
-  joint.topLeftCorner(n, n) = continuous.a * dt;
-  joint.topRightCorner(n, m) = continuous.b * dt;
-  const Eigen::MatrixXd transition = linear::exponential(joint);
-  return {transition.topLeftCorner(n, n), transition.topRightCorner(n, m), continuous.c, continuous.d};
-}
-
 std::pair<Eigen::MatrixXd, Eigen::MatrixXd> discretiseNoise(const Eigen::MatrixXd& a,
                                                             const Eigen::MatrixXd& q, double dt) {
   const Eigen::Index n = a.rows();

@@ -121,27 +121,5 @@ TEST(IdentifyFromForces, saysWhatIsMissing) {
   EXPECT_THROW(identifyFromForces(tests), Error);
 }
 
-TEST(IdentifyFromTorque, isEquation319AndTakesAnyEngagement) {
-  std::vector<MeanTorqueTest> tests;
-  for (const double feed : {3e-5, 6e-5, 1e-4}) {
-    MeanTorqueTest test;
-    test.tool = TOOL;
-    test.engagement = {0.0, units::PI, 0.002, feed};
-    test.torque = TOOL.radius() * 3 * 0.002 * (TRUTH.ktc / units::PI * feed + TRUTH.kte / 2.0);
-    tests.push_back(test);
-  }
-  MeanTorqueTest half = tests[0];
-  half.engagement = {0.0, units::PI / 2.0, 0.003, 8e-5};
-  half.torque = MechanisticForce(TOOL, TRUTH, half.engagement).mean().torque;
-  tests.push_back(half);
-  const IdentifiedCoefficients found = identifyFromTorque(tests);
-  EXPECT_NEAR(found.value.ktc, TRUTH.ktc, 1e-9 * TRUTH.ktc);
-  EXPECT_NEAR(found.value.kte, TRUTH.kte, 1e-9 * TRUTH.kte);
-  EXPECT_TRUE(std::isnan(found.value.krc));
-  EXPECT_TRUE(std::isnan(found.covariance(1, 1)));
-  tests.resize(2);
-  EXPECT_THROW(identifyFromTorque(tests), Error);
-}
-
 }  // namespace
 }  // namespace smartmill

@@ -122,8 +122,14 @@ TEST(StateSpace, hasTheFrequencyResponseOfTheModes) {
   }
 }
 
+// Zero-order hold by the matrix exponential of state and input together.
 TEST(StateSpace, discretisedItIsTheZeroOrderFilter) {
-  const StateSpace system = discretise(stateSpace(model()), 1.0 / RATE);
+  StateSpace system = stateSpace(model());
+  Eigen::MatrixXd joint = Eigen::MatrixXd::Zero(7, 7);
+  joint << system.a, system.b, Eigen::MatrixXd::Zero(1, 7);
+  const Eigen::MatrixXd transition = linear::exponential(joint / RATE);
+  system.a = transition.topLeftCorner(6, 6);
+  system.b = transition.topRightCorner(6, 1);
   ModalFilter filter(model(), RATE, Hold::zero_order);
   Eigen::VectorXd state = Eigen::VectorXd::Zero(6);
   for (int i = 0; i < 2000; ++i) {

@@ -16,21 +16,12 @@ struct MeanForceTest {
   std::array<double, 3> force_std{{0, 0, 0}};  ///< [N] of the means; zero: unweighted
 };
 
-struct MeanTorqueTest {
-  ToolGeometry tool;
-  Engagement engagement;
-  double torque = 0.0;      ///< [N m] mean cutting torque
-  double torque_std = 0.0;  ///< [N m] zero: unweighted
-};
-
-/// NaN where the tests say nothing about a coefficient.
 struct IdentifiedCoefficients {
   CuttingCoefficients value;
   CuttingCoefficients std_dev;
-  Eigen::MatrixXd
-      covariance;  ///< 6x6 in the order ktc, krc, kac, kte, kre, kae; NaN rows where not identified
+  Eigen::MatrixXd covariance;  ///< 6x6 in the order ktc, krc, kac, kte, kre, kae
   int tests = 0;
-  double r_squared_x = 0.0, r_squared_y = 0.0, r_squared_z = 0.0;  ///< [1] of the mean forces; NaN for torque
+  double r_squared_x = 0.0, r_squared_y = 0.0, r_squared_z = 0.0;  ///< [1] of the mean forces
 };
 
 /// Mean-force regression over tests of at least two feeds (all three forces together).
@@ -38,8 +29,5 @@ struct IdentifiedCoefficients {
 /// share.
 /// @throws Error with too few feeds or a rank-deficient plan, naming what is missing.
 IdentifiedCoefficients identifyFromForces(const std::vector<MeanForceTest>& tests);
-
-/// Ktc and Kte from mean torque at three or more feeds (Dunwoody eq. 3.19 generalised to any engagement).
-IdentifiedCoefficients identifyFromTorque(const std::vector<MeanTorqueTest>& tests);
 
 }  // namespace smartmill

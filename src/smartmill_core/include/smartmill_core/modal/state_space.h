@@ -18,9 +18,6 @@ struct StateSpace {
 /// one size a mode.
 StateSpace stateSpace(const ModalModel& model);
 
-/// Exact zero-order-hold discretisation by the matrix exponential. @param dt [s]
-StateSpace discretise(const StateSpace& continuous, double dt);
-
 /// Van Loan: exact discrete transition and process noise covariance of x' = A x + w, E w w' = q.
 /// @return {phi, qd} for a step dt [s].
 std::pair<Eigen::MatrixXd, Eigen::MatrixXd> discretiseNoise(const Eigen::MatrixXd& a,
