@@ -75,6 +75,116 @@ std::vector<CampaignTest> plan() {
   return tests;
 }
 
+// One test of a hidden machine as its sensors show it.
+class BenchRecorder {
+ public:
+  BenchRecorder(const CampaignTest& test, const BenchTruth& truth, int substeps, Random& random)
+      : test_(test),
+        outside_(truth.outside),
+        substeps_(substeps),
+        machine_(truth.machine, 1.0 / (test.sample_rate * substeps)) {
+    machine_.setClock({test.start_time.value_or(0.0), test.cut_time_before.value_or(0.0), true});
+    machine_.resetLoadMeter(test.spindle_speed);
+    for (sim::Tone* tone : machine_.tones()) tone->phase = between(random, 0.0, units::TWO_PI);
+    phase_ = between(random, 0.0, units::TWO_PI);
+    own_phase_ = between(random, 0.0, units::TWO_PI);
+    peak_ = between(random, 150.0, 300.0);
+    if (cut())
+      feed_ =
+          test.engagement->feed_per_tooth * truth.machine.tool->teeth * test.spindle_speed / units::TWO_PI;
+  }
+
+  Record record(Random& random, std::normal_distribution<double>& normal) {
+    Record record;
+    std::vector<double> angles, hammer, load;
+    std::array<std::vector<double>, 3> force;
+    const std::size_t count = samples();
+    for (std::size_t i = 0; i < count; ++i) {
+      const double t = static_cast<double>(i) / test_.sample_rate;
+      const sim::CuttingMachine::Input now = inputAt(t);
+      sim::ChannelValues shown = step(i);
+      record.time.push_back(t);
+      angles.push_back(std::fmod(now.motion.angle, units::TWO_PI));
+      double blow = 0.0;
+      for (const double f : now.sensor_force) blow += f;
+      hammer.push_back(blow + 0.2 * normal(random));
+      addOutside(t, shown);
+      machine_.finish(t, shown);
+      for (std::size_t a = 0; a < 3; ++a) force[a].push_back(shown[a] + normal(random));
+      load.push_back(machine_.rounded(shown[sim::LOAD_METER] + 2e-4 * normal(random)));
+    }
+    record.add("spindle_angle") = angles;
+    record.add("fx") = force[0];
+    record.add("fy") = force[1];
+    record.add("fz") = force[2];
+    if (tap()) {
+      record.add("hammer") = hammer;
+    } else {
+      record.add("load_meter") = load;
+    }
+    return record;
+  }
+
+ private:
+  static constexpr double HIT = 5e-3, WIDTH = 0.6e-3;  // [s] of a tap
+
+  bool tap() const { return test_.kind == TestKind::tap; }
+  bool cut() const { return test_.kind == TestKind::cut; }
+  std::size_t samples() const {
+    return tap() ? 3072 : cut() ? (test_.spindle_speed < 200.0 ? 7680 : 5120) : 3840;
+  }
+
+  sim::CuttingMachine::Input inputAt(double t) const {
+    sim::CuttingMachine::Input input;
+    input.motion.angle = phase_ + test_.spindle_speed * t;
+    input.motion.speed = test_.spindle_speed;
+    input.motion.velocity[0] = feed_;
+    input.motion.centre[0] = feed_ * t;
+    const std::size_t axis = test_.direction == "x" ? 0 : test_.direction == "y" ? 1 : 2;
+    if (tap() && t > HIT && t < HIT + WIDTH)
+      input.sensor_force[axis] = peak_ * std::sin(units::PI * (t - HIT) / WIDTH);
+    return input;
+  }
+
+  // From sample i to the next. @return the early channels at sample i
+  sim::ChannelValues step(std::size_t i) {
+    sim::ChannelValues shown{};
+    for (int s = 0; s < substeps_; ++s) {
+      const double t = (static_cast<double>(i) + static_cast<double>(s) / substeps_) / test_.sample_rate;
+      const sim::CuttingMachine::Input input = inputAt(t);
+      if (cut() && !engaged_ && t >= *test_.engage_time - 1e-3 / test_.sample_rate) {
+        machine_.engage({{test_.engagement->entry, test_.engagement->exit, test_.engagement->axial_depth}},
+                        input.motion, sim::engagementRise(machine_.vibrates()) * substeps_);
+        engaged_ = true;
+      }
+      const sim::CuttingMachine::Output out = machine_.step(input);
+      if (s == 0) shown = out.early;
+    }
+    return shown;
+  }
+
+  // Locked to the spindle or the same in every record, order and level would be effects.
+  void addOutside(double t, sim::ChannelValues& shown) const {
+    if (!outside_) return;
+    const OutsideCause& o = *outside_;
+    const double wave = o.kind == "tone" ? std::sin(units::TWO_PI * o.place * t + own_phase_)
+                        : o.kind == "order"
+                            ? (tap() ? 0.0 : std::sin(o.place * test_.spindle_speed * t + own_phase_))
+                        : o.kind == "level" ? std::cos(own_phase_)
+                                            : std::exp(-t / o.place);
+    shown[sim::channelOf(o.channel)] += o.amplitude * wave;
+  }
+
+  const CampaignTest& test_;
+  const std::optional<OutsideCause>& outside_;
+  int substeps_;
+  sim::CuttingMachine machine_;
+  double phase_ = 0.0, own_phase_ = 0.0;  // [rad] of tooth 1 and of what comes from outside
+  double peak_ = 0.0;                     // [N] of a tap
+  double feed_ = 0.0;                     // [m/s]
+  bool engaged_ = false;
+};
+
 }  // namespace
 
 std::string OutsideCause::domain() const {
@@ -148,73 +258,8 @@ void writeBenchCampaign(const MachineModel& nominal, const BenchTruth& truth, co
   Random random(seed);
   std::normal_distribution<double> normal;
   for (const CampaignTest& test : campaign.tests) {
-    sim::CuttingMachine machine(truth.machine, 1.0 / (test.sample_rate * substeps));
-    machine.setClock({test.start_time.value_or(0.0), test.cut_time_before.value_or(0.0), true});
-    machine.resetLoadMeter(test.spindle_speed);
-    for (sim::Tone* tone : machine.tones()) tone->phase = between(random, 0.0, units::TWO_PI);
-    const bool tap = test.kind == TestKind::tap, cut = test.kind == TestKind::cut;
-    const double phase = between(random, 0.0, units::TWO_PI), own_phase = between(random, 0.0, units::TWO_PI);
-    const double feed =
-        cut ? test.engagement->feed_per_tooth * truth.machine.tool->teeth * test.spindle_speed / units::TWO_PI
-            : 0.0;
-    Record record;
-    const std::size_t samples = tap ? 3072 : cut ? (test.spindle_speed < 200.0 ? 7680 : 5120) : 3840;
-    std::vector<double> angles, hammer, load;
-    std::array<std::vector<double>, 3> force;
-    const double peak = between(random, 150.0, 300.0), width = 0.6e-3, hit = 5e-3;
-    bool engaged = false;
-    for (std::size_t i = 0; i < samples; ++i) {
-      sim::ChannelValues shown{};
-      for (int s = 0; s < substeps; ++s) {
-        const double t = (static_cast<double>(i) + static_cast<double>(s) / substeps) / test.sample_rate;
-        sim::CuttingMachine::Input input;
-        input.motion.angle = phase + test.spindle_speed * t;
-        input.motion.speed = test.spindle_speed;
-        input.motion.velocity[0] = feed;
-        input.motion.centre[0] = feed * t;
-        if (tap && t > hit && t < hit + width)
-          input.sensor_force[test.direction == "x"   ? 0
-                             : test.direction == "y" ? 1
-                                                     : 2] = peak * std::sin(units::PI * (t - hit) / width);
-        if (cut && !engaged && t >= *test.engage_time - 1e-3 / test.sample_rate) {
-          machine.engage({{test.engagement->entry, test.engagement->exit, test.engagement->axial_depth}},
-                         input.motion, sim::engagementRise(machine.vibrates()) * substeps);
-          engaged = true;
-        }
-        const sim::CuttingMachine::Output out = machine.step(input);
-        if (s > 0) continue;
-        shown = out.early;
-        record.time.push_back(t);
-        angles.push_back(std::fmod(input.motion.angle, units::TWO_PI));
-        double blow = 0.0;
-        for (const double f : input.sensor_force) blow += f;
-        hammer.push_back(blow + 0.2 * normal(random));
-      }
-      const double t = static_cast<double>(i) / test.sample_rate;
-      if (truth.outside) {
-        const OutsideCause& o = *truth.outside;
-        // Locked to the spindle or the same in every record, order and level would be effects.
-        const double wave = o.kind == "tone" ? std::sin(units::TWO_PI * o.place * t + own_phase)
-                            : o.kind == "order"
-                                ? (tap ? 0.0 : std::sin(o.place * test.spindle_speed * t + own_phase))
-                            : o.kind == "level" ? std::cos(own_phase)
-                                                : std::exp(-t / o.place);
-        shown[sim::channelOf(o.channel)] += o.amplitude * wave;
-      }
-      machine.finish(t, shown);
-      for (std::size_t a = 0; a < 3; ++a) force[a].push_back(shown[a] + normal(random));
-      load.push_back(machine.rounded(shown[sim::LOAD_METER] + 2e-4 * normal(random)));
-    }
-    record.add("spindle_angle") = angles;
-    record.add("fx") = force[0];
-    record.add("fy") = force[1];
-    record.add("fz") = force[2];
-    if (tap) {
-      record.add("hammer") = hammer;
-    } else {
-      record.add("load_meter") = load;
-    }
-    writeCsv(record, folder + "/" + test.file);
+    BenchRecorder recorder(test, truth, substeps, random);
+    writeCsv(recorder.record(random, normal), folder + "/" + test.file);
   }
 }
 

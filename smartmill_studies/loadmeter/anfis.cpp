@@ -10,20 +10,44 @@
 
 namespace smartmill::loadmeter {
 
-Anfis::Anfis(const std::vector<std::vector<double>>& inputs, const std::vector<double>& outputs,
-             const Parameters& parameters)
-    : inputs_(inputs.empty() ? 0 : inputs.front().size()),
-      memberships_(static_cast<std::size_t>(parameters.memberships)) {
+namespace {
+
+void check(const std::vector<std::vector<double>>& inputs, const std::vector<double>& outputs,
+           const Anfis::Parameters& parameters) {
   if (parameters.memberships < 2 || parameters.memberships > 5 || parameters.epochs < 1 ||
       !(parameters.step > 0.0) || !(parameters.ridge >= 0.0)) {
     throw Error("anfis: memberships 2..5, epochs >= 1, step > 0 and ridge >= 0 are due");
   }
-  if (inputs.size() != outputs.size() || inputs.size() < inputs_ + 2) {
+  const std::size_t width = inputs.empty() ? 0 : inputs.front().size();
+  if (inputs.size() != outputs.size() || inputs.size() < width + 2) {
     throw Error("anfis: " + std::to_string(inputs.size()) + " samples are too few");
   }
   for (const auto& input : inputs) {
-    if (input.size() != inputs_) throw Error("anfis: samples of different length");
+    if (input.size() != width) throw Error("anfis: samples of different length");
   }
+}
+
+}  // namespace
+
+Anfis::Anfis(const std::vector<std::vector<double>>& inputs, const std::vector<double>& outputs,
+             const Parameters& parameters)
+    : inputs_(inputs.empty() ? 0 : inputs.front().size()),
+      memberships_(static_cast<std::size_t>(parameters.memberships)) {
+  check(inputs, outputs, parameters);
+  spread(inputs);
+  const auto [least, most] = std::minmax_element(outputs.begin(), outputs.end());
+  out_middle_ = 0.5 * (*least + *most);
+  out_span_ = *most > *least ? *most - *least : 1.0;
+  std::vector<std::vector<double>> x;
+  std::vector<double> y;
+  for (std::size_t i = 0; i < inputs.size(); ++i) {
+    x.push_back(scaled(inputs[i]));
+    y.push_back((outputs[i] - out_middle_) / out_span_);
+  }
+  learn(x, y, parameters);
+}
+
+void Anfis::spread(const std::vector<std::vector<double>>& inputs) {
   for (std::size_t i = 0; i < inputs_; ++i) {
     double low = inputs[0][i], high = inputs[0][i];
     for (const auto& input : inputs) {
@@ -37,62 +61,26 @@ Anfis::Anfis(const std::vector<std::vector<double>>& inputs, const std::vector<d
       bells_.push_back({0.5 * gap, 2.0, gap * static_cast<double>(m)});
     }
   }
-  const auto [least, most] = std::minmax_element(outputs.begin(), outputs.end());
-  out_middle_ = 0.5 * (*least + *most);
-  out_span_ = *most > *least ? *most - *least : 1.0;
-  std::vector<std::vector<double>> x;
-  std::vector<double> y;
-  for (std::size_t i = 0; i < inputs.size(); ++i) {
-    x.push_back(scaled(inputs[i]));
-    y.push_back((outputs[i] - out_middle_) / out_span_);
-  }
+}
+
+void Anfis::learn(const std::vector<std::vector<double>>& x, const std::vector<double>& y,
+                  const Parameters& parameters) {
   double step = parameters.step;
   solveLines(x, y, parameters.ridge);
   double before = squares(x, y);
   int falls = 0;
   for (int epoch = 0; epoch < parameters.epochs; ++epoch) {
-    // Backward pass: gradient to a, b, c of every bell, the lines held.
-    std::vector<double> gradient(3 * bells_.size(), 0.0);
-    std::vector<double> normalised;
-    const std::size_t width = inputs_ + 1;
-    for (std::size_t s = 0; s < x.size(); ++s) {
-      fire(x[s], &normalised);
-      std::vector<double> line(normalised.size());
-      double out = 0.0;
-      for (std::size_t r = 0; r < normalised.size(); ++r) {
-        line[r] = lines_[r * width + inputs_];
-        for (std::size_t i = 0; i < inputs_; ++i) line[r] += lines_[r * width + i] * x[s][i];
-        out += normalised[r] * line[r];
-      }
-      const double error = out - y[s];
-      for (std::size_t r = 0; r < normalised.size(); ++r) {
-        // d out / d ln(mu) of a membership of this rule is normalised (line - out).
-        const double share = 2.0 * error * normalised[r] * (line[r] - out);
-        std::size_t rest = r;
-        for (std::size_t i = 0; i < inputs_; ++i) {
-          const std::size_t at = i * memberships_ + rest % memberships_;
-          rest /= memberships_;
-          const Bell& bell = bells_[at];
-          const double d = x[s][i] - bell.c, ratio = std::abs(d / bell.a);
-          if (ratio < 1e-9) continue;
-          const double power = std::pow(ratio, 2.0 * bell.b), mu = 1.0 / (1.0 + power);
-          const double slope = mu * power;  // - d ln(mu) / d ln(power)
-          gradient[3 * at] += share * slope * 2.0 * bell.b / bell.a;
-          gradient[3 * at + 1] -= share * slope * 2.0 * std::log(ratio);
-          gradient[3 * at + 2] += share * slope * 2.0 * bell.b / d;
-        }
-      }
-    }
+    const std::vector<double> slopes = gradient(x, y);
     double norm = 0.0;
-    for (const double g : gradient) norm += g * g;
+    for (const double g : slopes) norm += g * g;
     if (!(norm > 0.0)) break;
     norm = std::sqrt(norm);
     const std::vector<Bell> kept = bells_;
     const std::vector<double> kept_lines = lines_;
     for (std::size_t k = 0; k < bells_.size(); ++k) {
-      bells_[k].a = std::clamp(bells_[k].a - step * gradient[3 * k] / norm, 0.1, 2.0);
-      bells_[k].b = std::clamp(bells_[k].b - step * gradient[3 * k + 1] / norm, 0.5, 5.0);
-      bells_[k].c = std::clamp(bells_[k].c - step * gradient[3 * k + 2] / norm, -0.5, 1.5);
+      bells_[k].a = std::clamp(bells_[k].a - step * slopes[3 * k] / norm, 0.1, 2.0);
+      bells_[k].b = std::clamp(bells_[k].b - step * slopes[3 * k + 1] / norm, 0.5, 5.0);
+      bells_[k].c = std::clamp(bells_[k].c - step * slopes[3 * k + 2] / norm, -0.5, 1.5);
     }
     solveLines(x, y, parameters.ridge);
     const double now = squares(x, y);
@@ -108,6 +96,46 @@ Anfis::Anfis(const std::vector<std::vector<double>>& inputs, const std::vector<d
     }
   }
   rms_ = out_span_ * std::sqrt(before / static_cast<double>(x.size()));
+}
+
+std::vector<double> Anfis::gradient(const std::vector<std::vector<double>>& x,
+                                    const std::vector<double>& y) const {
+  std::vector<double> sum(3 * bells_.size(), 0.0);
+  for (std::size_t s = 0; s < x.size(); ++s) {
+    const Answer answer = answerTo(x[s]);
+    const double error = answer.out - y[s];
+    for (std::size_t r = 0; r < answer.line.size(); ++r) {
+      // d out / d ln(mu) of a membership of this rule is normalised (line - out).
+      const double share = 2.0 * error * answer.normalised[r] * (answer.line[r] - answer.out);
+      std::size_t rest = r;
+      for (std::size_t i = 0; i < inputs_; ++i) {
+        const std::size_t at = i * memberships_ + rest % memberships_;
+        rest /= memberships_;
+        const Bell& bell = bells_[at];
+        const double d = x[s][i] - bell.c, ratio = std::abs(d / bell.a);
+        if (ratio < 1e-9) continue;
+        const double power = std::pow(ratio, 2.0 * bell.b), mu = 1.0 / (1.0 + power);
+        const double slope = mu * power;  // - d ln(mu) / d ln(power)
+        sum[3 * at] += share * slope * 2.0 * bell.b / bell.a;
+        sum[3 * at + 1] -= share * slope * 2.0 * std::log(ratio);
+        sum[3 * at + 2] += share * slope * 2.0 * bell.b / d;
+      }
+    }
+  }
+  return sum;
+}
+
+Anfis::Answer Anfis::answerTo(const std::vector<double>& x) const {
+  Answer answer;
+  fire(x, &answer.normalised);
+  const std::size_t width = inputs_ + 1;
+  answer.line.resize(answer.normalised.size());
+  for (std::size_t r = 0; r < answer.line.size(); ++r) {
+    answer.line[r] = lines_[r * width + inputs_];
+    for (std::size_t i = 0; i < inputs_; ++i) answer.line[r] += lines_[r * width + i] * x[i];
+    answer.out += answer.normalised[r] * answer.line[r];
+  }
+  return answer;
 }
 
 std::size_t Anfis::rules() const {
@@ -165,35 +193,16 @@ void Anfis::solveLines(const std::vector<std::vector<double>>& x, const std::vec
 
 double Anfis::squares(const std::vector<std::vector<double>>& x, const std::vector<double>& y) const {
   double sum = 0.0;
-  std::vector<double> normalised;
-  const std::size_t width = inputs_ + 1;
   for (std::size_t s = 0; s < x.size(); ++s) {
-    fire(x[s], &normalised);
-    double out = 0.0;
-    for (std::size_t r = 0; r < normalised.size(); ++r) {
-      double line = lines_[r * width + inputs_];
-      for (std::size_t i = 0; i < inputs_; ++i) line += lines_[r * width + i] * x[s][i];
-      out += normalised[r] * line;
-    }
-    sum += (out - y[s]) * (out - y[s]);
+    const double error = answerTo(x[s]).out - y[s];
+    sum += error * error;
   }
   return sum;
 }
 
 double Anfis::operator()(const std::vector<double>& input) const {
   if (input.size() != inputs_) throw Error("anfis: " + std::to_string(inputs_) + " inputs are due");
-  const std::vector<double> x = scaled(input);
-  // squares() of one sample against zero would lose the sign.
-  std::vector<double> normalised;
-  fire(x, &normalised);
-  double out = 0.0;
-  const std::size_t width = inputs_ + 1;
-  for (std::size_t r = 0; r < normalised.size(); ++r) {
-    double line = lines_[r * width + inputs_];
-    for (std::size_t i = 0; i < inputs_; ++i) line += lines_[r * width + i] * x[i];
-    out += normalised[r] * line;
-  }
-  return out_middle_ + out_span_ * out;
+  return out_middle_ + out_span_ * answerTo(scaled(input)).out;
 }
 
 }  // namespace smartmill::loadmeter

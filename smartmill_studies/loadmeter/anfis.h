@@ -30,7 +30,20 @@ class Anfis {
   struct Bell {
     double a, b, c;
   };
+  /// What the rules say of one scaled input.
+  struct Answer {
+    std::vector<double> normalised;  // firing of each rule, sum 1
+    std::vector<double> line;        // value of each rule's line
+    double out = 0.0;
+  };
   std::size_t rules() const;
+  /// Bells evenly over the range of each input.
+  void spread(const std::vector<std::vector<double>>& inputs);
+  void learn(const std::vector<std::vector<double>>& x, const std::vector<double>& y,
+             const Parameters& parameters);
+  /// Backward pass: of the squares to a, b, c of every bell, the lines held.
+  std::vector<double> gradient(const std::vector<std::vector<double>>& x, const std::vector<double>& y) const;
+  Answer answerTo(const std::vector<double>& x) const;
   std::vector<double> scaled(const std::vector<double>& input) const;
   void fire(const std::vector<double>& x, std::vector<double>* normalised) const;
   void solveLines(const std::vector<std::vector<double>>& x, const std::vector<double>& y, double ridge);

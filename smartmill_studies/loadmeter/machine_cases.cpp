@@ -46,47 +46,67 @@ std::vector<double> torqueOverARevolution(const ToolGeometry& tool, const Engage
   return torque;
 }
 
-MachineCase drawCase(unsigned seed, const Faults& faults) {
-  std::mt19937 random(seed);
-  std::normal_distribution<double> normal;
-  std::uniform_real_distribution<double> uniform;
-  const auto between = [&](double low, double high) { return low + (high - low) * uniform(random); };
-  MachineCase c;
+namespace {
+
+/// One stream of random numbers for a whole case.
+struct Draws {
+  explicit Draws(unsigned seed) : random(seed) {}
+  double normal() { return normal_distribution(random); }
+  double uniform() { return uniform_distribution(random); }
+  double between(double low, double high) { return low + (high - low) * uniform(); }
+
+  std::mt19937 random;
+  std::normal_distribution<double> normal_distribution;
+  std::uniform_real_distribution<double> uniform_distribution;
+};
+
+ToolGeometry drawTool(Draws& draw) {
   ToolGeometry tool;
-  tool.teeth = 2 + static_cast<int>(uniform(random) * 3.0);
-  tool.diameter = between(0.010, 0.025);
-  tool.helix = units::radFromDeg(between(0.0, 45.0));
-  c.truth.ktc = between(500e6, 2200e6);
-  c.truth.kte = between(8e3, 40e3);
+  tool.teeth = 2 + static_cast<int>(draw.uniform() * 3.0);
+  tool.diameter = draw.between(0.010, 0.025);
+  tool.helix = units::radFromDeg(draw.between(0.0, 45.0));
+  return tool;
+}
+
+Spindle drawSpindle(Draws& draw, const Faults& faults) {
   Spindle s;
-  s.viscous = between(2e-4, 6e-4);
-  s.coulomb = between(0.0, 0.15);
+  s.viscous = draw.between(2e-4, 6e-4);
+  s.coulomb = draw.between(0.0, 0.15);
   s.load_meter_gain = 3.88e-4;
   s.load_meter_bandwidth = 7.0;
   s.load_meter_resolution = faults.resolution > 0.0 ? faults.resolution : 1e-9;
+  return s;
+}
+
+FrictionLaw drawFriction(Draws& draw, const Spindle& nominal, const Faults& faults) {
   FrictionLaw law;
-  law.viscous = s.viscous * (1.0 + 0.1 * normal(random));
-  law.coulomb = s.coulomb * (1.0 + 0.1 * normal(random));
+  law.viscous = nominal.viscous * (1.0 + 0.1 * draw.normal());
+  law.coulomb = nominal.coulomb * (1.0 + 0.1 * draw.normal());
   if (faults.stribeck) {
-    law.breakaway = between(0.1, 0.6);
-    law.stribeck_speed = units::radPerSecFromRpm(between(1000.0, 3000.0));
+    law.breakaway = draw.between(0.1, 0.6);
+    law.stribeck_speed = units::radPerSecFromRpm(draw.between(1000.0, 3000.0));
   }
   if (faults.warmup) {
-    law.cold_ratio = between(0.1, 0.4);
-    law.warmup_time = between(200.0, 1200.0);
+    law.cold_ratio = draw.between(0.1, 0.4);
+    law.warmup_time = draw.between(200.0, 1200.0);
   }
-  const double gain = s.load_meter_gain * (1.0 + faults.gain_error * normal(random));
-  const double depth_share = 1.0 + faults.depth_error * normal(random);
-  c.depth = depth_share - 1.0;
-  const double offset = between(0.0, faults.largest_runout), angle = between(0.0, TWO_PI);
-  c.model.file = "case " + std::to_string(seed);
-  c.model.tool = tool;
-  c.model.spindle = s;
+  return law;
+}
 
-  double clock = 0.0, cut_time = 0.0;
-  const auto run = [&](TestKind kind, double speed, const Engagement& e) {
+/// The machine as it is, which cuts one test after the other.
+struct TrueMachine {
+  const Faults& faults;
+  ToolGeometry tool;
+  CuttingCoefficients truth;
+  FrictionLaw law;
+  double gain = 0.0;                   // [V/W] of the load meter
+  double depth_share = 1.0;            // [1] actual over commanded axial depth
+  double offset = 0.0, angle = 0.0;    // [m], [rad] runout
+  double clock = 0.0, cut_time = 0.0;  // [s]
+
+  TestRecord run(Draws& draw, const std::string& name, TestKind kind, double speed, const Engagement& e) {
     TestRecord t;
-    t.test.name = "test" + std::to_string(c.tests.size());
+    t.test.name = name;
     t.test.kind = kind;
     t.test.sample_rate = RATE;
     t.test.spindle_speed = speed;
@@ -98,32 +118,61 @@ MachineCase drawCase(unsigned seed, const Faults& faults) {
       t.test.cut_time_before = cut_time;
       Engagement actual = e;
       actual.axial_depth *= depth_share;
-      torque = torqueOverARevolution(tool, actual, c.truth, offset, angle, ANGLES);
+      torque = torqueOverARevolution(tool, actual, truth, offset, angle, ANGLES);
       cut_time += 5.0;
     }
+    t.record.file = name;
+    record(draw, speed, torque, &t.record);
+    clock += 45.0;
+    return t;
+  }
+
+ private:
+  /// The load meter: a first-order filter of the power, with noise, rounded.
+  void record(Draws& draw, double speed, const std::vector<double>& torque, Record* r) const {
     const double tau = timeConstant(faults.bandwidth), friction = law.torque(speed, clock);
-    double meter = gain * friction * speed, at = TWO_PI * uniform(random);
-    Record& r = t.record;
-    r.file = t.test.name;
-    r.add("load_meter");
+    double meter = gain * friction * speed, at = TWO_PI * draw.uniform();
+    r->add("load_meter");
     const double dt = 1.0 / RATE / SUBSTEPS, keep = std::exp(-dt / tau);
     for (int i = 0; i < static_cast<int>(LENGTH * RATE); ++i) {
       const double time = i / RATE;
-      r.time.push_back(time);
-      const double shown = meter + faults.noise * normal(random);
-      r.columns[0].push_back(
+      r->time.push_back(time);
+      const double shown = meter + faults.noise * draw.normal();
+      r->columns[0].push_back(
           faults.resolution > 0.0 ? faults.resolution * std::round(shown / faults.resolution) : shown);
       for (int k = 0; k < SUBSTEPS; ++k) {
         const double now = time + (k + 0.5) * dt;
         at = std::fmod(at + speed * dt, TWO_PI);
-        const double cutting = kind == TestKind::cut && now >= ENGAGE
-                                   ? torque[static_cast<std::size_t>(at / TWO_PI * ANGLES) % ANGLES]
-                                   : 0.0;
+        // Air gives no torque at any angle.
+        const double cutting =
+            now >= ENGAGE ? torque[static_cast<std::size_t>(at / TWO_PI * ANGLES) % ANGLES] : 0.0;
         meter = keep * meter + (1.0 - keep) * gain * (friction + cutting) * speed;
       }
     }
-    c.tests.push_back(t);
-    clock += 45.0;
+  }
+};
+
+}  // namespace
+
+MachineCase drawCase(unsigned seed, const Faults& faults) {
+  Draws draw(seed);
+  MachineCase c;
+  const ToolGeometry tool = drawTool(draw);
+  c.truth.ktc = draw.between(500e6, 2200e6);
+  c.truth.kte = draw.between(8e3, 40e3);
+  const Spindle spindle = drawSpindle(draw, faults);
+  TrueMachine machine{faults, tool, c.truth, drawFriction(draw, spindle, faults)};
+  machine.gain = spindle.load_meter_gain * (1.0 + faults.gain_error * draw.normal());
+  machine.depth_share = 1.0 + faults.depth_error * draw.normal();
+  machine.offset = draw.between(0.0, faults.largest_runout);
+  machine.angle = draw.between(0.0, TWO_PI);
+  c.depth = machine.depth_share - 1.0;
+  c.model.file = "case " + std::to_string(seed);
+  c.model.tool = tool;
+  c.model.spindle = spindle;
+
+  const auto run = [&](TestKind kind, double speed, const Engagement& e) {
+    c.tests.push_back(machine.run(draw, "test" + std::to_string(c.tests.size()), kind, speed, e));
   };
   for (const double rpm :
        {1000.0, 1500.0, 2000.0, 3000.0, 4500.0, 6000.0, 8000.0, 10000.0, 12500.0, 15000.0}) {
@@ -132,7 +181,7 @@ MachineCase drawCase(unsigned seed, const Faults& faults) {
   // Depth for a torque that such a spindle carries.
   const double torque_per_metre = tool.radius() * tool.teeth * (c.truth.ktc * 8e-5 / PI + c.truth.kte / 2.0);
   const double depth = std::min(2.5 / torque_per_metre, 0.004);
-  const double slow = units::radPerSecFromRpm(between(2500.0, 4000.0));
+  const double slow = units::radPerSecFromRpm(draw.between(2500.0, 4000.0));
   for (const double speed : {slow, 1.8 * slow}) {
     for (const double feed : {4e-5, 7e-5, 1.0e-4, 1.3e-4}) run(TestKind::cut, speed, {0.0, PI, depth, feed});
   }

@@ -175,61 +175,44 @@ struct InputArray {
   Inputs of;
 };
 
+/// A third of the prediction tests chooses among the arrays, as the paper does.
+struct Choice {
+  const InputArray* array = nullptr;
+  std::unique_ptr<Anfis> anfis;
+
+  double operator()(const TurningCut& c) const { return (*anfis)(array->of(c)); }
+};
+
 /// Learnt from the calibration tests, one of each array; the array with the least error in `validation`, as
 /// the paper chooses. One material only in the calibration: feed and depth tell the force there and mislead
 /// elsewhere, which cross-validation of it could not see.
-std::unique_ptr<Anfis> chooseAnfis(const std::vector<TurningCut>& cuts, const std::vector<double>& output,
-                                   const std::vector<TurningCut>& validation,
-                                   const std::vector<double>& truth, const std::vector<InputArray>& arrays,
-                                   std::size_t* chosen) {
+Choice chooseAnfis(const std::vector<TurningCut>& cuts, const std::vector<double>& output,
+                   const std::vector<TurningCut>& validation, const std::vector<double>& truth,
+                   const std::vector<InputArray>& arrays) {
   Anfis::Parameters parameters;
   parameters.epochs = 20;
   double least = std::numeric_limits<double>::infinity();
-  std::unique_ptr<Anfis> best;
-  for (std::size_t k = 0; k < arrays.size(); ++k) {
+  Choice best;
+  for (const InputArray& array : arrays) {
     std::vector<std::vector<double>> x;
-    for (const TurningCut& c : cuts) x.push_back(arrays[k].of(c));
+    for (const TurningCut& c : cuts) x.push_back(array.of(c));
     auto anfis = std::make_unique<Anfis>(x, output, parameters);
     double squares = 0.0;
     for (std::size_t i = 0; i < validation.size(); ++i) {
-      const double error = (*anfis)(arrays[k].of(validation[i])) - truth[i];
+      const double error = (*anfis)(array.of(validation[i])) - truth[i];
       squares += error * error;
     }
     if (squares < least) {
       least = squares;
-      *chosen = k;
-      best = std::move(anfis);
+      best = {&array, std::move(anfis)};
     }
   }
   return best;
 }
 
-}  // namespace
-
-TurningResult studyTurning(unsigned seed, const TurningVariances& variances, std::size_t replications) {
-  TurningCentre centre(seed, variances);
-  const std::vector<TurningCut> calibration = centre.calibrationTests(120);
-  const std::vector<TurningCut> prediction = centre.predictionTests(300);
-  TurningResult result;
-
-  std::vector<double> ix, fx, iz, fz, torque;
-  std::vector<TurningCut> z_cuts;
-  std::vector<SpindleCut> spindle;
-  for (const TurningCut& c : calibration) {
-    if (c.moves_x) ix.push_back(c.current[0]), fx.push_back(c.force[0]);
-    if (c.moves_z) iz.push_back(c.current[2]), fz.push_back(c.force[2]), z_cuts.push_back(c);
-    torque.push_back(c.force[1] * lever(c));
-    spindle.push_back({c.speed_rpm, rise(c), torque.back()});
-  }
-  result.x = fitLine(ix, fx);
-  result.z = fitLine(iz, fz);
-  const TorquePowerLaw law(spindle, TurningCentre::BASE_SPEED);
-  result.fit_x = result.x.r_squared;
-  result.fit_y = law.rSquared();
-  result.fit_z = result.z.r_squared;
-
-  // Torque rather than force is learnt: the work's radius is known, the motor does not feel it.
-  const std::vector<InputArray> y_arrays{
+// Torque rather than force is learnt: the work's radius is known, the motor does not feel it.
+const std::vector<InputArray>& torqueArrays() {
+  static const std::vector<InputArray> ARRAYS{
       {"{dI, N}",
        [](const TurningCut& c) {
          return std::vector<double>{rise(c), c.speed_rpm};
@@ -245,7 +228,11 @@ TurningResult studyTurning(unsigned seed, const TurningVariances& variances, std
       {"{dI, N, f ap}", [](const TurningCut& c) {
          return std::vector<double>{rise(c), c.speed_rpm, c.feed * c.depth};
        }}};
-  const std::vector<InputArray> z_arrays{
+  return ARRAYS;
+}
+
+const std::vector<InputArray>& feedForceArrays() {
+  static const std::vector<InputArray> ARRAYS{
       {"{I}", [](const TurningCut& c) { return std::vector<double>{c.current[2]}; }},
       {"{I, f}",
        [](const TurningCut& c) {
@@ -258,51 +245,99 @@ TurningResult studyTurning(unsigned seed, const TurningVariances& variances, std
       {"{I, f, ap}", [](const TurningCut& c) {
          return std::vector<double>{c.current[2], c.feed, c.depth};
        }}};
-  std::size_t y_choice = 0, z_choice = 0;
-  std::vector<TurningCut> validation, z_validation;
-  std::vector<double> torque_truth, z_truth;
-  for (std::size_t i = 0; i < prediction.size() / 3; ++i) {
-    const TurningCut& c = prediction[i];
-    validation.push_back(c);
-    torque_truth.push_back(c.force[1] * lever(c));
+  return ARRAYS;
+}
+
+double torqueOf(const TurningCut& c) {
+  return c.force[1] * lever(c);
+}
+
+/// What the calibration tests teach: lines for the slides, a law of torque over power for the spindle, and
+/// the networks.
+struct Calibration {
+  Line x, z;
+  TorquePowerLaw law;
+  Choice torque, feed_force;
+
+  /// Main force, by the law of the spindle.
+  double mainForce(const TurningCut& c) const {
+    return law.torque(c.speed_rpm, std::max(rise(c), 1e-3)) / lever(c);
+  }
+};
+
+Calibration calibrate(const std::vector<TurningCut>& tests, const std::vector<TurningCut>& validation) {
+  std::vector<double> ix, fx, iz, fz, torque, torque_truth, z_truth;
+  std::vector<TurningCut> z_cuts, z_validation;
+  std::vector<SpindleCut> spindle;
+  for (const TurningCut& c : tests) {
+    if (c.moves_x) ix.push_back(c.current[0]), fx.push_back(c.force[0]);
+    if (c.moves_z) iz.push_back(c.current[2]), fz.push_back(c.force[2]), z_cuts.push_back(c);
+    torque.push_back(torqueOf(c));
+    spindle.push_back({c.speed_rpm, rise(c), torque.back()});
+  }
+  for (const TurningCut& c : validation) {
+    torque_truth.push_back(torqueOf(c));
     if (c.moves_z) z_validation.push_back(c), z_truth.push_back(c.force[2]);
   }
-  const auto y_anfis = chooseAnfis(calibration, torque, validation, torque_truth, y_arrays, &y_choice);
-  const auto z_anfis = chooseAnfis(z_cuts, fz, z_validation, z_truth, z_arrays, &z_choice);
-  result.fy_inputs = y_arrays[y_choice].name;
-  result.fz_inputs = z_arrays[z_choice].name;
+  return {fitLine(ix, fx), fitLine(iz, fz), TorquePowerLaw(spindle, TurningCentre::BASE_SPEED),
+          chooseAnfis(tests, torque, validation, torque_truth, torqueArrays()),
+          chooseAnfis(z_cuts, fz, z_validation, z_truth, feedForceArrays())};
+}
 
+void compare(const Calibration& calibration, const std::vector<TurningCut>& tests, TurningResult* result) {
   std::array<std::vector<double>, 3> truth, regression, anfis;
-  for (std::size_t i = prediction.size() / 3; i < prediction.size(); ++i) {
-    const TurningCut& c = prediction[i];
+  for (const TurningCut& c : tests) {
     if (c.moves_x) {
       truth[0].push_back(c.force[0]);
-      regression[0].push_back(result.x.at(c.current[0]));
+      regression[0].push_back(calibration.x.at(c.current[0]));
       anfis[0].push_back(regression[0].back());
     }
     truth[1].push_back(c.force[1]);
-    regression[1].push_back(law.torque(c.speed_rpm, std::max(rise(c), 1e-3)) / lever(c));
-    anfis[1].push_back((*y_anfis)(y_arrays[y_choice].of(c)) / lever(c));
+    regression[1].push_back(calibration.mainForce(c));
+    anfis[1].push_back(calibration.torque(c) / lever(c));
     if (c.moves_z) {
       truth[2].push_back(c.force[2]);
-      regression[2].push_back(result.z.at(c.current[2]));
-      anfis[2].push_back((*z_anfis)(z_arrays[z_choice].of(c)));
+      regression[2].push_back(calibration.z.at(c.current[2]));
+      anfis[2].push_back(calibration.feed_force(c));
     }
   }
   for (std::size_t a = 0; a < 3; ++a) {
-    tally(truth[a], regression[a], a, &result.regression);
-    tally(truth[a], anfis[a], a, &result.anfis);
+    tally(truth[a], regression[a], a, &result->regression);
+    tally(truth[a], anfis[a], a, &result->anfis);
   }
+}
 
+void compareVariances(const Calibration& calibration, const std::vector<TurningCut>& replications,
+                      TurningResult* result) {
   std::array<std::vector<double>, 2> dynamometer, current;
-  for (const TurningCut& c : centre.replications(replications)) {
+  for (const TurningCut& c : replications) {
     dynamometer[0].push_back(c.force[1]);
-    current[0].push_back(law.torque(c.speed_rpm, std::max(rise(c), 1e-3)) / lever(c));
+    current[0].push_back(calibration.mainForce(c));
     dynamometer[1].push_back(c.force[2]);
-    current[1].push_back(result.z.at(c.current[2]));
+    current[1].push_back(calibration.z.at(c.current[2]));
   }
-  result.fy = splitVariance(dynamometer[0], current[0]);
-  result.fz = splitVariance(dynamometer[1], current[1]);
+  result->fy = splitVariance(dynamometer[0], current[0]);
+  result->fz = splitVariance(dynamometer[1], current[1]);
+}
+
+}  // namespace
+
+TurningResult studyTurning(unsigned seed, const TurningVariances& variances, std::size_t replications) {
+  TurningCentre centre(seed, variances);
+  const std::vector<TurningCut> calibration_tests = centre.calibrationTests(120);
+  const std::vector<TurningCut> prediction = centre.predictionTests(300);
+  const auto third = prediction.begin() + static_cast<std::ptrdiff_t>(prediction.size() / 3);
+  const Calibration calibration = calibrate(calibration_tests, {prediction.begin(), third});
+  TurningResult result;
+  result.x = calibration.x;
+  result.z = calibration.z;
+  result.fit_x = result.x.r_squared;
+  result.fit_y = calibration.law.rSquared();
+  result.fit_z = result.z.r_squared;
+  result.fy_inputs = calibration.torque.array->name;
+  result.fz_inputs = calibration.feed_force.array->name;
+  compare(calibration, {third, prediction.end()}, &result);
+  compareVariances(calibration, centre.replications(replications), &result);
   return result;
 }
 

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <deque>
 #include <exception>
 #include <random>
 #include <set>
@@ -95,77 +96,104 @@ void lookup(const std::string& file, int records) {
   report("baseline: every record of the pair read into memory", memory);
 }
 
-// @return whether every acknowledged record is in the file.
-bool crash(const std::string& file, int writers, double seconds, double every) {
-  int ends[2];
-  if (pipe(ends) != 0) throw Error("no pipe");
-  int next = 0;
-  const auto launch = [&] {
-    const int writer = next++;
+/// Processes that write records without end and say the stamp of each into a pipe once it is acknowledged.
+class Writers {
+ public:
+  explicit Writers(const std::string& file) : file_(file) {
+    if (pipe(ends_) != 0) throw Error("no pipe");
+  }
+
+  void launch() {
+    const int writer = launched_++;
     const pid_t pid = fork();
     if (pid < 0) throw Error("no process");
-    if (pid != 0) return pid;
-    close(ends[0]);
+    if (pid == 0) writeForever(writer);
+    running_.push_back(pid);
+  }
+
+  /// Kills the oldest.
+  void kill() {
+    ::kill(running_.front(), SIGKILL);
+    int status = 0;
+    waitpid(running_.front(), &status, 0);
+    by_itself_ = by_itself_ || !WIFSIGNALED(status);
+    running_.pop_front();
+  }
+
+  /// The pipe is read all the time, or full it would hold the writers up.
+  void readFor(double time) {
+    const Clock::time_point start = Clock::now();
+    for (double left = time; left > 0.0; left = time - since(start)) {
+      fd_set set;
+      FD_ZERO(&set);
+      FD_SET(ends_[0], &set);
+      timeval wait{static_cast<time_t>(left),
+                   static_cast<suseconds_t>(1e6 * (left - static_cast<int>(left)))};
+      if (select(ends_[0] + 1, &set, nullptr, nullptr, &wait) <= 0) break;
+      int stamp = 0;
+      if (read(ends_[0], &stamp, sizeof stamp) == sizeof stamp) acknowledged_.insert(stamp);
+    }
+  }
+
+  /// Kills all and reads what they still had said.
+  void end() {
+    while (!running_.empty()) kill();
+    close(ends_[1]);
+    for (int stamp = 0; read(ends_[0], &stamp, sizeof stamp) == sizeof stamp;) acknowledged_.insert(stamp);
+    close(ends_[0]);
+  }
+
+  const std::set<int>& acknowledged() const { return acknowledged_; }
+  bool stoppedByThemselves() const { return by_itself_; }
+
+ private:
+  [[noreturn]] void writeForever(int writer) {
+    close(ends_[0]);
     try {
-      CoefficientDatabase database(file);
+      CoefficientDatabase database(file_);
       for (int i = 0;; ++i) {
         const int stamp = writer * 1000000 + i;
         database.add(recordOf("t", stamp, 1e9, 2.0));
-        if (write(ends[1], &stamp, sizeof stamp) != sizeof stamp) break;
+        if (write(ends_[1], &stamp, sizeof stamp) != sizeof stamp) break;
       }
     } catch (const std::exception& error) {
       std::fprintf(stderr, "writer %d: %s\n", writer, error.what());
     }
     _exit(1);
-  };
-  std::vector<pid_t> running;
-  for (int i = 0; i < writers; ++i) running.push_back(launch());
+  }
+
+  std::string file_;
+  int ends_[2] = {-1, -1};
+  int launched_ = 0;
+  std::deque<pid_t> running_;
+  std::set<int> acknowledged_;
+  bool by_itself_ = false;
+};
+
+// @return whether every acknowledged record is in the file.
+bool crash(const std::string& file, int count, double seconds, double every) {
+  Writers writers(file);
+  for (int i = 0; i < count; ++i) writers.launch();
   const Clock::time_point begin = Clock::now();
-  std::set<int> acknowledged;
   int kills = 0;
-  bool by_itself = false;
-  const auto end = [&](pid_t pid) {
-    kill(pid, SIGKILL);
-    int status = 0;
-    waitpid(pid, &status, 0);
-    by_itself = by_itself || !WIFSIGNALED(status);
-  };
-  // The pipe is read all the time, or full it would hold the writers up.
-  const auto readFor = [&](double time) {
-    const Clock::time_point start = Clock::now();
-    for (double left = time; left > 0.0; left = time - since(start)) {
-      fd_set set;
-      FD_ZERO(&set);
-      FD_SET(ends[0], &set);
-      timeval wait{static_cast<time_t>(left),
-                   static_cast<suseconds_t>(1e6 * (left - static_cast<int>(left)))};
-      if (select(ends[0] + 1, &set, nullptr, nullptr, &wait) <= 0) break;
-      int stamp = 0;
-      if (read(ends[0], &stamp, sizeof stamp) == sizeof stamp) acknowledged.insert(stamp);
-    }
-  };
-  while (since(begin) < seconds) {
-    readFor(every);
-    pid_t& victim = running[static_cast<std::size_t>(kills++) % running.size()];
-    end(victim);
-    victim = launch();
+  for (; since(begin) < seconds; ++kills) {
+    writers.readFor(every);
+    writers.kill();
+    writers.launch();
     if (isatty(STDERR_FILENO)) std::fprintf(stderr, "\r%.0f of %.0f s", since(begin), seconds);
   }
   if (isatty(STDERR_FILENO)) std::fprintf(stderr, "\n");
-  for (const pid_t pid : running) end(pid);
-  close(ends[1]);
-  for (int stamp = 0; read(ends[0], &stamp, sizeof stamp) == sizeof stamp;) acknowledged.insert(stamp);
-  close(ends[0]);
+  writers.end();
   const CoefficientDatabase database(file);
   std::set<int> there;
   for (const CoefficientRecord& r : database.records("", "")) there.insert(static_cast<int>(r.set.stamp));
   std::size_t lost = 0;
-  for (const int one : acknowledged) lost += there.count(one) == 0;
+  for (const int one : writers.acknowledged()) lost += there.count(one) == 0;
   std::printf(
       "%d writers for %.0f s, %d killed in between: %zu records acknowledged, %zu in the file, %zu lost%s\n",
-      writers, since(begin), kills, acknowledged.size(), there.size(), lost,
-      by_itself ? "; a writer stopped by itself" : "");
-  return lost == 0 && !by_itself;
+      count, since(begin), kills, writers.acknowledged().size(), there.size(), lost,
+      writers.stoppedByThemselves() ? "; a writer stopped by itself" : "");
+  return lost == 0 && !writers.stoppedByThemselves();
 }
 
 }  // namespace

@@ -1,13 +1,13 @@
 #include "smartmill_core/model/machine_model.h"
 
 #include <cmath>
-#include <fstream>
 #include <limits>
 #include <numeric>
 #include <sstream>
 
 #include "smartmill_core/cutting/coefficient_set.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/io/text_file.h"
 #include "smartmill_core/model/effect_catalogue.h"
 #include "smartmill_core/model/strict_yaml.h"
 #include "smartmill_core/units.h"
@@ -331,6 +331,86 @@ void writeEffect(std::ostream& out, const EffectEntry& effect) {
   }
 }
 
+void writeTool(std::ostream& out, const MachineModel& model) {
+  const ToolGeometry& tool = *model.tool;
+  out << "tool:\n  teeth: " << tool.teeth << "\n";
+  writeKey(out, "  ", "diameter_mm", tool.diameter / units::MM);
+  writeKey(out, "  ", "helix_deg", units::degFromRad(tool.helix));
+  if (!tool.pitch.empty()) out << "  pitch_deg: " << list(tool.pitch, units::radFromDeg(1.0)) << "\n";
+  writeOptional(out, "stickout_mm", model.stickout, units::MM);
+}
+
+void writeToolTip(std::ostream& out, const MachineModel& model) {
+  if (model.tool_tip.x.modes.empty() && model.tool_tip.y.modes.empty()) return;
+  out << "tool_tip:\n";
+  writeModes(out, "  ", "x", model.tool_tip.x.modes, ModeKind::stiffness);
+  writeModes(out, "  ", "y", model.tool_tip.y.modes, ModeKind::stiffness);
+}
+
+void writeForceSensor(std::ostream& out, const ForceSensor& sensor) {
+  out << "force_sensor:\n";
+  for (std::size_t a = 0; a < 3; ++a) writeModes(out, "  ", AXES[a], sensor.axis[a].modes, ModeKind::gain);
+  if (sensor.noise_rms) out << "  noise_rms_n: " << point(*sensor.noise_rms, 1.0) << "\n";
+  if (sensor.measures_workpiece) out << "  measures: force_on_workpiece\n";
+  if (sensor.mean_samples) out << "  samples: mean\n";
+}
+
+void writeSpindle(std::ostream& out, const Spindle& s) {
+  out << "spindle:\n";
+  writeKey(out, "  ", "viscous_nm_s_per_rad", s.viscous);
+  writeKey(out, "  ", "coulomb_nm", s.coulomb);
+  writeKey(out, "  ", "load_meter_v_per_w", s.load_meter_gain);
+  writeKey(out, "  ", "load_meter_bandwidth_hz", s.load_meter_bandwidth);
+  writeKey(out, "  ", "load_meter_resolution_v", s.load_meter_resolution);
+  if (s.friction_zero_below > 0.0) {
+    writeKey(out, "  ", "friction_zero_below_rpm", units::rpmFromRadPerSec(s.friction_zero_below));
+  }
+  writeOptional(out, "load_meter_full_scale_v", s.load_meter_full_scale, 1.0);
+  writeOptional(out, "max_speed_rpm", s.max_speed, units::radPerSecFromRpm(1.0));
+  writeOptional(out, "rated_torque_nm", s.rated_torque, 1.0);
+  writeOptional(out, "rated_power_w", s.rated_power, 1.0);
+  writeOptional(out, "acceleration_rpm_per_s", s.acceleration, units::radPerSecFromRpm(1.0));
+}
+
+void writeAxes(std::ostream& out, const MachineAxes& axes) {
+  out << "axes:\n";
+  for (std::size_t a = 0; a < 3; ++a) {
+    out << "  " << AXES[a] << "_travel_mm: " << list({axes.travel[a][0], axes.travel[a][1]}, units::MM)
+        << "\n";
+  }
+  writeKey(out, "  ", "rapid_mm_per_min", axes.rapid * 60.0 / units::MM);
+  writeKey(out, "  ", "acceleration_mm_per_s2", axes.acceleration / units::MM);
+  out << "  home_mm: " << point(axes.home, units::MM) << "\n";
+}
+
+void writeHammer(std::ostream& out, const HammerStation& h) {
+  out << "hammer:\n";
+  writeKey(out, "  ", "offset_mm", h.offset / units::MM);
+  writeKey(out, "  ", "peak_force_n", h.peak_force);
+  writeKey(out, "  ", "contact_time_us", h.contact_time / 1e-6);
+  writeKey(out, "  ", "force_noise_rms_n", h.force_noise_rms);
+  writeKey(out, "  ", "gap_at_zero_volt_um", h.gap_at_zero_volt / units::UM);
+  writeKey(out, "  ", "gain_v", h.gain_volt);
+  writeKey(out, "  ", "range_v", h.range_volt);
+  writeKey(out, "  ", "voltage_noise_rms_v", h.voltage_noise_rms);
+  writeKey(out, "  ", "flute_depth_mm", h.flute_depth / units::MM);
+  out << "  position_mm:" << (h.position.empty() ? " {}" : "") << "\n";
+  for (const auto& [direction, p] : h.position)
+    out << "    " << direction << ": " << point(p, units::MM) << "\n";
+}
+
+void writeWorkpiece(std::ostream& out, const Workpiece& workpiece) {
+  out << "workpiece:\n  material: " << yamlWord(workpiece.material) << "\n";
+  out << "  low_mm: " << point(workpiece.low, units::MM) << "\n";
+  out << "  high_mm: " << point(workpiece.high, units::MM) << "\n";
+}
+
+void writeUncertainty(std::ostream& out, const Uncertainty& u) {
+  out << "uncertainty_percent: {cutting: " << yamlNumber(u.cutting)
+      << ", frequency: " << yamlNumber(u.frequency) << ", damping: " << yamlNumber(u.damping)
+      << ", stiffness: " << yamlNumber(u.stiffness) << ", spindle: " << yamlNumber(u.spindle) << "}\n";
+}
+
 }  // namespace
 
 const std::array<CuttingKey, 6>& cuttingKeys() {
@@ -408,89 +488,18 @@ MachineModel readMachineModel(const std::string& file) {
 void writeMachineModel(const MachineModel& model, const std::string& file) {
   std::ostringstream out;
   out << "format: " << FORMAT << "\n";
-  if (model.tool) {
-    out << "tool:\n  teeth: " << model.tool->teeth << "\n";
-    writeKey(out, "  ", "diameter_mm", model.tool->diameter / units::MM);
-    writeKey(out, "  ", "helix_deg", units::degFromRad(model.tool->helix));
-    if (!model.tool->pitch.empty()) {
-      out << "  pitch_deg: " << list(model.tool->pitch, units::radFromDeg(1.0)) << "\n";
-    }
-    writeOptional(out, "stickout_mm", model.stickout, units::MM);
-  }
-  if (model.cutting) {
-    out << cuttingSection(*model.cutting, model.cutting_std.value_or(NOT_IDENTIFIED));
-  }
-  if (!model.tool_tip.x.modes.empty() || !model.tool_tip.y.modes.empty()) {
-    out << "tool_tip:\n";
-    writeModes(out, "  ", "x", model.tool_tip.x.modes, ModeKind::stiffness);
-    writeModes(out, "  ", "y", model.tool_tip.y.modes, ModeKind::stiffness);
-  }
-  out << "force_sensor:\n";
-  for (std::size_t a = 0; a < 3; ++a)
-    writeModes(out, "  ", AXES[a], model.force_sensor.axis[a].modes, ModeKind::gain);
-  if (model.force_sensor.noise_rms)
-    out << "  noise_rms_n: " << point(*model.force_sensor.noise_rms, 1.0) << "\n";
-  if (model.force_sensor.measures_workpiece) out << "  measures: force_on_workpiece\n";
-  if (model.force_sensor.mean_samples) out << "  samples: mean\n";
-  if (model.spindle) {
-    const Spindle& s = *model.spindle;
-    out << "spindle:\n";
-    writeKey(out, "  ", "viscous_nm_s_per_rad", s.viscous);
-    writeKey(out, "  ", "coulomb_nm", s.coulomb);
-    writeKey(out, "  ", "load_meter_v_per_w", s.load_meter_gain);
-    writeKey(out, "  ", "load_meter_bandwidth_hz", s.load_meter_bandwidth);
-    writeKey(out, "  ", "load_meter_resolution_v", s.load_meter_resolution);
-    if (s.friction_zero_below > 0.0) {
-      writeKey(out, "  ", "friction_zero_below_rpm", units::rpmFromRadPerSec(s.friction_zero_below));
-    }
-    writeOptional(out, "load_meter_full_scale_v", s.load_meter_full_scale, 1.0);
-    writeOptional(out, "max_speed_rpm", s.max_speed, units::radPerSecFromRpm(1.0));
-    writeOptional(out, "rated_torque_nm", s.rated_torque, 1.0);
-    writeOptional(out, "rated_power_w", s.rated_power, 1.0);
-    writeOptional(out, "acceleration_rpm_per_s", s.acceleration, units::radPerSecFromRpm(1.0));
-  }
-  if (model.axes) {
-    out << "axes:\n";
-    for (std::size_t a = 0; a < 3; ++a) {
-      out << "  " << AXES[a]
-          << "_travel_mm: " << list({model.axes->travel[a][0], model.axes->travel[a][1]}, units::MM) << "\n";
-    }
-    writeKey(out, "  ", "rapid_mm_per_min", model.axes->rapid * 60.0 / units::MM);
-    writeKey(out, "  ", "acceleration_mm_per_s2", model.axes->acceleration / units::MM);
-    out << "  home_mm: " << point(model.axes->home, units::MM) << "\n";
-  }
-  if (model.hammer) {
-    const HammerStation& h = *model.hammer;
-    out << "hammer:\n";
-    writeKey(out, "  ", "offset_mm", h.offset / units::MM);
-    writeKey(out, "  ", "peak_force_n", h.peak_force);
-    writeKey(out, "  ", "contact_time_us", h.contact_time / 1e-6);
-    writeKey(out, "  ", "force_noise_rms_n", h.force_noise_rms);
-    writeKey(out, "  ", "gap_at_zero_volt_um", h.gap_at_zero_volt / units::UM);
-    writeKey(out, "  ", "gain_v", h.gain_volt);
-    writeKey(out, "  ", "range_v", h.range_volt);
-    writeKey(out, "  ", "voltage_noise_rms_v", h.voltage_noise_rms);
-    writeKey(out, "  ", "flute_depth_mm", h.flute_depth / units::MM);
-    out << "  position_mm:" << (h.position.empty() ? " {}" : "") << "\n";
-    for (const auto& [direction, p] : h.position)
-      out << "    " << direction << ": " << point(p, units::MM) << "\n";
-  }
-  if (model.workpiece) {
-    out << "workpiece:\n  material: " << yamlWord(model.workpiece->material) << "\n";
-    out << "  low_mm: " << point(model.workpiece->low, units::MM) << "\n";
-    out << "  high_mm: " << point(model.workpiece->high, units::MM) << "\n";
-  }
+  if (model.tool) writeTool(out, model);
+  if (model.cutting) out << cuttingSection(*model.cutting, model.cutting_std.value_or(NOT_IDENTIFIED));
+  writeToolTip(out, model);
+  writeForceSensor(out, model.force_sensor);
+  if (model.spindle) writeSpindle(out, *model.spindle);
+  if (model.axes) writeAxes(out, *model.axes);
+  if (model.hammer) writeHammer(out, *model.hammer);
+  if (model.workpiece) writeWorkpiece(out, *model.workpiece);
   out << "effects:" << (model.effects.empty() ? " []" : "") << "\n";
   for (const EffectEntry& effect : model.effects) writeEffect(out, effect);
-  const Uncertainty& u = model.uncertainty;
-  out << "uncertainty_percent: {cutting: " << yamlNumber(u.cutting)
-      << ", frequency: " << yamlNumber(u.frequency) << ", damping: " << yamlNumber(u.damping)
-      << ", stiffness: " << yamlNumber(u.stiffness) << ", spindle: " << yamlNumber(u.spindle) << "}\n";
-
-  std::ofstream stream(file);
-  stream << out.str();
-  stream.close();
-  if (!stream) throw Error(file + ": cannot be written");
+  writeUncertainty(out, model.uncertainty);
+  writeText(file, out.str());
 }
 
 }  // namespace smartmill
