@@ -235,6 +235,13 @@ TEST(Effects, saturationClipsTheForces) {
     clipped = clipped || std::abs(pure.column("fy")[i]) > 150.0;
   }
   EXPECT_TRUE(clipped);
+  // Of two the narrower; no other channel has a limit.
+  const ChannelValues limits =
+      EffectSet(with(mill(4, 30.0), {effectEntry("saturation", {{"limit_n", 150.0}}),
+                                     effectEntry("saturation", {{"limit_n", 120.0}})}))
+          .limits();
+  for (const std::size_t c : {FX, FY, FZ}) EXPECT_EQ(limits[c], 120.0);
+  for (const std::size_t c : {LOAD_METER, TOOL_X, ACCELERATION}) EXPECT_TRUE(std::isinf(limits[c]));
 }
 
 TEST(Effects, spindleOrderIsLockedToTheSpindle) {

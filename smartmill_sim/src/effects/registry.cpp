@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <limits>
 #include <map>
 #include <string>
 
@@ -96,6 +97,13 @@ void EffectSet::measure(Stage stage, const Instant& now, ChannelValues& channels
   for (const Member& m : effects_) {
     if (m.stage == stage) m.effect->measure(now, channels);
   }
+}
+
+ChannelValues EffectSet::limits() const {
+  ChannelValues most;
+  most.fill(std::numeric_limits<double>::infinity());
+  for (const Member& m : effects_) m.effect->limit(most);
+  return most;
 }
 
 std::vector<Tone*> EffectSet::tones() {

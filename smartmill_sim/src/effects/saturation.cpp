@@ -11,6 +11,9 @@ class Saturation : public Effect {
   void measure(const Instant&, ChannelValues& c) const override {
     for (const std::size_t f : {FX, FY, FZ}) c[f] = std::clamp(c[f], -limit_, limit_);
   }
+  void limit(ChannelValues& c) const override {
+    for (const std::size_t f : {FX, FY, FZ}) c[f] = std::min(c[f], limit_);
+  }
 
  private:
   double limit_;  // [N]

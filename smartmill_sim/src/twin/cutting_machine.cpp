@@ -151,6 +151,27 @@ CuttingMachine::Output CuttingMachine::step(const Input& input) {
 }
 
 void CuttingMachine::step(const Input& input, Output& out) {
+  takeOver(input);
+  out.force = cut(input.motion);
+  out.applied = {{out.force.fx + input.sensor_force[0], out.force.fy + input.sensor_force[1],
+                  out.force.fz + input.sensor_force[2]}};
+  if (effects_.has(Stage::sensor_force)) effects_.addForce(now_, out.applied);
+  moveTip(input, out);
+  showForce(out);
+  showLoad(input.motion.speed, out);
+  jump_ = 0.0;
+  engaged_ = false;
+  if (effects_.has(Stage::sensor_output)) effects_.measure(Stage::sensor_output, now_, out.early);
+  for (auto& [channel, line] : delays_) out.early[channel] = line.step(out.early[channel]);
+  ChannelValues shown = out.early;
+  if (effects_.has(Stage::signal)) effects_.measure(Stage::signal, now_, shown);
+  out.sensor = {{shown[FX], shown[FY], shown[FZ]}};
+  out.load_meter = shown[LOAD_METER];
+  out.displacement = {{shown[TOOL_X], shown[TOOL_Y]}};
+  passTime(input.motion);
+}
+
+void CuttingMachine::takeOver(const Input& input) {
   if (!effects_.empty() && (steps_to_update_ <= 0 || input.motion.speed != now_.speed)) {
     update(input);
     steps_to_update_ = UPDATE_STEPS;
@@ -160,24 +181,22 @@ void CuttingMachine::step(const Input& input, Output& out) {
   --steps_to_update_;
   now_.angle = input.motion.angle;
   now_.speed = input.motion.speed;
+}
 
-  if (rigid_) {
-    out.force = rigid_->at(input.motion.angle);
-  } else if (process_) {
-    ToolMotion motion = fed(input.motion);
-    // The tip's place needs this step's force and the force needs the place: the force is first taken to go
-    // on in a straight line, which errs by the square of the step.
-    for (std::size_t axis = 0; axis < 2 && vibrates_; ++axis) {
-      const std::array<double, 2>& f = tip_history_[axis];
-      motion.displacement[axis] = tip_[axis].peek(2.0 * f[0] - f[1]);
-    }
-    out.force = process_->step(motion);
-  } else {
-    out.force = {};
+CuttingForce CuttingMachine::cut(const ToolMotion& commanded) {
+  if (rigid_) return rigid_->at(commanded.angle);
+  if (!process_) return {};
+  ToolMotion motion = fed(commanded);
+  // The tip's place needs this step's force and the force needs the place: the force is first taken to go
+  // on in a straight line, which errs by the square of the step.
+  for (std::size_t axis = 0; axis < 2 && vibrates_; ++axis) {
+    const std::array<double, 2>& f = tip_history_[axis];
+    motion.displacement[axis] = tip_[axis].peek(2.0 * f[0] - f[1]);
   }
-  out.applied = {{out.force.fx + input.sensor_force[0], out.force.fy + input.sensor_force[1],
-                  out.force.fz + input.sensor_force[2]}};
-  if (effects_.has(Stage::sensor_force)) effects_.addForce(now_, out.applied);
+  return process_->step(motion);
+}
+
+void CuttingMachine::moveTip(const Input& input, Output& out) {
   const std::array<double, 2> tip{{out.force.fx + input.tip_force[0], out.force.fy + input.tip_force[1]}};
   ChannelValues& channels = out.early;
   for (std::size_t axis = 0; axis < 2 && vibrates_; ++axis) {
@@ -193,34 +212,32 @@ void CuttingMachine::step(const Input& input, Output& out) {
   if (process_)
     process_->settle(vibrates_ ? std::array<double, 2>{{channels[TOOL_X], channels[TOOL_Y]}}
                                : std::array<double, 2>{{0.0, 0.0}});
+}
+
+void CuttingMachine::showForce(Output& out) {
   const std::array<double, 3> cut{{out.force.fx, out.force.fy, out.force.fz}};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const double before = out.applied[axis] - jump_ * (cut[axis] - last_cut_[axis]);
-    channels[FX + axis] =
+    out.early[FX + axis] =
         sign_ * (jump_ != 0.0 ? sensor_[axis].jump(before, out.applied[axis]) : sensor_[axis].step(before));
   }
   last_cut_ = cut;
-  channels[LOAD_METER] = 0.0;
-  if (drive_) {
-    const double mean_torque = last_torque_ + 0.5 * (1.0 - jump_) * (out.force.torque - last_torque_);
-    channels[LOAD_METER] = drive_->step(mean_torque, input.motion.speed);
-    last_torque_ = out.force.torque;
-  }
-  jump_ = 0.0;
-  engaged_ = false;
-  if (effects_.has(Stage::sensor_output)) effects_.measure(Stage::sensor_output, now_, channels);
-  for (auto& [channel, line] : delays_) channels[channel] = line.step(channels[channel]);
-  ChannelValues shown = channels;
-  if (effects_.has(Stage::signal)) effects_.measure(Stage::signal, now_, shown);
-  out.sensor = {{shown[FX], shown[FY], shown[FZ]}};
-  out.load_meter = shown[LOAD_METER];
-  out.displacement = {{shown[TOOL_X], shown[TOOL_Y]}};
+}
 
+void CuttingMachine::showLoad(double speed, Output& out) {
+  out.early[LOAD_METER] = 0.0;
+  if (!drive_) return;
+  const double mean_torque = last_torque_ + 0.5 * (1.0 - jump_) * (out.force.torque - last_torque_);
+  out.early[LOAD_METER] = drive_->step(mean_torque, speed);
+  last_torque_ = out.force.torque;
+}
+
+void CuttingMachine::passTime(const ToolMotion& motion) {
   now_.record_time += time_step_;
   if (clock_.record || cutting()) clock_.edge_time += time_step_;
   if (!clock_.record) clock_.start_time += time_step_;
   if (state_.depth_slope != 0.0 && cutting()) {
-    const std::array<double, 2>& v = input.motion.velocity;
+    const std::array<double, 2>& v = motion.velocity;
     feed_path_ += time_step_ * state_.feed_ratio * std::hypot(v[0], v[1]);
   }
 }

@@ -6,6 +6,7 @@
 #include <functional>
 #include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Dense>
@@ -97,13 +98,9 @@ CuttingMachine::Clock clockOf(const MachineModel& model, const CampaignTest& tes
 // Phases of tones that no model knows, from what the record shows beyond the twin without them: joint least
 // squares of sine and cosine on every channel that a tone is in, about the means. Clipped samples do not
 // count.
-void findPhases(const MachineModel& model, const Record& recorded,
-                const std::array<std::vector<double>*, CHANNELS>& early, double rate,
+void findPhases(const Record& recorded, const std::array<std::vector<double>*, CHANNELS>& early, double rate,
                 const CuttingMachine& machine, const std::vector<Tone*>& tones) {
-  double limit = 1e300;
-  for (const EffectEntry& effect : model.effects) {
-    if (effect.name == "saturation") limit = std::min(limit, effect.numbers.at("limit_n"));
-  }
+  const ChannelValues limits = machine.limits();
   const auto n = static_cast<Eigen::Index>(2 * tones.size());
   std::vector<double> amplitude;
   for (Tone* tone : tones) {
@@ -123,7 +120,7 @@ void findPhases(const MachineModel& model, const Record& recorded,
     Eigen::MatrixXd square = Eigen::MatrixXd::Zero(n + 1, n + 1);  // last: the mean
     Eigen::VectorXd product = Eigen::VectorXd::Zero(n + 1), row = Eigen::VectorXd::Ones(n + 1);
     for (std::size_t i = 0; i < shown.size(); ++i) {
-      if (std::abs(shown[i]) > 0.98 * limit) continue;
+      if (std::abs(shown[i]) > 0.98 * limits[c]) continue;
       const double t = static_cast<double>(i) / rate;
       ChannelValues values{};
       values[c] = (*early[c])[i];
@@ -220,7 +217,7 @@ void run(const MachineModel& model, const CampaignTest& test, const SimulationOp
   const std::vector<Tone*> tones = machine.tones();
   if (!tones.empty()) {
     if (recorded && !options.random_phases) {
-      findPhases(model, *recorded, out, test.sample_rate, machine, tones);
+      findPhases(*recorded, out, test.sample_rate, machine, tones);
     } else {
       for (Tone* tone : tones)
         tone->phase = std::uniform_real_distribution<double>(0.0, units::TWO_PI)(random);
@@ -241,89 +238,122 @@ void run(const MachineModel& model, const CampaignTest& test, const SimulationOp
   }
 }
 
-Record simulate(const MachineModel& model, const CampaignTest& test, const Record* recorded, Record record,
-                double phase, const SimulationOptions& options) {
-  if (options.substeps < 1) throw Error("simulation: substeps below 1");
-  const double step_time = 1.0 / (test.sample_rate * options.substeps);
-  CuttingMachine machine(model, step_time, Feed::steady);
-  if (test.kind == TestKind::tap) {
-    const std::vector<double> hammer = contactForce(record.column("hammer"));
-    const std::size_t axis = test.direction == "x" ? 0 : test.direction == "y" ? 1 : 2;
-    if (axis < 2) machine.setProbe(axis);
-    const TapTarget target = targetOf(recorded ? *recorded : record, axis);
-    run(
-        model, test, options, machine,
-        [&](std::size_t i, double share) {
-          CuttingMachine::Input input;
-          const double force = interpolated(hammer, i, share);
-          if (target.tip) input.tip_force[axis] = force;
-          if (target.sensor) input.sensor_force[axis] = force;
-          return input;
-        },
-        recorded, record);
-    return record;
-  }
-  if (record.has("spindle_angle")) {
-    std::vector<double>& angle = record.add("spindle_angle");
-    for (std::size_t i = 0; i < record.size(); ++i) {
-      angle[i] = std::fmod(phase + test.spindle_speed * (record.time[i] - record.time[0]), units::TWO_PI);
-      if (angle[i] < 0.0) angle[i] += units::TWO_PI;
-    }
-  }
-  const bool cut = test.kind == TestKind::cut;
-  double feed = 0.0;  // [m/s]
-  if (cut) {
-    model.needCutting("simulate a cut");
-    feed = test.engagement->feed_per_tooth * model.needTool("simulate a cut").teeth * test.spindle_speed /
-           units::TWO_PI;
-  }
-  const double start = test.engage_time.value_or(record.time.front() - 1.0);
-  const double dt = 1.0 / test.sample_rate;
-  const auto inputAt = [&](double t) {
-    CuttingMachine::Input input;
-    input.motion.angle = phase + test.spindle_speed * (t - record.time[0]);
-    input.motion.speed = test.spindle_speed;
-    input.motion.velocity[0] = feed;
-    input.motion.centre[0] = feed * (t - record.time[0]);
-    return input;
-  };
-  bool engaged = false;
-  const auto engage = [&](const ToolMotion& now, double depth) {
-    machine.engage({{test.engagement->entry, test.engagement->exit, depth}}, now,
-                   engagementRise(machine.vibrates()) * options.substeps);
-    engaged = true;
-  };
-  if (test.running_before) {
-    // The same for every model, or what is compared would jump between models.
-    const double lead = *test.running_before < LEAST_STEADY ? *test.running_before : LEAD;
-    machine.setClock(clockOf(model, test, record));
-    if (record.has("load_meter")) machine.resetLoadMeter(test.spindle_speed);
-    const auto steps = static_cast<long>(lead * test.sample_rate * options.substeps);
-    const double step = dt / options.substeps;
-    CuttingMachine::Output out;
-    for (long k = steps; k > 0; --k) {
-      const CuttingMachine::Input input = inputAt(record.time[0] - static_cast<double>(k) * step);
-      if (cut && (k % GROWTH_STEPS == 0 || !engaged)) {
-        const double share =
-            LEAST_GROWTH + (1.0 - LEAST_GROWTH) * growth(static_cast<double>(steps - k) /
-                                                         (GROWING_SHARE * static_cast<double>(steps)));
-        if (!engaged) engage(input.motion, share * test.engagement->axial_depth);
-        machine.setDepth(share * test.engagement->axial_depth);
-      }
-      machine.step(input, out);
-    }
-    if (engaged) machine.setDepth(test.engagement->axial_depth, feed * (*test.running_before - lead));
-  }
+Record simulateTap(const MachineModel& model, const CampaignTest& test, const Record* recorded, Record record,
+                   const SimulationOptions& options, CuttingMachine& machine) {
+  const std::vector<double> hammer = contactForce(record.column("hammer"));
+  const std::size_t axis = test.direction == "x" ? 0 : test.direction == "y" ? 1 : 2;
+  if (axis < 2) machine.setProbe(axis);
+  const TapTarget target = targetOf(recorded ? *recorded : record, axis);
   run(
       model, test, options, machine,
       [&](std::size_t i, double share) {
-        const double t = record.time[i] + share * dt;
-        const CuttingMachine::Input input = inputAt(t);
-        // A rounded time stamp must not put the sample of engagement on the wrong side.
-        if (cut && !engaged && t >= start - 1e-3 * dt) engage(input.motion, test.engagement->axial_depth);
+        CuttingMachine::Input input;
+        const double force = interpolated(hammer, i, share);
+        if (target.tip) input.tip_force[axis] = force;
+        if (target.sensor) input.sensor_force[axis] = force;
         return input;
       },
       recorded, record);
+  return record;
+}
+
+// A spindle that turns steadily and, in a cut, a tool that is fed into its work.
+class SteadyTest {
+ public:
+  // @param phase of tooth 1 [rad] at the time `begin` [s] of the first sample
+  SteadyTest(const MachineModel& model, const CampaignTest& test, double phase, double begin, int substeps,
+             CuttingMachine& machine)
+      : test_(test), phase_(phase), begin_(begin), substeps_(substeps), machine_(machine) {
+    if (!cut()) return;
+    model.needCutting("simulate a cut");
+    feed_ = test.engagement->feed_per_tooth * model.needTool("simulate a cut").teeth * test.spindle_speed /
+            units::TWO_PI;
+  }
+
+  CuttingMachine::Input inputAt(double t) const {
+    CuttingMachine::Input input;
+    input.motion.angle = phase_ + test_.spindle_speed * (t - begin_);
+    input.motion.speed = test_.spindle_speed;
+    input.motion.velocity[0] = feed_;
+    input.motion.centre[0] = feed_ * (t - begin_);
+    return input;
+  }
+
+  // The same in a record; the tool engages when its time has come.
+  CuttingMachine::Input next(double t) {
+    const CuttingMachine::Input input = inputAt(t);
+    const double start = test_.engage_time.value_or(begin_ - 1.0);
+    // A rounded time stamp must not put the sample of engagement on the wrong side.
+    if (cut() && !engaged_ && t >= start - 1e-3 / test_.sample_rate)
+      engage(input.motion, test_.engagement->axial_depth);
+    return input;
+  }
+
+  // What ran before the record.
+  void lead() {
+    // The same for every model, or what is compared would jump between models.
+    const double time = *test_.running_before < LEAST_STEADY ? *test_.running_before : LEAD;
+    const auto steps = static_cast<long>(time * test_.sample_rate * substeps_);
+    const double step = 1.0 / test_.sample_rate / substeps_;
+    CuttingMachine::Output out;
+    for (long k = steps; k > 0; --k) {
+      const CuttingMachine::Input input = inputAt(begin_ - static_cast<double>(k) * step);
+      if (cut() && (k % GROWTH_STEPS == 0 || !engaged_)) {
+        const double share =
+            LEAST_GROWTH + (1.0 - LEAST_GROWTH) * growth(static_cast<double>(steps - k) /
+                                                         (GROWING_SHARE * static_cast<double>(steps)));
+        if (!engaged_) engage(input.motion, share * test_.engagement->axial_depth);
+        machine_.setDepth(share * test_.engagement->axial_depth);
+      }
+      machine_.step(input, out);
+    }
+    if (engaged_) machine_.setDepth(test_.engagement->axial_depth, feed_ * (*test_.running_before - time));
+  }
+
+ private:
+  bool cut() const { return test_.kind == TestKind::cut; }
+  void engage(const ToolMotion& now, double depth) {
+    machine_.engage({{test_.engagement->entry, test_.engagement->exit, depth}}, now,
+                    engagementRise(machine_.vibrates()) * substeps_);
+    engaged_ = true;
+  }
+
+  const CampaignTest& test_;
+  double phase_, begin_;
+  int substeps_;
+  CuttingMachine& machine_;
+  double feed_ = 0.0;  // [m/s]
+  bool engaged_ = false;
+};
+
+// The angle of a spindle that turns steadily, where a record asks for it.
+void fillAngle(Record& record, double phase, double speed) {
+  if (!record.has("spindle_angle")) return;
+  std::vector<double>& angle = record.add("spindle_angle");
+  for (std::size_t i = 0; i < record.size(); ++i) {
+    angle[i] = std::fmod(phase + speed * (record.time[i] - record.time[0]), units::TWO_PI);
+    if (angle[i] < 0.0) angle[i] += units::TWO_PI;
+  }
+}
+
+Record simulate(const MachineModel& model, const CampaignTest& test, const Record* recorded, Record record,
+                double phase, const SimulationOptions& options) {
+  if (options.substeps < 1) throw Error("simulation: substeps below 1");
+  CuttingMachine machine(model, 1.0 / (test.sample_rate * options.substeps), Feed::steady);
+  if (test.kind == TestKind::tap)
+    return simulateTap(model, test, recorded, std::move(record), options, machine);
+  fillAngle(record, phase, test.spindle_speed);
+  SteadyTest steady(model, test, phase, record.time.front(), options.substeps, machine);
+  if (test.running_before) {
+    machine.setClock(clockOf(model, test, record));
+    if (record.has("load_meter")) machine.resetLoadMeter(test.spindle_speed);
+    steady.lead();
+  }
+  const double dt = 1.0 / test.sample_rate;
+  run(
+      model, test, options, machine,
+      [&](std::size_t i, double share) { return steady.next(record.time[i] + share * dt); }, recorded,
+      record);
   return record;
 }
 

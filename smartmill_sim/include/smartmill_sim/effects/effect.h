@@ -83,6 +83,8 @@ class Effect {
   virtual void addForce(const Instant&, Axes3&) const {}
   /// Sensor output and signal: changes measured channels.
   virtual void measure(const Instant&, ChannelValues&) const {}
+  /// Lowers the size that each channel can show at most.
+  virtual void limit(ChannelValues&) const {}
   /// Of an effect that is a tone in the signals, else nullptr.
   virtual Tone* tone() { return nullptr; }
 };
@@ -107,6 +109,8 @@ class EffectSet {
   void addForce(const Instant& now, Axes3& force) const;
   /// Only the effects of one stage (sensor_output or signal).
   void measure(Stage stage, const Instant& now, ChannelValues& channels) const;
+  /// The size that each channel can show at most; infinity: any.
+  ChannelValues limits() const;
   std::vector<Tone*> tones();
 
  private:

@@ -70,6 +70,9 @@ class CuttingMachine {
   /// Early channels to what is shown: drift, hum and saturation at a time since the record began [s].
   void finish(double record_time, ChannelValues& channels) const;
 
+  /// The size that each channel can show at most; infinity: any.
+  ChannelValues limits() const { return effects_.limits(); }
+
   /// Displacement and acceleration sensors stand at the tip, in x (0) or y (1).
   void setProbe(std::size_t axis) { probe_ = axis; }
 
@@ -85,6 +88,14 @@ class CuttingMachine {
 
  private:
   void update(const Input& input);
+  // A step, in this order.
+  void takeOver(const Input& input);  // what effects set anew
+  CuttingForce cut(const ToolMotion& commanded);
+  void moveTip(const Input& input, Output& out);
+  void showForce(Output& out);
+  void showLoad(double speed, Output& out);
+  void passTime(const ToolMotion& motion);
+
   double actualDepth(double commanded) const;  // [m]
   void setActualDepths();
   ToolMotion fed(const ToolMotion& commanded) const;
