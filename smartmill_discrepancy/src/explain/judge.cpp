@@ -29,6 +29,7 @@ std::vector<std::pair<std::string, double>> numbersAt(const Member& member, cons
 // which only one direction is known.
 std::vector<FoundParameter> parametersOf(const Member& member, const Eigen::MatrixXd& covariance) {
   const auto numbers = numbersOf(member.hypothesis->entry(member.values));
+  const EffectKind& kind = *findEffect(member.hypothesis->effect);
   const Eigen::Index count = covariance.cols();
   const linear::SymmetricEigensystem axes = linear::symmetricEigensystem(covariance);
   std::vector<double> variance(numbers.size(), 0.0);
@@ -38,16 +39,17 @@ std::vector<FoundParameter> parametersOf(const Member& member, const Eigen::Matr
       const auto other = numbersAt(member, sign * reach * axes.vectors.col(k));
       if (other.size() != numbers.size()) continue;
       for (std::size_t n = 0; n < numbers.size(); ++n) {
-        double difference = other[n].second - numbers[n].second;
-        if (numbers[n].first == "angle_deg") difference = std::remainder(difference, 360.0);
+        const double difference =
+            parameterOf(kind, numbers[n].first).difference(other[n].second, numbers[n].second);
         variance[n] += difference * difference / (2.0 * static_cast<double>(count));
       }
     }
   }
   std::vector<FoundParameter> parameters;
   for (std::size_t k = 0; k < numbers.size(); ++k) {
-    const double own = TWIN_ACCURACY * (numbers[k].first == "angle_deg" ? 57.3 : numbers[k].second);
-    parameters.push_back({numbers[k].first, numbers[k].second, std::sqrt(variance[k] + own * own)});
+    const auto& [key, value] = numbers[k];
+    const double own = TWIN_ACCURACY * parameterOf(kind, key).scale(value);
+    parameters.push_back({key, value, std::sqrt(variance[k] + own * own)});
   }
   return parameters;
 }

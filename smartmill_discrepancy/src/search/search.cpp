@@ -25,45 +25,56 @@ std::string describe(const Member& m) {
   return line;
 }
 
-// The flexibility hypothesis whose axes are just those of some modes, with these modes.
-std::optional<Member> flexibilityOf(const std::map<char, std::vector<double>>& modes,
-                                    const std::vector<Hypothesis>& hypotheses) {
+using Pieces = std::map<std::string, std::vector<double>>;  // values by the name of a piece
+
+// The form of an effect that is put together of just these pieces, with their values.
+std::optional<Member> formOf(const std::string& effect, const Pieces& pieces,
+                             const std::vector<Hypothesis>& hypotheses) {
   for (const Hypothesis& h : hypotheses) {
-    if (h.effect != "tool_flexibility" || h.variant.size() != modes.size()) continue;
-    if (!std::all_of(h.variant.begin(), h.variant.end(), [&](char axis) { return modes.count(axis) > 0; }))
+    if (h.effect != effect || h.pieces.size() != pieces.size()) continue;
+    if (!std::all_of(h.pieces.begin(), h.pieces.end(),
+                     [&](const std::string& name) { return pieces.count(name) > 0; }))
       continue;
     Member one{&h, {}};
-    for (const char axis : h.variant) {
-      const std::vector<double>& mode = modes.at(axis);
-      one.values.insert(one.values.end(), mode.begin(), mode.end());
+    for (const std::string& name : h.pieces) {
+      const std::vector<double>& values = pieces.at(name);
+      one.values.insert(one.values.end(), values.begin(), values.end());
     }
     return one;
   }
   return {};
 }
 
-// A mode of the tool found beside another on the same axis may be what the other stood for, and modes found
-// axis by axis are one effect: the state with the newest modes of each axis in one member.
-std::optional<FitState> withOneFlexibility(const FitState& state, const std::vector<Hypothesis>& hypotheses) {
-  std::map<char, std::vector<double>> modes;
+// A piece of an effect found beside the same piece may be what the other stood for, and pieces found one by
+// one are one effect (modes of the tool, axis by axis): the state with the newest of each piece in one
+// member.
+std::optional<FitState> joined(const FitState& state, const std::string& effect,
+                               const std::vector<Hypothesis>& hypotheses) {
+  Pieces pieces;
   FitState merged{state.nominal, {}};
   std::size_t members = 0;
   for (const Member& m : state.members) {
-    if (m.hypothesis->effect != "tool_flexibility") {
+    if (m.hypothesis->effect != effect) {
       merged.members.push_back(m);
       continue;
     }
     ++members;
-    for (std::size_t a = 0; a < m.hypothesis->variant.size(); ++a) {
-      const auto from = m.values.begin() + static_cast<std::ptrdiff_t>(3 * a);
-      modes[m.hypothesis->variant[a]].assign(from, from + 3);
-    }
+    for (std::size_t k = 0; k < m.hypothesis->pieces.size(); ++k)
+      pieces[m.hypothesis->pieces[k]] = m.hypothesis->pieceOf(m.values, k);
   }
   if (members < 2) return {};
-  const std::optional<Member> one = flexibilityOf(modes, hypotheses);
+  const std::optional<Member> one = formOf(effect, pieces, hypotheses);
   if (!one) return {};
   merged.members.push_back(*one);
   return merged;
+}
+
+std::optional<FitState> withPiecesJoined(const FitState& state, const std::vector<Hypothesis>& hypotheses) {
+  for (const Member& m : state.members) {
+    if (m.hypothesis->pieces.empty()) continue;
+    if (const auto one = joined(state, m.hypothesis->effect, hypotheses)) return one;
+  }
+  return {};
 }
 
 // The promise is linear: of shorter ways from the null point to its start the one that fits best.
@@ -254,7 +265,7 @@ bool Search::isBetter(const Round& round) const {
 void Search::settle(Fit best) {
   constexpr FitOptions CLOSELY{8, 1e-4, true};
   tangents_ = linearise(best.state);
-  if (const auto one = withOneFlexibility(best.state, hypotheses_)) {
+  if (const auto one = withPiecesJoined(best.state, hypotheses_)) {
     Fit merged = quick_.fit(*one, &tangents_, CLOSELY);
     if (merged.bic < best.bic) {
       best = std::move(merged);

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 #include <yaml-cpp/yaml.h>
 
+#include "smartmill_core/model/effect_catalogue.h"
 #include "smartmill_core/testing/shared_data.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_discrepancy/explain/explain.h"
@@ -66,8 +67,7 @@ void expectTrue(const FoundEffect& found, const std::map<std::string, Printed>& 
   for (const FoundParameter& p : found.parameters) {
     const auto at = truth.find(p.key);
     const Printed expected = at == truth.end() ? Printed{} : at->second;  // a key left out is 0
-    double error = p.value - expected.value;
-    if (p.key == "angle_deg") error = std::remainder(error, 360.0);
+    const double error = parameterOf(*findEffect(found.name), p.key).difference(p.value, expected.value);
     EXPECT_LE(std::abs(error), 3.0 * p.std_dev + expected.rounding)
         << found.name << " " << p.key << " " << p.value << ", truth " << expected.value;
   }

@@ -38,7 +38,9 @@ struct Options {
 };
 
 bool needsFlexible(const Case& c) {
-  return std::find(c.names.begin(), c.names.end(), "process_damping") != c.names.end();
+  return std::any_of(c.names.begin(), c.names.end(), [](const std::string& name) {
+    return findEffect(name)->has(EffectNeed::flexible_tool);
+  });
 }
 
 std::vector<Case> drawCases(const Options& o, std::mt19937_64& random) {
@@ -74,7 +76,7 @@ double largestScore(const FoundEffect& found, const EffectEntry& truth) {
   for (const FoundParameter& p : found.parameters) {
     for (const auto& [key, value] : numbers) {
       if (key != p.key || p.std_dev <= 0.0) continue;
-      const double difference = key == "angle_deg" ? std::remainder(p.value - value, 360.0) : p.value - value;
+      const double difference = parameterOf(*findEffect(found.name), key).difference(p.value, value);
       largest = std::max(largest, std::abs(difference) / p.std_dev);
     }
   }
@@ -98,19 +100,27 @@ struct Outcome {
   double largest_score = 0.0;
 };
 
-Outcome runCase(const Options& o, const Case& c, int number, std::uint64_t seed) {
-  const std::string folder = o.out + "/case_" + std::to_string(number);
-  // Sealed: only this block knows the truth until explain is done.
+std::string joined(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : "+") + name;
+  return text;
+}
+
+// Draws a machine, hides the causes of a case in it and writes its campaign.
+BenchTruth hide(const Options& o, const Case& c, int number, std::uint64_t seed, const std::string& folder) {
   BenchTruth truth;
-  {
-    std::mt19937_64 own(seed);
-    const MachineModel nominal = drawMachine(own, needsFlexible(c));
-    truth.machine = o.exact_nominal ? nominal : drawTruth(nominal, own);
-    for (const std::string& name : c.names) truth.machine.effects.push_back(drawEffect(name, nominal, own));
-    if (c.kind == "outside") truth.outside = drawOutside(own);
-    writeBenchCampaign(nominal, truth, folder, seed + 1, o.substeps);
-    writeMachineModel(truth.machine, o.out + "/sealed_" + std::to_string(number) + ".yaml");
-  }
+  std::mt19937_64 own(seed);
+  const MachineModel nominal = drawMachine(own, needsFlexible(c));
+  truth.machine = o.exact_nominal ? nominal : drawTruth(nominal, own);
+  for (const std::string& name : c.names) truth.machine.effects.push_back(drawEffect(name, nominal, own));
+  if (c.kind == "outside") truth.outside = drawOutside(own);
+  writeBenchCampaign(nominal, truth, folder, seed + 1, o.substeps);
+  writeMachineModel(truth.machine, o.out + "/sealed_" + std::to_string(number) + ".yaml");
+  return truth;
+}
+
+// Looks for the causes with nothing but the campaign.
+Outcome look(const Options& o, const std::string& folder) {
   Outcome outcome;
   Explanation& e = outcome.explanation;
   try {
@@ -127,41 +137,61 @@ Outcome runCase(const Options& o, const Case& c, int number, std::uint64_t seed)
   } catch (const Error& error) {
     outcome.verdict = std::string("refused: ") + error.what();
   }
-  for (const std::string& name : c.names) outcome.expected += (outcome.expected.empty() ? "" : "+") + name;
-  if (truth.outside) outcome.expected = "outside: " + truth.outside->kind + " " + truth.outside->channel;
-  if (outcome.expected.empty()) outcome.expected = "nothing";
-  for (const FoundEffect& f : e.effects) {
-    outcome.named.push_back(f.name);
-    outcome.found += (outcome.found.empty() ? "" : "+") + f.name;
+  for (const FoundEffect& f : e.effects) outcome.named.push_back(f.name);
+  outcome.found = joined(outcome.named);
+  return outcome;
+}
+
+void scoreOutside(const OutsideCause& truth, Outcome* outcome) {
+  const Explanation& e = outcome->explanation;
+  outcome->expected = "outside: " + truth.kind + " " + truth.channel;
+  outcome->right = (outcome->verdict == "unknown_effect" || outcome->verdict == "partly_explained") &&
+                   !e.unexplained.empty() && e.unexplained.front().channel == truth.channel &&
+                   e.unexplained.front().domain == truth.domain();
+  outcome->false_effect = outcome->verdict == "explained";
+  for (const Finding& f : e.unexplained) outcome->found += " [" + f.channel + " " + f.domain + "]";
+}
+
+void scoreNothing(Outcome* outcome) {
+  outcome->expected = "nothing";
+  outcome->false_effect = !outcome->explanation.effects.empty();
+  outcome->right = outcome->verdict == "no_disagreement";
+}
+
+void scoreNames(const Case& c, const std::vector<EffectEntry>& truth, Outcome* outcome) {
+  const std::vector<FoundEffect>& effects = outcome->explanation.effects;
+  outcome->expected = joined(c.names);
+  outcome->right = true;
+  for (std::size_t k = 0; k < c.names.size(); ++k) {
+    const auto same = [&](const FoundEffect& f) { return f.name == c.names[k]; };
+    const auto at = std::find_if(effects.begin(), effects.end(), same);
+    outcome->right = outcome->right && (at != effects.end() || grouped(outcome->explanation, c.names[k]));
+    if (at != effects.end())
+      outcome->largest_score = std::max(outcome->largest_score, largestScore(*at, truth[k]));
   }
-  if (c.kind == "outside") {
-    outcome.right = (outcome.verdict == "unknown_effect" || outcome.verdict == "partly_explained") &&
-                    !e.unexplained.empty() && e.unexplained.front().channel == truth.outside->channel &&
-                    e.unexplained.front().domain == truth.outside->domain();
-    outcome.false_effect = outcome.verdict == "explained";
-    for (const Finding& f : e.unexplained) outcome.found += " [" + f.channel + " " + f.domain + "]";
+  // The first name is the one that explains most.
+  if (c.kind == "single" && outcome->right) {
+    const auto first = std::max_element(
+        effects.begin(), effects.end(),
+        [](const FoundEffect& a, const FoundEffect& b) { return a.delta_bic < b.delta_bic; });
+    outcome->right = first->name == c.names.front() || grouped(outcome->explanation, c.names.front());
+  }
+  for (const FoundEffect& f : effects) {
+    if (std::find(c.names.begin(), c.names.end(), f.name) == c.names.end()) outcome->false_effect = true;
+  }
+}
+
+Outcome runCase(const Options& o, const Case& c, int number, std::uint64_t seed) {
+  const std::string folder = o.out + "/case_" + std::to_string(number);
+  // Sealed: nothing of the truth but the campaign reaches explain.
+  const BenchTruth truth = hide(o, c, number, seed, folder);
+  Outcome outcome = look(o, folder);
+  if (truth.outside) {
+    scoreOutside(*truth.outside, &outcome);
   } else if (c.names.empty()) {
-    outcome.false_effect = !e.effects.empty();
-    outcome.right = outcome.verdict == "no_disagreement";
+    scoreNothing(&outcome);
   } else {
-    outcome.right = true;
-    for (std::size_t k = 0; k < c.names.size(); ++k) {
-      const auto same = [&](const FoundEffect& f) { return f.name == c.names[k]; };
-      const auto at = std::find_if(e.effects.begin(), e.effects.end(), same);
-      outcome.right = outcome.right && (at != e.effects.end() || grouped(e, c.names[k]));
-      if (at != e.effects.end())
-        outcome.largest_score = std::max(outcome.largest_score, largestScore(*at, truth.machine.effects[k]));
-    }
-    // The first name is the one that explains most.
-    if (c.kind == "single" && outcome.right) {
-      const auto first = std::max_element(
-          e.effects.begin(), e.effects.end(),
-          [](const FoundEffect& a, const FoundEffect& b) { return a.delta_bic < b.delta_bic; });
-      outcome.right = first->name == c.names.front() || grouped(e, c.names.front());
-    }
-    for (const FoundEffect& f : e.effects) {
-      if (std::find(c.names.begin(), c.names.end(), f.name) == c.names.end()) outcome.false_effect = true;
-    }
+    scoreNames(c, truth.machine.effects, &outcome);
   }
   if (outcome.found.empty()) outcome.found = outcome.verdict;
   if (!o.keep && outcome.right) std::filesystem::remove_all(folder);

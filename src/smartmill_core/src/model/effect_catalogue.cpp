@@ -40,7 +40,9 @@ EffectParameter orZero(const char* key, const char* unit) {
 }
 
 EffectParameter angle(const char* key) {
-  return number(key, "deg").drawn(0.0, 360.0);
+  EffectParameter p = number(key, "deg").drawn(0.0, 360.0);
+  p.period = 360.0;
+  return p;
 }
 
 EffectParameter angleOrZero(const char* key) {
@@ -106,9 +108,9 @@ Forms addedChipCoefficients(const Scope& scope) {
 }
 
 Forms flexibility(const Scope&) {
-  return {EffectForm({tipMode('x')}).named("x").sought(Seek::tip_mode),
-          EffectForm({tipMode('y')}).named("y").sought(Seek::tip_mode),
-          EffectForm({tipMode('x'), tipMode('y')}).named("xy").sought(Seek::tip_mode)};
+  return {EffectForm({tipMode('x')}).named("x").of({"x"}).sought(Seek::tip_mode),
+          EffectForm({tipMode('y')}).named("y").of({"y"}).sought(Seek::tip_mode),
+          EffectForm({tipMode('x'), tipMode('y')}).named("xy").of({"x", "y"}).sought(Seek::tip_mode)};
 }
 
 // The direct share gives the gain; how large that is, a nominal model may not know well.

@@ -228,6 +228,11 @@ EffectForm& EffectForm::sought(Seek what) {
   return *this;
 }
 
+EffectForm& EffectForm::of(const std::vector<std::string>& names) {
+  pieces = names;
+  return *this;
+}
+
 EffectForm::Values EffectForm::nulls() const {
   Values v;
   for (const Coordinate& c : coordinates) v.push_back(c.null);
@@ -253,6 +258,12 @@ EffectForm::Values EffectForm::values(const EffectEntry& entry) const {
     next += p.coordinates.size();
   }
   return v;
+}
+
+EffectForm::Values EffectForm::pieceOf(const Values& values, std::size_t piece) const {
+  auto first = values.begin();
+  for (std::size_t k = 0; k < piece; ++k) first += static_cast<std::ptrdiff_t>(parts_[k].coordinates.size());
+  return {first, first + static_cast<std::ptrdiff_t>(parts_[piece].coordinates.size())};
 }
 
 }  // namespace smartmill

@@ -1,8 +1,10 @@
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/effect_catalogue.h"
+#include "smartmill_core/units.h"
 
 namespace smartmill {
 
@@ -88,6 +90,14 @@ std::string EffectParameter::rangeText() const {
   return text;
 }
 
+double EffectParameter::difference(double number, double other) const {
+  return period > 0.0 ? std::remainder(number - other, period) : number - other;
+}
+
+double EffectParameter::scale(double number) const {
+  return period > 0.0 ? period / units::TWO_PI : number;
+}
+
 EffectParameter EffectParameter::drawn(double low, double high) const {
   EffectParameter p = *this;
   p.draw = {low, high, 0.0, false};
@@ -122,6 +132,12 @@ const EffectParameter* findParameter(const EffectKind& kind, const std::string& 
     if (parameter.key == key) return &parameter;
   }
   return nullptr;
+}
+
+const EffectParameter& parameterOf(const EffectKind& kind, const std::string& name) {
+  const EffectParameter* parameter = findParameter(kind, name.substr(0, name.find('[')));
+  if (!parameter) throw Error(kind.name + "." + name + ": no such key");
+  return *parameter;
 }
 
 std::optional<std::string> lackingFor(const EffectKind& kind, const EffectScope& scope) {

@@ -72,6 +72,7 @@ struct EffectParameter {
   std::vector<std::string> words = {};  ///< allowed words
   std::vector<double> choices = {};     ///< allowed numbers, empty: the range
   std::optional<double> sum = {};       ///< of a list, where it must be this
+  double period = 0.0;                  ///< of an angle: what turns by it is the same again; 0: none
   EffectDraw draw = {};
   std::size_t words_drawn = 0;  ///< so many of the words, from the first; 0: all
 
@@ -79,6 +80,10 @@ struct EffectParameter {
   bool allows(double number) const;
   /// What allows() asks for, e.g. "> 0"; "50 or 60".
   std::string rangeText() const;
+  /// number - other, of an angle the short way round.
+  double difference(double number, double other) const;
+  /// Against which an error of a number is small: the number itself, of an angle one radian.
+  double scale(double number) const;
 
   EffectParameter drawn(double low, double high) const;
   EffectParameter drawnOnBothSides(double low, double high, double about = 0.0) const;
@@ -130,6 +135,10 @@ const EffectKind* findEffect(const std::string& name);
 
 /// nullptr when the effect has no such key.
 const EffectParameter* findParameter(const EffectKind& kind, const std::string& key);
+
+/// The key behind a name that numbersOf() gives: itself, a list's, that of the modes.
+/// @throws Error when the effect has no such key.
+const EffectParameter& parameterOf(const EffectKind& kind, const std::string& name);
 
 /// Why a campaign cannot speak of an effect: nothing when it can; an empty text when nothing of the kind was
 /// measured.

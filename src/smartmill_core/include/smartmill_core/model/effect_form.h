@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <string>
 #include <vector>
@@ -97,6 +98,9 @@ struct EffectForm {
   EffectForm& probe(const Values& null, const std::vector<Values>& points);
   EffectForm& startingAt(const Values& point);  ///< a fit starts there
   EffectForm& sought(Seek what);
+  /// The effect is put together of pieces that may be found one by one, those of this form in the order of
+  /// its coordinates.
+  EffectForm& of(const std::vector<std::string>& names);
 
   std::string effect;   ///< name in the catalogue
   std::string variant;  ///< empty without one
@@ -104,13 +108,16 @@ struct EffectForm {
   std::vector<Coordinate> coordinates;
   std::vector<Probe> probes;
   Seek seek = Seek::nothing;
-  double handicap = 0.0;  ///< [BIC] of the effect
+  std::vector<std::string> pieces;  ///< of the effect; empty: it is one whole
+  double handicap = 0.0;            ///< [BIC] of the effect
 
   std::string title() const { return variant.empty() ? effect : effect + " (" + variant + ")"; }
   /// values.size() == coordinates.size()
   EffectEntry entry(const Values& values) const;
   /// Where an entry of this form stands: the inverse of entry().
   Values values(const EffectEntry& entry) const;
+  /// The values that belong to one of the pieces, by its place among them.
+  Values pieceOf(const Values& values, std::size_t piece) const;
 
  private:
   Values nulls() const;
