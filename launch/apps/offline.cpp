@@ -106,8 +106,8 @@ Agreement compareChart(const SessionRecording& live, const std::string& file) {
   if (!live.chart) return agreement;
   const NumberTable table = readNumberTable(file);
   std::vector<double> rpm, depth;
-  for (const double speed : live.chart->spindle_speed) rpm.push_back(units::rpmFromRadPerSec(speed));
-  for (const double limit : live.chart->depth_limit) depth.push_back(limit / units::MM);
+  for (const double speed : live.chart->limit.spindle_speed) rpm.push_back(units::rpmFromRadPerSec(speed));
+  for (const double limit : live.chart->limit.depth) depth.push_back(limit / units::MM);
   agreement.add(rpm, table.column("rpm"));
   agreement.add(depth, table.column("limit_mm"));
   return agreement;

@@ -31,16 +31,16 @@ namespace fs = std::filesystem;
 class TrueLimit {
  public:
   /// @param model file of the true machine @param folder for what the tool writes
-  TrueLimit(std::string model, fs::path folder, const ChartCurve& chart)
+  TrueLimit(std::string model, fs::path folder, const StabilityChart& chart)
       : model_(std::move(model)), folder_(std::move(folder)), chart_(chart) {}
 
-  ChartCurve over(double low, double high, std::size_t count) const {
+  StabilityChart over(double low, double high, std::size_t count) const {
     const std::string csv = (folder_ / "lobes_true.csv").string(),
                       log = (folder_ / "lobes_true.txt").string();
     char numbers[300];
     std::snprintf(numbers, sizeof numbers,
                   " --entry-deg %.12g --exit-deg %.12g --speeds %.12g:%.12g:%zu --max-depth-mm 1000",
-                  units::degFromRad(chart_.entry_angle), units::degFromRad(chart_.exit_angle),
+                  units::degFromRad(chart_.entry), units::degFromRad(chart_.exit),
                   units::rpmFromRadPerSec(low), units::rpmFromRadPerSec(high), count);
     const std::string command = "rosrun smartmill_stability lobes " + shellQuoted(model_) + numbers +
                                 " --method collocation -o " + shellQuoted(csv) + " >" + shellQuoted(log) +
@@ -50,13 +50,13 @@ class TrueLimit {
   }
 
   /// [m]
-  double at(double speed) const { return over(speed, speed, 1).depth_limit.at(0); }
+  double at(double speed) const { return over(speed, speed, 1).limit.depth.at(0); }
 
  private:
-  ChartCurve read(const std::string& csv) const {
-    ChartCurve curve;
-    curve.entry_angle = chart_.entry_angle;
-    curve.exit_angle = chart_.exit_angle;
+  StabilityChart read(const std::string& csv) const {
+    StabilityChart curve;
+    curve.entry = chart_.entry;
+    curve.exit = chart_.exit;
     std::ifstream in(csv);
     std::string line;
     std::getline(in, line);
@@ -64,19 +64,19 @@ class TrueLimit {
     while (std::getline(in, line)) {
       const std::size_t comma = line.find(',');
       const std::string depth = line.substr(comma + 1, line.find(',', comma + 1) - comma - 1);
-      curve.spindle_speed.push_back(units::radPerSecFromRpm(std::stod(line)));
-      curve.depth_limit.push_back(depth.empty() ? std::numeric_limits<double>::infinity()
+      curve.limit.spindle_speed.push_back(units::radPerSecFromRpm(std::stod(line)));
+      curve.limit.depth.push_back(depth.empty() ? std::numeric_limits<double>::infinity()
                                                 : std::stod(depth) * units::MM);
-      least = std::min(least, curve.depth_limit.back());
+      least = std::min(least, curve.limit.depth.back());
     }
-    if (curve.depth_limit.empty()) throw Error(csv + ": no limit stands there");
+    if (curve.limit.depth.empty()) throw Error(csv + ": no limit stands there");
     curve.absolute_depth_limit = least;
     return curve;
   }
 
   std::string model_;
   fs::path folder_;
-  ChartCurve chart_;
+  StabilityChart chart_;
 };
 
 /// The true machine as a model file; empty where the recording does not tell.
@@ -125,12 +125,12 @@ int run(const Request& request) {
   fs::create_directories(data, error);
   if (error) throw Error(data.string() + ": " + error.message());
 
-  std::optional<ChartCurve> true_chart;
+  std::optional<StabilityChart> true_chart;
   std::vector<double> true_limits;
   const std::string model = recording.chart ? trueModel(recording, data) : "";
   if (!model.empty()) {
     const TrueLimit limit(model, data, *recording.chart);
-    const std::vector<double>& speeds = recording.chart->spindle_speed;
+    const std::vector<double>& speeds = recording.chart->limit.spindle_speed;
     true_chart = limit.over(speeds.front(), speeds.back(), speeds.size());
     for (const RecordedCut& cut : recording.cuts) {
       const bool checks = cut.condition.name.rfind("verify_", 0) == 0;

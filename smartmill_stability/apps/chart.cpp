@@ -27,7 +27,7 @@ struct Options {
 
 constexpr int DIGITS = 17;  // the node's figures to the last one
 
-void write(const Chart& chart, const std::string& file) {
+void write(const StabilityChart& chart, const std::string& file) {
   CsvWriter csv("rpm,limit_mm,chatter_hz,torque_limit_mm,power_limit_mm", DIGITS);
   for (std::size_t i = 0; i < chart.limit.depth.size(); ++i) {
     csv.row(units::rpmFromRadPerSec(chart.limit.spindle_speed[i]), chart.limit.depth[i] / units::MM,
@@ -49,9 +49,9 @@ void write(const std::vector<ChatterState>& states, const std::string& file) {
   csv.save(file);
 }
 
-void print(const char* title, const std::vector<ChartPoint>& points) {
+void print(const char* title, const std::vector<StabilityPoint>& points) {
   std::printf("%s\n", title);
-  for (const ChartPoint& p : points) {
+  for (const StabilityPoint& p : points) {
     std::printf("  %8.1f rpm %8.4f mm (limit %8.4f mm, %7.1f Hz) %7.2f Nm %7.3f kW %8.2f cm3/min\n",
                 units::rpmFromRadPerSec(p.spindle_speed), p.axial_depth / units::MM,
                 p.depth_limit / units::MM, p.chatter_frequency, p.torque, p.power / 1e3,

@@ -122,24 +122,25 @@ bool drawFrf(const SessionRecording& recording, const std::filesystem::path& fol
 }
 
 bool drawChart(const SessionRecording& recording, const Report& report,
-               const std::optional<ChartCurve>& true_chart, const std::filesystem::path& folder) {
-  if (!recording.chart || recording.chart->spindle_speed.empty()) return false;
-  const ChartCurve& chart = *recording.chart;
+               const std::optional<StabilityChart>& true_chart, const std::filesystem::path& folder) {
+  if (!recording.chart || recording.chart->limit.spindle_speed.empty()) return false;
+  const StabilityChart& chart = *recording.chart;
   double highest = 4.0 * chart.absolute_depth_limit;
   Table table(folder / "data" / "chart.dat");
   const auto at = [](const std::vector<double>& values, std::size_t i) {
     return i < values.size() ? values[i] / units::MM : NOT_A_NUMBER;
   };
-  for (std::size_t i = 0; i < chart.spindle_speed.size(); ++i) {
-    table.row({units::rpmFromRadPerSec(chart.spindle_speed[i]), at(chart.depth_limit, i),
+  for (std::size_t i = 0; i < chart.limit.spindle_speed.size(); ++i) {
+    table.row({units::rpmFromRadPerSec(chart.limit.spindle_speed[i]), at(chart.limit.depth, i),
                at(chart.torque_depth_limit, i), at(chart.power_depth_limit, i)});
   }
   const std::string file = table.close();
   std::string plot = "plot ";
   if (true_chart) {
     Table true_table(folder / "data" / "chart_true.dat");
-    for (std::size_t i = 0; i < true_chart->spindle_speed.size(); ++i) {
-      true_table.row({units::rpmFromRadPerSec(true_chart->spindle_speed[i]), at(true_chart->depth_limit, i)});
+    for (std::size_t i = 0; i < true_chart->limit.spindle_speed.size(); ++i) {
+      true_table.row(
+          {units::rpmFromRadPerSec(true_chart->limit.spindle_speed[i]), at(true_chart->limit.depth, i)});
     }
     plot += true_table.close() +
             " using 1:2 with lines lw 4 lc rgb '#bbbbbb' title 'limit of the true machine', ";
@@ -212,7 +213,7 @@ bool drawForce(const RecordedCut& cut, const std::filesystem::path& folder) {
 }  // namespace
 
 std::vector<std::string> drawPictures(const SessionRecording& recording, const Report& report,
-                                      const std::optional<ChartCurve>& true_chart,
+                                      const std::optional<StabilityChart>& true_chart,
                                       const std::string& folder) {
   std::filesystem::create_directories(std::filesystem::path(folder) / "data");
   std::vector<std::string> drawn;

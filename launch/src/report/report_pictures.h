@@ -11,6 +11,7 @@ namespace smartmill::report {
 /// shows; the data drawn stand as tables in the folder's `data/`. @return names of the pictures drawn
 /// @throws Error when the folder cannot be written or gnuplot fails.
 std::vector<std::string> drawPictures(const SessionRecording& recording, const Report& report,
-                                      const std::optional<ChartCurve>& true_chart, const std::string& folder);
+                                      const std::optional<StabilityChart>& true_chart,
+                                      const std::string& folder);
 
 }  // namespace smartmill::report

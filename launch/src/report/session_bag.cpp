@@ -36,7 +36,7 @@ class Gatherer {
       recording_.true_coefficients = fromMsg(m);
     });
     bag.on<smartmill_msgs::StabilityChart>(names::STABILITY_CHART,
-                                           [this](const auto& m, double) { take(m); });
+                                           [this](const auto& m, double) { recording_.chart = fromMsg(m); });
     bag.on<smartmill_msgs::CuttingCondition>(names::CUTTING_CONDITION,
                                              [this](const auto& m, double) { take(fromMsg(m)); });
     bag.on<smartmill_msgs::CncState>(names::CNC_STATE, [this](const auto& m, double) { take(fromMsg(m)); });
@@ -64,11 +64,6 @@ class Gatherer {
       }
     }
     items.push_back(item);
-  }
-
-  void take(const smartmill_msgs::StabilityChart& m) {
-    recording_.chart = ChartCurve{m.spindle_speed, m.depth_limit, m.torque_depth_limit,  m.power_depth_limit,
-                                  m.entry_angle,   m.exit_angle,  m.absolute_depth_limit};
   }
 
   void take(const CuttingCondition& condition) {

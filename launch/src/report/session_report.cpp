@@ -140,11 +140,11 @@ std::string frfNote(const MeasuredFrf& measured, const MeasuredFrf* truth) {
   return note;
 }
 
-Section chartSection(const SessionRecording& recording, const std::optional<ChartCurve>& true_chart,
+Section chartSection(const SessionRecording& recording, const std::optional<StabilityChart>& true_chart,
                      const std::vector<CutCheck>& cuts) {
   Section section{"Stability chart", {}};
   if (!recording.chart) return section;
-  const ChartCurve& chart = *recording.chart;
+  const StabilityChart& chart = *recording.chart;
   for (const CutCheck& cut : cuts) {
     section.figures.push_back({"limit at" + shown(" %.0f rpm", units::rpmFromRadPerSec(cut.spindle_speed)),
                                "mm",
@@ -159,11 +159,11 @@ Section chartSection(const SessionRecording& recording, const std::optional<Char
                              NOT_A_NUMBER,
                              true_chart ? true_chart->absolute_depth_limit / units::MM : NOT_A_NUMBER,
                              {}});
-  const auto pocketsOf = [](const ChartCurve& curve) {
-    const double least = *std::min_element(curve.depth_limit.begin(), curve.depth_limit.end());
-    return pockets(curve.spindle_speed, curve.depth_limit, POCKET_FACTOR, POCKET_CEILING * least);
+  const auto pocketsOf = [](const StabilityChart& curve) {
+    const double least = *std::min_element(curve.limit.depth.begin(), curve.limit.depth.end());
+    return pockets(curve.limit.spindle_speed, curve.limit.depth, POCKET_FACTOR, POCKET_CEILING * least);
   };
-  if (chart.depth_limit.empty()) return section;
+  if (chart.limit.depth.empty()) return section;
   const std::vector<Pocket> measured = pocketsOf(chart);
   const std::vector<Pocket> truth = true_chart ? pocketsOf(*true_chart) : std::vector<Pocket>{};
   int shown_pockets = 0;
@@ -226,7 +226,7 @@ CutCheck checkOf(const SessionRecording& recording, const RecordedCut& cut, doub
   check.verdict = session::judge(cut.windows);
   if (recording.chart) {
     check.limit =
-        interpolate(recording.chart->spindle_speed, recording.chart->depth_limit, check.spindle_speed);
+        interpolate(recording.chart->limit.spindle_speed, recording.chart->limit.depth, check.spindle_speed);
     check.due = check.axial_depth < check.limit ? CutVerdict::Kind::stable : CutVerdict::Kind::chatter;
   }
   if (!cut.truth.empty() && std::isfinite(cut.steady_from)) {
@@ -269,7 +269,7 @@ std::pair<std::uint64_t, std::uint64_t> judgedSamples(const RecordedCut& cut, do
   return cut.truth.empty() ? range : cut.truth.covered(range.first, range.second);
 }
 
-Report makeReport(const SessionRecording& recording, const std::optional<ChartCurve>& true_chart,
+Report makeReport(const SessionRecording& recording, const std::optional<StabilityChart>& true_chart,
                   const std::vector<double>& true_limits) {
   Report report;
   for (std::size_t i = 0; i < recording.cuts.size(); ++i) {

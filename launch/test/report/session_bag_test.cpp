@@ -91,11 +91,12 @@ class SessionBag : public ::testing::Test {
     put(names::COEFFICIENTS, 12.1, toMsg(set));
     set.value.ktc = 8.1e8;
     put(names::TRUE_COEFFICIENTS, 12.1, toMsg(set));
-    smartmill_msgs::StabilityChart chart;
-    chart.spindle_speed = {900.0, 1100.0};
-    chart.depth_limit = {1e-3, 2e-3};
+    StabilityChart chart;
+    chart.stamp = 12.1;
+    chart.limit = {{900.0, 1100.0}, {1e-3, 2e-3}, {500.0, 510.0}};
+    chart.torque_depth_limit = chart.power_depth_limit = {4e-3, 3e-3};
     chart.absolute_depth_limit = 1e-3;
-    put(names::STABILITY_CHART, 12.2, chart);
+    put(names::STABILITY_CHART, 12.2, toMsg(chart));
     bag.close();
   }
 

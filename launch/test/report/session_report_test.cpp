@@ -80,8 +80,10 @@ SessionRecording example() {
   recording.true_modes = {modesOf("x", 1000.0, 20.0e6, 0.0)};
   recording.coefficients = coefficients(990e6, 5e6);
   recording.true_coefficients = coefficients(1000e6, 0.0);
-  recording.chart =
-      ChartCurve{{0.5 * SPEED, SPEED, 2.0 * SPEED}, {1e-3, 2e-3, 1e-3}, {}, {}, 0.0, units::PI, 1e-3};
+  StabilityChart& chart = recording.chart.emplace();
+  chart.limit = {{0.5 * SPEED, SPEED, 2.0 * SPEED}, {1e-3, 2e-3, 1e-3}, {}};
+  chart.exit = units::PI;
+  chart.absolute_depth_limit = 1e-3;
   RecordedCut resonance = cut("resonance", 0.5e-3);
   resonance.raw = sine(200.0, 4.0);
   resonance.compensated = sine(103.0, 4.0);

@@ -34,13 +34,14 @@ double around(const StabilityLimit& limit, std::size_t k, double margin,
 }
 
 /// The first points in the given order, one a pocket.
-std::vector<ChartPoint> pick(std::vector<ChartPoint> points, int count,
-                             const std::function<bool(const ChartPoint&, const ChartPoint&)>& better) {
+std::vector<StabilityPoint> pick(
+    std::vector<StabilityPoint> points, int count,
+    const std::function<bool(const StabilityPoint&, const StabilityPoint&)>& better) {
   std::stable_sort(points.begin(), points.end(), better);
-  std::vector<ChartPoint> chosen;
-  for (const ChartPoint& point : points) {
+  std::vector<StabilityPoint> chosen;
+  for (const StabilityPoint& point : points) {
     if (static_cast<int>(chosen.size()) >= count) break;
-    const bool near = std::any_of(chosen.begin(), chosen.end(), [&](const ChartPoint& other) {
+    const bool near = std::any_of(chosen.begin(), chosen.end(), [&](const StabilityPoint& other) {
       return std::abs(point.spindle_speed / other.spindle_speed - 1.0) < SAME_POCKET;
     });
     if (!near) chosen.push_back(point);
@@ -281,8 +282,8 @@ std::array<double, 2> ChartMaker::loadLimits(double speed) const {
   return {{torque, power}};
 }
 
-ChartPoint ChartMaker::point(double speed, double depth, double limit, double frequency) const {
-  ChartPoint result{speed, depth, limit, frequency};
+StabilityPoint ChartMaker::point(double speed, double depth, double limit, double frequency) const {
+  StabilityPoint result{speed, depth, limit, frequency};
   result.torque = torquePerDepth() * depth;
   result.power = result.torque * speed;
   // A tooth removes the integral of c sin(phi) R over its engagement.
@@ -309,9 +310,9 @@ StabilityLimit ChartMaker::wideLimits(const Basis& given) const {
   return given.limits(speeds);
 }
 
-void ChartMaker::recommend(Chart& chart, const StabilityLimit& wide) const {
+void ChartMaker::recommend(StabilityChart& chart, const StabilityLimit& wide) const {
   const std::vector<double>& speeds = chart.limit.spindle_speed;
-  std::vector<ChartPoint> cuts, peaks;
+  std::vector<StabilityPoint> cuts, peaks;
   for (std::size_t k = 0; k < speeds.size(); ++k) {
     const double stable =
         around(wide, k + static_cast<std::size_t>(linesBeyond()), parameters_.speed_margin, std::less<>());
@@ -324,15 +325,16 @@ void ChartMaker::recommend(Chart& chart, const StabilityLimit& wide) const {
     const bool over_right = k + 1 == cuts.size() || rate >= cuts[k + 1].material_removal_rate;
     if (rate > 0.0 && over_left && over_right) peaks.push_back(cuts[k]);
   }
-  chart.recommended = pick(peaks, parameters_.recommended, [](const ChartPoint& a, const ChartPoint& b) {
-    return a.material_removal_rate > b.material_removal_rate;
-  });
+  chart.recommended =
+      pick(peaks, parameters_.recommended, [](const StabilityPoint& a, const StabilityPoint& b) {
+        return a.material_removal_rate > b.material_removal_rate;
+      });
 }
 
-void ChartMaker::proposeUnstable(Chart& chart, const StabilityLimit& wide) const {
+void ChartMaker::proposeUnstable(StabilityChart& chart, const StabilityLimit& wide) const {
   const std::vector<double>& speeds = chart.limit.spindle_speed;
   const std::vector<double>& depth = chart.limit.depth;
-  std::vector<ChartPoint> valleys;
+  std::vector<StabilityPoint> valleys;
   for (std::size_t k = 1; k + 1 < speeds.size(); ++k) {
     if (!(depth[k] < depth[k - 1] && depth[k] <= depth[k + 1])) continue;
     const double highest =
@@ -344,22 +346,25 @@ void ChartMaker::proposeUnstable(Chart& chart, const StabilityLimit& wide) const
   // A check beside the recommended cut tells most: nearly the same speed, another outcome.
   const double reference =
       chart.recommended.empty() ? speeds.back() : chart.recommended.front().spindle_speed;
-  chart.unstable = pick(valleys, parameters_.unstable, [&](const ChartPoint& a, const ChartPoint& b) {
+  chart.unstable = pick(valleys, parameters_.unstable, [&](const StabilityPoint& a, const StabilityPoint& b) {
     return std::abs(std::log(a.spindle_speed / reference)) < std::abs(std::log(b.spindle_speed / reference));
   });
 }
 
-double ChartMaker::carried(const Chart& chart, std::size_t k) const {
+double ChartMaker::carried(const StabilityChart& chart, std::size_t k) const {
   return std::min({parameters_.load_share * chart.torque_depth_limit[k],
                    parameters_.load_share * chart.power_depth_limit[k], parameters_.max_depth});
 }
 
-Chart ChartMaker::chart() const {
+StabilityChart ChartMaker::chart() const {
   const Basis given = basis();
-  Chart chart;
+  StabilityChart chart;
   chart.stamp = stamp_;
   chart.tool = tool_;
   chart.material = coefficients_->material;
+  chart.entry = parameters_.entry;
+  chart.exit = parameters_.exit;
+  chart.feed_per_tooth = parameters_.feed_per_tooth;
   const StabilityLimit wide = wideLimits(given);
   const auto inner = [beyond = linesBeyond()](const std::vector<double>& all) {
     return std::vector<double>(all.begin() + beyond, all.end() - beyond);

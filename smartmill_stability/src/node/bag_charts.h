@@ -11,8 +11,8 @@ namespace smartmill::stability {
 
 /// What the node would have published.
 struct BagCharts {
-  std::optional<Chart> chart;  ///< the last one
-  std::string missing;         ///< why there is none
+  std::optional<StabilityChart> chart;  ///< the last one
+  std::string missing;                  ///< why there is none
   std::vector<ChatterState> states;
 };
 

@@ -20,38 +20,6 @@ NodeParameters read(const ros::NodeHandle& private_nh) {
   return parameters;
 }
 
-smartmill_msgs::StabilityPoint toMsg(const ChartPoint& point) {
-  smartmill_msgs::StabilityPoint message;
-  message.spindle_speed = point.spindle_speed;
-  message.axial_depth = point.axial_depth;
-  message.depth_limit = point.depth_limit;
-  message.chatter_frequency = point.chatter_frequency;
-  message.torque = point.torque;
-  message.power = point.power;
-  message.material_removal_rate = point.material_removal_rate;
-  return message;
-}
-
-smartmill_msgs::StabilityChart toMsg(const Chart& chart, const ChartParameters& parameters) {
-  smartmill_msgs::StabilityChart message;
-  message.header.stamp = fromSec(chart.stamp);
-  message.tool = chart.tool;
-  message.material = chart.material;
-  message.method = chart.method;
-  message.entry_angle = parameters.entry;
-  message.exit_angle = parameters.exit;
-  message.feed_per_tooth = parameters.feed_per_tooth;
-  message.spindle_speed = chart.limit.spindle_speed;
-  message.depth_limit = chart.limit.depth;
-  message.chatter_frequency = chart.limit.chatter_frequency;
-  message.torque_depth_limit = chart.torque_depth_limit;
-  message.power_depth_limit = chart.power_depth_limit;
-  message.absolute_depth_limit = chart.absolute_depth_limit;
-  for (const ChartPoint& point : chart.recommended) message.recommended.push_back(toMsg(point));
-  for (const ChartPoint& point : chart.unstable) message.unstable.push_back(toMsg(point));
-  return message;
-}
-
 }  // namespace
 
 StabilityNode::StabilityNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
@@ -99,7 +67,7 @@ void StabilityNode::measured(const Measured& measured) {
   chart_problem_.clear();
   if (!maker_.missing().empty()) return;
   try {
-    chart_.publish(toMsg(maker_.chart(), parameters_.chart));
+    chart_.publish(toMsg(maker_.chart()));
   } catch (const Error& error) {
     chart_problem_ = error.what();
     throw;

@@ -45,7 +45,7 @@ TEST(ChartMaker, measuredFrfsGiveTheBenchmarksLimits) {
 // Where the hammer's spectrum has a zero the FRF is noise as large as a resonance; its standard deviation
 // says so.
 TEST(ChartMaker, linesThatTheHammerDidNotExciteMakeNoPocket) {
-  const Chart clean = filled(slot()).chart();
+  const StabilityChart clean = filled(slot()).chart();
   ChartParameters parameters = slot();
   parameters.radial_ratio = 1.0 / 3.0;
   ChartMaker maker(parameters, machine());
@@ -63,7 +63,7 @@ TEST(ChartMaker, linesThatTheHammerDidNotExciteMakeNoPocket) {
     maker.handle(noisy);
   }
   maker.handle(coefficients());
-  const Chart chart = maker.chart();
+  const StabilityChart chart = maker.chart();
   ASSERT_EQ(chart.limit.depth.size(), clean.limit.depth.size());
   for (std::size_t k = 0; k < clean.limit.depth.size(); ++k) {
     if (std::isinf(clean.limit.depth[k])) continue;
@@ -82,7 +82,7 @@ TEST(ChartMaker, modesGiveTheSameChartAsTheirFrf) {
     maker.handle(MeasuredModes{10.0, "end_mill", POINT_TOOL_TIP, direction, "m/N", benchmark(), 0.0});
   }
   maker.handle(coefficients());
-  const Chart of_modes = maker.chart(), of_frf = filled(slot(), 0.25).chart();
+  const StabilityChart of_modes = maker.chart(), of_frf = filled(slot(), 0.25).chart();
   for (std::size_t k = 0; k < of_modes.limit.depth.size(); ++k) {
     ASSERT_NEAR(of_modes.limit.depth[k] / of_frf.limit.depth[k], 1.0, 2e-3) << k;
   }
@@ -109,7 +109,7 @@ TEST(ChartMaker, knownModesGiveTheConvergedLimits) {
   parameters.speeds = 601;
   const ChartMaker maker = fromModes(parameters, 0.01);
   const double table[][2] = {{6000, 0.0483482}, {10000, 0.0714108}, {15000, 0.1144476}, {20000, 0.0632216}};
-  const Chart chart = maker.chart();
+  const StabilityChart chart = maker.chart();
   EXPECT_EQ(chart.method, "collocation");
   for (const auto& row : table) {
     const double speed = units::radPerSecFromRpm(row[0]);
@@ -136,7 +136,7 @@ TEST(ChartMaker, modesThatFitBadlyLeaveTheChartToTheFrf) {
 }
 
 TEST(ChartMaker, spindleLimitsFollowTheMeanTorque) {
-  const Chart chart = filled(slot()).chart();
+  const StabilityChart chart = filled(slot()).chart();
   // A slot removes depth x diameter a feed: energy Ktc per volume, and the edge force along half a turn of
   // each tooth.
   const double energy_per_depth = 6e8 * 0.02 * 2 * 0.1e-3 + 1e4 * 2 * units::PI * 0.01;  // [J/m] a revolution
@@ -147,7 +147,7 @@ TEST(ChartMaker, spindleLimitsFollowTheMeanTorque) {
     EXPECT_NEAR(chart.power_depth_limit[k] * torque_per_depth / (8000.0 / speed - friction), 1.0, 1e-12);
   }
   ASSERT_FALSE(chart.recommended.empty());
-  const ChartPoint& best = chart.recommended.front();
+  const StabilityPoint& best = chart.recommended.front();
   EXPECT_NEAR(best.torque / (torque_per_depth * best.axial_depth), 1.0, 1e-12);
   EXPECT_NEAR(best.power / (best.torque * best.spindle_speed), 1.0, 1e-12);
   EXPECT_NEAR(best.material_removal_rate /
@@ -161,12 +161,12 @@ TEST(ChartMaker, recommendsStablePocketsAndProposesClearlyUnstableValleys) {
   ChartParameters parameters = slot();
   parameters.speed_high = units::radPerSecFromRpm(16000.0);
   const ChartMaker maker = filled(parameters);
-  const Chart chart = maker.chart();
+  const StabilityChart chart = maker.chart();
   ASSERT_GE(chart.recommended.size(), 2u);
   EXPECT_NEAR(units::rpmFromRadPerSec(chart.recommended[0].spindle_speed), 13830.0, 0.04 * 13830.0);
   EXPECT_NEAR(units::rpmFromRadPerSec(chart.recommended[1].spindle_speed), 9220.0, 0.04 * 9220.0);
   for (std::size_t i = 0; i < chart.recommended.size(); ++i) {
-    const ChartPoint& point = chart.recommended[i];
+    const StabilityPoint& point = chart.recommended[i];
     for (const double off : {0.991, 1.0, 1.009}) {
       const Prediction there = maker.predict(point.spindle_speed * off, point.axial_depth);
       EXPECT_TRUE(there.stable);
@@ -178,7 +178,7 @@ TEST(ChartMaker, recommendsStablePocketsAndProposesClearlyUnstableValleys) {
     }
   }
   ASSERT_FALSE(chart.unstable.empty());
-  for (const ChartPoint& point : chart.unstable) {
+  for (const StabilityPoint& point : chart.unstable) {
     for (const double off : {0.991, 1.0, 1.009}) {
       const Prediction there = maker.predict(point.spindle_speed * off, point.axial_depth);
       EXPECT_FALSE(there.stable);
@@ -199,9 +199,9 @@ TEST(ChartMaker, aWeakSpindleHoldsTheRecommendationDown) {
   maker.handle(frf("x", 1.0));
   maker.handle(frf("y", 1.0));
   maker.handle(coefficients());
-  const Chart chart = maker.chart();
+  const StabilityChart chart = maker.chart();
   for (const auto* points : {&chart.recommended, &chart.unstable}) {
-    for (const ChartPoint& point : *points) EXPECT_LE(point.torque, 0.8);
+    for (const StabilityPoint& point : *points) EXPECT_LE(point.torque, 0.8);
   }
 }
 

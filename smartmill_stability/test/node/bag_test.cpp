@@ -62,7 +62,7 @@ TEST(Bag, givesTheChartAndVerdictsOfTheLiveClasses) {
   maker.handle(frf("x", 1.0));
   maker.handle(frf("y", 1.0));
   maker.handle(coefficients());
-  const Chart chart = maker.chart();
+  const StabilityChart chart = maker.chart();
   ASSERT_TRUE(found.chart);
   EXPECT_EQ(found.chart->limit.depth, chart.limit.depth);
   EXPECT_EQ(found.chart->recommended.size(), chart.recommended.size());

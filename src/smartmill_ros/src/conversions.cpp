@@ -329,4 +329,65 @@ smartmill_msgs::CuttingCoefficients toMsg(const CoefficientSet& set) {
   return m;
 }
 
+StabilityPoint fromMsg(const smartmill_msgs::StabilityPoint& m) {
+  return {m.spindle_speed, m.axial_depth, m.depth_limit,          m.chatter_frequency,
+          m.torque,        m.power,       m.material_removal_rate};
+}
+
+smartmill_msgs::StabilityPoint toMsg(const StabilityPoint& point) {
+  smartmill_msgs::StabilityPoint m;
+  m.spindle_speed = point.spindle_speed;
+  m.axial_depth = point.axial_depth;
+  m.depth_limit = point.depth_limit;
+  m.chatter_frequency = point.chatter_frequency;
+  m.torque = point.torque;
+  m.power = point.power;
+  m.material_removal_rate = point.material_removal_rate;
+  return m;
+}
+
+StabilityChart fromMsg(const smartmill_msgs::StabilityChart& m) {
+  const std::size_t n = m.spindle_speed.size();
+  requireLength("depth_limit", m.depth_limit.size(), n);
+  requireLength("chatter_frequency", m.chatter_frequency.size(), n);
+  requireLength("torque_depth_limit", m.torque_depth_limit.size(), n);
+  requireLength("power_depth_limit", m.power_depth_limit.size(), n);
+  StabilityChart chart;
+  chart.stamp = toSec(m.header.stamp);
+  chart.tool = m.tool;
+  chart.material = m.material;
+  chart.method = m.method;
+  chart.entry = m.entry_angle;
+  chart.exit = m.exit_angle;
+  chart.feed_per_tooth = m.feed_per_tooth;
+  chart.limit = {m.spindle_speed, m.depth_limit, m.chatter_frequency};
+  chart.torque_depth_limit = m.torque_depth_limit;
+  chart.power_depth_limit = m.power_depth_limit;
+  chart.absolute_depth_limit = m.absolute_depth_limit;
+  for (const smartmill_msgs::StabilityPoint& point : m.recommended)
+    chart.recommended.push_back(fromMsg(point));
+  for (const smartmill_msgs::StabilityPoint& point : m.unstable) chart.unstable.push_back(fromMsg(point));
+  return chart;
+}
+
+smartmill_msgs::StabilityChart toMsg(const StabilityChart& chart) {
+  smartmill_msgs::StabilityChart m;
+  m.header.stamp = fromSec(chart.stamp);
+  m.tool = chart.tool;
+  m.material = chart.material;
+  m.method = chart.method;
+  m.entry_angle = chart.entry;
+  m.exit_angle = chart.exit;
+  m.feed_per_tooth = chart.feed_per_tooth;
+  m.spindle_speed = chart.limit.spindle_speed;
+  m.depth_limit = chart.limit.depth;
+  m.chatter_frequency = chart.limit.chatter_frequency;
+  m.torque_depth_limit = chart.torque_depth_limit;
+  m.power_depth_limit = chart.power_depth_limit;
+  m.absolute_depth_limit = chart.absolute_depth_limit;
+  for (const StabilityPoint& point : chart.recommended) m.recommended.push_back(toMsg(point));
+  for (const StabilityPoint& point : chart.unstable) m.unstable.push_back(toMsg(point));
+  return m;
+}
+
 }  // namespace smartmill

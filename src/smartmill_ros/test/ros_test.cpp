@@ -1,5 +1,6 @@
 #include <cmath>
 #include <filesystem>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -86,6 +87,35 @@ TEST(Conversions, conditionAndModesComeBackUnchanged) {
   const smartmill_msgs::Frf message = toMsg(frf);
   EXPECT_TRUE(std::isnan(message.coherence.at(1)));  // unknown, not zero
   EXPECT_EQ(fromMsg(message).frf.value, frf.frf.value);
+}
+
+TEST(Conversions, aChartComesBackUnchanged) {
+  StabilityChart chart;
+  chart.stamp = toSec(ros::Time(1763700000, 5));
+  chart.tool = "end_mill";
+  chart.material = "aluminium";
+  chart.method = "collocation";
+  chart.entry = 0.5;
+  chart.exit = 3.0;
+  chart.feed_per_tooth = 6e-5;
+  chart.limit = {{900.0, 1000.0}, {1e-3, std::numeric_limits<double>::infinity()}, {812.0, 813.0}};
+  chart.torque_depth_limit = {2e-3, 3e-3};
+  chart.power_depth_limit = {4e-3, 5e-3};
+  chart.absolute_depth_limit = 1e-3;
+  chart.recommended = {{900.0, 0.8e-3, 1e-3, 812.0, 3.0, 2700.0, 1e-6}};
+  chart.unstable = {{950.0, 2e-3, 1e-3, 812.5, 6.0, 5700.0, 2e-6}, {}};
+  smartmill_msgs::StabilityChart message = toMsg(chart);
+  EXPECT_EQ(message.depth_limit, chart.limit.depth);
+  EXPECT_EQ(message.exit_angle, 3.0);
+  EXPECT_EQ(message.unstable[0].power, 5700.0);
+  const StabilityChart back = fromMsg(message);
+  EXPECT_EQ(back.limit.chatter_frequency, chart.limit.chatter_frequency);
+  EXPECT_EQ(back.absolute_depth_limit, chart.absolute_depth_limit);
+  ASSERT_EQ(back.recommended.size(), 1u);
+  EXPECT_EQ(back.recommended[0].material_removal_rate, 1e-6);
+  message.power_depth_limit.pop_back();
+  EXPECT_NE(errorOf([&] { fromMsg(message); }).find("power_depth_limit: 1 values where 2"),
+            std::string::npos);
 }
 
 TEST(Frames, quarterTurnAboutZ) {

@@ -6,21 +6,13 @@
 #include <vector>
 
 #include "smartmill_core/cutting/coefficient_set.h"
+#include "smartmill_core/cutting/stability_chart.h"
 #include "smartmill_core/modal/results.h"
 #include "smartmill_core/signal/streams.h"
 #include "smartmill_launch/report/report_statistics.h"
 #include "smartmill_launch/session/session_plan.h"
 
 namespace smartmill::report {
-
-/// A stability limit over speed; a measured chart has the spindle's limits and points too.
-struct ChartCurve {
-  std::vector<double> spindle_speed;                          ///< [rad/s] rising
-  std::vector<double> depth_limit;                            ///< [m] +inf: none
-  std::vector<double> torque_depth_limit, power_depth_limit;  ///< [m] +inf: none; may be empty
-  double entry_angle = 0.0, exit_angle = 0.0;                 ///< [rad]
-  double absolute_depth_limit = NOT_A_NUMBER;                 ///< [m]
-};
 
 /// A cut of the session and what was seen of it.
 struct RecordedCut {
@@ -37,7 +29,7 @@ struct SessionRecording {
   std::vector<MeasuredFrf> frfs, true_frfs;
   std::vector<MeasuredModes> modes, true_modes;
   std::optional<CoefficientSet> coefficients, true_coefficients;
-  std::optional<ChartCurve> chart;
+  std::optional<StabilityChart> chart;
   std::vector<RecordedCut> cuts;
   double duration = 0.0;  ///< [s] of the recording
 
@@ -76,7 +68,7 @@ std::pair<std::uint64_t, std::uint64_t> judgedSamples(const RecordedCut& cut, do
 
 /// @param true_chart limit computed from the truth; empty without truth
 /// @param true_limits [m] the same at the speed of each cut in recording.cuts; NaN or empty: not known
-Report makeReport(const SessionRecording& recording, const std::optional<ChartCurve>& true_chart,
+Report makeReport(const SessionRecording& recording, const std::optional<StabilityChart>& true_chart,
                   const std::vector<double>& true_limits);
 
 /// Tables for people, in markdown with aligned columns.

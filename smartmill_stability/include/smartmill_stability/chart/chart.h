@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "smartmill_core/cutting/coefficient_set.h"
+#include "smartmill_core/cutting/stability_chart.h"
 #include "smartmill_core/modal/results.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/parameters/parameter_table.h"
@@ -43,35 +44,11 @@ struct ChartParameters {
   void validate() const;
 };
 
-/// One point of a chart.
-struct ChartPoint {
-  double spindle_speed = 0.0;                                           ///< [rad/s]
-  double axial_depth = 0.0;                                             ///< [m]
-  double depth_limit = 0.0;                                             ///< [m] +inf: none
-  double chatter_frequency = std::numeric_limits<double>::quiet_NaN();  ///< [Hz] at the limit
-  double torque = 0.0;                 ///< [N m] mean cutting torque at the chart's feed per tooth
-  double power = 0.0;                  ///< [W] mean cutting power
-  double material_removal_rate = 0.0;  ///< [m3/s]
-};
-
-struct Chart {
-  double stamp = 0.0;  ///< [s] of the newest input
-  std::string tool, material;
-  std::string method;  ///< zero_order or collocation
-  StabilityLimit limit;
-  std::vector<double>
-      torque_depth_limit;                 ///< [m] +inf: no limit known; friction takes its part of the torque
-  std::vector<double> power_depth_limit;  ///< [m]
-  double absolute_depth_limit = 0.0;      ///< [m] stable at any speed (collocation: of the chart)
-  std::vector<ChartPoint> recommended;    ///< best removal rate first, one a pocket
-  std::vector<ChartPoint> unstable;       ///< in the valleys, nearest to the best recommended speed first
-};
-
 /// Answer to: is this cut stable?
 struct Prediction {
   bool stable = false;
   bool within_spindle_limits = false;
-  ChartPoint point;
+  StabilityPoint point;
 };
 
 /// Makes charts of what was measured: gathers the FRFs (or modes) of x and y and the coefficients, in any
@@ -91,7 +68,7 @@ class ChartMaker {
   std::string missing() const;
 
   /// @throws Error when something is missing or the data contradict each other.
-  Chart chart() const;
+  StabilityChart chart() const;
 
   /// The machine as measured in a cut with other angles (a cut that has none: those of the chart); empty
   /// while modes of x and y or the tangential coefficient are missing.
@@ -111,13 +88,14 @@ class ChartMaker {
   void use(const std::string& tool, double stamp);
   /// Depth that the spindle carries at a speed: torque and power limit [m].
   std::array<double, 2> loadLimits(double speed) const;
-  double carried(const Chart& chart, std::size_t k) const;  // [m] by the spindle at a speed, with its reserve
+  double carried(const StabilityChart& chart,
+                 std::size_t k) const;  // [m] by the spindle at a speed, with its reserve
   int linesBeyond() const;
   /// A little beyond both ends of the chart, so that the margin of speed holds there too.
   StabilityLimit wideLimits(const Basis& given) const;
-  void recommend(Chart& chart, const StabilityLimit& wide) const;
-  void proposeUnstable(Chart& chart, const StabilityLimit& wide) const;
-  ChartPoint point(double speed, double depth, double limit, double frequency) const;
+  void recommend(StabilityChart& chart, const StabilityLimit& wide) const;
+  void proposeUnstable(StabilityChart& chart, const StabilityLimit& wide) const;
+  StabilityPoint point(double speed, double depth, double limit, double frequency) const;
   double torquePerDepth() const;  // [N]
   double friction(double speed) const;
 

@@ -6,6 +6,7 @@
 #include <limits>
 #include <vector>
 
+#include "smartmill_core/cutting/stability_chart.h"
 #include "smartmill_core/modal/modal_model.h"
 #include "smartmill_core/signal/frequency_response.h"
 
@@ -38,13 +39,6 @@ ToolTipResponse responseOf(const ModalModel& x, const ModalModel& y, double low,
 /// From measured FRFs; y is interpolated onto the lines of x. @throws Error when a unit is not m/N or the
 /// bands do not meet.
 ToolTipResponse responseOf(const FrequencyResponse& x, const FrequencyResponse& y);
-
-/// First loss of stability over spindle speed.
-struct StabilityLimit {
-  std::vector<double> spindle_speed;      ///< [rad/s]
-  std::vector<double> depth;              ///< [m] +inf: no limit found
-  std::vector<double> chatter_frequency;  ///< [Hz] at the limit; NaN without
-};
 
 /// Mean directional coefficients a_xx, a_xy, a_yx, a_yy over a revolution times 2 pi / teeth, so that A_0 =
 /// teeth / (2 pi) x these (Dunwoody eq. 6.3..6.9, where the second a_xx is a_yy), for [x, y] vibration of the

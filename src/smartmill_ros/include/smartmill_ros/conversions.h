@@ -11,8 +11,10 @@
 #include <smartmill_msgs/ModalModel.h>
 #include <smartmill_msgs/SampleBlock.h>
 #include <smartmill_msgs/SpindleAngle.h>
+#include <smartmill_msgs/StabilityChart.h>
 
 #include "smartmill_core/cutting/coefficient_set.h"
+#include "smartmill_core/cutting/stability_chart.h"
 #include "smartmill_core/modal/results.h"
 #include "smartmill_core/signal/streams.h"
 
@@ -44,5 +46,9 @@ MeasuredModes fromMsg(const smartmill_msgs::ModalModel& message);
 smartmill_msgs::ModalModel toMsg(const MeasuredModes& measured);
 CoefficientSet fromMsg(const smartmill_msgs::CuttingCoefficients& message);
 smartmill_msgs::CuttingCoefficients toMsg(const CoefficientSet& set);
+StabilityPoint fromMsg(const smartmill_msgs::StabilityPoint& message);
+smartmill_msgs::StabilityPoint toMsg(const StabilityPoint& point);
+StabilityChart fromMsg(const smartmill_msgs::StabilityChart& message);
+smartmill_msgs::StabilityChart toMsg(const StabilityChart& chart);
 
 }  // namespace smartmill
