@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "smartmill_core/testing/mill.h"
 #include "smartmill_core/units.h"
 #include "smartmill_discrepancy/data/dataset.h"
 #include "smartmill_sim/twin/twin.h"
@@ -15,13 +16,8 @@ constexpr double AIR_CUT_NOISE = 2.2e-4;  // [V]
 
 inline MachineModel spindleOnly() {
   MachineModel m;
-  Spindle s;
-  s.viscous = 4.1e-4;
-  s.coulomb = 0.05;
-  s.load_meter_gain = 3.88e-4;
-  s.load_meter_bandwidth = 7.0;
-  s.load_meter_resolution = 1e-6;
-  m.spindle = s;
+  m.spindle = mill().spindle;
+  m.spindle->load_meter_resolution = 1e-6;
   return m;
 }
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "smartmill_core/cutting/mechanistic.h"
+#include "smartmill_core/testing/mill.h"
 #include "smartmill_core/units.h"
 #include "smartmill_sim/effects/effect.h"
 #include "smartmill_sim/twin/twin.h"
@@ -13,22 +14,6 @@
 namespace smartmill::sim {
 
 constexpr double RATE = 25600.0;  // [Hz]
-
-/// A mill with an ideal force sensor: what it shows is what acts.
-inline MachineModel mill(int teeth, double helix_deg) {
-  MachineModel model;
-  model.file = "model.yaml";
-  model.tool = ToolGeometry{teeth, 20e-3, units::radFromDeg(helix_deg), {}};
-  model.cutting = CuttingCoefficients{800e6, 300e6, 200e6, 20e3, 25e3, 3e3};
-  Spindle spindle;
-  spindle.viscous = 4e-4;
-  spindle.coulomb = 0.05;
-  spindle.load_meter_gain = 4e-4;
-  spindle.load_meter_bandwidth = 7.0;
-  spindle.load_meter_resolution = 3e-4;
-  model.spindle = spindle;
-  return model;
-}
 
 inline MachineModel with(MachineModel model, const std::vector<EffectEntry>& effects) {
   for (const EffectEntry& e : effects) model.effects.push_back(e);

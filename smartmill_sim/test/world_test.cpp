@@ -11,6 +11,7 @@
 
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/testing/mill.h"
 #include "smartmill_core/units.h"
 #include "smartmill_sim/world/hammer_station.h"
 #include "smartmill_sim/world/stock.h"
@@ -123,25 +124,12 @@ TEST(Stock, NothingWithoutFeedOrAbove) {
 // ---- world
 
 MachineModel mill() {
-  MachineModel m;
-  m.file = "mill";
-  ToolGeometry tool;
-  tool.teeth = 4;
-  tool.diameter = 2.0 * RADIUS;
-  tool.helix = units::radFromDeg(30.0);
-  m.tool = tool;
+  MachineModel m = smartmill::mill();
+  m.tool->diameter = 2.0 * RADIUS;
   m.stickout = 50e-3;
-  m.cutting = CuttingCoefficients{800e6, 200e6, 150e6, 20e3, 15e3, 1e3};
-  Spindle spindle;
-  spindle.viscous = 4e-4;
-  spindle.coulomb = 0.1;
-  spindle.load_meter_gain = 4e-4;
-  spindle.load_meter_bandwidth = 7.0;
-  spindle.load_meter_resolution = 3e-4;
-  spindle.load_meter_full_scale = 8.0;
-  spindle.max_speed = units::radPerSecFromRpm(20000.0);
-  spindle.acceleration = units::radPerSecFromRpm(20000.0);  // in one second
-  m.spindle = spindle;
+  m.spindle->load_meter_full_scale = 8.0;
+  m.spindle->max_speed = units::radPerSecFromRpm(20000.0);
+  m.spindle->acceleration = units::radPerSecFromRpm(20000.0);  // in one second
   MachineAxes axes;
   axes.travel = {{{-0.2, 0.2}, {-0.2, 0.2}, {-0.2, 0.1}}};
   axes.rapid = 0.5;

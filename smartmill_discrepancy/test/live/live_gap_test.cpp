@@ -1,14 +1,13 @@
 #include "smartmill_discrepancy/live/live_gap.h"
 
 #include <cmath>
-#include <filesystem>
-#include <fstream>
 #include <random>
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/testing/mill.h"
+#include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_core/units.h"
 #include "smartmill_sim/twin/cutting_machine.h"
 #include "smartmill_sim/twin/twin.h"
@@ -18,30 +17,13 @@ namespace {
 
 constexpr double SIGMA = 2.0;  // [N]
 
-/// A folder that goes with the test.
-struct Folder {
-  std::string path =
-      (std::filesystem::temp_directory_path() / ("live_gap_test_" + std::to_string(getpid()))).string();
-  Folder() { std::filesystem::create_directories(path); }
-  ~Folder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path, ignored);
-  }
-};
-
 MachineModel mill(bool with_noise = true) {
-  const Folder folder;
-  const std::string file = folder.path + "/mill.yaml";
-  std::ofstream out(file);
-  out << "format: smartmill-model/1\n"
-         "tool: {teeth: 4, diameter_mm: 20.0, helix_deg: 30.0}\n"
-         "cutting: {Ktc_n_per_mm2: 800.0, Krc_n_per_mm2: 170.0, Kac_n_per_mm2: 220.0,\n"
-         "          Kte_n_per_mm: 27.0, Kre_n_per_mm: 30.0, Kae_n_per_mm: 1.4}\n"
-         "force_sensor:\n"
-         "  x: [{frequency_hz: 930.0, damping_ratio: 0.02, gain: 0.9}]\n";
-  if (with_noise) out << "  noise_rms_n: [2.0, 2.0, 2.0]\n";
-  out.close();
-  return readMachineModel(file);
+  MachineModel model = smartmill::mill();
+  model.spindle.reset();
+  model.force_sensor.axis[0].modes = {{930.0, 0.02, 0.9}};
+  model.force_sensor.axis[0].direct = 0.1;
+  if (with_noise) model.force_sensor.noise_rms = Axes3{{SIGMA, SIGMA, SIGMA}};
+  return model;
 }
 
 Stretch slot(const MachineModel& model, std::uint64_t seed) {
@@ -111,14 +93,8 @@ MachineModel flexibleMill() {
   MachineModel model = mill();
   model.tool_tip.x.modes = {{1210.0, 0.031, 1.0 / 28e6}};
   model.tool_tip.y.modes = {{1180.0, 0.029, 1.0 / 31e6}};
-  Spindle spindle;
-  spindle.viscous = 3.7e-4;
-  spindle.coulomb = 0.1;
-  spindle.load_meter_gain = 3.88e-4;
-  spindle.load_meter_bandwidth = 7.0;
-  spindle.load_meter_resolution = 3e-4;
-  spindle.load_meter_full_scale = 8.0;
-  model.spindle = spindle;
+  model.spindle = smartmill::mill().spindle;
+  model.spindle->load_meter_full_scale = 8.0;
   return model;
 }
 
@@ -199,11 +175,11 @@ TEST(LiveGap, refusesAModelWithoutNoise) {
 }
 
 TEST(RecordStretch, readsBackTheSame) {
-  const Folder folder;
+  const TemporaryFolder folder;
   const MachineModel model = mill();
   Stretch stretch = slot(model, 3);
   stretch.test.name = "slot 1/2";  // no file's name
-  const std::string out = folder.path + "/campaign";
+  const std::string out = folder.file("campaign");
   recordStretch(model, stretch, out);
   recordStretch(model, stretch, out);
   const Campaign campaign = readCampaign(out);

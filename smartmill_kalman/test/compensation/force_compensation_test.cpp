@@ -9,8 +9,8 @@
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/modal/modal_filter.h"
+#include "smartmill_core/testing/tap_rig.h"
 #include "smartmill_core/units.h"
-#include "smartmill_kalman_testing/tap_rig.h"
 
 namespace smartmill::kalman {
 namespace {

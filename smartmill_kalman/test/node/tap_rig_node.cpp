@@ -12,7 +12,7 @@
 
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/names.h"
-#include "smartmill_kalman_testing/tap_rig.h"
+#include "smartmill_core/testing/tap_rig.h"
 #include "smartmill_ros/conversions.h"
 
 namespace smartmill::kalman {

@@ -7,8 +7,8 @@
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/testing/coverage.h"
+#include "smartmill_core/testing/tap_rig.h"
 #include "smartmill_kalman/compensation/sorted_compensation.h"
-#include "smartmill_kalman_testing/tap_rig.h"
 
 namespace smartmill::kalman {
 namespace {

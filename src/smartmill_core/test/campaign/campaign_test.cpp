@@ -9,6 +9,7 @@
 #include "smartmill_core/campaign/record.h"
 #include "smartmill_core/cutting/regression.h"
 #include "smartmill_core/signal/statistics.h"
+#include "smartmill_core/testing/refusals.h"
 #include "smartmill_core/testing/shared_data.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_core/units.h"
@@ -36,13 +37,6 @@ tests:
 - {name: air, kind: air, file: air.csv, sample_rate_hz: 100, spindle_speed_rpm: 1000, running_before_s: 0.4}
 - {name: tap, kind: tap, file: tap.csv, sample_rate_hz: 100, spindle_speed_rpm: 0, direction: z}
 )";
-
-std::string with(const std::string& from, const std::string& to) {
-  std::string text = CAMPAIGN;
-  const std::size_t at = text.find(from);
-  EXPECT_NE(at, std::string::npos) << from;
-  return text.replace(at, from.size(), to);
-}
 
 void expectCampaign(const Campaign& c, const std::string& folder) {
   ASSERT_EQ(c.tests.size(), 3u);
@@ -72,10 +66,7 @@ TEST(Campaign, readsAndWritesEveryKey) {
 }
 
 TEST(Campaign, refusesWithFileKeyAndValue) {
-  const TemporaryFolder folder;
-  const struct {
-    const char *from, *to, *message;
-  } cases[] = {
+  const std::vector<Refusal> refusals{
       {"file: slot.csv", "file: ../slot.csv",
        "tests[0].file: '../slot.csv' lies outside the campaign's folder"},
       {"file: slot.csv", "file: /slot.csv", "tests[0].file: '/slot.csv' lies outside the campaign's folder"},
@@ -94,10 +85,7 @@ TEST(Campaign, refusesWithFileKeyAndValue) {
       {"model: model.yaml\n", "", "model: is missing"},
       {"tests:", "runs:", "tests: is missing"},
   };
-  for (const auto& c : cases) {
-    const std::string file = folder.write("campaign.yaml", with(c.from, c.to));
-    EXPECT_EQ(errorOf([&] { readCampaign(file); }), file + ": " + c.message);
-  }
+  expectRefusals(CAMPAIGN, refusals, readCampaign);
 }
 
 TEST(Record, readsColumnsInAnyOrderAndNotesTheUnknown) {

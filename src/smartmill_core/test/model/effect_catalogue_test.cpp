@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/testing/mill.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_core/units.h"
 
@@ -18,30 +19,14 @@ namespace {
 
 constexpr int DRAWS = 20;
 
-MachineModel mill(int teeth) {
-  MachineModel m;
-  m.tool = ToolGeometry{teeth, 16e-3, units::radFromDeg(35.0), {}};
-  m.cutting = CuttingCoefficients{800e6, 300e6, 200e6, 20e3, 25e3, 3e3};
+// With modes, so that every effect can be thought.
+MachineModel vibratingMill(int teeth) {
+  MachineModel m = mill(teeth);
   for (ModalModel& axis : m.force_sensor.axis) {
-    Mode mode;
-    mode.frequency = 1200.0;
-    mode.damping_ratio = 0.03;
-    mode.gain = 0.9;
-    axis.modes = {mode};
+    axis.modes = {{1200.0, 0.03, 0.9}};
     axis.direct = 0.1;
   }
-  Mode tip;
-  tip.frequency = 1100.0;
-  tip.damping_ratio = 0.04;
-  tip.gain = 1.0 / 30e6;
-  m.tool_tip.x.modes = {tip};
-  Spindle s;
-  s.viscous = 4e-4;
-  s.coulomb = 0.05;
-  s.load_meter_gain = 4e-4;
-  s.load_meter_bandwidth = 7.0;
-  s.load_meter_resolution = 3e-4;
-  m.spindle = s;
+  m.tool_tip.x.modes = {{1100.0, 0.04, 1.0 / 30e6}};
   return m;
 }
 
@@ -66,7 +51,7 @@ void expectSame(const EffectEntry& a, const EffectEntry& b, double tolerance) {
 }
 
 TEST(EffectCatalogue, everyEntryIsWhole) {
-  const MachineModel model = mill(4);
+  const MachineModel model = vibratingMill(4);
   std::set<std::string> names;
   for (const EffectKind& kind : effectCatalogue()) {
     EXPECT_TRUE(names.insert(kind.name).second) << kind.name << " stands twice";
@@ -126,9 +111,45 @@ TEST(EffectCatalogue, holdsTheNamesThatOtherProgramsUse) {
   EXPECT_EQ(findEffect("saturation")->parameters.at(0).unit, "N");
 }
 
+TEST(EffectCatalogue, anglesDifferTheShortWayRound) {
+  const EffectKind &order = *findEffect("spindle_order"), &runout = *findEffect("runout");
+  EXPECT_NEAR(parameterOf(order, "y_deg").difference(359.0, 2.0), -3.0, 1e-12);
+  EXPECT_NEAR(parameterOf(order, "y_deg").scale(10.0), 57.29577951308232, 1e-12);  // one radian
+  EXPECT_EQ(parameterOf(order, "y_n").difference(359.0, 2.0), 357.0);
+  EXPECT_EQ(parameterOf(order, "y_n").scale(10.0), 10.0);
+  EXPECT_NEAR(parameterOf(runout, "angle_deg").difference(-170.0, 170.0), 20.0, 1e-12);
+  // Names of a report lead to their key; a pitch is a width, not a direction.
+  EXPECT_EQ(parameterOf(*findEffect("uneven_pitch"), "pitch_deg[1]").difference(359.0, 2.0), 357.0);
+  EXPECT_EQ(parameterOf(*findEffect("tool_flexibility"), "x[0].frequency_hz").key, "x");
+  EXPECT_THROW(parameterOf(runout, "offset"), Error);
+}
+
+// Modes found axis by axis are what the form of both axes writes.
+TEST(EffectCatalogue, piecesMakeUpTheWhole) {
+  const MachineModel model = vibratingMill(2);
+  const std::vector<EffectForm> forms = formsOf(*findEffect("tool_flexibility"), scopeOf(model));
+  const auto named = [&](const std::string& variant) -> const EffectForm& {
+    return *std::find_if(forms.begin(), forms.end(),
+                         [&](const EffectForm& f) { return f.variant == variant; });
+  };
+  const EffectForm::Values x{7.0, -3.0, 20.0}, y{7.2, -3.1, 30.0}, both{7.0, -3.0, 20.0, 7.2, -3.1, 30.0};
+  const EffectForm& whole = named("xy");
+  EXPECT_EQ(whole.pieces, (std::vector<std::string>{"x", "y"}));
+  EXPECT_EQ(whole.pieceOf(both, 0), x);
+  EXPECT_EQ(whole.pieceOf(both, 1), y);
+  auto parts = numbersOf(named("x").entry(x));
+  const auto other = numbersOf(named("y").entry(y));
+  parts.insert(parts.end(), other.begin(), other.end());
+  EXPECT_EQ(numbersOf(whole.entry(both)), parts);
+  for (const EffectKind& kind : effectCatalogue()) {
+    for (const EffectForm& form : formsOf(kind, scopeOf(model)))
+      EXPECT_TRUE(form.pieces.empty() || kind.name == "tool_flexibility") << form.title();
+  }
+}
+
 TEST(EffectCatalogue, fitsLookInsideTheirBounds) {
   for (const int teeth : {2, 3, 4}) {
-    const MachineModel model = mill(teeth);
+    const MachineModel model = vibratingMill(teeth);
     for (const EffectKind& kind : effectCatalogue()) {
       for (const EffectForm& form : formsOf(kind, scopeOf(model))) {
         const std::string name = form.title();
@@ -166,7 +187,7 @@ TEST(EffectCatalogue, drawnEntriesComeBackFromFiles) {
   for (const int teeth : {2, 3, 4}) {
     for (const EffectKind& kind : effectCatalogue()) {
       for (int k = 0; k < DRAWS / 4; ++k) {
-        MachineModel model = mill(teeth);
+        MachineModel model = vibratingMill(teeth);
         const EffectEntry drawn = drawEffect(kind.name, model, random);
         EXPECT_NO_THROW(effectEntry(drawn.name, drawn.numbers, drawn.words, drawn.lists)) << kind.name;
         model.effects = {drawn};
@@ -184,7 +205,7 @@ TEST(EffectCatalogue, drawnEntriesComeBackFromFiles) {
 TEST(EffectCatalogue, coordinatesAndEntriesAreEachOthersInverse) {
   EffectKind::Random random(11);
   for (const int teeth : {2, 3, 4, 6}) {
-    const MachineModel model = mill(teeth);
+    const MachineModel model = vibratingMill(teeth);
     for (const EffectKind& kind : effectCatalogue()) {
       const std::vector<EffectForm> forms = formsOf(kind, scopeOf(model));
       for (int k = 0; k < DRAWS; ++k) {
@@ -247,7 +268,7 @@ TEST(EffectCoordinates, areWhatTheySay) {
     for (const double v : list.values(level)) EXPECT_NEAR(v, 0.0, 1e-12);
   }
 
-  const EffectForm pitch({pitches("pitch_deg", *mill(3).tool, {-30.0, 30.0, 1e-3, 5.0})});
+  const EffectForm pitch({pitches("pitch_deg", *vibratingMill(3).tool, {-30.0, 30.0, 1e-3, 5.0})});
   const std::vector<std::pair<std::string, double>> degrees = numbersOf(pitch.entry({4.0, -1.0}));
   ASSERT_EQ(degrees.size(), 3u);
   EXPECT_EQ(degrees[2].first, "pitch_deg[2]");
@@ -256,7 +277,7 @@ TEST(EffectCoordinates, areWhatTheySay) {
 }
 
 TEST(EffectCatalogue, tellsWhyACampaignCannotSpeakOfAnEffect) {
-  MachineModel model = mill(1);
+  MachineModel model = vibratingMill(1);
   model.tool_tip = {};
   EffectScope scope = scopeOf(model);
   scope.start_times = scope.cut_times = false;
@@ -280,7 +301,7 @@ TEST(EffectEntry, isChecked) {
                Error);
   EXPECT_THROW(effectEntry("uneven_pitch", {}), Error);
   EXPECT_THROW(effectEntry("uneven_pitch", {}, {}, {{"pitch_deg", {-90.0, 450.0}}}), Error);
-  EXPECT_THROW(drawEffect("coolant", mill(2), *std::make_unique<EffectKind::Random>(1)), Error);
+  EXPECT_THROW(drawEffect("coolant", vibratingMill(2), *std::make_unique<EffectKind::Random>(1)), Error);
 }
 
 // docs/effects.md is made from the catalogue: rosrun smartmill_studies sim_effect_table docs/effects.md

@@ -7,6 +7,7 @@
 
 #include "smartmill_core/model/effect_catalogue.h"
 #include "smartmill_core/model/strict_yaml.h"
+#include "smartmill_core/testing/refusals.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_core/units.h"
 
@@ -83,14 +84,6 @@ effects:
 uncertainty_percent: {cutting: 4, damping: 12}
 )";
 
-/// MODEL with one piece of text replaced.
-std::string with(const std::string& from, const std::string& to) {
-  std::string text = MODEL;
-  const std::size_t at = text.find(from);
-  EXPECT_NE(at, std::string::npos) << from;
-  return text.replace(at, from.size(), to);
-}
-
 void expectModel(const MachineModel& m) {
   ASSERT_TRUE(m.tool && m.stickout && m.cutting && m.cutting_std && m.spindle && m.axes && m.hammer &&
               m.workpiece);
@@ -157,9 +150,7 @@ TEST(MachineModel, anEmptyModelIsAModelAndToolsRefuseByName) {
 
 TEST(MachineModel, refusesWithFileKeyAndValue) {
   const TemporaryFolder folder;
-  const struct {
-    const char *from, *to, *message;
-  } cases[] = {
+  const std::vector<Refusal> refusals{
       {"diameter_mm: 19.05", "diameter_mm: -19.05", "tool.diameter_mm: -19.05 is out of range (> 0)"},
       {"diameter_mm: 19.05", "diameter_mm: .nan", "tool.diameter_mm: '.nan' is not a finite number"},
       {"diameter_mm: 19.05", "diameter_mm: nan", "tool.diameter_mm: 'nan' is not a finite number"},
@@ -204,10 +195,7 @@ TEST(MachineModel, refusesWithFileKeyAndValue) {
       {"tool:\n", "tool: 4\ntools:\n", "tool: '4' is not a map of keys"},
       {"effects:\n", "effects: {}\nmore:\n", "effects: a map is not a list"},
   };
-  for (const auto& c : cases) {
-    const std::string file = folder.write("bad.yaml", with(c.from, c.to));
-    EXPECT_EQ(errorOf([&] { readMachineModel(file); }), file + ": " + c.message);
-  }
+  expectRefusals(MODEL, refusals, readMachineModel);
   const std::string broken = folder.write("broken.yaml", "format: [smartmill\n");
   const std::string message = errorOf([&] { readMachineModel(broken); });
   EXPECT_THAT(message, HasSubstr(broken + ": not a YAML file: "));

@@ -12,7 +12,7 @@
 #include "smartmill_core/signal/streams.h"
 #include "smartmill_core/units.h"
 
-namespace smartmill::kalman {
+namespace smartmill {
 
 /// A dynamometer of one mode, static gain 1.
 inline ModalModel dynamometer() {
@@ -120,4 +120,4 @@ class TapRig {
   std::array<double, 3> truth{};
 };
 
-}  // namespace smartmill::kalman
+}  // namespace smartmill
