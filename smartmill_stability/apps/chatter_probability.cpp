@@ -10,6 +10,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/io/csv.h"
 #include "smartmill_core/program.h"
+#include "smartmill_stability/chart/cut_request.h"
 #include "smartmill_stability/chart/picture.h"
 #include "smartmill_stability/chart/uncertainty.h"
 #include "smartmill_stability/solvers/model_system.h"
@@ -18,9 +19,9 @@ namespace {
 
 using namespace smartmill;  // NOLINT
 
-struct Request {
-  std::string model, speeds, depths, out;
-  double entry_deg = 0.0, exit_deg = 180.0, risk = 0.05, speed_margin = 0.02;
+struct Request : stability::CutRequest {
+  std::string depths;
+  double risk = 0.05, speed_margin = 0.02;
   int draws = 60, points = 5;
   unsigned seed = 1;
 };
@@ -28,10 +29,8 @@ struct Request {
 void run(const Request& request) {
   if (!(request.risk >= 0.0) || !(request.risk < 1.0)) throw Error("--risk: 0 <= value < 1 is due");
   const MachineModel model = readMachineModel(request.model);
-  const stability::RegenerativeSystem system =
-      stability::systemOf(model, request.entry_deg, request.exit_deg);
-  std::vector<double> speeds = stability::rangeOf("--speeds", request.speeds);
-  for (double& speed : speeds) speed = units::radPerSecFromRpm(speed);
+  const stability::RegenerativeSystem system = request.system(model);
+  const std::vector<double> speeds = request.speedRange();
   std::vector<double> depths = stability::rangeOf("--depths-mm", request.depths);
   for (double& depth : depths) depth *= units::MM;
   const bool terminal = isatty(STDERR_FILENO);
@@ -70,17 +69,13 @@ int main(int argc, char** argv) {
   Request request;
   CommandLine line{
       "Probability of chatter over speed and depth, from the standard deviations of a machine model."};
-  line.option("model", request.model, "machine model file with tool, cutting and tool_tip").required();
-  line.option("--entry-deg", request.entry_deg, "immersion angle at which a tooth enters [deg]").required();
-  line.option("--exit-deg", request.exit_deg, "immersion angle at which a tooth leaves [deg]").required();
-  line.option("--speeds", request.speeds, "LO:HI:N [rpm]").required();
+  request.addTo(line, "LO:HI:N");
   line.option("--depths-mm", request.depths, "LO:HI:N [mm]").required();
   line.option("--draws", request.draws, "machines drawn (60)");
   line.option("--seed", request.seed, "of the draws (1)");
   line.option("--risk", request.risk, "probability of chatter that robust points may have (0.05)");
   line.option("--speed-margin", request.speed_margin, "share of the speed to both sides (0.02)");
   line.option("--points", request.points, "robust points printed (5)");
-  line.option("-o,--out", request.out, "CSV file; a picture of the same name with .png stands beside it")
-      .required();
+  request.addOutTo(line);
   return runProgram(line, argc, argv, [&] { run(request); });
 }

@@ -13,6 +13,7 @@
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/program.h"
 #include "smartmill_core/units.h"
+#include "smartmill_stability/chart/cut_request.h"
 #include "smartmill_stability/chart/picture.h"
 #include "smartmill_stability/solvers/boundary.h"
 #include "smartmill_stability/solvers/model_system.h"
@@ -22,9 +23,9 @@ namespace {
 
 using namespace smartmill;
 
-struct Request {
-  std::string model, method = "collocation", speeds, out, boundary, serration;
-  double entry_deg = 0.0, exit_deg = 180.0, max_depth_mm = 0.0, feed_mm = 0.0;
+struct Request : stability::CutRequest {
+  std::string method = "collocation", boundary, serration;
+  double max_depth_mm = 0.0, feed_mm = 0.0;
   bool errors = false;
 };
 
@@ -107,10 +108,8 @@ void addChips(const Request& request, stability::RegenerativeSystem& system) {
 void run(const Request& request) {
   const stability::Method method = stability::methodOf(request.method);
   if (!(request.max_depth_mm > 0.0)) throw Error("--max-depth-mm: above 0 is due");
-  std::vector<double> speeds = stability::rangeOf("--speeds", request.speeds);  // [rpm]
-  for (double& speed : speeds) speed = units::radPerSecFromRpm(speed);
-  stability::RegenerativeSystem system =
-      stability::systemOf(readMachineModel(request.model), request.entry_deg, request.exit_deg);
+  const std::vector<double> speeds = request.speedRange();
+  stability::RegenerativeSystem system = request.system(readMachineModel(request.model));
   addChips(request, system);
   stability::SolverOptions options;
   options.estimate_error = request.errors;
@@ -151,15 +150,11 @@ int main(int argc, char** argv) {
   CommandLine line{
       "Stability lobes of a machine model: the first loss of stability when the depth grows, over spindle "
       "speed."};
-  line.option("model", request.model, "machine model file with tool, cutting and tool_tip").required();
-  line.option("--entry-deg", request.entry_deg, "immersion angle at which a tooth enters [deg]").required();
-  line.option("--exit-deg", request.exit_deg, "immersion angle at which a tooth leaves [deg]").required();
+  request.addTo(line, "LO:HI:N");
   line.option("--method", request.method,
               "solver: collocation (default), semi_discretization, multi_frequency, zero_order");
-  line.option("--speeds", request.speeds, "LO:HI:N [rpm]").required();
   line.option("--max-depth-mm", request.max_depth_mm, "depths up to here [mm]").required();
-  line.option("-o,--out", request.out, "CSV file; a picture of the same name with .png stands beside it")
-      .required();
+  request.addOutTo(line);
   line.option("--boundary", request.boundary,
               "CSV of the whole boundary with its islands, besides the first loss; a picture beside it");
   line.option(

@@ -4,7 +4,6 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/units.h"
-#include "smartmill_stability/solvers/model_system.h"
 
 namespace smartmill::stability {
 
@@ -14,10 +13,7 @@ void StudyRange::validate() const {
 }
 
 void StudyRequest::addTo(CommandLine& line) {
-  line.option("model", model, "machine model file with tool, cutting and tool_tip").required();
-  line.option("--entry-deg", entry_deg, "immersion angle at which a tooth enters [deg]").required();
-  line.option("--exit-deg", exit_deg, "immersion angle at which a tooth leaves [deg]").required();
-  line.option("--speeds", speeds, "LO:HI [rpm]").required();
+  CutRequest::addTo(line, "LO:HI");
   line.option("--max-depth-mm", max_depth_mm, "limits are looked for up to here [mm]").required();
   line.option("--seed", seed, "of the draws (1)");
 }
@@ -26,10 +22,6 @@ MachineModel StudyRequest::machine() const {
   MachineModel machine = readMachineModel(model);
   machine.needTool("simulate cuts");
   return machine;
-}
-
-RegenerativeSystem StudyRequest::system(const MachineModel& machine) const {
-  return systemOf(machine, entry_deg, exit_deg);
 }
 
 StudyRange StudyRequest::range() const {

@@ -58,17 +58,13 @@ void findings(std::ostream& out, const char* title, const std::vector<Finding>& 
 }
 
 const char* sentenceOf(Verdict verdict) {
-  switch (verdict) {
-    case Verdict::no_disagreement:
-      return "Model and records agree to the noise.";
-    case Verdict::explained:
-      return "The effects below explain what model and records differ by.";
-    case Verdict::partly_explained:
-      return "The effects below explain a part; something remains that no effect of the catalogue explains.";
-    case Verdict::unknown_effect:
-      break;
-  }
-  return "Model and records differ, and no effect of the catalogue explains it.";
+  static const std::map<Verdict, const char*> SENTENCES{
+      {Verdict::no_disagreement, "Model and records agree to the noise."},
+      {Verdict::explained, "The effects below explain what model and records differ by."},
+      {Verdict::partly_explained,
+       "The effects below explain a part; something remains that no effect of the catalogue explains."},
+      {Verdict::unknown_effect, "Model and records differ, and no effect of the catalogue explains it."}};
+  return SENTENCES.at(verdict);
 }
 
 const std::map<std::string, std::string> CAPTIONS{

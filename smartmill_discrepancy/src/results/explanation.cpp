@@ -1,19 +1,14 @@
 #include "smartmill_discrepancy/results/explanation.h"
 
+#include <array>
+#include <cstddef>
+
 namespace smartmill::discrepancy {
 
 const char* nameOf(Verdict verdict) {
-  switch (verdict) {
-    case Verdict::no_disagreement:
-      return "no_disagreement";
-    case Verdict::explained:
-      return "explained";
-    case Verdict::partly_explained:
-      return "partly_explained";
-    case Verdict::unknown_effect:
-      break;
-  }
-  return "unknown_effect";
+  static const std::array<const char*, 4> NAMES{
+      {"no_disagreement", "explained", "partly_explained", "unknown_effect"}};
+  return NAMES.at(static_cast<std::size_t>(verdict));
 }
 
 }  // namespace smartmill::discrepancy

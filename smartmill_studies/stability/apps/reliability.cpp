@@ -71,7 +71,6 @@ int main(int argc, char** argv) {
   line.option("--draws", request.draws, "behind each prediction (200)");
   line.option("--bins", request.bins, "of the predicted probability (4)");
   line.flag("--solver-only", request.solver_only, "the solver is the observer too, no simulator");
-  line.option("-o,--out", request.out, "CSV file; the diagram of the same name with .png stands beside it")
-      .required();
+  request.addOutTo(line, "the diagram");
   return runProgram(line, argc, argv, [&] { run(request); });
 }

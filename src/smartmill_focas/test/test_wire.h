@@ -63,19 +63,39 @@ inline bool eventually(const std::function<bool()>& condition, double seconds = 
   return true;
 }
 
-/// A blocking TCP socket that knows nothing of FOCAS.
-class RawSocket {
+inline sockaddr_in loopback(std::uint16_t port) {
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(port);
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  return address;
+}
+
+/// A file descriptor that is closed with it.
+class OwnedDescriptor {
  public:
-  explicit RawSocket(int fd) : fd_(fd) {}
-  RawSocket(const RawSocket&) = delete;
-  ~RawSocket() { close(); }
+  explicit OwnedDescriptor(int fd) : fd_(fd) {}
+  OwnedDescriptor(const OwnedDescriptor&) = delete;
+  ~OwnedDescriptor() { close(); }
+  void close() {
+    if (fd_ >= 0) {
+      ::close(fd_);
+      fd_ = -1;
+    }
+  }
+
+ protected:
+  int fd_;
+};
+
+/// A blocking TCP socket that knows nothing of FOCAS.
+class RawSocket : public OwnedDescriptor {
+ public:
+  using OwnedDescriptor::OwnedDescriptor;
   static int connectTo(std::uint16_t port) {
     const int fd = ::socket(AF_INET, SOCK_STREAM, 0);
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_port = htons(port);
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    if (::connect(fd, reinterpret_cast<sockaddr*>(&address), sizeof address) != 0) {
+    const sockaddr_in address = loopback(port);
+    if (::connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
       throw std::runtime_error("test cannot connect");
     }
     return fd;
@@ -118,24 +138,13 @@ class RawSocket {
   /// True when the peer has closed (nothing more comes).
   bool closedByPeer() { return receive(1).empty(); }
   void shutdownSend() { ::shutdown(fd_, SHUT_WR); }
-  void close() {
-    if (fd_ >= 0) {
-      ::close(fd_);
-      fd_ = -1;
-    }
-  }
-
- private:
-  int fd_;
 };
 
 /// Listens on a free port of loopback.
-class RawListener {
+class RawListener : public OwnedDescriptor {
  public:
-  RawListener() : fd_(::socket(AF_INET, SOCK_STREAM, 0)) {
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  RawListener() : OwnedDescriptor(::socket(AF_INET, SOCK_STREAM, 0)) {
+    sockaddr_in address = loopback(0);
     socklen_t size = sizeof address;
     if (::bind(fd_, reinterpret_cast<sockaddr*>(&address), size) != 0 || ::listen(fd_, 8) != 0) {
       throw std::runtime_error("test cannot listen");
@@ -143,18 +152,10 @@ class RawListener {
     ::getsockname(fd_, reinterpret_cast<sockaddr*>(&address), &size);
     port_ = ntohs(address.sin_port);
   }
-  ~RawListener() { close(); }
   std::uint16_t port() const { return port_; }
   int accept() { return ::accept(fd_, nullptr, nullptr); }
-  void close() {
-    if (fd_ >= 0) {
-      ::close(fd_);
-      fd_ = -1;
-    }
-  }
 
  private:
-  int fd_;
   std::uint16_t port_ = 0;
 };
 

@@ -1,0 +1,30 @@
+#include "smartmill_stability/chart/cut_request.h"
+
+#include "smartmill_core/units.h"
+#include "smartmill_stability/solvers/model_system.h"
+
+namespace smartmill::stability {
+
+void CutRequest::addTo(CommandLine& line, const std::string& form) {
+  line.option("model", model, "machine model file with tool, cutting and tool_tip").required();
+  line.option("--entry-deg", entry_deg, "immersion angle at which a tooth enters [deg]").required();
+  line.option("--exit-deg", exit_deg, "immersion angle at which a tooth leaves [deg]").required();
+  line.option("--speeds", speeds, form + " [rpm]").required();
+}
+
+void CutRequest::addOutTo(CommandLine& line, const std::string& what) {
+  line.option("-o,--out", out, "CSV file; " + what + " of the same name with .png stands beside it")
+      .required();
+}
+
+RegenerativeSystem CutRequest::system(const MachineModel& machine) const {
+  return systemOf(machine, entry_deg, exit_deg);
+}
+
+std::vector<double> CutRequest::speedRange() const {
+  std::vector<double> range = rangeOf("--speeds", speeds);
+  for (double& speed : range) speed = units::radPerSecFromRpm(speed);
+  return range;
+}
+
+}  // namespace smartmill::stability
