@@ -118,7 +118,7 @@ class Account {
 
 void run(double minutes) {
   ForceSensor sensor;
-  for (ModalModel& axis : sensor.axis) axis = kalman::ReferenceCase::exactSensor();
+  for (ModalModel& axis : sensor.axis) axis = ReferenceCase::exactSensor();
   std::size_t blocks_out = 0;
   double sum = 0.0;
   const auto receive = [&](const ForceBlock&, const ForceBlock& compensated) {

@@ -108,8 +108,7 @@ Took runEstimator(int blocks, double& sum) {
     ++out;
     sum += compensated.force[0].back();
   });
-  for (std::size_t axis = 0; axis < 3; ++axis)
-    estimator.setSensor(axis, kalman::ReferenceCase::exactSensor());
+  for (std::size_t axis = 0; axis < 3; ++axis) estimator.setSensor(axis, ReferenceCase::exactSensor());
   const Took took = run(blocks, [&](const SampleBlock& block) {
     estimator.handle(SpindleAngle{block.stamp, SPEED * block.stamp, SPEED});
     estimator.handle(block);

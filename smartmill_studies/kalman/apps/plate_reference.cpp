@@ -104,7 +104,7 @@ void milling(const kalman::PlateSensor& plate, const kalman::TransferMatrix& thr
     for (const auto* record : {&measured, &by_three, &by_six}) {
       for (std::size_t axis = 0; axis < 3; ++axis) {
         std::printf("%8.1f",
-                    100.0 * kalman::bandError((*record)[axis], applied[axis], RATE, 2560, 22528, 1e3 * band));
+                    100.0 * bandError((*record)[axis], applied[axis], RATE, 2560, 22528, 1e3 * band));
       }
       std::printf(" ");
     }
