@@ -72,6 +72,7 @@ void KalmanNode::listen() {
         sensor_frame_ = frame;
         sorted_.push(fromMsg(message));
       });
+  inputs.setWaiting(names::DYNAMOMETER, [this] { return waiting_.size(); });
   connect(inputs, sorted_);
   feed<smartmill_msgs::CuttingCondition>(inputs, names::CUTTING_CONDITION, sorted_);
   // A recording that began after the taps holds the modes that served in it.

@@ -9,11 +9,13 @@ namespace smartmill {
 namespace {
 
 constexpr double SAY_EVERY = 5.0;  // [s] of lines in the log about one input
+constexpr double HOLD = 120.0;     // [s] without a question after which a player counts as gone
 
 }  // namespace
 
 std::string InputHealth::take(double now, const std::function<void()>& handle) {
   watchdog_.heard();
+  ++taken_;
   try {
     handle();
     standing_ = false;
@@ -40,6 +42,10 @@ Inputs::Inputs(ros::NodeHandle nh, double timeout) : nh_(std::move(nh)), timeout
 }
 
 void Inputs::tick(double period) {
+  if (held_ > 0.0) {
+    held_ -= period;
+    return;
+  }
   any_.tick(period);
   for (InputHealth& input : inputs_) input.watchdog().tick(period);
 }
@@ -72,6 +78,22 @@ const InputHealth* Inputs::dead(std::initializer_list<const char*> topics) {
     if (input.watchdog().dead()) return &input;
   }
   return nullptr;
+}
+
+void Inputs::follow(const smartmill_msgs::Follow::Request& request,
+                    smartmill_msgs::Follow::Response& response) {
+  using Request = smartmill_msgs::Follow::Request;
+  if (request.phase == Request::BEGIN || held_ > 0.0) held_ = HOLD;
+  if (request.phase == Request::END || request.phase == Request::LEAVE) held_ = 0.0;
+  if (request.phase == Request::END) {
+    any_.end();
+    for (InputHealth& input : inputs_) input.watchdog().end();
+  }
+  for (std::size_t i = 0; i < inputs_.size(); ++i) {
+    response.topics.push_back(subscribers_[i].getTopic());
+    response.taken.push_back(inputs_[i].taken());
+    response.publishers.push_back(subscribers_[i].getNumPublishers());
+  }
 }
 
 void Inputs::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {

@@ -5,6 +5,8 @@
 
 #include <ros/console.h>
 
+#include "smartmill_ros/follower.h"
+
 namespace smartmill {
 namespace {
 
@@ -14,7 +16,10 @@ constexpr double TICK = 0.05;  // [s]
 
 NodeShell::NodeShell(ros::NodeHandle nh, ros::NodeHandle private_nh, const std::string& hardware,
                      double input_timeout)
-    : nh_(nh), inputs_(nh, input_timeout), diagnostics_(nh, std::move(private_nh)) {
+    : nh_(nh),
+      inputs_(nh, input_timeout),
+      diagnostics_(nh, private_nh),
+      follow_(private_nh.advertiseService(FOLLOW, &NodeShell::follow, this)) {
   diagnostics_.setHardwareID(hardware);
   diagnostics_.add("inputs", &inputs_, &Inputs::diagnose);
   every(TICK, [this] {
@@ -29,14 +34,24 @@ void NodeShell::diagnose(const std::string& name,
 }
 
 void NodeShell::every(double period, std::function<void()> work) {
-  timers_.push_back(
-      nh_.createWallTimer(ros::WallDuration(period), [work = std::move(work)](const ros::WallTimerEvent&) {
-        try {
-          work();
-        } catch (const std::exception& error) {
-          ROS_ERROR_STREAM_THROTTLE(5.0, error.what());
-        }
-      }));
+  works_.push_back([work = std::move(work)] {
+    try {
+      work();
+    } catch (const std::exception& error) {
+      ROS_ERROR_STREAM_THROTTLE(5.0, error.what());
+    }
+  });
+  timers_.push_back(nh_.createWallTimer(ros::WallDuration(period),
+                                        [work = works_.back()](const ros::WallTimerEvent&) { work(); }));
+}
+
+bool NodeShell::follow(smartmill_msgs::Follow::Request& request, smartmill_msgs::Follow::Response& response) {
+  inputs_.follow(request, response);
+  // The work of watching finds the end, and hands out what waits.
+  if (request.phase == smartmill_msgs::Follow::Request::END) {
+    for (const auto& work : works_) work();
+  }
+  return true;
 }
 
 }  // namespace smartmill

@@ -1,3 +1,6 @@
+#include <algorithm>
+#include <atomic>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -10,6 +13,7 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/names.h"
+#include "smartmill_ros/follower.h"
 #include "smartmill_ros/frf_server.h"
 #include "smartmill_ros/kept_topic.h"
 #include "smartmill_ros/node_shell.h"
@@ -20,7 +24,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-constexpr double PATIENCE = 30.0;  // [s], for a busy machine
+constexpr double PATIENCE = 120.0;  // [s], for a busy machine
 
 template <class Condition>
 bool eventually(Condition condition) {
@@ -80,6 +84,44 @@ TEST(NodeShell, AHandlerThatThrowsLeavesADiagnosticAndTheNodeGoesOn) {
   const InputHealth* dead = shell.inputs().dead({names::SPINDLE_ANGLE});
   ASSERT_NE(dead, nullptr);
   EXPECT_EQ(dead->topic(), names::SPINDLE_ANGLE);
+}
+
+TEST(Followers, WhoPlaysLosesNothingAndItsPausesAreNoEnd) {
+  ros::NodeHandle nh, private_nh("~");
+  NodeShell shell(nh, private_nh, "none", 0.1);
+  std::vector<double> taken;
+  std::atomic<int> ticks{0}, ends{0};
+  shell.inputs().on<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE,
+                                                  [&](const smartmill_msgs::SpindleAngle& m, double) {
+                                                    taken.push_back(m.angle);
+                                                    ros::WallDuration(1e-4).sleep();
+                                                  });
+  shell.every(0.01, [&] {
+    ++ticks;
+    ends += shell.inputs().any().ended();
+  });
+  const auto publisher = nh.advertise<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE, 600);
+  ros::AsyncSpinner spinner(1);
+  spinner.start();
+  Followers followers({ros::this_node::getName()});
+  followers.begin();
+  followers.expect(publisher);
+  smartmill_msgs::SpindleAngle message;
+  // More than the publisher's queue holds, faster than they are taken.
+  for (int i = 0; i < 5000; ++i) {
+    message.angle = i;
+    followers.publish(publisher, message);
+  }
+  followers.settle();
+  EXPECT_EQ(taken.size(), 5000u);
+  EXPECT_TRUE(std::is_sorted(taken.begin(), taken.end()));
+  const int since = ticks;
+  while (ticks < since + 50) ros::WallDuration(0.01).sleep();  // five times the timeout
+  EXPECT_EQ(ends, 0);
+  followers.end();
+  EXPECT_EQ(ends, 1);
+  EXPECT_THROW(Followers({"/nobody"}).begin(0.1), Error);
+  spinner.stop();
 }
 
 TEST(KeptTopic, ALateSubscriberGetsTheLastOfEveryKey) {

@@ -35,5 +35,18 @@ TEST(Watchdog, anEndIsToldOnceForEachStretchThatWasHeard) {
   EXPECT_TRUE(dog.ended());
 }
 
+TEST(Watchdog, whoKnowsTellsTheEnd) {
+  Watchdog dog(1.0);
+  dog.end();
+  EXPECT_FALSE(dog.ended());  // nothing was heard
+  dog.heard();
+  dog.end();
+  EXPECT_TRUE(dog.dead());
+  EXPECT_TRUE(dog.ended());
+  EXPECT_FALSE(dog.ended());
+  dog.heard();
+  EXPECT_FALSE(dog.dead());
+}
+
 }  // namespace
 }  // namespace smartmill

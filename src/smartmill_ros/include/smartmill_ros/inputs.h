@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <cstdint>
 #include <deque>
 #include <functional>
 #include <string>
@@ -7,6 +9,7 @@
 
 #include <diagnostic_updater/DiagnosticStatusWrapper.h>
 #include <ros/node_handle.h>
+#include <smartmill_msgs/Follow.h>
 #include <boost/function.hpp>
 
 #include "smartmill_core/signal/watchdog.h"
@@ -33,6 +36,11 @@ class InputHealth {
   /// What was refused since it was asked for last; empty: nothing.
   std::string takeProblem();
   std::size_t refused() const { return refused_; }  ///< [1] since the start
+  /// [1] messages since the start that the node is done with
+  std::uint64_t taken() const {
+    return taken_ - (waiting_ ? std::min<std::uint64_t>(taken_, waiting_()) : 0);
+  }
+  void setWaiting(std::function<std::size_t()> waiting) { waiting_ = std::move(waiting); }
 
  private:
   std::string topic_, problem_;
@@ -40,6 +48,8 @@ class InputHealth {
   bool told_ = false, standing_ = false;  // the problem was asked for; the newest message was refused
   double said_ = -1e9;                    // [s] last line for the log
   std::size_t refused_ = 0;
+  std::uint64_t taken_ = 0;
+  std::function<std::size_t()> waiting_;
 };
 
 /// What a node listens to. on() has the signature of BagReader's, so that one function can connect either to
@@ -68,8 +78,18 @@ class Inputs {
   /// Of all inputs together. ended() is the end of data: nothing more will come to release what waits.
   Watchdog& any() { return any_; }
 
+  /// @param waiting [1] messages of a topic that the node has put aside; who plays to it waits for them too.
+  /// @throws std::out_of_range when nobody listens to it.
+  void setWaiting(const std::string& topic, std::function<std::size_t()> waiting) {
+    find(topic).setWaiting(std::move(waiting));
+  }
+
   /// From a wall timer of the thread that reads the inputs. @param period [s] of that timer
   void tick(double period);
+
+  /// A player of recorded data says how it stands and asks what was taken. While it asks, its own pauses are
+  /// no silence.
+  void follow(const smartmill_msgs::Follow::Request& request, smartmill_msgs::Follow::Response& response);
 
   /// What is silent and what was refused.
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
@@ -81,6 +101,7 @@ class Inputs {
 
   ros::NodeHandle nh_;
   double timeout_;
+  double held_ = 0.0;               // [s] of ticks that are no silence
   std::deque<InputHealth> inputs_;  // their places stay
   Watchdog any_;
   std::deque<ros::Subscriber> subscribers_;

@@ -6,13 +6,15 @@
 
 #include <diagnostic_updater/diagnostic_updater.h>
 #include <ros/node_handle.h>
+#include <ros/service_server.h>
 #include <ros/wall_timer.h>
 
 #include "smartmill_ros/inputs.h"
 
 namespace smartmill {
 
-/// What every node has around its class: inputs that catch, work on a wall timer, diagnostics once a second.
+/// What every node has around its class: inputs that catch, work on a wall timer, diagnostics once a second,
+/// the service `follow` for whoever plays data to it.
 class NodeShell {
  public:
   /// @param hardware the id in the diagnostics @param input_timeout [s] see Inputs
@@ -34,10 +36,14 @@ class NodeShell {
   void every(double period, std::function<void()> work);
 
  private:
+  bool follow(smartmill_msgs::Follow::Request& request, smartmill_msgs::Follow::Response& response);
+
   ros::NodeHandle nh_;
   Inputs inputs_;
   diagnostic_updater::Updater diagnostics_;
+  std::vector<std::function<void()>> works_;
   std::vector<ros::WallTimer> timers_;
+  ros::ServiceServer follow_;
 };
 
 }  // namespace smartmill

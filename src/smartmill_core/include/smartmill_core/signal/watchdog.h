@@ -1,5 +1,7 @@
 #pragma once
 
+#include <limits>
+
 namespace smartmill {
 
 /// Tells when a source has fallen silent. Silence is counted in ticks of whoever reads the source, not on a
@@ -17,6 +19,8 @@ class Watchdog {
   }
   /// Everything that waited was read; so much time has passed since the last tick. @param period [s]
   void tick(double period) { silent_ += period; }
+  /// Who feeds the source says that nothing more will come.
+  void end() { silent_ = std::numeric_limits<double>::infinity(); }
 
   bool ever() const { return ever_; }        ///< anything heard yet?
   double silent() const { return silent_; }  ///< [s] since the last, or since the start
