@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "smartmill_core/error.h"
+#include "smartmill_ros/follower.h"
 
 namespace smartmill::session {
 namespace {
@@ -25,6 +26,9 @@ BagRecorder::BagRecorder(const ros::NodeHandle& nh, const std::string& path,
     throw Error(path_ + UNFINISHED + ": cannot be written");
   }
   bag_.setCompression(rosbag::compression::LZ4);
+  ros::NodeHandle private_nh("~");
+  private_nh.setCallbackQueue(&queue_);
+  follow_ = private_nh.advertiseService(FOLLOW, &BagRecorder::follow, this);
 }
 
 void BagRecorder::look() {
@@ -33,9 +37,9 @@ void BagRecorder::look() {
   for (const ros::master::TopicInfo& topic : topics) {
     const std::string& name = topic.name;
     const auto matches = [&](const std::regex& pattern) { return std::regex_match(name, pattern); };
-    if (subscribers_.count(name) || std::none_of(patterns_.begin(), patterns_.end(), matches)) continue;
+    if (topics_.count(name) || std::none_of(patterns_.begin(), patterns_.end(), matches)) continue;
     const boost::function<void(Event)> callback = [this, name](Event event) { write(name, event); };
-    subscribers_[name] = nh_.subscribe<topic_tools::ShapeShifter, Event>(name, UNLIMITED, callback);
+    topics_[name].subscriber = nh_.subscribe<topic_tools::ShapeShifter, Event>(name, UNLIMITED, callback);
   }
 }
 
@@ -59,6 +63,17 @@ void BagRecorder::write(const std::string& topic, Event event) {
   bag_.write(topic, std::max(event.getReceiptTime(), ros::TIME_MIN), *event.getMessage(),
              event.getConnectionHeaderPtr());
   ++written_;
+  ++topics_[topic].messages;
+}
+
+bool BagRecorder::follow(smartmill_msgs::Follow::Request&, smartmill_msgs::Follow::Response& response) {
+  look();
+  for (const auto& [topic, recorded] : topics_) {
+    response.topics.push_back(topic);
+    response.taken.push_back(recorded.messages);
+    response.publishers.push_back(recorded.subscriber.getNumPublishers());
+  }
+  return true;
 }
 
 }  // namespace smartmill::session

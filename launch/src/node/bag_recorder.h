@@ -8,12 +8,14 @@
 #include <ros/callback_queue.h>
 #include <ros/ros.h>
 #include <rosbag/bag.h>
+#include <smartmill_msgs/Follow.h>
 #include <topic_tools/shape_shifter.h>
 
 namespace smartmill::session {
 
 /// Records whatever is said on some topics. It loses nothing that reaches it: where the computer is too busy
-/// to write, messages wait (rosbag record keeps 100 of a topic and drops the rest).
+/// to write, messages wait (rosbag record keeps 100 of a topic and drops the rest). Its service `follow`
+/// tells who is about to say something whether it listens (smartmill_ros/follower.h).
 class BagRecorder {
  public:
   /// @param patterns regular expressions (ECMAScript) of whole topic names
@@ -28,6 +30,7 @@ class BagRecorder {
   void finish();
 
  private:
+  bool follow(smartmill_msgs::Follow::Request& request, smartmill_msgs::Follow::Response& response);
   using Event = const ros::MessageEvent<topic_tools::ShapeShifter const>&;
   void write(const std::string& topic, Event event);
 
@@ -36,8 +39,13 @@ class BagRecorder {
   std::string path_;
   std::vector<std::regex> patterns_;
   rosbag::Bag bag_;
-  std::map<std::string, ros::Subscriber> subscribers_;
+  struct Recorded {
+    ros::Subscriber subscriber;
+    std::uint64_t messages = 0;
+  };
+  std::map<std::string, Recorded> topics_;
   std::size_t written_ = 0;
+  ros::ServiceServer follow_;
 };
 
 }  // namespace smartmill::session

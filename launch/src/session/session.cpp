@@ -15,6 +15,7 @@
 #include "smartmill_core/names.h"
 #include "smartmill_core/units.h"
 #include "smartmill_ros/conversions.h"
+#include "smartmill_ros/follower.h"
 #include "smartmill_ros/parameter_reader.h"
 
 namespace smartmill::session {
@@ -285,15 +286,27 @@ std::string Session::missing() const {
   return text;
 }
 
+std::string Session::recorderMissing() const {
+  if (parameters_.recorder.empty()) return {};
+  smartmill_msgs::Follow service;
+  if (!ask(parameters_.recorder + "/" + FOLLOW, service, SERVICE_WAIT)) return "the recorder";
+  const std::string topics = unconnected(service.response);
+  return topics.empty() ? "" : "the recorder's connection with " + topics;
+}
+
 // ---------------------------------------------------------------------------------------------- the steps
 
 std::string Session::waitReady() {
   if (!waitUntil([&] { return missing().empty(); }, parameters_.ready_timeout)) {
     throw Error(format("after %.0f s still missing: ", parameters_.ready_timeout) + missing());
   }
+  // A recorder that misses something is no reason to leave the job.
+  std::string recorder;
+  waitUntil([&] { return (recorder = recorderMissing()).empty(); }, parameters_.ready_timeout);
   pause(parameters_.start_delay);
   return format("nodes, sensors and controller are there; the stock holds %.0f lanes",
-                static_cast<double>(plan_.lanes()));
+                static_cast<double>(plan_.lanes())) +
+         (recorder.empty() ? "" : "; not there: " + recorder);
 }
 
 std::string Session::arm(bool on, double timeout) {

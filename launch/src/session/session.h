@@ -65,6 +65,7 @@ class Session {
   std::string verify(const char* role, const PlannedCut& cut, CutVerdict::Kind due);
   void makeSafe();
   std::string missing() const;
+  std::string recorderMissing() const;
 
   ros::NodeHandle nh_;
   const std::atomic<bool>& stop_;

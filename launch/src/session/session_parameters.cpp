@@ -35,8 +35,9 @@ void SessionParameters::declare(ParameterTable& table) {
   table.number("sensor_modes", sensor_modes, "1", Range::closed(0, 20),
                "of the force sensor to fit; 0: chosen by evidence");
   table.section("Patience.");
+  table.text("recorder", recorder, "node that records: nothing begins before it listens; empty: none");
   table.number("start_delay", start_delay, "s", Range::closed(0.0, 60.0),
-               "before the first goal: a recorder finds the topics");
+               "before the first goal: listeners of any kind find the topics");
   table.number("ready_timeout", ready_timeout, "s", patience,
                "for nodes, sensors and controller to be there");
   table.number("frf_timeout", frf_timeout, "s", patience, "of one direction");

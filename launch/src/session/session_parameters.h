@@ -15,6 +15,7 @@ struct SessionParameters {
   int hits = 20, modes = 0;
   int sensor_hits = 10, sensor_modes = 0;
   bool verify = true;
+  std::string recorder;
   double start_delay = 2.0;
   double ready_timeout = 30.0;
   double frf_timeout = 300.0;

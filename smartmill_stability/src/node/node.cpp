@@ -40,7 +40,7 @@ StabilityNode::StabilityNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
           [this](const CuttingCondition& condition) { return maker_.system(condition.engagement); },
           [this](const ChatterAdvice& advice) { publish(advice); }),
       chart_(nh.advertise<smartmill_msgs::StabilityChart>(names::STABILITY_CHART, 1, true)),
-      chatter_(nh.advertise<smartmill_msgs::ChatterState>(names::CHATTER_STATE, STREAM_QUEUE)),
+      chatter_(nh.advertise<smartmill_msgs::ChatterState>(names::CHATTER_STATE, STREAM_QUEUE, true)),
       advice_(nh.advertise<smartmill_msgs::ChatterAdvice>(names::CHATTER_ADVICE, 10, true)),
       predict_(nh.advertiseService(names::PREDICT_STABILITY, &StabilityNode::predict, this)) {
   listen();
