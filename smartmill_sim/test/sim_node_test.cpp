@@ -42,7 +42,7 @@ class SimNode : public testing::Test {
 
   /// Patience is wall time, what is asserted is not.
   bool until(const std::function<bool()>& done) {
-    for (int k = 0; k < 3000 && ros::ok(); ++k) {
+    for (int k = 0; k < 12000 && ros::ok(); ++k) {
       {
         const std::lock_guard<std::mutex> lock(mutex);
         if (done()) return true;
@@ -55,7 +55,7 @@ class SimNode : public testing::Test {
   smartmill_msgs::Strike strike(const std::string& service, const std::string& point,
                                 const std::string& direction) {
     ros::ServiceClient client = nh.serviceClient<smartmill_msgs::Strike>(service);
-    EXPECT_TRUE(client.waitForExistence(ros::Duration(20.0)));
+    EXPECT_TRUE(client.waitForExistence(ros::Duration(120.0)));
     smartmill_msgs::Strike call;
     call.request.point = point;
     call.request.direction = direction;

@@ -29,7 +29,7 @@ namespace {
 using smartmill_msgs::CncState;
 using smartmill_msgs::RunProgramResult;
 
-constexpr double PATIENCE = 20.0;  // [s] generous: the computer may be slow
+constexpr double PATIENCE = 120.0;  // [s] generous: the computer may be slow
 
 class CncNodeTest : public ::testing::Test {
  protected:
@@ -163,13 +163,17 @@ TEST_F(CncNodeTest, StateLoadMacroAndTransform) {
   ASSERT_TRUE(spinUntil([&] { return buffer.canTransform("machine", "spindle", ros::Time(0)); }));
   EXPECT_NEAR(buffer.lookupTransform("machine", "spindle", ros::Time(0)).transform.translation.z, 0.030,
               1e-9);
-  // 50 Hz by the shorter half of the periods: a busy computer stretches some, a wrong rate all of them.
+  // 50 Hz by the shorter half of two seconds' periods: a busy computer stretches some, a wrong rate all of
+  // them. One that is too busy has quieter seconds.
+  const auto halfOfThem = [&] {
+    std::vector<double> periods;
+    for (std::size_t i = stamps_.size() - 100; i < stamps_.size(); ++i)
+      periods.push_back((stamps_[i] - stamps_[i - 1]).toSec());
+    std::sort(periods.begin(), periods.end());
+    return periods[periods.size() / 2];
+  };
   stamps_.clear();
-  ASSERT_TRUE(spinUntil([&] { return stamps_.size() >= 101; }));
-  std::vector<double> periods;
-  for (std::size_t i = 1; i < stamps_.size(); ++i) periods.push_back((stamps_[i] - stamps_[i - 1]).toSec());
-  std::sort(periods.begin(), periods.end());
-  EXPECT_LT(periods[periods.size() / 2], 0.03);
+  EXPECT_TRUE(spinUntil([&] { return stamps_.size() > 100 && halfOfThem() < 0.03; }));
 }
 
 TEST_F(CncNodeTest, MotionsAndConditions) {

@@ -22,6 +22,7 @@
 #include "smartmill_core/units.h"
 #include "smartmill_discrepancy/data/dataset.h"
 #include "smartmill_ros/conversions.h"
+#include "smartmill_ros/follower.h"
 #include "smartmill_sim/effects/effect.h"
 #include "smartmill_sim/twin/twin.h"
 
@@ -61,7 +62,7 @@ class MonitorNodeTest : public testing::Test {
   }
 
   bool wait(const std::function<bool()>& reached) {
-    for (int i = 0; i < 400 && !reached(); ++i) {
+    for (int i = 0; i < 2400 && !reached(); ++i) {
       ros::spinOnce();
       ros::WallDuration(0.05).sleep();
     }
@@ -90,8 +91,8 @@ class MonitorNodeTest : public testing::Test {
     options.phase = 0.3;
     const Record record = sim::simulateTest(machine, test, DURATION, options);
     const auto &fx = record.column("fx"), &fy = record.column("fy"), &fz = record.column("fz");
-    conditions_.publish(toMsg(condition));
-    ros::WallDuration(0.2).sleep();  // topics keep no order among each other
+    node_.publish(conditions_, toMsg(condition));
+    node_.settle();  // topics keep no order among each other
     const double feed = FEED_PER_TOOTH * machine.tool->teeth * test.spindle_speed / units::TWO_PI;
     for (std::size_t k = 0; (k + 1) * BLOCK <= record.size(); ++k) {
       const double t = static_cast<double>(k * BLOCK) / RATE;
@@ -101,12 +102,12 @@ class MonitorNodeTest : public testing::Test {
       state.position = {feed * t, 0.0, 0.0};
       state.distance_to_go = {0.0, 0.0, 0.0};
       state.spindle_speed = test.spindle_speed;
-      states_.publish(toMsg(state));
+      node_.publish(states_, toMsg(state));
       SpindleAngle angle;
       angle.stamp = begin + t;
       angle.speed = test.spindle_speed;
       angle.angle = std::fmod(0.3 + test.spindle_speed * t, units::TWO_PI);
-      angles_.publish(toMsg(angle));
+      node_.publish(angles_, toMsg(angle));
       SampleBlock block;
       block.stamp = begin + t;
       block.sample_rate = RATE;
@@ -116,7 +117,7 @@ class MonitorNodeTest : public testing::Test {
       block.units = {"N", "N", "N"};
       for (std::size_t i = k * BLOCK; i < (k + 1) * BLOCK; ++i)
         block.samples.insert(block.samples.end(), {fx[i], fy[i], fz[i]});
-      blocks_.publish(toMsg(block));
+      node_.publish(blocks_, toMsg(block));
     }
   }
 
@@ -135,13 +136,13 @@ class MonitorNodeTest : public testing::Test {
   std::vector<smartmill_msgs::DiscrepancyState> gaps_;
   diagnostic_msgs::DiagnosticStatus status_;
   std::uint64_t index_ = 0;
+  Followers node_{{names::absolute("monitor")}};
 };
 
 TEST_F(MonitorNodeTest, warnsOfAHiddenEffectAndOfNothingElse) {
-  ASSERT_TRUE(wait([&] {
-    return conditions_.getNumSubscribers() && states_.getNumSubscribers() && angles_.getNumSubscribers() &&
-           blocks_.getNumSubscribers() && results_.getNumPublishers() && diagnostics_.getNumPublishers();
-  }));
+  node_.begin();
+  for (const ros::Publisher& publisher : {conditions_, states_, angles_, blocks_}) node_.expect(publisher);
+  ASSERT_TRUE(wait([&] { return results_.getNumPublishers() && diagnostics_.getNumPublishers(); }));
 
   // 0.15 s of settling leave two stretches of 0.3 s of a second.
   mill(model_, "healthy", 1000.0, 4000.0, 1e-3);

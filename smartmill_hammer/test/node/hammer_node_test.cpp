@@ -2,10 +2,12 @@
 // a cancel.
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <string>
 
 #include <actionlib/client/simple_action_client.h>
@@ -29,13 +31,22 @@ namespace {
 
 using Client = actionlib::SimpleActionClient<smartmill_msgs::MeasureFrfAction>;
 
+const ros::Duration PATIENCE(200.0);  // of a busy machine
+
+template <class Done>
+bool eventually(Done done) {
+  const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(PATIENCE.toSec());
+  while (!done() && ros::WallTime::now() < end) ros::WallDuration(0.05).sleep();
+  return done();
+}
+
 class HammerNode : public testing::Test {
  protected:
   HammerNode() : client(names::MEASURE_TOOL_FRF, true), spinner(2) { spinner.start(); }
 
   smartmill_msgs::MeasureFrfGoal goal() const {
     smartmill_msgs::MeasureFrfGoal g;
-    g.header.stamp = ros::Time::now();
+    g.header.stamp = ros::Time::now() + ros::Duration(1.0);  // in order on a busy machine too
     g.tool = "mill";
     g.point = "tool_tip";
     g.direction = "x";
@@ -46,12 +57,19 @@ class HammerNode : public testing::Test {
     return g;
   }
 
+  static ros::Time stampOf(const smartmill_msgs::MeasureFrfActionGoal&) { return ros::TIME_MAX; }
+  template <class Message>
+  static ros::Time stampOf(const Message& m) {
+    return m.header.stamp;
+  }
+
   template <class Message>
   void record(const std::string& topic) {
     boost::function<void(const boost::shared_ptr<const Message>&)> write =
         [this, topic](const boost::shared_ptr<const Message>& m) {
           const std::lock_guard<std::mutex> lock(mutex);
           ++recorded;
+          newest[topic] = stampOf(*m);
           if (bag.isOpen()) bag.write("/smartmill/" + topic, ros::Time::now(), *m);
         };
     recorders.push_back(nh.subscribe<Message>(topic, 0, write));
@@ -64,17 +82,24 @@ class HammerNode : public testing::Test {
                                          [](const ros::Subscriber& s) { return s.getNumPublishers() > 0; });
   }
 
+  /// Whether all that was said up to a time has been recorded.
+  bool recordedUpTo(const ros::Time& time) {
+    const std::lock_guard<std::mutex> lock(mutex);
+    return std::all_of(newest.begin(), newest.end(), [&](const auto& entry) { return entry.second > time; });
+  }
+
   ros::NodeHandle nh;
   Client client;
   ros::AsyncSpinner spinner;
   std::mutex mutex;
   rosbag::Bag bag;
-  int recorded = 0;  // messages
+  int recorded = 0;                         // messages
+  std::map<std::string, ros::Time> newest;  // by topic
   std::vector<ros::Subscriber> recorders;
 };
 
 TEST_F(HammerNode, MeasuresRecordsAndReplaysToTheLastDigit) {
-  ASSERT_TRUE(client.waitForServer(ros::Duration(20.0)));
+  ASSERT_TRUE(client.waitForServer(PATIENCE));
   const std::string folder = testing::TempDir();
   const std::string bag_file = folder + "smartmill_hammer_node_test.bag";
   bag.open(bag_file, rosbag::bagmode::Write);
@@ -82,9 +107,9 @@ TEST_F(HammerNode, MeasuresRecordsAndReplaysToTheLastDigit) {
   record<smartmill_msgs::CncState>(names::CNC_STATE);
   record<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE);
   record<smartmill_msgs::MeasureFrfActionGoal>(names::goals(names::MEASURE_TOOL_FRF));
-  for (int i = 0; i < 200 && !recording(); ++i) ros::WallDuration(0.1).sleep();
+  ASSERT_TRUE(eventually([&] { return recording(); }));
   client.sendGoal(goal());
-  ASSERT_TRUE(client.waitForResult(ros::Duration(200.0)));
+  ASSERT_TRUE(client.waitForResult(PATIENCE));
   const auto result = client.getResult();
   ASSERT_TRUE(result);
   ASSERT_EQ(result->code, smartmill_msgs::MeasureFrfResult::OK) << result->message;
@@ -100,14 +125,14 @@ TEST_F(HammerNode, MeasuresRecordsAndReplaysToTheLastDigit) {
   // Subscribers that come late get it too.
   smartmill_msgs::FrfConstPtr frf;
   smartmill_msgs::ModalModelConstPtr modes;
-  frf = ros::topic::waitForMessage<smartmill_msgs::Frf>(names::TOOL_FRF, nh, ros::Duration(5.0));
-  modes = ros::topic::waitForMessage<smartmill_msgs::ModalModel>(names::TOOL_MODES, nh, ros::Duration(5.0));
+  frf = ros::topic::waitForMessage<smartmill_msgs::Frf>(names::TOOL_FRF, nh, PATIENCE);
+  modes = ros::topic::waitForMessage<smartmill_msgs::ModalModel>(names::TOOL_MODES, nh, PATIENCE);
   ASSERT_TRUE(frf && modes);
   EXPECT_EQ(frf->real, result->frf.real);
   EXPECT_EQ(modes->direction, "x");
 
   // The bag through the offline class: every digit.
-  ros::WallDuration(0.3).sleep();
+  ASSERT_TRUE(eventually([&, now = ros::Time::now()] { return recordedUpTo(now); }));
   {
     const std::lock_guard<std::mutex> lock(mutex);
     bag.close();
@@ -133,22 +158,23 @@ TEST_F(HammerNode, MeasuresRecordsAndReplaysToTheLastDigit) {
 }
 
 TEST_F(HammerNode, CancelEndsIt) {
-  ASSERT_TRUE(client.waitForServer(ros::Duration(20.0)));
-  client.sendGoal(goal());
-  ros::WallDuration(3.0).sleep();
+  ASSERT_TRUE(client.waitForServer(PATIENCE));
+  std::atomic<bool> begun{false};
+  client.sendGoal(goal(), {}, {}, [&](const smartmill_msgs::MeasureFrfFeedbackConstPtr&) { begun = true; });
+  ASSERT_TRUE(eventually([&] { return begun.load(); }));
   client.cancelGoal();
-  ASSERT_TRUE(client.waitForResult(ros::Duration(20.0)));
+  ASSERT_TRUE(client.waitForResult(PATIENCE));
   EXPECT_EQ(client.getState(), actionlib::SimpleClientGoalState::PREEMPTED);
   EXPECT_EQ(client.getResult()->code, smartmill_msgs::MeasureFrfResult::CANCELLED)
       << client.getResult()->message;
 }
 
 TEST_F(HammerNode, RefusesABadGoalInOneLine) {
-  ASSERT_TRUE(client.waitForServer(ros::Duration(20.0)));
+  ASSERT_TRUE(client.waitForServer(PATIENCE));
   auto bad = goal();
   bad.direction = "z";
   client.sendGoal(bad);
-  ASSERT_TRUE(client.waitForResult(ros::Duration(20.0)));
+  ASSERT_TRUE(client.waitForResult(PATIENCE));
   EXPECT_EQ(client.getResult()->code, smartmill_msgs::MeasureFrfResult::BAD_GOAL);
   EXPECT_NE(client.getResult()->message.find("'z'"), std::string::npos) << client.getResult()->message;
 }

@@ -17,12 +17,13 @@
 #include "smartmill_core/modal/modal_model.h"
 #include "smartmill_core/names.h"
 #include "smartmill_core/units.h"
+#include "smartmill_ros/follower.h"
 
 namespace smartmill {
 namespace {
 
 bool waitUntil(const std::function<bool()>& done) {
-  for (int i = 0; i < 300 && !done() && ros::ok(); ++i) {
+  for (int i = 0; i < 2400 && !done() && ros::ok(); ++i) {
     ros::spinOnce();
     ros::WallDuration(0.05).sleep();
   }
@@ -49,9 +50,12 @@ TEST(KalmanNode, compensatesInTheMachinesFrame) {
       [&](const geometry_msgs::WrenchStamped::ConstPtr& m) { wrenches.push_back(*m); });
   auto blocks = nh.advertise<smartmill_msgs::SampleBlock>(names::DYNAMOMETER, 0);
   auto angles = nh.advertise<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE, 0);
+  Followers node({names::absolute("kalman")});
+  node.begin();
+  node.expect(blocks);
+  node.expect(angles);
   ASSERT_TRUE(waitUntil([&] {
-    return blocks.getNumSubscribers() > 0 && angles.getNumSubscribers() > 0 && sub1.getNumPublishers() > 0 &&
-           sub2.getNumPublishers() > 0 && sub3.getNumPublishers() > 0;
+    return sub1.getNumPublishers() > 0 && sub2.getNumPublishers() > 0 && sub3.getNumPublishers() > 0;
   }));
 
   ModalModel sensor;
@@ -76,11 +80,11 @@ TEST(KalmanNode, compensatesInTheMachinesFrame) {
     smartmill_msgs::SpindleAngle angle;
     angle.header.stamp = block.header.stamp;
     angle.speed = units::TWO_PI * 232.5;
-    angles.publish(angle);
-    blocks.publish(block);
+    node.publish(angles, angle);
+    node.publish(blocks, block);
     ros::spinOnce();
-    ros::WallDuration(0.002).sleep();
   }
+  node.end();
   ASSERT_TRUE(waitUntil(
       [&] { return compensated.count((COUNT - 1) * BLOCK) > 0 && measured.count((COUNT - 1) * BLOCK) > 0; }));
   const smartmill_msgs::ForceBlock& last = compensated[(COUNT - 1) * BLOCK];
@@ -110,9 +114,12 @@ TEST(KalmanNode, takesSixSensorsInTheSpindle) {
       });
   auto blocks = nh.advertise<smartmill_msgs::SampleBlock>(names::DYNAMOMETER, 0);
   auto angles = nh.advertise<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE, 0);
+  Followers node({"/spindle_sensor/kalman"});
+  node.begin();
+  node.expect(blocks);
+  node.expect(angles);
   ASSERT_TRUE(waitUntil([&] {
-    return blocks.getNumSubscribers() > 0 && angles.getNumSubscribers() > 0 && sub1.getNumPublishers() > 0 &&
-           sub2.getNumPublishers() > 0 && sub3.getNumPublishers() > 0;
+    return sub1.getNumPublishers() > 0 && sub2.getNumPublishers() > 0 && sub3.getNumPublishers() > 0;
   }));
   constexpr int COUNT = 60, BAD = 50;
   const double start = std::floor(ros::Time::now().toSec());
@@ -129,11 +136,11 @@ TEST(KalmanNode, takesSixSensorsInTheSpindle) {
     for (int i = 0; i < 256; ++i) block.samples.insert(block.samples.end(), {px, -px, -py, py, 1.0, 1.0});
     smartmill_msgs::SpindleAngle angle;
     angle.header.stamp = block.header.stamp;
-    angles.publish(angle);  // at rest: samples pass through
-    blocks.publish(block);
+    node.publish(angles, angle);  // at rest: samples pass through
+    node.publish(blocks, block);
     ros::spinOnce();
-    ros::WallDuration(0.002).sleep();
   }
+  node.end();
   ASSERT_TRUE(
       waitUntil([&] { return compensated.count(256 * (COUNT - 1)) && measured.count(256 * (COUNT - 1)); }));
   // x of the sensor is y of the machine.

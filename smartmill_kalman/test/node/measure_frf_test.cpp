@@ -32,19 +32,20 @@
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/names.h"
 #include "smartmill_core/units.h"
+#include "smartmill_ros/follower.h"
 #include "smartmill_ros/parameter_reader.h"
 
 namespace smartmill::kalman {
 namespace {
 
 /// Goals and conditions are told ahead, so that they are in order on a busy machine too.
-const ros::Duration LEAD(0.5);
+const ros::Duration LEAD(2.0);
 
 using Client = actionlib::SimpleActionClient<smartmill_msgs::MeasureFrfAction>;
 using Blocks = std::map<std::uint64_t, smartmill_msgs::ForceBlock>;
 
 template <typename Done>
-bool waitUntil(Done done, double patience = 15.0) {
+bool waitUntil(Done done, double patience = 120.0) {
   for (int i = 0; i < patience / 0.05 && !done() && ros::ok(); ++i) ros::WallDuration(0.05).sleep();
   return done();
 }
@@ -85,7 +86,7 @@ class MeasureFrf : public testing::Test {
       const std::lock_guard<std::mutex> lock(mutex);
       said += m->stage + "\n";
     });
-    if (!client.waitForResult(ros::Duration(30.0))) throw Error("no result");
+    if (!client.waitForResult(ros::Duration(120.0))) throw Error("no result");
     return *client.getResult();
   }
 
@@ -119,7 +120,7 @@ void expectSame(const Blocks& some, const Blocks& all, std::size_t least) {
 }
 
 TEST_F(MeasureFrf, TapsThenCutsAndReplaysToTheLastDigit) {
-  ASSERT_TRUE(client.waitForServer(ros::Duration(20.0)));
+  ASSERT_TRUE(client.waitForServer(ros::Duration(120.0)));
   const std::string file = testing::TempDir() + "smartmill_kalman_measure_frf_test.bag";
   bag.open(file, rosbag::bagmode::Write);
   collect(names::FORCE_COMPENSATED, live);
@@ -176,11 +177,18 @@ TEST_F(MeasureFrf, TapsThenCutsAndReplaysToTheLastDigit) {
   cut.axial_depth = 2e-3;
   cut.exit_angle = units::PI;
   condition.publish(cut);
-  ros::WallDuration(1.8).sleep();
+  // By the rig's samples, however late they are.
+  const auto milled = [&](const ros::Time& until) {
+    return waitUntil([&] {
+      const std::lock_guard<std::mutex> lock(mutex);
+      return live.rbegin()->second.header.stamp > until;
+    });
+  };
+  ASSERT_TRUE(milled(cut.header.stamp + ros::Duration(1.5)));
   smartmill_msgs::CuttingCondition none;
   none.header.stamp = ros::Time::now() + LEAD;
   condition.publish(none);
-  ros::WallDuration(1.2).sleep();
+  ASSERT_TRUE(milled(none.header.stamp + ros::Duration(0.5)));
   std::uint64_t last = 0;
   {
     const std::lock_guard<std::mutex> lock(mutex);
@@ -255,21 +263,18 @@ TEST_F(MeasureFrf, TapsThenCutsAndReplaysToTheLastDigit) {
     }
   }
   ASSERT_EQ(out.size(), 5u);
-  ASSERT_TRUE(waitUntil([&] {
-    for (const auto& entry : out) {
-      if (entry.second.getNumSubscribers() == 0) return false;
-    }
-    return true;
-  }));
-  const ros::WallTime begin = ros::WallTime::now();
+  Followers node({names::absolute("again/kalman")});
+  node.begin();
+  for (const auto& entry : out) node.expect(entry.second);
   for (const rosbag::MessageInstance& m : view) {
-    if (out.count(m.getTopic()) == 0) continue;
-    // Four times as fast as it was recorded.
-    const double due = (m.getTime() - view.getBeginTime()).toSec() / 4.0;
-    const double ahead = due - (ros::WallTime::now() - begin).toSec();
-    if (ahead > 0.0) ros::WallDuration(ahead).sleep();
-    out[m.getTopic()].publish(m);
+    const auto publisher = out.find(m.getTopic());
+    if (publisher == out.end()) continue;
+    node.publish(publisher->second, m);
+    // Goals and conditions are there before what comes after them.
+    if (m.isType<smartmill_msgs::CuttingCondition>() || m.isType<smartmill_msgs::MeasureFrfActionGoal>())
+      node.settle();
   }
+  node.end();
   ASSERT_TRUE(waitUntil([&] {
     const std::lock_guard<std::mutex> lock(mutex);
     return !again.empty() && again.rbegin()->first + 20 * 256 >= last;

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "../session.h"
+#include "smartmill_core/names.h"
 #include "smartmill_msgs/CncState.h"
 #include "smartmill_msgs/CuttingCoefficients.h"
 #include "smartmill_msgs/CuttingCondition.h"
@@ -16,11 +17,14 @@
 #include "smartmill_msgs/LoadSample.h"
 #include "smartmill_msgs/SampleBlock.h"
 #include "smartmill_ros/conversions.h"
+#include "smartmill_ros/follower.h"
 
 namespace smartmill::loadmeter {
 namespace {
 
 using Client = actionlib::SimpleActionClient<smartmill_msgs::IdentifyCoefficientsAction>;
+
+const ros::Duration PATIENCE(120.0);  // of a busy machine
 
 smartmill_msgs::IdentifyCoefficientsGoal goalAt(double stamp, bool reset) {
   smartmill_msgs::IdentifyCoefficientsGoal goal;
@@ -47,44 +51,44 @@ TEST(LoadMeterNode, identifiesPublishesAndAnswers) {
   const auto forces = nh.subscribe<geometry_msgs::WrenchStamped>("force/motor_current", 10, take);
   const auto conditions = nh.advertise<smartmill_msgs::CuttingCondition>("cut/condition", 0, true);
   Client client("loadmeter/identify_coefficients", false);
-  ASSERT_TRUE(client.waitForServer(ros::Duration(20.0)));
-  for (int i = 0;
-       i < 200 && !(states.getNumSubscribers() && loads.getNumSubscribers() && currents.getNumSubscribers() &&
-                    forces.getNumPublishers() && conditions.getNumSubscribers());
-       ++i) {
-    ros::WallDuration(0.05).sleep();
-  }
-  ASSERT_TRUE(states.getNumSubscribers() && loads.getNumSubscribers() && conditions.getNumSubscribers());
+  ASSERT_TRUE(client.waitForServer(PATIENCE));
+  Followers node({names::absolute("loadmeter")});
+  node.begin();
+  for (const ros::Publisher& publisher : {states, loads, currents, conditions}) node.expect(publisher);
+  // A goal keeps no order with the streams: it is there before they go on.
+  const auto send = [&](double stamp, bool reset) {
+    client.sendGoal(goalAt(stamp, reset));
+    node.settle();
+  };
 
   Session session(4, 2e-4);
-  int sent = 0;
-  session.state = [&](const CncState& s) { states.publish(toMsg(s)); };
-  session.load = [&](const LoadSample& l) {
-    loads.publish(toMsg(l));
-    if (++sent % 10 == 0)
-      ros::WallDuration(0.002).sleep();  // far faster than a machine, yet not faster than the queue
-  };
+  session.state = [&](const CncState& s) { node.publish(states, toMsg(s)); };
+  session.load = [&](const LoadSample& l) { node.publish(loads, toMsg(l)); };
   session.cutting = {TRUTH.ktc, 420e6, 0.0, TRUTH.kte, 21e3, 0.0};
-  session.currents = [&](const SampleBlock& b) { currents.publish(toMsg(b)); };
-  session.condition = [&](const CuttingCondition& c) { conditions.publish(toMsg(c)); };
+  session.currents = [&](const SampleBlock& b) { node.publish(currents, toMsg(b)); };
+  session.condition = [&](const CuttingCondition& c) {
+    node.publish(conditions, toMsg(c));
+    node.settle();
+  };
 
   // A plan that was forgotten does not count.
   session.air(9000.0, 2.0);
-  client.sendGoal(goalAt(session.now(), true));
+  send(session.now(), true);
   session.air(2000.0, 0.2);
-  ASSERT_TRUE(client.waitForResult(ros::Duration(10.0)));
+  ASSERT_TRUE(client.waitForResult(PATIENCE));
   EXPECT_EQ(client.getResult()->code, smartmill_msgs::IdentifyCoefficientsResult::OK);
 
-  client.sendGoal(goalAt(session.now(), false));
+  send(session.now(), false);
   session.air(2000.0, 0.2);
-  ASSERT_TRUE(client.waitForResult(ros::Duration(10.0)));
+  ASSERT_TRUE(client.waitForResult(PATIENCE));
   EXPECT_EQ(client.getState(), actionlib::SimpleClientGoalState::ABORTED);
   EXPECT_EQ(client.getResult()->code, smartmill_msgs::IdentifyCoefficientsResult::TOO_FEW_TESTS);
 
   takeThrough(session);
-  client.sendGoal(goalAt(session.now(), false));
+  send(session.now(), false);
+  node.leave();
   // Nothing follows: the node must not wait for ever for a stream that has ended.
-  ASSERT_TRUE(client.waitForResult(ros::Duration(15.0)));
+  ASSERT_TRUE(client.waitForResult(PATIENCE));
   const auto result = client.getResult();
   ASSERT_EQ(result->code, smartmill_msgs::IdentifyCoefficientsResult::OK) << result->message;
   EXPECT_NEAR(result->coefficients.ktc, TRUTH.ktc, 0.01 * TRUTH.ktc);
@@ -95,8 +99,8 @@ TEST(LoadMeterNode, identifiesPublishesAndAnswers) {
   EXPECT_EQ(result->coefficients.source, "load_meter");
 
   // Latched: who comes late gets it.
-  const auto latched = ros::topic::waitForMessage<smartmill_msgs::CuttingCoefficients>(
-      "material/coefficients", nh, ros::Duration(10.0));
+  const auto latched =
+      ros::topic::waitForMessage<smartmill_msgs::CuttingCoefficients>("material/coefficients", nh, PATIENCE);
   ASSERT_TRUE(latched);
   EXPECT_EQ(latched->ktc, result->coefficients.ktc);
 
@@ -113,6 +117,7 @@ TEST(LoadMeterNode, identifiesPublishesAndAnswers) {
   EXPECT_TRUE(std::isnan(call.response.coefficients.ktc));
   EXPECT_NE(call.response.message.find("endmill / aluminium"), std::string::npos);
 
+  node.begin();
   // After a pass in air the X drive tells the force of a cut; Y and Z stood still: nothing is told of them.
   session.airPass(6000.0, 6e-5, 4.0);
   session.slot(6000.0, 6e-5, 4.0);
@@ -122,7 +127,7 @@ TEST(LoadMeterNode, identifiesPublishesAndAnswers) {
                            .mean()
                            .fx;
   geometry_msgs::WrenchStamped last;
-  for (int i = 0; i < 200; ++i) {
+  for (int i = 0; i < 2400; ++i) {
     ros::WallDuration(0.05).sleep();
     const std::lock_guard<std::mutex> guard(force_lock);
     last = force;

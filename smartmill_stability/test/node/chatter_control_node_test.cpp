@@ -1,6 +1,5 @@
-#include <mutex>
-
 #include <gtest/gtest.h>
+#include <ros/callback_queue.h>
 #include <ros/ros.h>
 
 #include <smartmill_msgs/ModalModel.h>
@@ -10,6 +9,7 @@
 #include "smartmill_core/names.h"
 #include "smartmill_core/units.h"
 #include "smartmill_ros/conversions.h"
+#include "smartmill_ros/follower.h"
 #include "smartmill_stability_testing/control_streams.h"
 
 namespace smartmill::stability {
@@ -19,40 +19,32 @@ TEST(ChatterControlNode, learnsFromItsStreams) {
   ros::NodeHandle nh;
   ros::AsyncSpinner spinner(1);
   spinner.start();
-  std::mutex mutex;
   std::size_t commands = 0;
   const ros::Subscriber listener = nh.subscribe<smartmill_msgs::SampleBlock>(
       names::CONTROL_COMMAND, 0,
-      boost::function<void(const smartmill_msgs::SampleBlock::ConstPtr&)>([&](const auto& m) {
-        const std::lock_guard<std::mutex> lock(mutex);
-        commands += m->samples.size();
-      }));
+      boost::function<void(const smartmill_msgs::SampleBlock::ConstPtr&)>(
+          [&](const auto& m) { commands += m->samples.size(); }));
   ros::Publisher angles = nh.advertise<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE, 0);
   ros::Publisher blocks = nh.advertise<smartmill_msgs::SampleBlock>(names::DISPLACEMENT, 0);
-  for (int i = 0; i < 400 && (!angles.getNumSubscribers() || !blocks.getNumSubscribers() ||
-                              !listener.getNumPublishers());
-       ++i)
-    ros::WallDuration(0.05).sleep();
-  ASSERT_GT(blocks.getNumSubscribers(), 0u);
+  Followers node({names::absolute("chatter_control")});
+  node.begin();
+  node.expect(angles);
+  node.expect(blocks);
   const TurningProcess process = kimProcess(2.0);
-  angles.publish(toMsg(SpindleAngle{99.0, 0.0, units::TWO_PI / process.period}));
-  ros::WallDuration(0.5).sleep();  // another topic keeps no order with this one
-  for (const SampleBlock& block : displacementBlocks(process, 2.1, 100)) blocks.publish(toMsg(block));
-  const auto machine =
-      ros::topic::waitForMessage<smartmill_msgs::ModalModel>(names::CONTROL_MACHINE, nh, ros::Duration(20.0));
+  node.publish(angles, toMsg(SpindleAngle{99.0, 0.0, units::TWO_PI / process.period}));
+  node.settle();  // another topic keeps no order with this one
+  for (const SampleBlock& block : displacementBlocks(process, 2.1, 100)) node.publish(blocks, toMsg(block));
+  node.end();
+  const auto machine = ros::topic::waitForMessage<smartmill_msgs::ModalModel>(names::CONTROL_MACHINE, nh,
+                                                                              ros::Duration(120.0));
   ASSERT_TRUE(machine);
   ASSERT_EQ(machine->modes.size(), 1u);
   const ModalModel model = fromMsg(*machine).model;
   EXPECT_NEAR(model.modes[0].frequency * units::TWO_PI, 350.0, 3.5);
   EXPECT_NEAR(model.modes[0].damping_ratio, 0.02, 0.004);
-  for (int i = 0; i < 100; ++i) {
-    {
-      const std::lock_guard<std::mutex> lock(mutex);
-      if (commands >= 21000) break;
-    }
-    ros::WallDuration(0.05).sleep();
-  }
-  const std::lock_guard<std::mutex> lock(mutex);
+  // Everything said has come; what is not handled yet is handled here.
+  spinner.stop();
+  ros::getGlobalCallbackQueue()->callAvailable();
   EXPECT_EQ(commands, 21000u);
 }
 

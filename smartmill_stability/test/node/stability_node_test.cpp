@@ -1,6 +1,5 @@
-#include <mutex>
-
 #include <gtest/gtest.h>
+#include <ros/callback_queue.h>
 #include <ros/ros.h>
 
 #include <smartmill_msgs/ChatterAdvice.h>
@@ -10,6 +9,7 @@
 
 #include "smartmill_core/names.h"
 #include "smartmill_ros/conversions.h"
+#include "smartmill_ros/follower.h"
 #include "smartmill_stability_testing/benchmark.h"
 #include "smartmill_stability_testing/cutting_scene.h"
 
@@ -17,6 +17,8 @@ namespace smartmill::stability {
 namespace {
 
 using smartmill_msgs::PredictStability;
+
+const ros::Duration PATIENCE(120.0);  // of a busy machine
 
 class StabilityNode : public ::testing::Test {
  protected:
@@ -27,7 +29,7 @@ class StabilityNode : public ::testing::Test {
     call.request.spindle_speed = units::radPerSecFromRpm(rpm);
     call.request.axial_depth = depth;
     auto client = nh_.serviceClient<PredictStability>(names::PREDICT_STABILITY);
-    EXPECT_TRUE(client.waitForExistence(ros::Duration(20.0)));
+    EXPECT_TRUE(client.waitForExistence(PATIENCE));
     EXPECT_TRUE(client.call(call));
     return call.response;
   }
@@ -35,13 +37,14 @@ class StabilityNode : public ::testing::Test {
   template <typename Message>
   ros::Publisher publisher(const char* topic) {
     ros::Publisher p = nh_.advertise<Message>(topic, 0);
-    for (int i = 0; i < 400 && !p.getNumSubscribers(); ++i) ros::WallDuration(0.05).sleep();
-    EXPECT_GT(p.getNumSubscribers(), 0u) << topic;
+    node_.begin();
+    node_.expect(p);
     return p;
   }
 
   ros::NodeHandle nh_;
   ros::AsyncSpinner spinner_;
+  Followers node_{{names::absolute("stability")}};
 };
 
 TEST_F(StabilityNode, publishesTheChartAndAnswers) {
@@ -55,8 +58,8 @@ TEST_F(StabilityNode, publishesTheChartAndAnswers) {
   sets.publish(toMsg(coefficients()));
 
   // Latched: who comes late gets it.
-  const auto chart = ros::topic::waitForMessage<smartmill_msgs::StabilityChart>(names::STABILITY_CHART, nh_,
-                                                                                ros::Duration(10.0));
+  const auto chart =
+      ros::topic::waitForMessage<smartmill_msgs::StabilityChart>(names::STABILITY_CHART, nh_, PATIENCE);
   ASSERT_TRUE(chart);
   EXPECT_EQ(chart->tool, "end_mill");
   EXPECT_EQ(chart->material, "aluminium");
@@ -75,52 +78,38 @@ TEST_F(StabilityNode, publishesTheChartAndAnswers) {
 }
 
 TEST_F(StabilityNode, findsChatterInReplayedForce) {
-  std::mutex mutex;
   std::vector<smartmill_msgs::ChatterState> states;
   const ros::Subscriber subscriber = nh_.subscribe<smartmill_msgs::ChatterState>(
       names::CHATTER_STATE, 0,
       boost::function<void(const smartmill_msgs::ChatterState::ConstPtr&)>(
-          [&](const smartmill_msgs::ChatterState::ConstPtr& state) {
-            const std::lock_guard<std::mutex> lock(mutex);
-            states.push_back(*state);
-          }));
+          [&](const smartmill_msgs::ChatterState::ConstPtr& state) { states.push_back(*state); }));
   const auto conditions = publisher<smartmill_msgs::CuttingCondition>(names::CUTTING_CONDITION);
   const auto cnc = publisher<smartmill_msgs::CncState>(names::CNC_STATE);
   const auto angles = publisher<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE);
   const auto forces = publisher<smartmill_msgs::ForceBlock>(names::FORCE_COMPENSATED);
-  for (int i = 0; i < 200 && !subscriber.getNumPublishers(); ++i) ros::WallDuration(0.05).sleep();
 
   struct Sink {
     const ros::Publisher &conditions, &cnc, &angles, &forces;
+    Followers& node;
     void operator()(const CuttingCondition& c) const {
-      conditions.publish(toMsg(c));
-      ros::WallDuration(0.2).sleep();
+      node.publish(conditions, toMsg(c));
+      node.settle();
     }
-    void operator()(const CncState& s) const { cnc.publish(toMsg(s)); }
-    void operator()(const SpindleAngle& a) const { angles.publish(toMsg(a)); }
-    void operator()(const ForceBlock& b) const {
-      forces.publish(toMsg(b, "machine"));
-      ros::WallDuration(0.002).sleep();  // far faster than a machine, yet not faster than the queue
-    }
+    void operator()(const CncState& s) const { node.publish(cnc, toMsg(s)); }
+    void operator()(const SpindleAngle& a) const { node.publish(angles, toMsg(a)); }
+    void operator()(const ForceBlock& b) const { node.publish(forces, toMsg(b, "machine")); }
   };
-  const Sink sink{conditions, cnc, angles, forces};
+  node_.begin();
+  const Sink sink{conditions, cnc, angles, forces, node_};
   Scene scene;
   play(scene, sink, 100.0);
   scene.chatter = 150.0;
   play(scene, sink, 200.0);
-  // The node takes what waits, notices that no more comes and evaluates the rest: until it has said nothing
-  // for a while.
-  const auto said = [&] {
-    const std::lock_guard<std::mutex> lock(mutex);
-    return states.empty() || toSec(states.back().header.stamp) < 200.0 ? std::size_t{0} : states.size();
-  };
-  std::size_t before = 0;
-  for (int i = 0; i < 30 && (before == 0 || before != said()); ++i) {
-    before = said();
-    ros::WallDuration(2.0).sleep();
-  }
+  node_.end();
+  // Everything said has come; what is not handled yet is handled here.
+  spinner_.stop();
+  ros::getGlobalCallbackQueue()->callAvailable();
 
-  const std::lock_guard<std::mutex> lock(mutex);
   int quiet = 0, chatter = 0;
   for (const auto& state : states) {
     const double stamp = toSec(state.header.stamp);
@@ -136,8 +125,8 @@ TEST_F(StabilityNode, findsChatterInReplayedForce) {
   EXPECT_GT(chatter, 10);
   // Two straight teeth of the model: the fastest speed below 2200 rad/s at which they pass in step with the
   // chatter.
-  const auto advice = ros::topic::waitForMessage<smartmill_msgs::ChatterAdvice>(names::CHATTER_ADVICE, nh_,
-                                                                                ros::Duration(5.0));
+  const auto advice =
+      ros::topic::waitForMessage<smartmill_msgs::ChatterAdvice>(names::CHATTER_ADVICE, nh_, PATIENCE);
   ASSERT_TRUE(advice);
   EXPECT_EQ(advice->condition, "cut_1");
   EXPECT_GT(toSec(advice->header.stamp), 200.0);

@@ -14,7 +14,7 @@
 namespace smartmill::focas {
 namespace {
 
-constexpr double TIMEOUT = 10.0;  // [s] generous: tests must not depend on the computer's speed
+constexpr double TIMEOUT = 60.0;  // [s] generous: tests must not depend on the computer's speed
 
 const char* const OPEN_REPLY_BODY = "00000000 00000003 0001 0001 Z8 0001 Z6 0001 Z10 0001 Z30";
 const char* const SYSINFO_REPLY =

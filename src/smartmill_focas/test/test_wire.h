@@ -52,7 +52,7 @@ inline std::string show(const Bytes& bytes) {
 }
 
 /// Waits until a condition holds; generous, so that a slow computer passes too.
-inline bool eventually(const std::function<bool()>& condition, double seconds = 10.0) {
+inline bool eventually(const std::function<bool()>& condition, double seconds = 120.0) {
   const auto deadline = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
   while (!condition()) {
     if (std::chrono::steady_clock::now() > deadline) {
@@ -111,8 +111,8 @@ class RawSocket : public OwnedDescriptor {
     }
     return true;
   }
-  /// That many bytes, fewer when the peer closes or 10 s pass.
-  Bytes receive(std::size_t count, int timeout_ms = 10000) {
+  /// That many bytes, fewer when the peer closes or nothing comes for two minutes.
+  Bytes receive(std::size_t count, int timeout_ms = 120000) {
     Bytes bytes;
     while (bytes.size() < count) {
       pollfd wait{fd_, POLLIN, 0};
