@@ -65,6 +65,8 @@ class ClosedFormMachine {
   Axes3 position{{0.0, 0.0, 0.15}};
   double spindle = 0.7, spindle_speed = 0.0;
   double closest = 1.0;  // [m] least gap ever
+  /// [m] standard deviation of a distance moved, which the axes do not show.
+  double position_noise = 0.0;
   int strikes = 0;
 
   explicit ClosedFormMachine(std::uint32_t seed) : random(seed) {
@@ -164,7 +166,7 @@ class ClosedFormMachine {
         const Axes3& p = h.position.at(dir == 0 ? "x" : "y");
         const double facing = dir == 0 ? 0.5 * units::PI : 0.0;
         const double gap =
-            p[d] + 2.0 * h.gap_at_zero_volt - position[d] + away +
+            p[d] + 2.0 * h.gap_at_zero_volt - position[d] - unseen[d] + away +
             profile.retreat(spindle + mounting, model.tool->lag() * (p[2] - position[2]), facing);
         closest = std::min(closest, gap);
         volt = gap > 0.0 ? h.gain_volt * (h.gap_at_zero_volt / gap - 1.0) : h.range_volt;
@@ -237,6 +239,10 @@ class ClosedFormMachine {
       for (std::size_t i = 0; i < 3; ++i) rest = std::hypot(rest, to[i] - position[i]);
       if (rest <= way) {
         position = to;
+        std::normal_distribution<double> normal;
+        if (position_noise > 0.0) {
+          for (double& u : unseen) u += position_noise * normal(random);
+        }
         way -= rest;
         path.pop_front();
       } else {
@@ -250,6 +256,7 @@ class ClosedFormMachine {
   std::vector<ModalFilter> filter;
   int filter_direction = -1;
   std::deque<Waypoint> path;
+  Axes3 unseen{};  // [m] beyond the shown position
   double path_from = 0.0, orient_from = 0.0, orient_to = 0.0, hit_at = -1.0;
   bool orienting = false;
 };

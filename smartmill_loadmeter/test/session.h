@@ -36,7 +36,7 @@ inline MachineModel model() {
 /// A machine that goes through air cuts and slots; everything it says is handed over in stamp order.
 class Session {
  public:
-  Session(unsigned seed, double noise) : random_(seed), noise_(noise) {}
+  Session(unsigned seed, double noise) : random_(seed), angle_random_(seed), noise_(noise) {}
 
   std::function<void(const CncState&)> state = [](const CncState&) {};
   std::function<void(const LoadSample&)> load = [](const LoadSample&) {};
@@ -59,7 +59,10 @@ class Session {
     const Engagement e{0.0, units::PI, 0.002, feed};
     const CuttingForce force = MechanisticForce(TOOL, cutting, e).mean();
     x_force_ = force.fx;
-    if (ripple) ripple_ = torqueOverARevolution(e);
+    if (ripple) {
+      ripple_ = torqueOverARevolution(e);
+      if (any_angle) angle_ = units::TWO_PI * uniform_(angle_random_);
+    }
     run(seconds, speed, force.torque);
     ripple_.clear();
     x_force_ = 0.0;
@@ -85,6 +88,8 @@ class Session {
 
   /// The load meter shows how the teeth pass; without it a cut is its mean torque.
   bool ripple = false;
+  /// Each slot begins at another angle of the spindle, with the ripple.
+  bool any_angle = false;
   /// Offset of the cutter axis [m] and its angle [rad], with the ripple.
   double runout = 0.0, runout_angle = 0.0;
 
@@ -197,8 +202,9 @@ class Session {
   }
 
   const ToolGeometry TOOL{3, 0.012, units::radFromDeg(35.0), {}};
-  std::mt19937 random_;
+  std::mt19937 random_, angle_random_;
   std::normal_distribution<double> normal_;
+  std::uniform_real_distribution<double> uniform_;
   double noise_;
   double time_ = 1000.0, position_ = 0.0, speed_ = 0.0, lagged_ = 0.0;
   double x_force_ = 0.0, phase_ = 0.0, angle_ = 0.0;
@@ -208,10 +214,10 @@ class Session {
   std::normal_distribution<double> hall_;
 };
 
-/// Three air cuts and three slots, at a speed at which the readings meet all phases of a revolution.
-inline void takeThrough(Session& session) {
+/// Three air cuts and three slots. At 6000 rpm the readings, one in two revolutions, meet a single phase of it.
+inline void takeThrough(Session& session, double rpm = 6000.0) {
   for (const double rpm : {2000.0, 6000.0, 12000.0}) session.air(rpm, 3.0);
-  for (const double feed : {3e-5, 6e-5, 1e-4}) session.slot(6100.0, feed, 4.0);
+  for (const double feed : {3e-5, 6e-5, 1e-4}) session.slot(rpm, feed, 4.0);
 }
 
 }  // namespace smartmill::loadmeter

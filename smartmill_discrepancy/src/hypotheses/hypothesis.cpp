@@ -11,18 +11,22 @@ namespace {
 EffectScope scopeOf(const Dataset& data) {
   EffectScope scope{data.nominal, {}};
   scope.start_times = scope.cut_times = true;
+  double first_cut = 0.0;
   for (const TestData& t : data.tests) {
     const bool cut = t.test.kind == TestKind::cut;
     scope.channels.insert(t.channels.begin(), t.channels.end());
     scope.cuts = scope.cuts || cut;
     scope.start_times = scope.start_times && t.test.start_time;
     scope.cut_times = scope.cut_times && (!cut || t.test.cut_time_before);
+    const double start = cut ? t.test.start_time.value_or(0.0) : 0.0;
+    if (start > 0.0 && (first_cut == 0.0 || start < first_cut)) first_cut = start;
     for (const char* name : {"fx", "fy", "fz"}) {
       if (!t.record.has(name)) continue;
       for (const double f : t.record.column(name))
         scope.largest_force = std::max(scope.largest_force, std::abs(f));
     }
   }
+  if (first_cut > 0.0) scope.first_cut = first_cut;
   return scope;
 }
 

@@ -17,13 +17,12 @@ namespace {
 // Machines drawn with friction that their nominal models lack, nominal values off by what is stated of them:
 // the fit's standard deviations tell how far it is from the truth, neither too small nor inflated.
 TEST(Fitter, standardDeviationsAreHonest) {
-  constexpr int RUNS = 100;
   std::mt19937_64 random(17);
   std::normal_distribution<double> normal;
   const MachineModel nominal = spindleOnly();
   const NominalFreedom freedom(nominal);
   std::array<Coverage, 2> coverage;
-  for (int run = 0; run < RUNS; ++run) {
+  for (int run = 0; run < Coverage::RUNS; ++run) {
     std::vector<double> off;
     for (const Coordinate& c : freedom.coordinates()) off.push_back(c.prior_std * normal(random));
     MachineModel machine = freedom.apply(nominal, off);

@@ -73,8 +73,7 @@ TEST(SensorCalibration, JogsAsTheThesisDoes) {
 TEST(SensorCalibration, StandardDeviationIsHonest) {
   const SensorCalibrationOptions options;
   Coverage sensitivity;
-  const int runs = 200;
-  for (int i = 0; i < runs; ++i) {
+  for (int i = 0; i < Coverage::RUNS; ++i) {
     const Outcome o = run(options, 700e-6, 1e-3, 100u + static_cast<std::uint32_t>(i));
     ASSERT_EQ(o.calibration.state(), SensorCalibration::State::done) << o.calibration.reason();
     const double truth = Sensor().sensitivity(o.gap + 0.0);

@@ -21,7 +21,7 @@ namespace {
 // at the start is known.
 TEST(SpeedTracker, FindsTheSpeedAsWellAsLeastSquares) {
   constexpr double RATE = 25600.0, SPEED = 900.0, SLOPE = 400.0;
-  constexpr int COUNT = 2000, RUNS = 100;
+  constexpr int COUNT = 2000, RUNS = Coverage::RUNS;
   std::mt19937 random(3);
   std::normal_distribution<double> noise(0.0, 1.0);
   double squares = 0.0;
@@ -41,7 +41,7 @@ TEST(SpeedTracker, FindsTheSpeedAsWellAsLeastSquares) {
   }
   // Phase zero at the start: sum of (i dt)^2 is N^3 dt^2 / 3.
   const double best = std::sqrt(3.0) / (SLOPE / RATE * std::pow(COUNT, 1.5));
-  EXPECT_LT(std::sqrt(squares), 1.3 * best);  // RMS of 100 runs: +- 7 % and a window of inflated noise
+  EXPECT_LT(std::sqrt(squares), 1.3 * best);  // RMS of 200 runs: +- 5 % and a window of inflated noise
   EXPECT_GT(std::sqrt(squares), 0.7 * best);
   EXPECT_TRUE(speed.honest());
 }

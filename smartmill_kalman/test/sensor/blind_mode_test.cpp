@@ -66,7 +66,7 @@ TEST(BlindMode, FindsTheModeWithAnHonestDeviation) {
   ModalModel sensor;
   sensor.modes = {{970.0, 0.02, 1.0}};
   Coverage frequency, damping;
-  for (std::uint32_t seed = 0; seed < 20; ++seed) {
+  for (std::uint32_t seed = 0; seed < Coverage::RUNS; ++seed) {
     const BlindMode found = findBlindMode(cut(sensor, seed, 3.0), RATE, SPEED, 600.0, 1500.0);
     EXPECT_NEAR(found.mode.frequency, 970.0, 0.01 * 970.0);
     EXPECT_GT(found.likelihood, 10.0);

@@ -100,7 +100,7 @@ TEST(SensorMeasurement, ABlowFromTheOtherSideIsTurned) {
   EXPECT_NEAR(r.modes.model.modes[0].gain, 0.9, 0.02);
 }
 
-// 200 measurements, by their noise alone: the allowance for systematic errors, which this rig has not, is
+// By their noise alone: the allowance for systematic errors, which this rig has not, is
 // left out. Aliasing of the sampled half sine biases by less than the noise here.
 TEST(SensorMeasurement, StandardDeviationsAreHonest) {
   Coverage frequency, damping, gain;
@@ -108,7 +108,7 @@ TEST(SensorMeasurement, StandardDeviationsAreHonest) {
   taps.record_length = 0.1;
   taps.systematic = 0.0;
   taps.rest_time = 0.02;
-  for (std::uint32_t run = 0; run < 200; ++run) {
+  for (std::uint32_t run = 0; run < Coverage::RUNS; ++run) {
     Loop loop(dynamometer(), 100 + run, taps);
     loop.rig.noise = 3.0;
     const SensorResult r = loop.measure(goal("x", 4, 1));

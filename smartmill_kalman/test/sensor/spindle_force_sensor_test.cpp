@@ -121,7 +121,7 @@ TEST(CalibrateStatic, VerificationTellsAWrongConstant) {
 
 TEST(CalibrateStatic, StandardDeviationsAreHonest) {
   Coverage x, y, z;
-  for (std::uint32_t run = 0; run < 100; ++run) {
+  for (std::uint32_t run = 0; run < Coverage::RUNS; ++run) {
     const SpindleSensorCalibration c =
         calibrateStatic(weights({100.0, 180.0}, 0.01, 100 + run), TABLE).calibration;
     x.add(c.x.slope - TABLE.x.slope, c.x.slope_std);

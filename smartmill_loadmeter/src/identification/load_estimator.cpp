@@ -462,9 +462,11 @@ Eigen::MatrixXd LoadEstimator::covariance() const {
   const double clusters = static_cast<double>(records_.size()), n = static_cast<double>(size);
   const double few = clusters / std::max(1.0, clusters - n);
   const Eigen::MatrixXd scatter = covariance * between * covariance * few;
-  // Many records tell of their scatter themselves; few do not.
+  // Many records tell of their scatter themselves; few do not, and the larger of two estimates, one of them by
+  // two or three degrees of freedom, would be too large on the average: theirs counts by what is left in all.
   const bool many = clusters >= 2.0 * n;
   const Eigen::MatrixXd from_noise = covariance * (many ? 1.0 : std::max(1.0, chosen_.misfit));
+  if (!many) return from_noise + covariance * rounding * covariance;
   const Eigen::Index tc = static_cast<Eigen::Index>(chosen_.terms.ktcAt()), te = tc + 1;
   Eigen::MatrixXd total = from_noise;
   if (scatter(tc, tc) * from_noise(te, te) + scatter(te, te) * from_noise(tc, tc) >

@@ -48,8 +48,7 @@ TEST(IdleVoltage, reproducesTheFiguresOfTheThesis) {
 
 TEST(IdleVoltage, standardDeviationsAreHonest) {
   Coverage kb, ktcf;
-  const int runs = 200;
-  for (int run = 0; run < runs; ++run) {
+  for (int run = 0; run < Coverage::RUNS; ++run) {
     const IdleVoltage idle = fitIdleVoltage(thesisAirCuts(static_cast<unsigned>(run) + 10), ZERO_BELOW, STEP);
     kb.add(idle.kb.value - KB, idle.kb.std_dev);
     ktcf.add(idle.ktcf.value - KTCF, idle.ktcf.std_dev);

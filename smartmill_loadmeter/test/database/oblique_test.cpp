@@ -185,7 +185,7 @@ TEST(SemiInverse, overManyMaterialsForceIsWithinEightPercent) {
 TEST(SemiInverse, standardDeviationsAreHonest) {
   Materials materials(12, 0.03);
   Coverage ktc, krc, kac;
-  for (int run = 0; run < 200; ++run) {
+  for (int run = 0; run < Coverage::RUNS; ++run) {
     const Prediction p = materials.draw();
     ktc.add(p.found.value.ktc - p.truth.ktc, p.found.std_dev.ktc);
     krc.add(p.found.value.krc - p.truth.krc, p.found.std_dev.krc);

@@ -89,9 +89,8 @@ struct Plant {
 
 TEST(LoadRecords, shortRecordsGiveTheTruthWithHonestStandardDeviations) {
   const TemporaryFolder folder;
-  const int runs = 60;
   Coverage ktc, kte;
-  for (int run = 0; run < runs; ++run) {
+  for (int run = 0; run < Coverage::RUNS; ++run) {
     const Plant plant(folder.file(""), static_cast<unsigned>(run + 1), true);
     const CoefficientSet k = identifyFromLoadRecords(plant.campaign, plant.model, {}).set;
     EXPECT_NEAR(k.value.ktc, TRUTH.ktc, 0.005 * TRUTH.ktc);

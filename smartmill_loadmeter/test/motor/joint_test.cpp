@@ -115,7 +115,7 @@ TEST(Joint, oneFeedSeparatesNothingAndSaysSo) {
 TEST(Joint, overManyMachinesRadialAndAxialAreWithinTenPercentInTheMedianAndHonest) {
   std::vector<double> krc, kac;
   Coverage radial, axial;
-  const int runs = 200;
+  const int runs = Coverage::RUNS;
   for (int run = 0; run < runs; ++run) {
     Machine m(static_cast<unsigned>(run) + 10);
     std::vector<JointReading> readings;

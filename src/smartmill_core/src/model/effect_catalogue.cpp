@@ -185,6 +185,16 @@ Forms saturations(const Scope& scope) {
               .startingAt({0.97 * most})};
 }
 
+// Tried at several time constants, in units of the time before the first cut.
+Forms thermalGrowth(const Scope& scope) {
+  EffectForm form({saturating("growth_um", "time_constant_s", scope.first_cut, {-2000.0, 2000.0, 0.0125, 50.0})});
+  for (const double constants : {0.2, 0.6, 1.75}) {
+    const double share = std::exp(-1.0 / constants);
+    form.probe({0.0, share}, {{10.0, share}});
+  }
+  return {form};
+}
+
 // ---- draws
 
 double between(Random& random, double low, double high) {
@@ -316,10 +326,7 @@ std::vector<EffectKind> motion() {
        {number("growth_um", "um").drawn(30.0, 120.0),
         number("time_constant_s", "s", POSITIVE).drawn(120.0, 500.0)},
        {Need::cuts, Need::start_time},
-       always(EffectForm({amplitude("growth_um", {-2000.0, 2000.0, 0.0125, 50.0}),
-                          logarithm("time_constant_s", {std::log(2.0), std::log(20000.0), 2.5e-4, 1.0}, 1.0,
-                                    std::log(250.0))})
-                  .scaled(10.0, {80.0, 250.0, 700.0}))},
+       thermalGrowth},
   };
 }
 

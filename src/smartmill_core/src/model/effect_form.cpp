@@ -96,6 +96,22 @@ EffectCoordinates powerLaw(const std::string& exponent_key, const std::string& r
           }};
 }
 
+EffectCoordinates saturating(const std::string& size_key, const std::string& constant_key, double time,
+                             const FitRange& range) {
+  constexpr double LEAST = 1.0 / 30.0, MOST = 50.0, USUAL = 0.6;  // constants over the time
+  const auto share = [](double constants) { return std::exp(-1.0 / constants); };
+  return {{coordinate(size_key + " so far", range),
+           {"share to come", share(USUAL), share(LEAST), share(MOST), 1e-4, 0.3}},
+          [=](const double* v, EffectEntry& e) {
+            e.numbers[size_key] = v[0] / (1.0 - v[1]);
+            e.numbers[constant_key] = -time / std::log(v[1]);
+          },
+          [=](const EffectEntry& e, double* v) {
+            v[1] = share(valueOf(e, constant_key) / time);
+            v[0] = valueOf(e, size_key) * (1.0 - v[1]);
+          }};
+}
+
 EffectCoordinates pitches(const std::string& key, const ToolGeometry& tool, const FitRange& range) {
   EffectCoordinates c;
   std::vector<double> nominal;

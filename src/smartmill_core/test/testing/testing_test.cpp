@@ -23,25 +23,28 @@ Coverage estimates(int count, double stated) {
 }
 
 TEST(Coverage, holdsHonestDeviationsOnly) {
-  for (const int count : {20, 40, 200, 2000}) {
+  for (const int count : {Coverage::RUNS, 600, 2000}) {
     EXPECT_TRUE(estimates(count, 1.0).honest()) << count;
-    EXPECT_FALSE(estimates(count, 0.5).honest()) << count;
-    EXPECT_FALSE(estimates(count, 2.0).honest()) << count;
+    EXPECT_FALSE(estimates(count, 1.0 / 1.5).honest()) << count;
+    EXPECT_FALSE(estimates(count, 1.5).honest()) << count;
   }
   EXPECT_FALSE(estimates(2000, 1.1).honest());
   EXPECT_FALSE(estimates(2000, 0.9).honest());
-  EXPECT_TRUE(estimates(2000, 1.1).honest(0, 0.1));
-  EXPECT_TRUE(estimates(2000, 1.1).honest(200));
+  EXPECT_TRUE(estimates(2000, 1.1).honest(Coverage::RUNS));
 }
 
 TEST(Coverage, refusesNothingAndNoDeviation) {
   EXPECT_FALSE(Coverage().honest());
-  Coverage coverage = estimates(40, 1.0);
+  EXPECT_FALSE(estimates(Coverage::RUNS - 10, 1.0).honest());  // too few to tell
+  EXPECT_FALSE(estimates(2000, 1.0).honest(Coverage::RUNS - 10.0));
+  EXPECT_FALSE(estimates(60, 1.0).honest(0.0, 2.0));
+  EXPECT_TRUE(estimates(72, 1.0).honest(0.0, 2.0));
+  Coverage coverage = estimates(Coverage::RUNS, 1.0);
   coverage.add(0.0, 0.0);
   EXPECT_FALSE(coverage.honest());
 }
 
-// Tables of chi-square: 5 degrees of freedom, 0.0005 and 0.9995: 0.158 and 22.105; 100: 59.896 and 153.167. A
+// Chi-square of 200 degrees of freedom at the probabilities of -4 and 4 normal deviations: 129.78 and 290.18. A
 // mean square just inside is honest, one just outside is not.
 TEST(Coverage, hasTheLimitsOfTheTables) {
   const auto of = [](int count, double sum) {
@@ -49,12 +52,10 @@ TEST(Coverage, hasTheLimitsOfTheTables) {
     for (int i = 0; i < count; ++i) coverage.add(std::sqrt(sum / count), 1.0);
     return static_cast<bool>(coverage.honest());
   };
-  EXPECT_TRUE(of(5, 22.105 * 0.97));
-  EXPECT_FALSE(of(5, 22.105 * 1.03));
-  EXPECT_TRUE(of(100, 59.896 * 1.01));
-  EXPECT_FALSE(of(100, 59.896 * 0.99));
-  EXPECT_TRUE(of(100, 153.167 * 0.99));
-  EXPECT_FALSE(of(100, 153.167 * 1.01));
+  EXPECT_TRUE(of(200, 129.78 * 1.01));
+  EXPECT_FALSE(of(200, 129.78 * 0.99));
+  EXPECT_TRUE(of(200, 290.18 * 0.99));
+  EXPECT_FALSE(of(200, 290.18 * 1.01));
 }
 
 void testThatNeedsData(std::string& found) {

@@ -27,11 +27,12 @@ double Coverage::rms() const {
   return std::sqrt(sum_ / static_cast<double>(count_));
 }
 
-::testing::AssertionResult Coverage::honest(std::size_t independent, double slack) const {
-  constexpr double Z = 3.29;  // 999 of 1000, both sides
-  const auto freedom = static_cast<double>(independent == 0 ? count_ : independent);
-  const double least = std::sqrt(chiSquareShare(freedom, -Z)) / (1.0 + slack);
-  const double most = std::sqrt(chiSquareShare(freedom, Z)) * (1.0 + slack);
+::testing::AssertionResult Coverage::honest(double independent, double told) const {
+  constexpr double Z = 4.0;  // of the normal distribution, both sides
+  const double freedom = independent > 0.0 ? independent : static_cast<double>(count_);
+  const double least = std::sqrt(chiSquareShare(freedom, -Z)), most = std::sqrt(chiSquareShare(freedom, Z));
+  if (!(most <= told * least))
+    return ::testing::AssertionFailure() << freedom << " independent errors tell no factor of " << told;
   const bool good = rms() >= least && rms() <= most;  // NaN is not good
   return (good ? ::testing::AssertionSuccess() : ::testing::AssertionFailure())
          << "error over stated deviation has RMS " << rms() << " over " << count_ << " estimates, honest is "
