@@ -149,8 +149,8 @@ TEST(HammerSequence, TurnsAFluteToTheHammerForAnyCutter) {
   }
 }
 
-// Repeated measurements with other noise, the axes off by what is stated of them. The first mode: on the second
-// one the sampled half sine's aliasing adds up to 1 %, which no scatter shows.
+// Repeated measurements with other noise, the axes off by what is stated of them. The first mode: on the
+// second one the sampled half sine's aliasing adds up to 1 %, which no scatter shows.
 TEST(HammerSequence, StandardDeviationOfStiffnessIsHonest) {
   Coverage gain;
   for (int run = 0; run < Coverage::RUNS; ++run) {

@@ -53,9 +53,9 @@ TEST(TransferMatrix, FindsThePlatesSixBySix) {
   EXPECT_LT(found.condition[20], 1.5);
 }
 
-/// How many of the real and imaginary parts of an inverse are independent of each other, of errors dH that are
-/// so: the error -W dH W has rows that hang together as those of W do, and columns as its columns. Of a sum of
-/// squares with correlations c, (number)^2 / sum of c^2 counts (Satterthwaite 1946).
+/// How many of the real and imaginary parts of an inverse are independent of each other, of errors dH that
+/// are so: the error -W dH W has rows that hang together as those of W do, and columns as its columns. Of a
+/// sum of squares with correlations c, (number)^2 / sum of c^2 counts (Satterthwaite 1946).
 double independentParts(const Eigen::MatrixXcd& w) {
   const auto squares = [](const Eigen::MatrixXcd& covariance) {
     const Eigen::VectorXd deviation = covariance.diagonal().real().cwiseSqrt();

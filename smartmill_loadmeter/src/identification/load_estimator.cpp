@@ -462,8 +462,9 @@ Eigen::MatrixXd LoadEstimator::covariance() const {
   const double clusters = static_cast<double>(records_.size()), n = static_cast<double>(size);
   const double few = clusters / std::max(1.0, clusters - n);
   const Eigen::MatrixXd scatter = covariance * between * covariance * few;
-  // Many records tell of their scatter themselves; few do not, and the larger of two estimates, one of them by
-  // two or three degrees of freedom, would be too large on the average: theirs counts by what is left in all.
+  // Many records tell of their scatter themselves; few do not, and the larger of two estimates, one of them
+  // by two or three degrees of freedom, would be too large on the average: theirs counts by what is left in
+  // all.
   const bool many = clusters >= 2.0 * n;
   const Eigen::MatrixXd from_noise = covariance * (many ? 1.0 : std::max(1.0, chosen_.misfit));
   if (!many) return from_noise + covariance * rounding * covariance;

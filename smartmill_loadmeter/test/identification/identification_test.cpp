@@ -63,9 +63,9 @@ TEST(LoadMeterIdentification, findsTheTruthWithHonestStandardDeviations) {
   checkHonesty(6100.0, 0.01, 0.03);
 }
 
-// At 100 turns a second each reading of a slot meets the same phase of the ripple, of which the lag leaves 1 / 43
-// at the 300 Hz of the teeth: a percent of the torque, which no mean over readings takes away and three feeds
-// make some percent of Ktc and of the smaller Kte. The deviations must say so.
+// At 100 turns a second each reading of a slot meets the same phase of the ripple, of which the lag leaves 1
+// / 43 at the 300 Hz of the teeth: a percent of the torque, which no mean over readings takes away and three
+// feeds make some percent of Ktc and of the smaller Kte. The deviations must say so.
 TEST(LoadMeterIdentification, readingsInStepWithTheTeethSaySo) {
   checkHonesty(6000.0, 0.05, 0.2);
 }

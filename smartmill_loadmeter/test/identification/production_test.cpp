@@ -80,8 +80,9 @@ TEST(Recursive, isHonest) {
   Coverage ktc, kte;
   constexpr int READINGS = 60;
   constexpr double MEMORY = 300.0;
-  // Readings of 10 s fade by exp(-10 s / memory) each: what is stated counts the weights w as so many readings,
-  // for values that drift; values that stand still are better known, by sum w / sum w^2 in variance.
+  // Readings of 10 s fade by exp(-10 s / memory) each: what is stated counts the weights w as so many
+  // readings, for values that drift; values that stand still are better known, by sum w / sum w^2 in
+  // variance.
   double weights = 0.0, squares = 0.0;
   for (int i = 0; i < READINGS; ++i) {
     const double weight = std::exp(-10.0 * i / MEMORY);

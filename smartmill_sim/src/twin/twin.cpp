@@ -369,7 +369,8 @@ double recordedPhase(const CampaignTest& test, const Record& recorded) {
     s += std::sin(angle[i] - turned);
     c += std::cos(angle[i] - turned);
   }
-  // A line of no whole order tells one turn from the next: the record's own count, 0..2 pi at its first sample.
+  // A line of no whole order tells one turn from the next: the record's own count, 0..2 pi at its first
+  // sample.
   return angle[0] + std::remainder(std::atan2(s, c) - angle[0], units::TWO_PI);
 }
 

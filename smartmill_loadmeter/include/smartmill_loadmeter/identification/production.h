@@ -21,9 +21,9 @@ struct TorqueReading {
 
 /// Ktc and Kte followed over ordinary production cuts: recursive least squares on the mean torque (eq. 3.19
 /// for any engagement), forgetting what is older than some minutes of cutting, so that wear shows. Directions
-/// that the cuts do not excite (one feed only) fade back to the uncertainty of the start, never beyond. Standard
-/// deviations leave room for a drift within the memory: of coefficients that stand still they are up to sqrt(2)
-/// times as large as the errors.
+/// that the cuts do not excite (one feed only) fade back to the uncertainty of the start, never beyond.
+/// Standard deviations leave room for a drift within the memory: of coefficients that stand still they are up
+/// to sqrt(2) times as large as the errors.
 class RecursiveCoefficients {
  public:
   struct Start {

@@ -187,7 +187,8 @@ Forms saturations(const Scope& scope) {
 
 // Tried at several time constants, in units of the time before the first cut.
 Forms thermalGrowth(const Scope& scope) {
-  EffectForm form({saturating("growth_um", "time_constant_s", scope.first_cut, {-2000.0, 2000.0, 0.0125, 50.0})});
+  EffectForm form(
+      {saturating("growth_um", "time_constant_s", scope.first_cut, {-2000.0, 2000.0, 0.0125, 50.0})});
   for (const double constants : {0.2, 0.6, 1.75}) {
     const double share = std::exp(-1.0 / constants);
     form.probe({0.0, share}, {{10.0, share}});

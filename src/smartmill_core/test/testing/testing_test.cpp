@@ -44,8 +44,8 @@ TEST(Coverage, refusesNothingAndNoDeviation) {
   EXPECT_FALSE(coverage.honest());
 }
 
-// Chi-square of 200 degrees of freedom at the probabilities of -4 and 4 normal deviations: 129.78 and 290.18. A
-// mean square just inside is honest, one just outside is not.
+// Chi-square of 200 degrees of freedom at the probabilities of -4 and 4 normal deviations: 129.78 and 290.18.
+// A mean square just inside is honest, one just outside is not.
 TEST(Coverage, hasTheLimitsOfTheTables) {
   const auto of = [](int count, double sum) {
     Coverage coverage;

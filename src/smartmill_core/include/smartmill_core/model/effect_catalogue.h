@@ -97,7 +97,7 @@ struct EffectScope {
   bool cuts = false;
   bool start_times = false, cut_times = false;  ///< stated wherever they count
   double largest_force = 0.0;                   ///< [N] of the records
-  double first_cut = 400.0;                     ///< [s] > 0, least start time of a cut that does not start at 0
+  double first_cut = 400.0;  ///< [s] > 0, least start time of a cut that does not start at 0
 };
 
 /// One cause that a nominal model may lack. Everything that speaks of it reads this declaration: the strict

@@ -58,8 +58,9 @@ EffectCoordinates sizes(const std::string& key, const std::string& y_ratio_key, 
 EffectCoordinates powerLaw(const std::string& exponent_key, const std::string& reference_key, double middle,
                            double low, double high);
 
-/// A size that is reached by 1 - exp(-t / constant): what is there at a time t > 0, and the share of the whole that
-/// is to come after it. Both stay told where the constant is not: of a constant far below t nothing is to come.
+/// A size that is reached by 1 - exp(-t / constant): what is there at a time t > 0, and the share of the
+/// whole that is to come after it. Both stay told where the constant is not: of a constant far below t
+/// nothing is to come.
 /// @param time [s] a time at which the effect is seen first; earlier ones need larger powers of the share
 EffectCoordinates saturating(const std::string& size_key, const std::string& constant_key, double time,
                              const FitRange& range);
