@@ -4,7 +4,7 @@
 #include <exception>
 
 #include "session/session.h"
-#include "smartmill_ros/node_main.h"
+#include "smartmill_ros/run_node.h"
 
 namespace {
 std::atomic<bool> stop{false};

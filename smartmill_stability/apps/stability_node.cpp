@@ -1,6 +1,5 @@
-#include "node/node.h"
 #include "smartmill_ros/node_main.h"
 
 int main(int argc, char** argv) {
-  return smartmill::runNode<smartmill::stability::StabilityNode>(argc, argv, "stability");
+  return smartmill::nodeMain(argc, argv);
 }

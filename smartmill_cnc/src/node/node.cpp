@@ -15,7 +15,9 @@
 #include "smartmill_msgs/LoadSample.h"
 #include "smartmill_ros/conversions.h"
 #include "smartmill_ros/frames.h"
+#include "smartmill_ros/node_main.h"
 #include "smartmill_ros/parameter_reader.h"
+#include "smartmill_ros/run_node.h"
 
 namespace smartmill::cnc {
 namespace {
@@ -299,3 +301,7 @@ void CncNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
 }
 
 }  // namespace smartmill::cnc
+
+int smartmill::nodeMain(int argc, char** argv) {
+  return runNode<cnc::CncNode>(argc, argv, "cnc");
+}

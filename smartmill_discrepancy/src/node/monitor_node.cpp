@@ -4,7 +4,9 @@
 
 #include "node/wiring.h"
 #include "smartmill_core/error.h"
+#include "smartmill_ros/node_main.h"
 #include "smartmill_ros/parameter_reader.h"
+#include "smartmill_ros/run_node.h"
 
 namespace smartmill::discrepancy {
 namespace {
@@ -83,3 +85,7 @@ void MonitorNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) 
 }
 
 }  // namespace smartmill::discrepancy
+
+int smartmill::nodeMain(int argc, char** argv) {
+  return runNode<discrepancy::MonitorNode>(argc, argv, "monitor");
+}

@@ -6,7 +6,9 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/names.h"
+#include "smartmill_ros/node_main.h"
 #include "smartmill_ros/parameter_reader.h"
+#include "smartmill_ros/run_node.h"
 #include "wiring.h"
 
 namespace smartmill {
@@ -81,3 +83,7 @@ void HammerServer::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status)
 
 }  // namespace hammer
 }  // namespace smartmill
+
+int smartmill::nodeMain(int argc, char** argv) {
+  return runNode<hammer::HammerServer>(argc, argv, "hammer");
+}

@@ -11,7 +11,9 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_ros/frames.h"
+#include "smartmill_ros/node_main.h"
 #include "smartmill_ros/parameter_reader.h"
+#include "smartmill_ros/run_node.h"
 
 namespace smartmill::kalman {
 namespace {
@@ -216,3 +218,7 @@ void KalmanNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
 }
 
 }  // namespace smartmill::kalman
+
+int smartmill::nodeMain(int argc, char** argv) {
+  return runNode<kalman::KalmanNode>(argc, argv, "kalman");
+}

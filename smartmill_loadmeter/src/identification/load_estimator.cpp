@@ -6,10 +6,11 @@
 #include <limits>
 #include <set>
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_core/units.h"
 #include "smartmill_loadmeter/calibration/load_meter.h"
 
@@ -455,8 +456,7 @@ Eigen::MatrixXd LoadEstimator::covariance() const {
     row += k;
     if (!(r.rounding > 0.0)) continue;
     // A constant error e of the voltage moves the target by pinv(rows)' sum e.
-    const Eigen::VectorXd moved =
-        part.transpose() * (r.rows.transpose().completeOrthogonalDecomposition().solve(r.sum)) / noise_;
+    const Eigen::VectorXd moved = part.transpose() * linear::leastNorm(r.rows.transpose(), r.sum) / noise_;
     rounding += moved * moved.transpose() * (r.rounding * r.rounding);
   }
   const double clusters = static_cast<double>(records_.size()), n = static_cast<double>(size);

@@ -3,8 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 
+#include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_core/units.h"
 #include "smartmill_loadmeter/calibration/load_meter.h"
 #include "smartmill_loadmeter/identification/runout_torque.h"
@@ -246,19 +247,19 @@ void LoadRecord::condense(const Spindle& spindle, const LoadPoint& about) {
     sum += row;
     squares += voltage[i] * voltage[i];
   }
-  const Eigen::SelfAdjointEigenSolver<Square> solver(normal);
-  const double largest = solver.eigenvalues().maxCoeff();
+  const linear::SymmetricEigensystem own = linear::symmetricEigensystem(normal);
+  const double largest = own.values.maxCoeff();
   std::vector<int> kept;
   for (int k = 0; k < LOAD_COLUMNS; ++k) {
-    if (solver.eigenvalues()[k] > 1e-11 * largest) kept.push_back(k);
+    if (own.values[k] > 1e-11 * largest) kept.push_back(k);
   }
   rows.resize(static_cast<Eigen::Index>(kept.size()), LOAD_COLUMNS);
   target.resize(static_cast<Eigen::Index>(kept.size()));
   for (std::size_t i = 0; i < kept.size(); ++i) {
     const Eigen::Index at = static_cast<Eigen::Index>(i);
-    const double root = std::sqrt(solver.eigenvalues()[kept[i]]);
-    rows.row(at) = root * solver.eigenvectors().col(kept[i]).transpose();
-    target[at] = solver.eigenvectors().col(kept[i]).dot(right) / root;
+    const double root = std::sqrt(own.values[kept[i]]);
+    rows.row(at) = root * own.vectors.col(kept[i]).transpose();
+    target[at] = own.vectors.col(kept[i]).dot(right) / root;
   }
   left = std::max(0.0, squares - target.squaredNorm());
   variance = left / static_cast<double>(voltage.size());

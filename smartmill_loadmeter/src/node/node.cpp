@@ -6,7 +6,9 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/units.h"
 #include "smartmill_ros/frames.h"
+#include "smartmill_ros/node_main.h"
 #include "smartmill_ros/parameter_reader.h"
+#include "smartmill_ros/run_node.h"
 
 namespace smartmill::loadmeter {
 
@@ -183,3 +185,7 @@ void LoadMeterNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status
 }
 
 }  // namespace smartmill::loadmeter
+
+int smartmill::nodeMain(int argc, char** argv) {
+  return runNode<loadmeter::LoadMeterNode>(argc, argv, "loadmeter");
+}

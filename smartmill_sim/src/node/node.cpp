@@ -14,7 +14,9 @@
 #include "smartmill_core/names.h"
 #include "smartmill_ros/conversions.h"
 #include "smartmill_ros/frames.h"
+#include "smartmill_ros/node_main.h"
 #include "smartmill_ros/parameter_reader.h"
+#include "smartmill_ros/run_node.h"
 
 namespace smartmill::sim {
 namespace {
@@ -165,3 +167,7 @@ void Node::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
 }
 
 }  // namespace smartmill::sim
+
+int smartmill::nodeMain(int argc, char** argv) {
+  return runNode<sim::Node>(argc, argv, "sim");
+}

@@ -8,7 +8,9 @@
 
 #include "smartmill_core/names.h"
 #include "smartmill_core/units.h"
+#include "smartmill_ros/node_main.h"
 #include "smartmill_ros/parameter_reader.h"
+#include "smartmill_ros/run_node.h"
 
 namespace smartmill::stability {
 namespace {
@@ -61,3 +63,7 @@ void ControlNode::publish(const LearntMachine& learnt) {
 }
 
 }  // namespace smartmill::stability
+
+int smartmill::nodeMain(int argc, char** argv) {
+  return runNode<stability::ControlNode>(argc, argv, "chatter_control");
+}

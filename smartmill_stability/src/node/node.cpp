@@ -7,7 +7,9 @@
 #include "node/wiring.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/machine_model.h"
+#include "smartmill_ros/node_main.h"
 #include "smartmill_ros/parameter_reader.h"
+#include "smartmill_ros/run_node.h"
 
 namespace smartmill::stability {
 namespace {
@@ -171,3 +173,7 @@ void StabilityNode::diagnoseChatter(diagnostic_updater::DiagnosticStatusWrapper&
 }
 
 }  // namespace smartmill::stability
+
+int smartmill::nodeMain(int argc, char** argv) {
+  return runNode<stability::StabilityNode>(argc, argv, "stability");
+}

@@ -56,6 +56,10 @@ LeastSquares leastSquares(const MatrixXd& a, const MatrixXd& b) {
   return {qr.solve(b), qr.rank()};
 }
 
+VectorXd leastNorm(const MatrixXd& a, const VectorXd& b) {
+  return a.completeOrthogonalDecomposition().solve(b);
+}
+
 MatrixXd triangleOf(const MatrixXd& a) {
   const Eigen::HouseholderQR<MatrixXd> qr(a);
   return qr.matrixQR().topRows(a.cols()).triangularView<Eigen::Upper>();

@@ -97,6 +97,10 @@ TEST(LinearAlgebra, FindsLeastSquares) {
   EXPECT_NEAR(line.x(1, 0), -0.5, 1e-14);
   a.col(0) = a.col(1);
   EXPECT_EQ(linear::leastSquares(a, y).rank, 1);
+  // The columns are the same: of all x1 + x2 that fit as well, equal shares are the least.
+  const VectorXd least = linear::leastNorm(a, y);
+  EXPECT_NEAR(least[0], least[1], 1e-14);
+  EXPECT_NEAR(least[0], a.col(0).dot(y.col(0)) / a.col(0).squaredNorm() / 2.0, 1e-14);
   const MatrixXd r = linear::triangleOf(a);
   EXPECT_LT((r.transpose() * r - a.transpose() * a).norm(), 1e-13);
   EXPECT_EQ(r(1, 0), 0.0);

@@ -40,6 +40,10 @@ struct LeastSquares {
 };
 LeastSquares leastSquares(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b);
 
+/// The least x among those with the least a x - b (the pseudo-inverse of a times b), by complete orthogonal
+/// decomposition.
+Eigen::VectorXd leastNorm(const Eigen::MatrixXd& a, const Eigen::VectorXd& b);
+
 /// R of a = Q R: upper triangle, as many rows as a has columns (a has at least as many rows).
 Eigen::MatrixXd triangleOf(const Eigen::MatrixXd& a);
 
