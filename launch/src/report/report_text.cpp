@@ -14,7 +14,6 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 using Row = std::vector<std::string>;
-using session::CutVerdict;
 
 std::string shown(const char* format, double value) {
   if (std::isnan(value)) return "-";

@@ -192,7 +192,7 @@ Section forceSection(const RecordedCut& cut, std::vector<std::string>& notes) {
     notes.push_back("cut " + cut.condition.name + ": no steady samples with settled compensation");
     return section;
   }
-  std::array<double, 3> truth;
+  std::array<double, 3> truth{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     truth[axis] = cut.truth.empty() ? NOT_A_NUMBER : middleRange(cut.truth.axis(axis, from, to));
   }

@@ -122,7 +122,7 @@ class Search {
   };
 
   void fitNominal();
-  bool addEffect(std::size_t round);
+  bool addEffect(std::size_t number);
   Round fitPromises(std::size_t number);
   bool worthFitting(const Round& round, const Promise& promise, double largest) const;
   void fitPromise(const Promise& promise, Round& round);

@@ -13,6 +13,14 @@
 #include "smartmill_core/units.h"
 #include "smartmill_kalman/filter/riccati.h"
 
+// Vectors for the processor at hand; clang, which only reads this file, wants to see it where a function is
+// declared.
+#ifdef __clang__
+#define AVX2_AND_DEFAULT
+#else
+#define AVX2_AND_DEFAULT __attribute__((target_clones("avx2", "default")))
+#endif
+
 namespace smartmill::kalman {
 namespace {
 
@@ -329,9 +337,7 @@ void HarmonicFilter::reset() {
 }
 
 // Without fused multiply-adds the clones give the same numbers.
-__attribute__((target_clones("avx2", "default"))) double HarmonicFilter::advance(const GainBlock* gain,
-                                                                                 double innovation,
-                                                                                 double force_gain) {
+AVX2_AND_DEFAULT double HarmonicFilter::advance(const GainBlock* gain, double innovation, double force_gain) {
   const Four nu = {innovation, innovation, innovation, innovation};
   Four force = {}, expected = {};
   Block* block = blocks_.data();
@@ -384,8 +390,8 @@ std::shared_ptr<const HarmonicFilter::Layout> HarmonicFilter::layout() const {
 }
 
 // lambda(k) = c' nu / S + (I - c' K') Phi' lambda(k + 1); force smoothed = force predicted + (P d')' lambda.
-__attribute__((target_clones("avx2", "default"))) double HarmonicFilter::goBack(
-    const Layout& layout, std::size_t level, double innovation, bool seen, std::vector<GainBlock>& lambda) {
+AVX2_AND_DEFAULT double HarmonicFilter::goBack(const Layout& layout, std::size_t level, double innovation,
+                                               bool seen, std::vector<GainBlock>& lambda) {
   const std::vector<GainBlock>&gain = layout.gains[level], &smoothing = layout.smoothing[level];
   Four through = {}, correction = {};
   for (std::size_t i = 0; i < lambda.size(); ++i) {

@@ -118,7 +118,7 @@ void SpindleForceSensor::learn(double time, double angle, double speed,
   if (stretch_ && std::abs(speed - stretch_->speed) > STEADY * std::max(stretch_->speed, LEAST_SPEED))
     closeStretch();
   if (!stretch_) {
-    stretch_.emplace();
+    stretch_ = Stretch{};
     stretch_->from = time;
     stretch_->speed = speed;
     stretch_->first = sensors;

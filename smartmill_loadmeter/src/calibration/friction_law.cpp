@@ -69,8 +69,8 @@ struct FrictionData {
   Friction linear;
   std::set<double> speeds, times;
 
-  FrictionData(const std::vector<TimedAirCut>& air_cuts, double load_meter_gain, double zero_below_)
-      : gain(load_meter_gain), zero_below(zero_below_) {
+  FrictionData(const std::vector<TimedAirCut>& air_cuts, double load_meter_gain, double below)
+      : gain(load_meter_gain), zero_below(below) {
     std::vector<AirCut> plain;
     for (const TimedAirCut& a : air_cuts) {
       plain.push_back(a.cut);

@@ -16,7 +16,6 @@ namespace smartmill::loadmeter {
 
 namespace {
 
-using units::PI;
 using units::TWO_PI;
 
 constexpr double REFERENCE_CHIP = 1e-4;      // [m]

@@ -35,7 +35,7 @@ class Lag {
 
 // Torque in cut per unit of Ktc, Kte: at engagement, in the mean, from `first` on.
 struct UnitTorque {
-  std::array<double, 2> at_engagement, mean;
+  std::array<double, 2> at_engagement{}, mean{};
   std::array<std::vector<double>, 2> torque;
 };
 

@@ -106,7 +106,7 @@ class RunoutEffect {
 
  private:
   struct Node {
-    std::array<double, 2> share;
+    std::array<double, 2> share{};
     std::vector<std::array<std::complex<double>, 2>> harmonics;  // [V] amplitude per N/m2 and N/m
   };
   static constexpr std::size_t NODES = 13;

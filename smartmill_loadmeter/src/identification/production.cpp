@@ -21,7 +21,7 @@ double determinant(const Information& i) {
 }
 
 struct Sensitivity {
-  double tc, te;  // [N m] per unit of Ktc, Kte
+  double tc = 0.0, te = 0.0;  // [N m] per unit of Ktc, Kte
 };
 
 Sensitivity sensitivityOf(const ToolGeometry& tool, const Engagement& engagement) {
@@ -83,7 +83,7 @@ namespace {
 struct Candidate {
   PlannedCut cut;
   Sensitivity s;
-  double variance;  // [N2 m2] of its torque
+  double variance = 0.0;  // [N2 m2] of its torque
 };
 
 // Cuts that keep the limits.

@@ -208,7 +208,7 @@ double refine(Fit* fit, std::array<double, 2> start, SecondOrder* model) {
 
 /// Of gain, frequency and damping; blocks overlap by half, so half of the residuals count.
 Eigen::Matrix3d covarianceOf(const Fit& fit, const SecondOrder& model, double squares) {
-  const VectorXd linear = fit.linear();
+  const VectorXd& linear = fit.linear();
   MatrixXd jacobian(fit.size(), 5);
   jacobian.rightCols(3) = fit.basisOf(model.frequency, model.damping_ratio);
   const VectorXd here = jacobian.rightCols(3) * linear;

@@ -28,7 +28,7 @@ void prepareSocket(int fd) {
 }
 
 Transfer readSome(int fd, FrameReader& reader, std::size_t max_bytes) {
-  std::array<std::uint8_t, 16384> chunk;
+  std::array<std::uint8_t, 16384> chunk;  // NOLINT(cppcoreguidelines-pro-type-member-init): recv fills it
   std::size_t total = 0;
   while (total < max_bytes) {
     const ssize_t got = ::recv(fd, chunk.data(), std::min(chunk.size(), max_bytes - total), 0);

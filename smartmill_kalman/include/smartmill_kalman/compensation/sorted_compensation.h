@@ -96,7 +96,7 @@ class SortedCompensation {
   ForceCompensation compensation_;
   SensorMeasurement measurement_;
   StreamSorter sorter_;
-  std::array<double, 3> identified_;  // [s] stamp of the modes in use, an axis each
+  std::array<double, 3> identified_{};  // [s] stamp of the modes in use, an axis each
   StreamSorter::Stream conditions_, goals_, hammers_, angles_, blocks_;
   std::optional<SpindleForceSensor> spindle_;
   std::optional<SensorMatrix> matrix_;

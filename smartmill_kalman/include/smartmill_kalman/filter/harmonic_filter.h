@@ -177,7 +177,7 @@ class HarmonicFilter {
   double expectation() const;
 
   ModalModel sensor_;
-  double spindle_speed_, sample_rate_;
+  double spindle_speed_ = 0.0, sample_rate_;
   std::size_t modes_;
   int harmonics_;
   std::vector<HarmonicGain> design_;

@@ -27,9 +27,9 @@ class LagSmoother {
 
  private:
   struct Sample {
-    double predicted, innovation;  // [N]
-    std::size_t level;
-    bool seen, wall;  // wall: what comes from here on says nothing about the time before
+    double predicted = 0.0, innovation = 0.0;  // [N]
+    std::size_t level = 0;
+    bool seen = false, wall = false;  // wall: what comes from here on says nothing about the time before
     std::shared_ptr<const HarmonicFilter::Layout> layout;
   };
   std::deque<Sample> samples_;

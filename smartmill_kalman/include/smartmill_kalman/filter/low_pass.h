@@ -21,7 +21,7 @@ class LowPass {
 
  private:
   struct Section {
-    double b0, b1, b2, a1, a2;
+    double b0 = 0.0, b1 = 0.0, b2 = 0.0, a1 = 0.0, a2 = 0.0;
     double s1 = 0.0, s2 = 0.0;
   };
   std::array<Section, 2> sections_;

@@ -98,8 +98,8 @@ class SpindleForceSensor {
 
   SpindleSensorCalibration calibration_;
   double length_;
-  std::array<double, 3> constant_;  // of x, y, z
-  double yx_, yz_, xz_;             // pair per load; 0: none
+  std::array<double, 3> constant_{};  // of x, y, z
+  double yx_, yz_, xz_;               // pair per load; 0: none
   std::array<ModalModel, 3> sensor_;
   std::vector<ModalFilter> courses_;  // of yx, yz, xz
   double course_rate_ = 0.0;          // [Hz]

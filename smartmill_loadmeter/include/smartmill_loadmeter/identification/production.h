@@ -47,7 +47,7 @@ class RecursiveCoefficients {
 
  private:
   std::array<double, 2> value_;
-  std::array<double, 3> information_, start_;  // xx, xy, yy
+  std::array<double, 3> information_{}, start_{};  // xx, xy, yy
   double memory_;
   double surprise_ = 0.0;
   int readings_ = 0;

@@ -54,7 +54,7 @@ class MillingProcess {
  private:
   /// A turn of the spindle back in the history.
   struct Delay {
-    double turn;                           // [rad]
+    double turn = 0.0;                     // [rad]
     std::size_t steps = 0;                 // ago: the step before it
     std::array<double, 4> weights{};       // of the steps steps + 1, steps, steps - 1, steps - 2 ago
     long of_regime = -1;                   // for which these hold
