@@ -13,7 +13,7 @@ def packages():
     found = {}
     for path in ROOT.glob("**/package.xml"):
         relative = path.relative_to(ROOT)
-        if relative.parts[0] not in ("build", "devel"):
+        if relative.parts[0] not in ("build", "build_sanitized", "devel"):
             found[re.search(r"<name>(.*?)</name>", path.read_text()).group(1)] = path.parent
     return found
 

@@ -1,72 +1,122 @@
 #!/usr/bin/env python3
 """Holds sources to .clang-tidy. What was good before and has not changed (nor a header of the project that it reads, nor
-the checks) is not read again: CACHE remembers it.
+the checks) is not read again: CACHE remembers it. Needs a built tree, which knows what each source reads.
 
-usage: tidy.py [FOLDER...]   sources under these folders; none: all
+usage: tidy.py [--minutes N] [FOLDER...]   all sources under these folders; none: those of the libraries and programs that
+know no ROS. Shells cost 10 s each for ROS's headers and hold little thought; tests and studies would double the time.
 """
+import argparse
 import collections
 import concurrent.futures
 import hashlib
 import json
 import os
 import pathlib
+import re
 import subprocess
 import sys
+import time
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 BUILD = ROOT / "build"
 CACHE = pathlib.Path(os.environ.get("XDG_CACHE_HOME", pathlib.Path.home() / ".cache")) / "smartmill_tidy"
+# Headers that gcc has compiled before mean nothing to clang, and a source has to stand without them.
+PRECOMPILED = re.compile(r" -Winvalid-pch| -include \S*cmake_pch\.hxx")
+ROS = pathlib.Path("/usr/include/ros")
+OUT_OF_TIME = 124  # exit code, as that of timeout
+VERSION = subprocess.run(["clang-tidy", "--version"], capture_output=True, check=True).stdout
 
 
 def dependencies():
-    """What ninja knows: the files of the project that each source was compiled from."""
-    reads = collections.defaultdict(set)
+    """What ninja knows: the files of the project that each source was compiled from, and which sources read ROS."""
+    reads, shells = collections.defaultdict(set), set()
     for block in subprocess.run(["ninja", "-C", BUILD, "-t", "deps"], capture_output=True, text=True,
                                 check=True).stdout.split("\n\n"):
         files = [(BUILD / line.strip()).resolve() for line in block.split("\n")[1:] if line.strip()]
-        ours = [f for f in files if ROOT in f.parents and BUILD not in f.parents]
+        ours = [f for f in files if ROOT in f.parents and BUILD not in f.parents and ROOT / "devel" not in f.parents]
         for source in ours:
             if source.suffix == ".cpp":
                 reads[source].update(ours)
-    return reads
+                if any(ROS in f.parents for f in files):
+                    shells.add(source)
+    return reads, shells
 
 
-def fingerprint(source, files):
-    state = hashlib.sha256(subprocess.run(["clang-tidy", "--version"], capture_output=True, check=True).stdout)
-    for path in [ROOT / ".clang-tidy", source, *sorted(files)]:
+def looked_at(source, folders, shells):
+    if folders:
+        return any(f == source or f in source.parents for f in folders)
+    parts = source.relative_to(ROOT).parts
+    return source not in shells and not {"test", "testing", "smartmill_studies"}.intersection(parts)
+
+
+def commands():
+    """How each source of the project is compiled; one that several targets share: as in the first."""
+    found = {}
+    for entry in json.loads((BUILD / "compile_commands.json").read_text()):
+        source = pathlib.Path(entry["file"]).resolve()
+        if ROOT in source.parents and BUILD not in source.parents:
+            found.setdefault(source, {**entry, "command": PRECOMPILED.sub("", entry["command"])})
+    return found
+
+
+def fingerprint(source, command, files):
+    state = hashlib.sha256(VERSION + command.replace(str(ROOT), "").encode())
+    for path in [ROOT / ".clang-tidy", *sorted(files | {source})]:
         if path.exists():
             state.update(str(path.relative_to(ROOT)).encode() + path.read_bytes())
     return state.hexdigest()
 
 
-def check(source, files):
+def check(folder, source, good):
     """What clang-tidy says of a source; empty: it is good."""
-    good = CACHE / fingerprint(source, files)
-    if good.exists():
-        return ""
-    run = subprocess.run(["clang-tidy", "-p", BUILD, "--quiet", source], capture_output=True, text=True, check=False)
+    run = subprocess.run(["clang-tidy", "-p", folder, "--quiet", source], capture_output=True, text=True, check=False)
     if run.returncode == 0:
-        CACHE.mkdir(parents=True, exist_ok=True)
         good.touch()
         return ""
     return run.stdout.strip() or run.stderr.strip()
 
 
+def findings(said):
+    """Each finding with the lines that explain it; one of a header is told by every source that reads it."""
+    return re.split(r"\n(?=/\S+:\d+:\d+: (?:error|warning): )", said)
+
+
 def main():
-    folders = [(ROOT / f).resolve() for f in sys.argv[1:]] or [ROOT]
-    reads = dependencies()
-    sources = {pathlib.Path(entry["file"]).resolve() for entry in json.loads((BUILD / "compile_commands.json").read_text())}
-    sources = sorted(s for s in sources if ROOT in s.parents and BUILD not in s.parents
-                     and any(f == s or f in s.parents for f in folders))
-    bad = 0
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folders", nargs="*")
+    parser.add_argument("--minutes", type=float, default=float("inf"),
+                        help="no source is begun after them; what was not reached is told, exit code 124")
+    arguments = parser.parse_args()
+    end = time.monotonic() + 60.0 * arguments.minutes
+    folders = [(ROOT / f).resolve() for f in arguments.folders]
+    reads, shells = dependencies()
+    todo, count = [], 0
+    CACHE.mkdir(parents=True, exist_ok=True)
+    database = BUILD / "tidy"
+    database.mkdir(exist_ok=True)
+    entries = commands()
+    (database / "compile_commands.json").write_text(json.dumps(list(entries.values())))
+    for source, entry in sorted(entries.items()):
+        if not looked_at(source, folders, shells):
+            continue
+        count += 1
+        if source not in reads:
+            sys.exit(f"clang-tidy: {source.relative_to(ROOT)} is not built: run ./setup before")
+        good = CACHE / fingerprint(source, entry["command"], reads[source])
+        if not good.exists():
+            todo.append((source, good))
+    told, bad, late = set(), 0, 0
     with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
-        for said in pool.map(lambda s: check(s, reads[s]), sources):
-            if said:
-                bad += 1
-                print(said)
-    print(f"clang-tidy: {bad} of {len(sources)} sources are not good" if bad else
-          f"clang-tidy: good, {len(sources)} sources")
-    return 1 if bad else 0
+        for said in pool.map(lambda job: check(database, *job) if time.monotonic() < end else None, todo):
+            late += said is None
+            bad += bool(said)
+            for finding in findings(said or ""):
+                if finding not in told:
+                    print(finding, flush=True)
+                    told.add(finding)
+    print(f"clang-tidy: {f'{bad} sources are not good' if bad else 'good'}; {count} sources, {count - len(todo)} "
+          f"unchanged since they were good, {late} not reached in time")
+    return 1 if bad else OUT_OF_TIME if late else 0
 
 
 sys.exit(main())
