@@ -231,11 +231,18 @@ const std::map<std::string, double>& statedNoise() {
   return NOISE;
 }
 
-/// This cut is close to its stability limit: 0.15 us of delay in another program's steps move it by as much
-/// as is left (0.5 N at last, from nothing in its first revolutions; at 4 to 192 steps a sample of this one
-/// and of a brute force with discs the same).
-bool nearItsLimit(const std::string& campaign, const CampaignTest& test) {
-  return campaign == "vibrating_runout" && test.name == "slot_4500_deep";
+/// Largest gap of a channel of one test: 1.05, but for one cut near its stability limit. There any difference
+/// of two solutions of the same equations lives on as the tool's own motion (1131 Hz, multiplier 0.985 a
+/// turn) and becomes 15 times as large in seven turns: so do this twin's at 4 and at 16 steps a sample (0.15
+/// of the noise), and so does what is left, which lies on that line, below the noise in the first turns. This
+/// twin's steps make a tenth of its squares, the digits of the hidden runout a twentieth; the 0.04 N to which
+/// the other program states to have converged would, fifteenfold, make 0.6 N, and 0.5 N are left.
+double allowedGap(const std::string& campaign, const CampaignTest& test, const std::string& channel) {
+  static const std::map<std::string, double> NEAR_ITS_LIMIT{
+      {"fx", 1.13}, {"fy", 1.09}, {"tool_x", 1.07}, {"tool_y", 1.23}};
+  if (campaign != "vibrating_runout" || test.name != "slot_4500_deep") return 1.05;
+  const auto allowed = NEAR_ITS_LIMIT.find(channel);
+  return allowed == NEAR_ITS_LIMIT.end() ? 1.05 : allowed->second;
 }
 
 // Campaigns made by another program, its models and effects exact: what is left must be its noise, on every
@@ -257,8 +264,7 @@ TEST(Twin, leavesOnlyTheNoiseOfIndependentCampaigns) {
         if (!measured.has(channel)) continue;
         const Left left = leftOf(measured, simulated, channel, noise, 0, measured.size());
         whole[channel].add(left);
-        EXPECT_LE(left.gap(), nearItsLimit(name, test) ? 1.25 : 1.05)
-            << name << " " << test.name << " " << channel;
+        EXPECT_LE(left.gap(), allowedGap(name, test, channel)) << name << " " << test.name << " " << channel;
         ++checked;
         if (test.kind != TestKind::cut) continue;
         const auto begin = static_cast<std::size_t>(*test.engage_time * test.sample_rate);
