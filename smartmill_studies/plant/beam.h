@@ -1,0 +1,33 @@
+#pragma once
+
+#include <vector>
+
+namespace smartmill::plant {
+
+/// A mode of a structure as seen at one point.
+struct PointMode {
+  double frequency = 0.0;      ///< [Hz] undamped
+  double damping_ratio = 0.0;  ///< [1]
+  double compliance = 0.0;     ///< [m/N] share of the static compliance at that point
+};
+
+/// An end mill as a round beam (Euler and Bernoulli) that stands in a spindle: a rigid body on a spring
+/// across and one against tilting.
+struct ToolInSpindle {
+  double stickout = 0.0;        ///< [m]
+  double shank_diameter = 0.0;  ///< [m]
+  double fluted_length = 0.0;  ///< [m] from the tip; there the section is flute_ratio of the shank's diameter
+  double flute_ratio = 0.8;    ///< [1] effective diameter of the fluted part over the shank's
+  double young = 0.0;          ///< [N/m2]
+  double density = 0.0;        ///< [kg/m3]
+  double spindle_mass = 0.0;   ///< [kg]
+  double spindle_inertia = 0.0;    ///< [kg m2] against tilting
+  double stiffness_across = 0.0;   ///< [N/m]
+  double stiffness_tilting = 0.0;  ///< [N m/rad]
+  double damping_ratio = 0.0;      ///< [1] of every mode
+};
+
+/// Modes at the tool's tip below a frequency [Hz], lowest first; twelve elements along the stick-out.
+std::vector<PointMode> tipModes(const ToolInSpindle& tool, double below);
+
+}  // namespace smartmill::plant

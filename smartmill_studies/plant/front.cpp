@@ -1,0 +1,133 @@
+#include "plant/front.h"
+
+#include <cmath>
+
+#include "smartmill_core/units.h"
+
+namespace smartmill::plant {
+namespace {
+
+double cross(const Point& a, const Point& b) {
+  return a.x * b.y - a.y * b.x;
+}
+Point operator-(const Point& a, const Point& b) {
+  return {a.x - b.x, a.y - b.y};
+}
+
+// A tool that turns clockwise comes to b after a (less than half a turn apart).
+bool isLater(const Point& b, const Point& a) {
+  return cross(a, b) < 0.0;
+}
+
+// Corners further than this behind the axis, in radii, are walls that no tooth reaches any more.
+constexpr double FORGOTTEN = 0.3;
+
+}  // namespace
+
+Front::Front(double radius, std::size_t teeth, double step) : teeth_(teeth), radius_(radius) {
+  const double behind = std::asin(FORGOTTEN);
+  for (double angle = -behind; angle <= units::PI + behind; angle += step)
+    insertAfter(last_, {radius * std::sin(angle), radius * std::cos(angle)});
+}
+
+std::size_t Front::insertAfter(std::size_t corner, const Point& at) {
+  std::size_t fresh = pool_.size();
+  if (free_.empty()) {
+    pool_.emplace_back();
+  } else {
+    fresh = free_.back();
+    free_.pop_back();
+  }
+  const std::size_t after = corner == END ? first_ : pool_[corner].after;
+  pool_[fresh] = {at, corner, after};
+  (corner == END ? first_ : pool_[corner].after) = fresh;
+  (after == END ? last_ : pool_[after].before) = fresh;
+  ++size_;
+  return fresh;
+}
+
+void Front::remove(std::size_t corner) {
+  const Corner gone = pool_[corner];
+  (gone.before == END ? first_ : pool_[gone.before].after) = gone.after;
+  (gone.after == END ? last_ : pool_[gone.after].before) = gone.before;
+  for (Tooth& t : teeth_) {
+    if (t.behind == corner) t.behind = gone.before;
+  }
+  free_.push_back(corner);
+  --size_;
+}
+
+void Front::forget(const Point& axis) {
+  const double limit = axis.x - FORGOTTEN * radius_;
+  while (first_ != END && pool_[first_].after != END && pool_[pool_[first_].after].at.x < limit &&
+         pool_[pool_[first_].after].at.y > axis.y)
+    remove(first_);
+  while (last_ != END && pool_[last_].before != END && pool_[pool_[last_].before].at.x < limit &&
+         pool_[pool_[last_].before].at.y < axis.y)
+    remove(last_);
+}
+
+double Front::pass(std::size_t tooth, const Point& axis, const Point& tip) {
+  Tooth& t = teeth_[tooth];
+  const Point ray = tip - axis;
+  if (ray.x < -0.5 * FORGOTTEN * radius_) {  // behind the tool: a new revolution
+    if (t.moving) forget(axis);
+    t = Tooth();
+    return -radius_;
+  }
+  std::size_t next = t.behind == END ? first_ : pool_[t.behind].after;
+  std::size_t begin = t.behind;
+  while (next != END && !isLater(pool_[next].at - axis, ray)) {
+    t.behind = next;
+    next = pool_[next].after;
+  }
+  if (t.behind == END || next == END) {
+    t.moving = false;
+    return -radius_;
+  }
+  const Point a = pool_[t.behind].at, edge = pool_[next].at - a;
+  const double length = std::hypot(ray.x, ray.y);
+  const double surface = cross(a - axis, edge) / cross(ray, edge) * length;
+  const double depth = length - surface;
+  if (t.moving && (depth > 0.0 || t.depth > 0.0)) {
+    const Point chord = tip - t.tip;
+    const auto at = [&](double share) { return Point{t.tip.x + share * chord.x, t.tip.y + share * chord.y}; };
+    const std::size_t behind = t.behind;
+    // Corners that the tip passed on its way and that lie on the axis' side of its chord are cut off.
+    std::size_t corner = begin == END ? first_ : pool_[begin].after;
+    const bool passed = begin != behind;
+    std::size_t kept = begin;  // the last corner that stays, on whose far side new ones come
+    if (t.depth <= 0.0) {
+      // Into the work: corners before the crossing stay.
+      const double share = t.depth / (t.depth - depth);
+      while (passed && corner != next && cross(chord, pool_[corner].at - t.tip) > 0.0) {
+        kept = corner;
+        corner = pool_[corner].after;
+      }
+      kept = insertAfter(kept, at(share));
+    }
+    while (passed && corner != next && cross(chord, pool_[corner].at - t.tip) <= 0.0) {
+      const std::size_t gone = corner;
+      corner = pool_[corner].after;
+      remove(gone);
+    }
+    if (depth > 0.0) {
+      while (passed && corner != next) {  // what numbers leave between
+        const std::size_t gone = corner;
+        corner = pool_[corner].after;
+        remove(gone);
+      }
+      t.behind = insertAfter(kept, tip);
+    } else {
+      kept = insertAfter(kept, at(t.depth / (t.depth - depth)));
+      t.behind = kept;
+      while (pool_[t.behind].after != next) t.behind = pool_[t.behind].after;
+    }
+  }
+  t.tip = tip;
+  t.depth = depth;
+  t.moving = true;
+  return depth;
+}
+
+}  // namespace smartmill::plant

@@ -1,0 +1,230 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "plant/beam.h"
+#include "plant/draw.h"
+#include "plant/front.h"
+#include "plant/machine.h"
+#include "plant/oscillator.h"
+#include "plant/plate.h"
+#include "smartmill_core/campaign/campaign.h"
+#include "smartmill_core/testing/shared_data.h"
+#include "smartmill_core/testing/temporary_folder.h"
+#include "smartmill_core/units.h"
+
+namespace smartmill::plant {
+namespace {
+
+constexpr double RADIUS = 10e-3, STEP = 1e-3;  // [m], [rad]
+
+/// A tool at rest in its axis over some turns: chips [m] of each tooth over the last one's angle.
+std::vector<std::vector<double>> chipsOf(const std::vector<double>& offsets, double feed_per_tooth) {
+  const std::size_t teeth = offsets.size();
+  Front front(RADIUS, teeth, STEP);
+  const int turn = static_cast<int>(units::TWO_PI / STEP), turns = 25;
+  std::vector<std::vector<double>> chips(teeth);
+  for (int i = 0; i < turns * turn; ++i) {
+    const double angle = units::TWO_PI * i / turn;
+    const Point axis{feed_per_tooth * teeth * angle / units::TWO_PI, 0.0};
+    for (std::size_t k = 0; k < teeth; ++k) {
+      const double phi = angle + units::TWO_PI * static_cast<double>(k) / teeth, reach = RADIUS + offsets[k];
+      const double h = front.pass(k, axis, {axis.x + reach * std::sin(phi), axis.y + reach * std::cos(phi)});
+      if (i >= (turns - 1) * turn) chips[k].push_back(std::max(h, 0.0));
+    }
+  }
+  return chips;
+}
+
+double largest(const std::vector<double>& values) {
+  return *std::max_element(values.begin(), values.end());
+}
+
+// What teeth take away in a turn is what the tool moved on, whatever each of them takes.
+TEST(Front, TeethTakeAwayWhatTheToolMovesOn) {
+  for (const std::vector<double>& offsets : {std::vector<double>{0, 0, 0, 0}, {12e-6, 0, -12e-6, 0}, {0}}) {
+    const double feed = 0.06e-3;
+    double area = 0.0;
+    for (const auto& tooth : chipsOf(offsets, feed)) {
+      for (const double h : tooth) area += h * (RADIUS - 0.5 * h) * STEP;
+    }
+    EXPECT_NEAR(area / (2.0 * RADIUS * feed * offsets.size()), 1.0, 3e-3) << offsets.size() << " teeth";
+  }
+}
+
+TEST(Front, LongTeethTakeTheShortOnesShare) {
+  const double feed = 0.05e-3;
+  const auto even = chipsOf({0, 0}, feed), little = chipsOf({10e-6, 0}, feed),
+             much = chipsOf({80e-6, 0}, feed);
+  EXPECT_NEAR(largest(even[0]), feed, 2e-3 * feed);
+  EXPECT_NEAR(largest(little[0]), feed + 10e-6, 2e-3 * feed);
+  EXPECT_NEAR(largest(little[1]), feed - 10e-6, 2e-3 * feed);
+  EXPECT_NEAR(largest(much[0]), 2.0 * feed, 4e-3 * feed);
+  EXPECT_EQ(largest(much[1]), 0.0);
+}
+
+TEST(Front, KeepsNoMoreCornersThanAFrontNeeds) {
+  Front front(RADIUS, 1, STEP);
+  for (int i = 0; i < 200000; ++i) {
+    const double phi = STEP * i;
+    const Point axis{0.1e-3 * phi / units::TWO_PI, 0.0};
+    front.pass(0, axis, {axis.x + RADIUS * std::sin(phi), axis.y + RADIUS * std::cos(phi)});
+  }
+  EXPECT_LT(front.corners(), 6000u);
+}
+
+// A clamped round bar: first bending frequency 1.8751^2 sqrt(E I / (rho A L^4)) / 2 pi, compliance L^3 / 3 E
+// I.
+TEST(Beam, ClampedBar) {
+  ToolInSpindle t;
+  t.stickout = 0.1;
+  t.shank_diameter = 0.012;
+  t.flute_ratio = 1.0;
+  t.young = 210e9;
+  t.density = 7850.0;
+  t.spindle_mass = 1e3;
+  t.spindle_inertia = 1e3;
+  t.stiffness_across = 1e13;
+  t.stiffness_tilting = 1e11;
+  t.damping_ratio = 0.02;
+  const double d = t.shank_diameter, inertia = units::PI / 64.0 * std::pow(d, 4),
+               area = units::PI / 4.0 * d * d;
+  const auto modes = tipModes(t, 3e5);
+  double compliance = 0.0;
+  for (const PointMode& m : modes) compliance += m.compliance;
+  EXPECT_NEAR(modes[0].frequency,
+              1.87510 * 1.87510 / units::TWO_PI *
+                  std::sqrt(t.young * inertia / (t.density * area * std::pow(t.stickout, 4))),
+              0.5);
+  EXPECT_NEAR(compliance / (std::pow(t.stickout, 3) / (3.0 * t.young * inertia)), 1.0, 1e-3);
+}
+
+TEST(PlateSensor, ShowsAForceAtRestAsItIs) {
+  Plate p;
+  p.mass = 15.0;
+  p.size = {0.24, 0.17, 0.07};
+  p.stiffness = {3e8, 4e8, 8e8};
+  p.springs = {0.1, 0.07, 0.01};
+  p.force_point = {0.01, -0.02, 0.03};
+  p.damping_ratio = 0.02;
+  for (std::size_t c = 0; c < 3; ++c) {
+    for (std::size_t a = 0; a < 3; ++a) {
+      double sum = 0.0;
+      for (const SensorMode& m : modesOf(p)) sum += m.shown[c] * m.driven[a];
+      EXPECT_NEAR(sum, c == a ? 1.0 : 0.0, 1e-9);
+    }
+  }
+}
+
+TEST(OscillatorTest, AnswersAStepAndAResonantForceAsTheClosedFormsSay) {
+  const double frequency = 800.0, damping = 0.03, step = 1e-5, w = units::TWO_PI * frequency;
+  Oscillator swings(frequency, damping, step), rings(frequency, damping, step);
+  const double wd = w * std::sqrt(1.0 - damping * damping);
+  double peak = 0.0;
+  swings.step(1.0);  // a ramp of one step; from there a step of 1
+  const double value = swings.value(), rate = swings.rate();
+  for (int i = 1; i <= 20000; ++i) {
+    swings.step(1.0);
+    const double t = i * step, decay = std::exp(-damping * w * t);
+    const double exact = 1.0 + decay * ((value - 1.0) * std::cos(wd * t) +
+                                        (rate + damping * w * (value - 1.0)) / wd * std::sin(wd * t));
+    ASSERT_NEAR(swings.value(), exact, 1e-9);
+    rings.step(std::sin(w * i * step));
+    if (i > 15000) peak = std::max(peak, std::abs(rings.value()));
+  }
+  EXPECT_NEAR(peak, 1.0 / (2.0 * damping), 0.01);
+}
+
+CampaignTest slot(double rpm, double feed, double depth) {
+  CampaignTest t;
+  t.name = "slot";
+  t.kind = TestKind::cut;
+  t.sample_rate = 25600.0;
+  t.spindle_speed = units::radPerSecFromRpm(rpm);
+  t.engagement = Engagement{0.0, units::PI, depth, feed};
+  return t;
+}
+
+Plant rigidPlant() {
+  Plant p;
+  p.tool.teeth = 4;
+  p.tool.diameter = 20e-3;
+  p.tool.helix = units::radFromDeg(30.0);
+  p.cutting = {796e6, 168e6, 222e6, 27.7e3, 30.8e3, 1.4e3};
+  return p;
+}
+
+// Mean forces of a slot (Altintas): Fx = -N a (Krc c / 4 + Kre / pi) and so on; the true path of the teeth is
+// left out there and worth some 0.1 %.
+TEST(Machine, MeanForcesOfASlot) {
+  std::mt19937_64 random(1);
+  RunOptions o;
+  o.noise = false;
+  o.steps = 16;
+  const double feed = 0.05e-3, depth = 1e-3;
+  const Plant p = rigidPlant();
+  const Record r = run(p, slot(3000.0, feed, depth), o, random);
+  const std::size_t turn = 512, turns = r.size() / turn;
+  const double na = 4.0 * depth;
+  const std::vector<double> expected{-na * (p.cutting.krc * feed / 4.0), na * p.cutting.ktc * feed / 4.0,
+                                     na * (p.cutting.kac * feed / units::PI + p.cutting.kae / 2.0)};
+  const std::vector<std::string> names{"fx", "fy", "fz"};
+  for (std::size_t c = 0; c < 3; ++c) {
+    double mean = 0.0;
+    for (std::size_t i = 0; i < turn * turns; ++i) mean += r.column(names[c])[i];
+    mean /= static_cast<double>(turn * turns);
+    const double edge = c == 0   ? -na * p.cutting.kre / units::PI
+                        : c == 1 ? na * p.cutting.kte / units::PI
+                                 : 0.0;
+    EXPECT_NEAR(mean / (expected[c] + edge), 1.0, 4e-3) << names[c];
+  }
+}
+
+// Records of another independent program, which follows the classical rule for chips: the true path of the
+// teeth differs by 0.2 % of a chip at 0.1 mm a tooth. Noise: 1 N, 0.05 um.
+TEST(Machine, MeetsRecordsOfAnotherProgram) {
+  SMARTMILL_SHARED_DATA(folder, "campaigns/vibrating_none");
+  const Campaign campaign = readCampaign(folder);
+  const Plant plant = plantOf(readMachineModel(campaign.modelPath()));
+  std::mt19937_64 random(1);
+  for (const CampaignTest& test : campaign.tests) {
+    if (test.kind != TestKind::cut) continue;
+    const Record record = readRecord(campaign, test);
+    RunOptions o;
+    o.noise = false;
+    o.show_tip = true;
+    o.phase = record.column("spindle_angle").front();
+    const Record own = run(plant, test, o, random);
+    ASSERT_EQ(own.size(), record.size());
+    for (const char* name : {"fx", "fy", "fz", "tool_x", "tool_y"}) {
+      const double noise = name[0] == 'f' ? 1.0 : 0.05e-6;
+      double squares = 0.0;
+      for (std::size_t i = 0; i < own.size(); ++i)
+        squares += std::pow((record.column(name)[i] - own.column(name)[i]) / noise, 2);
+      EXPECT_LT(std::sqrt(squares / own.size()), 1.7) << test.name << " " << name;
+    }
+  }
+}
+
+TEST(Draw, TheSameCaseGivesTheSameRecordsAndAnotherRunOthers) {
+  const std::vector<Case> cases = drawCases({1, 0, 0, 0, 0}, {"runout"}, 5);
+  ASSERT_EQ(cases.size(), 1u);
+  Drawn drawn = draw(cases[0]);
+  ASSERT_EQ(drawn.plant.effects.size(), 1u);
+  EXPECT_TRUE(drawn.nominal.effects.empty());
+  drawn.campaign.tests.erase(drawn.campaign.tests.begin() + 2, drawn.campaign.tests.end());  // two air cuts
+  const TemporaryFolder folder;
+  writeCampaignOf(drawn, cases[0], folder.file("a"));
+  writeCampaignOf(drawn, cases[0], folder.file("b"));
+  writeCampaignOf(drawn, cases[0], folder.file("c"), true);
+  const auto fx = [&](const std::string& run) {
+    const Campaign c = readCampaign(folder.file(run));
+    return readRecord(c, c.tests[0]).column("fx");
+  };
+  EXPECT_EQ(fx("a"), fx("b"));
+  EXPECT_NE(fx("a"), fx("c"));
+}
+
+}  // namespace
+}  // namespace smartmill::plant
