@@ -34,7 +34,7 @@ def functions(text):
     """(name, first line, lines) of every function body: a block outside other functions whose head ends in a parameter list."""
     found, depth, open_at, head, line, head_line = [], 0, None, "", 1, 1
     stack = []
-    for character in without_text(text):
+    for character in re.sub(r"^[ \t]*#.*$", "", without_text(text), flags=re.M):
         if character == "{":
             is_function = open_at is None and ")" in head and not CONTROL.match(head.strip() or " ") and "=" not in head.split(
                 "(")[0]
