@@ -341,11 +341,12 @@ void writeCampaignOf(const Drawn& drawn, const Case& hidden, const std::string& 
   if (failed) throw Error(folder + ": " + failed.message());
   writeMachineModel(drawn.nominal, folder + "/model.yaml");
   writeCampaign(drawn.campaign, folder);
-  Random random(hidden.seed + (second ? 2 : 1));
+  Random phases(hidden.seed + 1), random(hidden.seed + (second ? 3 : 2));
   RunOptions options;
   options.show_tip = !drawn.plant.tip[0].empty();
   options.show_angle = drawn.angle;
   for (const CampaignTest& test : drawn.campaign.tests) {
+    options.phase = between(phases, 0.0, units::TWO_PI);
     writeCsv(run(drawn.plant, test, options, random), folder + "/" + test.file);
   }
 }

@@ -75,8 +75,8 @@ double Front::pass(std::size_t tooth, const Point& axis, const Point& tip) {
     t = Tooth();
     return -radius_;
   }
-  std::size_t next = t.behind == END ? first_ : pool_[t.behind].after;
-  std::size_t begin = t.behind;
+  const std::size_t begin = t.behind;
+  std::size_t next = begin == END ? first_ : pool_[begin].after;
   while (next != END && !isLater(pool_[next].at - axis, ray)) {
     t.behind = next;
     next = pool_[next].after;
@@ -87,47 +87,35 @@ double Front::pass(std::size_t tooth, const Point& axis, const Point& tip) {
   }
   const Point a = pool_[t.behind].at, edge = pool_[next].at - a;
   const double length = std::hypot(ray.x, ray.y);
-  const double surface = cross(a - axis, edge) / cross(ray, edge) * length;
-  const double depth = length - surface;
-  if (t.moving && (depth > 0.0 || t.depth > 0.0)) {
-    const Point chord = tip - t.tip;
-    const auto at = [&](double share) { return Point{t.tip.x + share * chord.x, t.tip.y + share * chord.y}; };
-    const std::size_t behind = t.behind;
-    // Corners that the tip passed on its way and that lie on the axis' side of its chord are cut off.
-    std::size_t corner = begin == END ? first_ : pool_[begin].after;
-    const bool passed = begin != behind;
-    std::size_t kept = begin;  // the last corner that stays, on whose far side new ones come
-    if (t.depth <= 0.0) {
-      // Into the work: corners before the crossing stay.
-      const double share = t.depth / (t.depth - depth);
-      while (passed && corner != next && cross(chord, pool_[corner].at - t.tip) > 0.0) {
-        kept = corner;
-        corner = pool_[corner].after;
-      }
-      kept = insertAfter(kept, at(share));
-    }
-    while (passed && corner != next && cross(chord, pool_[corner].at - t.tip) <= 0.0) {
-      const std::size_t gone = corner;
-      corner = pool_[corner].after;
-      remove(gone);
-    }
-    if (depth > 0.0) {
-      while (passed && corner != next) {  // what numbers leave between
-        const std::size_t gone = corner;
-        corner = pool_[corner].after;
-        remove(gone);
-      }
-      t.behind = insertAfter(kept, tip);
-    } else {
-      kept = insertAfter(kept, at(t.depth / (t.depth - depth)));
-      t.behind = kept;
-      while (pool_[t.behind].after != next) t.behind = pool_[t.behind].after;
-    }
-  }
+  const double depth = length - cross(a - axis, edge) / cross(ray, edge) * length;
+  if (t.moving && (depth > 0.0 || t.depth > 0.0)) clip(t, begin, next, tip, depth);
   t.tip = tip;
   t.depth = depth;
   t.moving = true;
   return depth;
+}
+
+void Front::clip(Tooth& t, std::size_t begin, std::size_t next, const Point& tip, double depth) {
+  const Point chord = tip - t.tip;
+  const auto crossing = [&] {
+    const double share = t.depth / (t.depth - depth);
+    return Point{t.tip.x + share * chord.x, t.tip.y + share * chord.y};
+  };
+  const auto outside = [&](std::size_t corner) { return cross(chord, pool_[corner].at - t.tip) > 0.0; };
+  std::size_t corner = begin == END ? first_ : pool_[begin].after;
+  std::size_t kept = begin;  // the last corner that stays, on whose far side new ones come
+  if (t.depth <= 0.0) {      // into the work: corners before the crossing stay
+    for (; corner != next && outside(corner); corner = pool_[corner].after) kept = corner;
+    kept = insertAfter(kept, crossing());
+  }
+  // Inside, what the chord leaves on the axis' side goes; with a tip still inside, all that was passed.
+  while (corner != next && (depth > 0.0 || !outside(corner))) {
+    const std::size_t gone = corner;
+    corner = pool_[corner].after;
+    remove(gone);
+  }
+  t.behind = insertAfter(kept, depth > 0.0 ? tip : crossing());
+  while (pool_[t.behind].after != next) t.behind = pool_[t.behind].after;
 }
 
 }  // namespace smartmill::plant

@@ -42,6 +42,9 @@ class Front {
     bool moving = false;
   };
 
+  /// Takes away what a tooth cut on its way to its tip here. @param begin corner behind which it stood
+  /// @param next corner that it has not reached @param depth [m] of the tip
+  void clip(Tooth& tooth, std::size_t begin, std::size_t next, const Point& tip, double depth);
   std::size_t insertAfter(std::size_t corner, const Point& at);
   void remove(std::size_t corner);
   void forget(const Point& axis);

@@ -1,0 +1,149 @@
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+#include "plant/front.h"
+#include "plant/hidden.h"
+#include "plant/machine.h"
+
+namespace smartmill::plant {
+
+/// Where the teeth stand and how far they reach.
+struct Teeth {
+  std::vector<double> angle;   // [rad] against tooth 1
+  std::vector<double> radius;  // [m]
+  double lag = 0.0;            // [rad/m]
+};
+
+Teeth teethOf(const Plant& plant, const Hidden& hidden);
+
+/// From a chip to the forces on a length of edge.
+class Law {
+ public:
+  Law(const Plant& plant, const Hidden& hidden, const CampaignTest& test)
+      : plant_(plant),
+        c_(plant.cutting),
+        growth_(hidden("tool_wear", "edge_growth_per_min") / 60.0),
+        cut_before_(test.cut_time_before.value_or(0.0)),
+        exponent_(hidden("size_effect", "exponent")),
+        reference_(units::UM * hidden("size_effect", "reference_chip_um")),
+        buildup_(units::UM * hidden("edge_buildup", "chip_um")),
+        damping_(units::N_PER_MM * hidden("process_damping", "coefficient_n_per_mm")) {
+    c_.ktc += units::N_PER_MM2 * hidden("chip_coefficients", "Ktc_n_per_mm2");
+    c_.krc += units::N_PER_MM2 * hidden("chip_coefficients", "Krc_n_per_mm2");
+    c_.kac += units::N_PER_MM2 * hidden("chip_coefficients", "Kac_n_per_mm2");
+    c_.kte += units::N_PER_MM * hidden("edge_forces", "Kte_n_per_mm");
+    c_.kre += units::N_PER_MM * hidden("edge_forces", "Kre_n_per_mm");
+    c_.kae += units::N_PER_MM * hidden("edge_forces", "Kae_n_per_mm");
+    speed_ = test.spindle_speed * 0.5 * plant.tool.diameter;
+    if (hidden.has("cutting_speed"))
+      chip_factor_ = std::pow(speed_ / (units::M_PER_MIN * hidden("cutting_speed", "reference_m_per_min")),
+                              -hidden("cutting_speed", "exponent"));
+  }
+
+  /// What holds at a time: unsteadiness [1] of the chip coefficients, time since engagement [s].
+  void setTime(double unsteadiness, double in_cut) {
+    now_ = chip_factor_ * (1.0 + unsteadiness);
+    if (isOutside(plant_, "softer_with_time"))
+      now_ *= 1.0 + plant_.outside->size * std::exp(-in_cut / plant_.outside->place);
+    edge_ = 1.0 + growth_ * (cut_before_ + in_cut);
+  }
+
+  /// Tangential, radial, axial force [N/m] on an edge. @param chip [m] > 0 @param into [m/s] velocity into
+  /// the work @param height [m] above the tip @param depth [m] of the cut
+  std::array<double, 3> force(double chip, double into, double height, double depth) const {
+    double specific = now_, edge = edge_;
+    if (exponent_ != 0.0) specific *= std::pow(chip / reference_, -exponent_);
+    if (buildup_ > 0.0) edge *= 1.0 - std::exp(-chip / buildup_);
+    if (plant_.outside) {
+      const Outside& o = *plant_.outside;
+      if (o.kind == "kink" && chip > o.place)
+        specific *= (o.place + (1.0 - o.size) * (chip - o.place)) / chip;
+      if (o.kind == "hard_skin" && height > depth - o.place) specific *= 1.0 + o.size;
+    }
+    const double flank = damping_ * into / speed_;
+    return {specific * c_.ktc * chip + edge * c_.kte + 0.3 * flank,
+            specific * c_.krc * chip + edge * c_.kre + flank, specific * c_.kac * chip + edge * c_.kae};
+  }
+
+ private:
+  const Plant& plant_;
+  CuttingCoefficients c_;
+  double growth_, cut_before_, exponent_, reference_, buildup_, damping_;
+  double speed_ = 0.0, chip_factor_ = 1.0, now_ = 1.0, edge_ = 1.0;
+};
+
+/// Slices of the tool in the work.
+class Cutting {
+ public:
+  struct Result {
+    std::array<double, 3> force{};  // [N] on the tool
+    double torque = 0.0;            // [N m]
+  };
+
+  Cutting(const Plant& plant, const Hidden& hidden, const CampaignTest& test, double slice, double step_angle)
+      : plant_(plant),
+        teeth_(teethOf(plant, hidden)),
+        law_(plant, hidden, test),
+        cut_(*test.engagement),
+        slice_(slice) {
+    depth_ = cut_.axial_depth;
+    if (hidden.has("thermal_growth"))
+      depth_ +=
+          units::UM * hidden("thermal_growth", "growth_um") *
+          (1.0 - std::exp(-test.start_time.value_or(0.0) / hidden("thermal_growth", "time_constant_s")));
+    tilt_ = 1e-3 * hidden("depth_tilt", "slope_um_per_mm");
+    slices_ = static_cast<std::size_t>(std::ceil((depth_ + std::abs(tilt_) * 0.02) / slice_));
+    fronts_.assign(slices_, Front(0.5 * plant.tool.diameter, plant.tool.teeth, step_angle));
+  }
+
+  /// One step. @param axis of the tool [m] @param rate [m/s] of its vibration @param fed [m] since engagement
+  Result step(double angle, const Point& axis, const Point& rate, double unsteadiness, double in_cut,
+              double fed) {
+    Result sum;
+    const double depth = depth_ + tilt_ * fed, radius = 0.5 * plant_.tool.diameter;
+    law_.setTime(unsteadiness, in_cut);
+    for (std::size_t s = 0; s < slices_; ++s) {
+      const double low = s * slice_, share = std::clamp((depth - low) / slice_, 0.0, 1.0);
+      if (share <= 0.0) continue;
+      const double height = low + 0.5 * share * slice_;
+      for (std::size_t k = 0; k < teeth_.angle.size(); ++k) {
+        if (k == 0 && isOutside(plant_, "lost_corner") && height < plant_.outside->place) continue;
+        const double phi = angle + teeth_.angle[k] - teeth_.lag * height;
+        const double sin = std::sin(phi), cos = std::cos(phi);
+        const Point tip{axis.x + teeth_.radius[k] * sin, axis.y + teeth_.radius[k] * cos};
+        const double chip = fronts_[s].pass(k, axis, tip);
+        if (chip <= 0.0 || !inWork(tip, sin, radius)) continue;
+        const auto [ft, fr, fa] = law_.force(chip, rate.x * sin + rate.y * cos, height, depth);
+        const double length = share * slice_;
+        sum.force[0] += (-ft * cos - fr * sin) * length;
+        sum.force[1] += (ft * sin - fr * cos) * length;
+        sum.force[2] += fa * length;
+        sum.torque += ft * length * radius;
+      }
+    }
+    return sum;
+  }
+
+ private:
+  // The work reaches from R cos(exit) to R cos(entry) across the feed; a full slot has walls on both sides.
+  bool inWork(const Point& tip, double sin, double radius) const {
+    if (sin < 0.0) return false;
+    const bool from_wall = cut_.entry <= 1e-9, to_wall = cut_.exit >= units::PI - 1e-9;
+    return (from_wall || tip.y <= radius * std::cos(cut_.entry)) &&
+           (to_wall || tip.y >= radius * std::cos(cut_.exit));
+  }
+
+  const Plant& plant_;
+  Teeth teeth_;
+  Law law_;
+  Engagement cut_;
+  double slice_, depth_ = 0.0, tilt_ = 0.0;
+  std::size_t slices_ = 0;
+  std::vector<Front> fronts_;
+};
+
+}  // namespace smartmill::plant
