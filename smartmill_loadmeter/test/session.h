@@ -217,7 +217,7 @@ class Session {
 /// Three air cuts and three slots. At 6000 rpm the readings, one in two revolutions, meet a single phase of
 /// it.
 inline void takeThrough(Session& session, double rpm = 6000.0) {
-  for (const double rpm : {2000.0, 6000.0, 12000.0}) session.air(rpm, 3.0);
+  for (const double in_air : {2000.0, 6000.0, 12000.0}) session.air(in_air, 3.0);
   for (const double feed : {3e-5, 6e-5, 1e-4}) session.slot(rpm, feed, 4.0);
 }
 

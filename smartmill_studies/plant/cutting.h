@@ -8,6 +8,7 @@
 #include "plant/front.h"
 #include "plant/hidden.h"
 #include "plant/machine.h"
+#include "smartmill_core/units.h"
 
 namespace smartmill::plant {
 

@@ -251,10 +251,17 @@ double growth(const Plant& plant, const CampaignTest& test, std::uint64_t seed) 
   return worst;
 }
 
+bool vibrates(const Plant& plant) {
+  return !plant.tip[0].empty() ||
+         std::any_of(plant.effects.begin(), plant.effects.end(), [](const EffectEntry& e) {
+           return !e.flexibility.x.modes.empty() || !e.flexibility.y.modes.empty();
+         });
+}
+
 // A depth at which every cut of the plan settles.
 double depthFor(const Plant& plant, const Plan& plan, std::uint64_t seed) {
-  double depth = plant.tip[0].empty() ? 2e-3 : 1.5e-3;
-  if (plant.tip[0].empty()) return depth;
+  if (!vibrates(plant)) return 2e-3;
+  double depth = 1.5e-3;
   for (; depth > 0.2e-3; depth *= 0.7) {
     const std::vector<CampaignTest> tests = testsOf(plan, depth);
     const bool settles = std::all_of(tests.begin(), tests.end(), [&](const CampaignTest& t) {
@@ -292,11 +299,11 @@ std::vector<Case> drawCases(const Counts& counts, const std::vector<std::string>
   Random random(seed);
   std::vector<Case> cases;
   const auto add = [&](const std::string& kind, const std::vector<std::string>& hidden) {
-    const bool needs_tip = std::count(hidden.begin(), hidden.end(), "process_damping") > 0;
-    const bool gives_tip = std::count(hidden.begin(), hidden.end(), "tool_flexibility") > 0;
-    const bool vibrating =
-        (cases.size() % 2 == 1 || needs_tip) && !(gives_tip && cases.size() % 4 < 3 && !needs_tip);
-    cases.push_back({kind, hidden, vibrating, random()});
+    const bool needs_tip = std::any_of(hidden.begin(), hidden.end(), [](const std::string& name) {
+      const EffectKind* effect = findEffect(name);
+      return effect && effect->has(EffectNeed::flexible_tool);
+    });
+    cases.push_back({kind, hidden, needs_tip || cases.size() % 2 == 1, random()});
   };
   const auto several = [&](const std::string& kind, std::size_t count) {
     std::vector<std::string> hidden;

@@ -1,0 +1,145 @@
+#include "discrepancy/bench_case.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "smartmill_core/campaign/record.h"
+#include "smartmill_core/error.h"
+#include "smartmill_core/model/effect_catalogue.h"
+#include "smartmill_discrepancy/explain/explain.h"
+#include "smartmill_discrepancy/report/report_json.h"
+
+namespace smartmill::discrepancy {
+namespace {
+
+using nlohmann::json;
+
+bool isGrouped(const Explanation& e, const std::string& name) {
+  return std::any_of(e.not_separable.begin(), e.not_separable.end(), [&](const auto& group) {
+    return std::find(group.begin(), group.end(), name) != group.end();
+  });
+}
+
+// Distances of found parameters from the truth, in their standard deviations.
+std::vector<double> scores(const FoundEffect& found, const EffectEntry& truth) {
+  std::vector<double> all;
+  const auto numbers = numbersOf(truth);
+  for (const FoundParameter& p : found.parameters) {
+    for (const auto& [key, value] : numbers) {
+      if (key != p.key || p.std_dev <= 0.0) continue;
+      all.push_back(std::abs(parameterOf(*findEffect(found.name), key).difference(p.value, value)) /
+                    p.std_dev);
+    }
+  }
+  return all;
+}
+
+// What no model can get below: the gap between two runs of the plant, each of which strays by as much.
+double floorOf(const plant::Drawn& drawn, const std::string& one, const std::string& other) {
+  const Campaign a = readCampaign(one), b = readCampaign(other);
+  double squares = 0.0, count = 0.0;
+  for (std::size_t k = 0; k < a.tests.size(); ++k) {
+    if (a.tests[k].kind == TestKind::tap) continue;
+    const Record first = readRecord(a, a.tests[k]), second = readRecord(b, b.tests[k]);
+    const auto add = [&](const char* channel, double noise) {
+      if (!first.has(channel)) return;
+      const std::vector<double>&x = first.column(channel), &y = second.column(channel);
+      for (std::size_t i = 0; i < std::min(x.size(), y.size()); ++i)
+        squares += std::pow((x[i] - y[i]) / noise, 2);
+      count += static_cast<double>(x.size());
+    };
+    add("fx", drawn.plant.noise_rms[0]);
+    add("fy", drawn.plant.noise_rms[1]);
+    add("fz", drawn.plant.noise_rms[2]);
+    add("tool_x", drawn.plant.tip_noise);
+    add("tool_y", drawn.plant.tip_noise);
+  }
+  return std::sqrt(0.5 * squares / count);
+}
+
+Explanation look(const std::string& folder, const std::function<void(const std::string&)>& progress) {
+  const Campaign campaign = readCampaign(folder);
+  const Dataset data = loadDataset(campaign, readMachineModel(campaign.modelPath()));
+  ExplainOptions options;
+  options.bench.threads = 1;
+  options.search.progress = progress;
+  std::filesystem::create_directories(folder + "/report");
+  Explanation e = explain(data, options, folder + "/report");
+  writeReport(e, folder + "/report");
+  return e;
+}
+
+bool isRight(const plant::Case& hidden, const Explanation& e) {
+  if (hidden.kind == "none") return e.verdict == Verdict::no_disagreement;
+  // Of a cause without a name none is right; something must be left to be told.
+  if (hidden.kind == "outside") return e.effects.empty() && e.verdict == Verdict::unknown_effect;
+  const bool all = std::all_of(hidden.names.begin(), hidden.names.end(), [&](const std::string& name) {
+    return isGrouped(e, name) || std::any_of(e.effects.begin(), e.effects.end(),
+                                             [&](const FoundEffect& f) { return f.name == name; });
+  });
+  if (!all || hidden.kind != "single") return all;
+  // The name that explains most is the first.
+  const auto first =
+      std::max_element(e.effects.begin(), e.effects.end(),
+                       [](const FoundEffect& a, const FoundEffect& b) { return a.delta_bic < b.delta_bic; });
+  return first->name == hidden.names.front() || isGrouped(e, hidden.names.front());
+}
+
+bool isHidden(const plant::Case& hidden, const Explanation& e, const std::string& name) {
+  return std::any_of(hidden.names.begin(), hidden.names.end(),
+                     [&](const std::string& h) { return h == name || isGrouped(e, h); });
+}
+
+void score(const plant::Case& hidden, const plant::Drawn& drawn, const Explanation& e, json* line) {
+  json& out = *line;
+  out["verdict"] = nameOf(e.verdict);
+  out["right"] = isRight(hidden, e);
+  bool false_effect = false;
+  std::vector<double> all;
+  for (const FoundEffect& f : e.effects) {
+    const bool right = hidden.kind != "outside" && isHidden(hidden, e, f.name);
+    false_effect = false_effect || !right;
+    out["named"].push_back({{"name", f.name}, {"confidence", f.confidence}, {"right", right}});
+    for (const EffectEntry& truth : drawn.plant.effects) {
+      if (truth.name != f.name) continue;
+      const std::vector<double> some = scores(f, truth);
+      all.insert(all.end(), some.begin(), some.end());
+    }
+  }
+  out["false_effect"] = false_effect;
+  out["parameters"] = all.size();
+  out["inside"] = std::count_if(all.begin(), all.end(), [](double z) { return z <= 1.96; });
+  out["largest_z"] = all.empty() ? 0.0 : *std::max_element(all.begin(), all.end());
+  out["gap_before"] = e.before.fit;
+  out["gap_after"] = e.after.fit;
+  out["heldout_after"] = e.after.heldout;
+  out["seconds"] = e.seconds;
+}
+
+}  // namespace
+
+json runBenchCase(const plant::Case& hidden, int number, const std::string& folder,
+                  const std::function<void(const std::string&)>& progress) {
+  json line{{"case", number},         {"kind", hidden.kind},
+            {"hidden", hidden.names}, {"vibrating", hidden.vibrating},
+            {"named", json::array()}, {"right", false},
+            {"false_effect", false}};
+  const plant::Drawn drawn = plant::draw(hidden);
+  plant::writeCampaignOf(drawn, hidden, folder);
+  plant::writeCampaignOf(drawn, hidden, folder + "/again", true);
+  line["floor"] = floorOf(drawn, folder, folder + "/again");
+  std::filesystem::remove_all(folder + "/again");
+  try {
+    score(hidden, drawn, look(folder, progress), &line);
+  } catch (const Error& error) {
+    line["verdict"] = std::string("refused: ") + error.what();
+  }
+  plant::writeTruth(drawn, folder + "/truth.yaml");
+  return line;
+}
+
+}  // namespace smartmill::discrepancy
