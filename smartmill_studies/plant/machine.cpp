@@ -87,7 +87,7 @@ class Turning {
 
  private:
   double speed_, phase_, ripple_, ripple_speed_, ripple_phase_;
-  std::array<double, 499> scatter_;
+  std::array<double, 499> scatter_{};
 };
 
 // A blow of a hammer: fast rise, slower fall, 0.8 ms.
