@@ -18,10 +18,16 @@ namespace {
 
 using nlohmann::json;
 
-bool isGrouped(const Explanation& e, const std::string& name) {
-  return std::any_of(e.not_separable.begin(), e.not_separable.end(), [&](const auto& group) {
-    return std::find(group.begin(), group.end(), name) != group.end();
-  });
+bool contains(const std::vector<std::string>& names, const std::string& name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+// explain says that the tests do not tell these two apart, or they are the same.
+bool standsFor(const Explanation& e, const std::string& named, const std::string& hidden) {
+  return named == hidden || std::any_of(e.not_separable.begin(), e.not_separable.end(),
+                                        [&](const std::vector<std::string>& group) {
+                                          return contains(group, named) && contains(group, hidden);
+                                        });
 }
 
 // Distances of found parameters from the truth, in their standard deviations.
@@ -74,24 +80,25 @@ Explanation look(const std::string& folder, const std::function<void(const std::
 }
 
 bool isRight(const plant::Case& hidden, const Explanation& e) {
-  if (hidden.kind == "none") return e.verdict == Verdict::no_disagreement;
+  if (hidden.kind == "none") return e.effects.empty();
   // Of a cause without a name none is right; something must be left to be told.
   if (hidden.kind == "outside") return e.effects.empty() && e.verdict == Verdict::unknown_effect;
-  const bool all = std::all_of(hidden.names.begin(), hidden.names.end(), [&](const std::string& name) {
-    return isGrouped(e, name) || std::any_of(e.effects.begin(), e.effects.end(),
-                                             [&](const FoundEffect& f) { return f.name == name; });
-  });
-  if (!all || hidden.kind != "single") return all;
+  const auto found = [&](const std::string& name) {
+    return std::any_of(e.effects.begin(), e.effects.end(),
+                       [&](const FoundEffect& f) { return standsFor(e, f.name, name); });
+  };
+  if (!std::all_of(hidden.names.begin(), hidden.names.end(), found)) return false;
+  if (hidden.kind != "single") return true;
   // The name that explains most is the first.
   const auto first =
       std::max_element(e.effects.begin(), e.effects.end(),
                        [](const FoundEffect& a, const FoundEffect& b) { return a.delta_bic < b.delta_bic; });
-  return first->name == hidden.names.front() || isGrouped(e, hidden.names.front());
+  return standsFor(e, first->name, hidden.names.front());
 }
 
 bool isHidden(const plant::Case& hidden, const Explanation& e, const std::string& name) {
   return std::any_of(hidden.names.begin(), hidden.names.end(),
-                     [&](const std::string& h) { return h == name || isGrouped(e, h); });
+                     [&](const std::string& h) { return standsFor(e, name, h); });
 }
 
 void score(const plant::Case& hidden, const plant::Drawn& drawn, const Explanation& e, json* line) {

@@ -113,8 +113,8 @@ MachineModel believedOf(const Plant& plant, Random& random) {
                                        [&](const SensorMode& x, const SensorMode& y) {
                                          return x.driven[a] * x.shown[a] < y.driven[a] * y.shown[a];
                                        });
-    const Mode mode =
-        believedMode(main->frequency, main->damping_ratio, main->driven[a] * main->shown[a], 0.0, u, random);
+    const Mode mode = believedMode(main->frequency, main->damping_ratio,
+                                   std::min(1.0, main->driven[a] * main->shown[a]), 0.0, u, random);
     m.force_sensor.axis[a].modes = {mode};
     m.force_sensor.axis[a].direct = 1.0 - mode.gain;
   }
