@@ -68,7 +68,7 @@ function(smartmill_library name)
   cmake_parse_arguments(arg "" "" "SOURCES;LIBRARIES" ${ARGN})
   add_library(${name} ${arg_SOURCES})
   smartmill_compile_options(${name})
-  smartmill_precompiled_headers(${name} library)
+  smartmill_precompiled_headers(${name} library ${SMARTMILL_LIBRARY_OPTIONS})
   target_compile_options(${name} PRIVATE ${SMARTMILL_LIBRARY_OPTIONS})
   target_link_libraries(${name} ${catkin_LIBRARIES} ${arg_LIBRARIES})
   install(TARGETS ${name} LIBRARY DESTINATION ${CATKIN_PACKAGE_LIB_DESTINATION}
