@@ -97,12 +97,7 @@ void StabilityNode::publish(const ChatterAdvice& advice) {
   message.severity = advice.episode.severity;
   message.onset = advice.episode.onset;
   for (const ChatterAdvice::Speed& s : advice.speeds) {
-    smartmill_msgs::StabilityPoint point;
-    point.spindle_speed = s.speed;
-    point.axial_depth = advice.depth;
-    point.depth_limit = s.limit;
-    point.chatter_frequency = s.frequency;
-    message.speeds.push_back(point);
+    message.speeds.push_back(toMsg(StabilityPoint{s.speed, advice.depth, s.limit, s.frequency}));
   }
   message.corrected = advice.correction.has_value();
   if (advice.correction) {
