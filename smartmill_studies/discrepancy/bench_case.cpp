@@ -45,12 +45,11 @@ std::vector<double> scores(const FoundEffect& found, const EffectEntry& truth) {
 }
 
 // What no model can get below: the gap between two runs of the plant, each of which strays by as much.
-double floorOf(const plant::Drawn& drawn, const std::string& one, const std::string& other) {
-  const Campaign a = readCampaign(one), b = readCampaign(other);
+double floorOf(const plant::Drawn& drawn, const std::vector<Record>& one, const std::vector<Record>& other) {
   double squares = 0.0, count = 0.0;
-  for (std::size_t k = 0; k < a.tests.size(); ++k) {
-    if (a.tests[k].kind == TestKind::tap) continue;
-    const Record first = readRecord(a, a.tests[k]), second = readRecord(b, b.tests[k]);
+  for (std::size_t k = 0; k < one.size(); ++k) {
+    if (drawn.campaign.tests[k].kind == TestKind::tap) continue;
+    const Record &first = one[k], &second = other[k];
     const auto add = [&](const char* channel, double noise) {
       if (!first.has(channel)) return;
       const std::vector<double>&x = first.column(channel), &y = second.column(channel);
@@ -136,10 +135,9 @@ json runBenchCase(const plant::Case& hidden, int number, const std::string& fold
             {"named", json::array()}, {"right", false},
             {"false_effect", false}};
   const plant::Drawn drawn = plant::draw(hidden);
-  plant::writeCampaignOf(drawn, hidden, folder);
-  plant::writeCampaignOf(drawn, hidden, folder + "/again", true);
-  line["floor"] = floorOf(drawn, folder, folder + "/again");
-  std::filesystem::remove_all(folder + "/again");
+  const std::vector<Record> records = plant::runCampaign(drawn, hidden);
+  plant::writeCampaignOf(drawn, records, folder);
+  line["floor"] = floorOf(drawn, records, plant::runCampaign(drawn, hidden, true));
   try {
     score(hidden, drawn, look(folder, progress), &line);
   } catch (const Error& error) {

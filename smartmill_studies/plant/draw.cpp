@@ -342,20 +342,27 @@ Drawn draw(const Case& hidden) {
   return drawn;
 }
 
-void writeCampaignOf(const Drawn& drawn, const Case& hidden, const std::string& folder, bool second) {
+std::vector<Record> runCampaign(const Drawn& drawn, const Case& hidden, bool second) {
+  Random phases(hidden.seed + 1), random(hidden.seed + (second ? 3 : 2));
+  RunOptions options;
+  options.show_tip = !drawn.plant.tip[0].empty();
+  options.show_angle = drawn.angle;
+  std::vector<Record> records;
+  for (const CampaignTest& test : drawn.campaign.tests) {
+    options.phase = between(phases, 0.0, units::TWO_PI);
+    records.push_back(run(drawn.plant, test, options, random));
+  }
+  return records;
+}
+
+void writeCampaignOf(const Drawn& drawn, const std::vector<Record>& records, const std::string& folder) {
   std::error_code failed;
   std::filesystem::create_directories(folder, failed);
   if (failed) throw Error(folder + ": " + failed.message());
   writeMachineModel(drawn.nominal, folder + "/model.yaml");
   writeCampaign(drawn.campaign, folder);
-  Random phases(hidden.seed + 1), random(hidden.seed + (second ? 3 : 2));
-  RunOptions options;
-  options.show_tip = !drawn.plant.tip[0].empty();
-  options.show_angle = drawn.angle;
-  for (const CampaignTest& test : drawn.campaign.tests) {
-    options.phase = between(phases, 0.0, units::TWO_PI);
-    writeCsv(run(drawn.plant, test, options, random), folder + "/" + test.file);
-  }
+  for (std::size_t k = 0; k < records.size(); ++k)
+    writeCsv(records[k], folder + "/" + drawn.campaign.tests[k].file);
 }
 
 void writeTruth(const Drawn& drawn, const std::string& file) {

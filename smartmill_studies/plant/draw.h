@@ -7,6 +7,7 @@
 
 #include "plant/machine.h"
 #include "smartmill_core/campaign/campaign.h"
+#include "smartmill_core/campaign/record.h"
 #include "smartmill_core/model/machine_model.h"
 
 namespace smartmill::plant {
@@ -39,9 +40,12 @@ struct Drawn {
 
 Drawn draw(const Case& hidden);
 
-/// Runs every test and writes a campaign folder: model.yaml, campaign.yaml, records. @param second another
-/// draw of everything that differs from run to run (noise, phases, unsteadiness) @throws Error.
-void writeCampaignOf(const Drawn& drawn, const Case& hidden, const std::string& folder, bool second = false);
+/// Runs every test. @param second another draw of what differs from run to run (noise, unsteadiness, not the
+/// spindle's phase) @throws Error.
+std::vector<Record> runCampaign(const Drawn& drawn, const Case& hidden, bool second = false);
+
+/// Writes a campaign folder: model.yaml, campaign.yaml, records (one a test). @throws Error.
+void writeCampaignOf(const Drawn& drawn, const std::vector<Record>& records, const std::string& folder);
 
 /// What is hidden, as YAML (for the scorer). @throws Error.
 void writeTruth(const Drawn& drawn, const std::string& file);

@@ -129,6 +129,7 @@ class TestRun {
                  plant.unsteadiness, random),
         sensor_(plant, hidden_, units::rpmFromRadPerSec(test.spindle_speed), step_),
         tip_(plant, hidden_, step_),
+        disturbance_(hidden_, test.spindle_speed),
         chain_(plant, hidden_, test.spindle_speed, step_, random),
         peak_(std::uniform_real_distribution<double>(150.0, 300.0)(random)) {
     if (plant.spindle && !isTap()) drive_.emplace(plant, hidden_, test, step_);
@@ -176,7 +177,7 @@ class TestRun {
                             turning_.unsteadiness(angle(t)), t - engage_, fed);
     }
     tip_.step(chip.force);
-    std::array<double, 3> force = disturbance(hidden_, angle(t), test_.spindle_speed);
+    std::array<double, 3> force = disturbance_.force(angle(t));
     for (std::size_t a = 0; a < 3; ++a) force[a] += chip.force[a];
     force[test_.direction == "y" ? 1 : test_.direction == "z" ? 2 : 0] += hammer(t);
     sensor_.step(force);
@@ -230,6 +231,7 @@ class TestRun {
   Turning turning_;
   Sensor sensor_;
   Tip tip_;
+  Disturbance disturbance_;
   Chain chain_;
   double peak_;  // [N] of the hammer
   std::optional<Drive> drive_;

@@ -101,22 +101,40 @@ class Drive {
 };
 
 /// What stands on a sensor besides the cut.
-inline std::array<double, 3> disturbance(const Hidden& hidden, double angle, double speed) {
-  std::array<double, 3> force{};
-  const double unbalance = 1e-6 * hidden("unbalance", "mass_eccentricity_g_mm") * speed * speed;
-  const double at = angle + units::radFromDeg(hidden("unbalance", "angle_deg"));
-  force[0] += unbalance * std::sin(at);
-  force[1] += unbalance * std::cos(at);
-  if (speed == 0.0) return force;
-  for (const EffectEntry* e : hidden.all("spindle_order")) {
-    const char* axes[] = {"x", "y", "z"};
-    for (std::size_t a = 0; a < 3; ++a)
-      force[a] += e->numbers.at(std::string(axes[a]) + "_n") *
-                  std::sin(e->numbers.at("order") * angle +
-                           units::radFromDeg(e->numbers.at(std::string(axes[a]) + "_deg")));
+class Disturbance {
+ public:
+  Disturbance(const Hidden& hidden, double speed)
+      : unbalance_(1e-6 * hidden("unbalance", "mass_eccentricity_g_mm") * speed * speed),
+        unbalance_angle_(units::radFromDeg(hidden("unbalance", "angle_deg"))) {
+    if (speed == 0.0) return;
+    for (const EffectEntry* e : hidden.all("spindle_order")) {
+      Order order{e->numbers.at("order"), {}, {}};
+      const std::array<std::string, 3> axes{"x", "y", "z"};
+      for (std::size_t a = 0; a < 3; ++a) {
+        order.size[a] = e->numbers.at(axes[a] + "_n");
+        order.phase[a] = units::radFromDeg(e->numbers.at(axes[a] + "_deg"));
+      }
+      orders_.push_back(order);
+    }
   }
-  return force;
-}
+  /// [N] @param angle [rad] of the spindle
+  std::array<double, 3> force(double angle) const {
+    const double at = angle + unbalance_angle_;
+    std::array<double, 3> force{unbalance_ * std::sin(at), unbalance_ * std::cos(at), 0.0};
+    for (const Order& o : orders_) {
+      for (std::size_t a = 0; a < 3; ++a) force[a] += o.size[a] * std::sin(o.order * angle + o.phase[a]);
+    }
+    return force;
+  }
+
+ private:
+  struct Order {
+    double order = 0.0;
+    std::array<double, 3> size{}, phase{};  // [N], [rad]
+  };
+  double unbalance_, unbalance_angle_;  // [N], [rad]
+  std::vector<Order> orders_;
+};
 
 /// Amplifiers, cables and the recorder: from the sensor to the file.
 class Chain {
@@ -132,23 +150,24 @@ class Chain {
       delay_[channelNumber(e->words.at("channel"))] += 1e-6 * e->numbers.at("delay_us");
       delayed_ = true;
     }
+    longest_ = static_cast<std::size_t>(*std::max_element(delay_.begin(), delay_.end()) / step_) + 3;
+    const char axes[] = {'x', 'y', 'z'};
+    for (std::size_t a = 0; a < 3; ++a) {
+      for (std::size_t b = 0; b < 3; ++b)
+        cross_talk_[a][b] = a == b ? 1.0 : hidden("cross_talk", {axes[a], axes[b]});
+    }
+    for (const EffectEntry* e : hidden.all("gain_error"))
+      gain_[channelNumber(e->words.at("channel"))] *= e->numbers.at("gain");
   }
 
   /// Every step: cross-talk and gains, which delays come after.
-  void feed(Channels c) {
+  void feed(const Channels& c) {
     Channels mixed = c;
-    const char axes[] = {'x', 'y', 'z'};
-    for (std::size_t a = 0; a < 3; ++a) {
-      for (std::size_t b = 0; b < 3; ++b) {
-        if (a != b) mixed[a] += hidden_("cross_talk", {axes[a], axes[b]}) * c[b];
-      }
-    }
-    for (const EffectEntry* e : hidden_.all("gain_error"))
-      mixed[channelNumber(e->words.at("channel"))] *= e->numbers.at("gain");
+    for (std::size_t a = 0; a < 3; ++a)
+      mixed[a] = cross_talk_[a][0] * c[0] + cross_talk_[a][1] * c[1] + cross_talk_[a][2] * c[2];
+    for (std::size_t k = 0; k < mixed.size(); ++k) mixed[k] *= gain_[k];
     late_.push_back(mixed);
-    const std::size_t longest =
-        static_cast<std::size_t>(*std::max_element(delay_.begin(), delay_.end()) / step_) + 3;
-    while (late_.size() > longest) late_.pop_front();
+    while (late_.size() > longest_) late_.pop_front();
   }
 
   /// What is written at this instant, without noise. @param angle [rad] of the spindle
@@ -201,6 +220,9 @@ class Chain {
   double speed_, step_, hum_phase_, own_phase_;
   std::array<double, 4> delay_{};
   bool delayed_ = false;
+  std::size_t longest_ = 0;  // steps that the latest channel needs
+  std::array<std::array<double, 3>, 3> cross_talk_{};
+  Channels gain_{1.0, 1.0, 1.0, 1.0};
   std::deque<Channels> late_;
 };
 
