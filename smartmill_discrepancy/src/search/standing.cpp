@@ -13,55 +13,36 @@
 namespace smartmill::discrepancy {
 namespace {
 
-// Sums of one test over its channels.
-struct Asked {
-  double squares = 0.0;   // d.d
-  double product = 0.0;   // d.r
-  double variance = 0.0;  // of the product
-};
-
-// Squares by frequency, as many as those of the block; the mean square of the window is 3/8.
-std::vector<double> power(const std::vector<double>& values, const Block& b) {
-  const std::vector<double> taper = hannWindow(b.size);
-  std::vector<double> part(b.size);
-  for (std::size_t i = 0; i < b.size; ++i) part[i] = taper[i] * values[b.offset + i];
-  std::vector<double> squares;
+// Squares by frequency, as many as those of the values; the mean square of the window is 3/8.
+std::vector<double> power(const double* values, std::size_t size) {
+  std::vector<double> part = hannWindow(size), squares;
+  for (std::size_t i = 0; i < size; ++i) part[i] *= values[i];
   for (const std::complex<double>& x : fourier(part)) {
-    const bool single = squares.empty() || 2 * squares.size() == b.size;
-    squares.push_back((single ? 1.0 : 2.0) * std::norm(x) / (0.375 * static_cast<double>(b.size)));
+    const bool single = squares.empty() || 2 * squares.size() == size;
+    squares.push_back((single ? 1.0 : 2.0) * std::norm(x) / (0.375 * static_cast<double>(size)));
   }
   return squares;
 }
 
-std::vector<Asked> askedBy(const TwinRunner& runner, const MachineModel& better, const MachineModel& other) {
+std::vector<AskedTest> askedBy(const TwinRunner& runner, const MachineModel& better,
+                               const MachineModel& other) {
   const auto simulated = runner.simulate({better, other});
-  std::vector<double> difference(runner.size()), left(runner.size());
-  for (std::size_t i = 0; i < difference.size(); ++i) {
-    difference[i] = simulated[0][i] - simulated[1][i];
+  std::vector<double> between(runner.size()), left(runner.size());
+  for (std::size_t i = 0; i < between.size(); ++i) {
+    between[i] = simulated[0][i] - simulated[1][i];
     left[i] = runner.measured()[i] - simulated[0][i];
   }
-  std::map<std::size_t, Asked> by_test;
-  for (const Block& b : runner.blocks()) {
-    Asked& asked = by_test[b.test];
-    double squares = 0.0;
-    for (std::size_t i = b.offset; i < b.offset + b.size; ++i) {
-      squares += difference[i] * difference[i];
-      asked.product += difference[i] * left[i];
-    }
-    if (squares <= 0.0) continue;
-    asked.squares += squares;
-    const std::vector<double> of_difference = power(difference, b), of_left = power(left, b);
-    for (std::size_t k = 0; k < of_left.size(); ++k) asked.variance += of_difference[k] * of_left[k];
-  }
-  std::vector<Asked> all;
+  std::map<std::size_t, AskedTest> by_test;
+  for (const Block& b : runner.blocks()) by_test[b.test].add(&between[b.offset], &left[b.offset], b.size);
+  std::vector<AskedTest> all;
   for (const auto& [test, asked] : by_test) all.push_back(asked);
   return all;
 }
 
 // Where structure is left, stated values are pulled by it too: its variance is that of the residuals.
-Asked askedByStated(const NominalFreedom& freedom, const FitState& better, const FitState& other,
-                    double variance) {
-  Asked asked;
+AskedTest askedByStated(const NominalFreedom& freedom, const FitState& better, const FitState& other,
+                        double variance) {
+  AskedTest asked;
   const std::vector<Coordinate>& free = freedom.coordinates();
   for (std::size_t c = 0; c < free.size(); ++c) {
     const double d = (better.nominal[c] - other.nominal[c]) / free[c].prior_std;
@@ -72,10 +53,28 @@ Asked askedByStated(const NominalFreedom& freedom, const FitState& better, const
   return asked;
 }
 
-AskedShare pooled(const std::vector<Asked>& tests) {
+}  // namespace
+
+// The window spreads a line over bins in such shares that the products of two lines' bins add up to half the
+// product of their squares, the variance at a random phase. Noise of unit variance, two degrees of freedom a
+// bin, is counted twice by that.
+void AskedTest::add(const double* between, const double* left, std::size_t size) {
+  double own = 0.0;
+  for (std::size_t i = 0; i < size; ++i) {
+    own += between[i] * between[i];
+    product += between[i] * left[i];
+  }
+  if (own <= 0.0) return;
+  squares += own;
+  const std::vector<double> of_between = power(between, size), of_left = power(left, size);
+  const double sum = std::inner_product(of_left.begin(), of_left.end(), of_between.begin(), 0.0);
+  variance += std::max(sum - own, 0.5 * sum);
+}
+
+AskedShare sharedBy(const std::vector<AskedTest>& tests) {
   double weights = 0.0, sum = 0.0, spread = 0.0, count = 0.0;
   const auto each = [&](const auto& use) {
-    for (const Asked& t : tests) {
+    for (const AskedTest& t : tests) {
       if (t.squares > 0.0 && t.variance > 0.0)
         use(1.0 + t.product / t.squares, t.squares * t.squares / t.variance);
     }
@@ -91,8 +90,6 @@ AskedShare pooled(const std::vector<Asked>& tests) {
   const double more = count > 1.0 ? std::max(1.0, spread / (count - 1.0)) : 1.0;
   return {share, std::sqrt(more / weights)};
 }
-
-}  // namespace
 
 const AskedShare& Standing::weaker() const {
   if (!std::isfinite(heldout.std_dev)) return fitted;
@@ -111,13 +108,13 @@ bool Standing::holds() const {
 Standing standingOf(const Workbench& bench, const FitState& better, const FitState& other) {
   constexpr double TELLS = 25.0;  // squares over the noise
   const MachineModel first = bench.exact().model(better), second = bench.exact().model(other);
-  const std::vector<Asked> heldout = askedBy(bench.heldout(), first, second);
-  std::vector<Asked> fitted = askedBy(bench.fitted(), first, second);
+  const std::vector<AskedTest> heldout = askedBy(bench.heldout(), first, second);
+  std::vector<AskedTest> fitted = askedBy(bench.fitted(), first, second);
   const double variance = std::max(1.0, bench.exactSquares(better) / bench.samples());
   fitted.push_back(askedByStated(bench.freedom(), better, other, variance));
   const double squares = std::accumulate(heldout.begin(), heldout.end(), 0.0,
-                                         [](double sum, const Asked& t) { return sum + t.squares; });
-  return {pooled(squares < TELLS ? std::vector<Asked>{} : heldout), pooled(fitted)};
+                                         [](double sum, const AskedTest& t) { return sum + t.squares; });
+  return {sharedBy(squares < TELLS ? std::vector<AskedTest>{} : heldout), sharedBy(fitted)};
 }
 
 double heldoutReduction(const Workbench& bench, const FitState& better, const FitState& other) {

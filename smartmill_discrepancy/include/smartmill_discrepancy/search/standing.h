@@ -1,5 +1,8 @@
 #pragma once
 
+#include <cstddef>
+#include <vector>
+
 #include "smartmill_discrepancy/search/workbench.h"
 
 namespace smartmill::discrepancy {
@@ -21,6 +24,19 @@ struct AskedShare {
   /// Standard deviations by which the tests ask for more than half.
   double beyond() const { return (share - 0.5) / std_dev; }
 };
+
+/// What one test says of two models: sums over its channels.
+struct AskedTest {
+  double squares = 0.0;   ///< d.d
+  double product = 0.0;   ///< d.r
+  double variance = 0.0;  ///< of the product
+
+  /// One channel, values over the noise. @param between d @param left r
+  void add(const double* between, const double* left, std::size_t size);
+};
+
+/// Of tests that tell the models apart; of none the deviation is infinite.
+AskedShare sharedBy(const std::vector<AskedTest>& tests);
 
 /// How one model stands against another in tests that it was not fitted to, and in those that it was.
 struct Standing {
