@@ -6,12 +6,11 @@
 #include <utility>
 #include <vector>
 
-#include "smartmill_core/cutting/rigid_cut.h"
 #include "smartmill_core/modal/modal_filter.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_sim/effects/delay_line.h"
 #include "smartmill_sim/effects/effect.h"
-#include "smartmill_sim/twin/milling_process.h"
+#include "smartmill_sim/twin/cutter.h"
 #include "smartmill_sim/twin/spindle_drive.h"
 
 namespace smartmill::sim {
@@ -107,8 +106,7 @@ class CuttingMachine {
   Instant now_;
   Clock clock_;
   int steps_to_update_ = 0;
-  std::optional<MillingProcess> process_;
-  std::optional<RigidCut> rigid_;  // instead of the process: steady, no modes
+  std::optional<Cutter> cutter_;
   bool vibrates_ = false;
   std::optional<std::size_t> probe_;
   std::vector<ContactArc> arcs_;                     // as commanded
