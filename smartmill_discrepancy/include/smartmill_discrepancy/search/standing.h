@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <vector>
 
@@ -13,7 +14,8 @@ namespace smartmill::discrepancy {
 ///
 ///     |r + d|^2 - |r|^2 = |d|^2 (2 a - 1)
 ///
-/// the better model shrinks the gap of that test when a > 1/2. What it leaves is noise and whatever it lacks
+/// the better model shrinks the gap of that test when a > 1/2; where a > 3/2 the test would be nearer still
+/// with twice of it, and it is the size that the tests do not agree about. What it leaves is noise and whatever it lacks
 /// besides; where the phases of that have nothing to do with those of d, d.r has the variance
 /// sum_k |D_k|^2 |R_k|^2 over the frequencies: little where what is left lies elsewhere, much where it lies
 /// just where d acts.
@@ -21,8 +23,8 @@ struct AskedShare {
   double share = 0.5;    ///< [1] mean of the a, by their variances
   double std_dev = 0.0;  ///< [1] of it; where the tests differ by more than their variances say, as they do
 
-  /// Standard deviations by which the tests ask for more than half.
-  double beyond() const { return (share - 0.5) / std_dev; }
+  /// Standard deviations by which the tests ask for more than half and less than one and a half.
+  double beyond() const { return (0.5 - std::abs(share - 1.0)) / std_dev; }
 };
 
 /// What one test says of two models: sums over its channels.
@@ -43,9 +45,9 @@ struct Standing {
   AskedShare heldout;  ///< unknown (infinite deviation) where no held-out test tells the two apart
   AskedShare fitted;   ///< the stated uncertainty of the nominal values is one test more of these
 
-  /// The group that asks for less.
+  /// The group that is less sure of it.
   const AskedShare& weaker() const;
-  /// Probability that the gap shrinks: that the weaker group asks for more than half.
+  /// Probability that the weaker group asks for more than half and less than one and a half.
   double confidence() const;
   /// Whether both groups do, by two standard deviations each.
   bool holds() const;
