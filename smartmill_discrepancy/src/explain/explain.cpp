@@ -98,6 +98,7 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
   challenge(bench, searched, &found, &result.resembles);
   result.unexplained = findStructure(bench.fitted(), found.best.residual, structure);
   result.interrupted = bench.cancelled();
+  bench.turnTo(found.best.state);
 
   MachineModel improved = nameEffects(bench, searched, found, &result);
   const GapPair after = remainsOf(bench, improved).gap;
