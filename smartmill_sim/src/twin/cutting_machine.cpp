@@ -24,7 +24,7 @@ CuttingMachine::CuttingMachine(const MachineModel& model, double time_step, Feed
       time_step_(time_step),
       sign_(model.force_sensor.measures_workpiece ? -1.0 : 1.0) {
   model_.effects.clear();
-  TwinSetup setup{std::move(model_), {}, {}};
+  TwinSetup setup{std::move(model_), {}, {}, {}};
   if (setup.model.tool) setup.radius_offset.assign(static_cast<std::size_t>(setup.model.tool->teeth), 0.0);
   effects_.setUp(setup);
   model_ = std::move(setup.model);
@@ -39,6 +39,7 @@ CuttingMachine::CuttingMachine(const MachineModel& model, double time_step, Feed
     } else {
       process_.emplace(*model_.tool, nominal_.law, time_step, setup.radius_offset);
     }
+    layers_ = EdgeLayers(setup, nominal_.law, time_step, rigid_.has_value());
   }
   state_ = nominal_;
   tip_.emplace_back(model_.tool_tip.x, rate, Hold::first_order);
@@ -73,6 +74,7 @@ void CuttingMachine::engage(const std::vector<ContactArc>& arcs, const ToolMotio
   if (!process_ && !rigid_)
     throw Error(model_.file + ": tool or cutting is missing (needed to simulate a cut)");
   if (!feed_start_) feed_start_ = now.centre;
+  if (arcs_.empty()) cut_time_ = 0.0;
   Input input;
   input.motion = now;
   update(input);
@@ -86,6 +88,7 @@ void CuttingMachine::engage(const std::vector<ContactArc>& arcs, const ToolMotio
   depth_extra_ = state_.depth_extra;
   if (process_) process_->engage(actual, fed(now));
   if (rigid_) rigid_->engage(actual, feedOf(fed(now)));
+  layers_.engage(actual, fed(now));
 }
 
 double CuttingMachine::actualDepth(double commanded) const {
@@ -99,6 +102,7 @@ void CuttingMachine::setActualDepths() {
   depth_extra_ = state_.depth_extra;
   if (process_) process_->setDepths(depths);
   if (rigid_) rigid_->setDepths(depths);
+  layers_.setDepths(depths);
 }
 
 void CuttingMachine::setDepth(double depth, double passed_over) {
@@ -126,10 +130,12 @@ void CuttingMachine::update(const Input& input) {
   now_.speed = input.motion.speed;
   now_.start_time = clock_.start_time;
   now_.edge_time = clock_.edge_time;
+  now_.cut_time = cut_time_;
   state_ = nominal_;
   effects_.update(now_, state_);
   if (process_) process_->setLaw(state_.law);
   if (rigid_) rigid_->setLaw(state_.law);
+  layers_.setLaw(state_.law);
   if (drive_) drive_->setFriction(state_.friction_extra, state_.friction_factor);
   // The first time exactly, then only when it has moved.
   const double moved = std::abs(state_.sensor_frequency / sensor_frequency_ - 1.0);
@@ -184,7 +190,11 @@ void CuttingMachine::takeOver(const Input& input) {
 }
 
 CuttingForce CuttingMachine::cut(const ToolMotion& commanded) {
-  if (rigid_) return rigid_->at(commanded.angle);
+  if (rigid_) {
+    CuttingForce force = rigid_->at(commanded.angle);
+    layers_.add(commanded, force);
+    return force;
+  }
   if (!process_) return {};
   ToolMotion motion = fed(commanded);
   // The tip's place needs this step's force and the force needs the place: the force is first taken to go
@@ -193,7 +203,9 @@ CuttingForce CuttingMachine::cut(const ToolMotion& commanded) {
     const std::array<double, 2>& f = tip_history_[axis];
     motion.displacement[axis] = tip_[axis].peek(2.0 * f[0] - f[1]);
   }
-  return process_->step(motion);
+  CuttingForce force = process_->step(motion);
+  layers_.add(motion, force);
+  return force;
 }
 
 void CuttingMachine::moveTip(const Input& input, Output& out) {
@@ -209,9 +221,12 @@ void CuttingMachine::moveTip(const Input& input, Output& out) {
     channels[DISPLACEMENT] = channels[TOOL_X + *probe_];
     channels[ACCELERATION] = tip_[*probe_].acceleration();
   }
-  if (process_)
-    process_->settle(vibrates_ ? std::array<double, 2>{{channels[TOOL_X], channels[TOOL_Y]}}
-                               : std::array<double, 2>{{0.0, 0.0}});
+  if (process_) {
+    const std::array<double, 2> at =
+        vibrates_ ? std::array<double, 2>{{channels[TOOL_X], channels[TOOL_Y]}} : std::array<double, 2>{};
+    process_->settle(at);
+    layers_.settle(at);
+  }
 }
 
 void CuttingMachine::showForce(Output& out) {
@@ -235,6 +250,7 @@ void CuttingMachine::showLoad(double speed, Output& out) {
 void CuttingMachine::passTime(const ToolMotion& motion) {
   now_.record_time += time_step_;
   if (clock_.record || cutting()) clock_.edge_time += time_step_;
+  if (cutting()) cut_time_ += time_step_;
   if (!clock_.record) clock_.start_time += time_step_;
   if (state_.depth_slope != 0.0 && cutting()) {
     const std::array<double, 2>& v = motion.velocity;

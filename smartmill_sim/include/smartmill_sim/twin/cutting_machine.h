@@ -11,6 +11,7 @@
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_sim/effects/delay_line.h"
 #include "smartmill_sim/effects/effect.h"
+#include "smartmill_sim/twin/edge_layers.h"
 #include "smartmill_sim/twin/milling_process.h"
 #include "smartmill_sim/twin/spindle_drive.h"
 
@@ -109,11 +110,13 @@ class CuttingMachine {
   int steps_to_update_ = 0;
   std::optional<MillingProcess> process_;
   std::optional<RigidCut> rigid_;  // instead of the process: steady, no modes
+  EdgeLayers layers_;
   bool vibrates_ = false;
   std::optional<std::size_t> probe_;
   std::vector<ContactArc> arcs_;                     // as commanded
   double depth_extra_ = 0.0;                         // [m] that the depths hold now
   double feed_path_ = 0.0;                           // [m] since engagement
+  double cut_time_ = 0.0;                            // [s] since then
   std::optional<std::array<double, 2>> feed_start_;  // [m] where feed errors begin to count
   std::vector<ModalFilter> tip_;                     // x, y
   std::vector<ModalFilter> sensor_;                  // x, y, z

@@ -105,7 +105,8 @@ void RigidCut::setLaw(const CuttingLaw& law) {
   const CuttingCoefficients &a = law.coefficients, &b = law_.coefficients;
   const bool same = a.ktc == b.ktc && a.krc == b.krc && a.kac == b.kac && a.kte == b.kte && a.kre == b.kre &&
                     a.kae == b.kae && law.edge_chip == law_.edge_chip &&
-                    law.size_exponent == law_.size_exponent && law.size_reference == law_.size_reference;
+                    law.size_exponent == law_.size_exponent && law.size_reference == law_.size_reference &&
+                    law.course == law_.course;
   if (law.chip_factor != law_.chip_factor || law.edge_factor != law_.edge_factor) {
     joined_now_ = false;
     ++factor_changes_;
