@@ -8,7 +8,9 @@
 #include "smartmill_discrepancy/data/labels.h"
 #include "smartmill_discrepancy/explain/challenge.h"
 #include "smartmill_discrepancy/explain/judge.h"
+#include "smartmill_discrepancy/explain/nameless.h"
 #include "smartmill_discrepancy/explain/outcome.h"
+#include "smartmill_discrepancy/explain/sentence.h"
 #include "smartmill_discrepancy/results/formatted.h"
 #include "smartmill_sim/twin/twin.h"
 
@@ -76,7 +78,6 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
   if (!labels.doubtful.empty()) searched.most_effects = std::min<std::size_t>(searched.most_effects, 2);
   const std::vector<Hypothesis> hypotheses = catalogueHypotheses(data, &result.notes);
   SearchResult found = search(bench, hypotheses, searched);
-  for (const Rung& r : found.ladder) result.ladder.push_back(r.tried);
 
   // What the calibration of the nominal values takes away is no disagreement of their kind.
   StructureOptions structure = options.structure;
@@ -84,9 +85,15 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
   result.where = findStructure(bench.fitted(), found.null.residual, structure);
   result.unexplained = findStructure(bench.fitted(), found.best.residual, structure);
   challenge(bench, options, structure, &found, &result.unexplained);
+  Nameless nameless(bench, options, structure);
+  const MachineModel named_only = bench.exact().model(found.best.state);
+  nameless.extend(&found, &result.unexplained);
   result.interrupted = bench.cancelled();
 
+  for (const Rung& r : found.ladder) result.ladder.push_back(r.tried);
   const MachineModel improved = nameEffects(bench, searched, found, &result);
+  result.sentence = sentenceOf(result);
+  if (!result.sentence.empty()) result.named_only = remainsOf(bench, named_only).gap;
   writeOutcome(bench, before, improved, folder, &result);
   addChatter(bench.data(), &result);
   result.verdict = verdictOf(result);

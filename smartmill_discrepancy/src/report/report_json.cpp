@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/model/effect_catalogue.h"
 
 namespace smartmill::discrepancy {
 namespace {
@@ -51,18 +52,25 @@ void writeReport(const Explanation& e, const std::string& folder) {
     Json alternatives = Json::array();
     for (const auto& [name, delta] : effect.alternatives)
       alternatives.push_back({{"name", name}, {"delta_bic", rounded(delta)}});
-    report["effects"].push_back({{"name", effect.name},
-                                 {"parameters", parameters},
-                                 {"delta_bic", rounded(effect.delta_bic)},
-                                 {"heldout_gap_reduction", rounded(effect.heldout_gap_reduction)},
-                                 {"confidence", rounded(effect.confidence)},
-                                 {"alternatives", alternatives}});
+    Json entry = {{"name", effect.name}};
+    if (const EffectKind* kind = findEffect(effect.name); kind && kind->empirical())
+      entry = {{"name", EMPIRICAL}, {"stage", kind->form_stage}, {"form", kind->form}};
+    entry.update({{"parameters", parameters},
+                  {"delta_bic", rounded(effect.delta_bic)},
+                  {"heldout_gap_reduction", rounded(effect.heldout_gap_reduction)},
+                  {"confidence", rounded(effect.confidence)},
+                  {"alternatives", alternatives}});
+    report["effects"].push_back(entry);
   }
   report["not_separable"] = e.not_separable;
   report["suggested_test"] = e.suggested_test ? Json(*e.suggested_test) : Json(nullptr);
   report["unexplained"] = findingsOf(e.unexplained);
   report["gap"] = {{"before", {{"fit", rounded(e.before.fit)}, {"heldout", rounded(e.before.heldout)}}},
                    {"after", {{"fit", rounded(e.after.fit)}, {"heldout", rounded(e.after.heldout)}}}};
+  if (e.named_only)
+    report["gap"]["without_empirical"] = {{"fit", rounded(e.named_only->fit)},
+                                          {"heldout", rounded(e.named_only->heldout)}};
+  if (!e.sentence.empty()) report["sentence"] = e.sentence;
   report["gaps"] = Json::array();
   for (const BlockGap& g : e.gaps) {
     report["gaps"].push_back(
