@@ -86,14 +86,13 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
   result.unexplained = findStructure(bench.fitted(), found.best.residual, structure);
   challenge(bench, options, structure, &found, &result.unexplained);
   Nameless nameless(bench, options, structure);
-  const MachineModel named_only = bench.exact().model(found.best.state);
-  nameless.extend(&found, &result.unexplained);
+  const std::optional<FitState> named_only = nameless.extend(&found, &result.unexplained);
   result.interrupted = bench.cancelled();
 
   for (const Rung& r : found.ladder) result.ladder.push_back(r.tried);
   const MachineModel improved = nameEffects(bench, searched, found, &result);
   result.sentence = sentenceOf(result);
-  if (!result.sentence.empty()) result.named_only = remainsOf(bench, named_only).gap;
+  if (named_only) result.named_only = remainsOf(bench, bench.exact().model(*named_only)).gap;
   writeOutcome(bench, before, improved, folder, &result);
   addChatter(bench.data(), &result);
   result.verdict = verdictOf(result);

@@ -192,14 +192,9 @@ std::vector<Fit> Nameless::fitsBeside(const Fit& now, const NominalTangents& tan
 
 // One cause without a name may do all that several names stand for.
 std::vector<Fit> Nameless::fitsInstead(SearchResult* found) const {
-  const FitState bare{found->best.state.nominal, {}};
-  FitState at = bare;
-  NominalTangents tangents = bench_.linearise(at);
-  Fit now = bench_.quick().fit(at, &tangents, CLOSELY);
+  const Fit now = fitted({found->best.state.nominal, {}});
   if (!now.converged) return {};
-  tangents = bench_.linearise(now.state);
-  now = bench_.quick().fit(now.state, &tangents, CLOSELY);
-  return fitsBeside(now, tangents, now.bic - found->best.bic, found);
+  return fitsBeside(now, bench_.linearise(now.state), now.bic - found->best.bic, found);
 }
 
 bool Nameless::take(const Fit& start, const FitState& before, SearchResult* found) const {
@@ -244,11 +239,34 @@ bool Nameless::addOne(SearchResult* found, const std::vector<Finding>& unexplain
   return false;
 }
 
-void Nameless::extend(SearchResult* found, std::vector<Finding>* unexplained) {
-  for (std::size_t n = 0; n < rule_.most && !unexplained->empty() && !bench_.cancelled(); ++n) {
-    if (!addOne(found, *unexplained)) return;
-    *unexplained = findStructure(bench_.fitted(), found->best.residual, structure_);
+Fit Nameless::fitted(const FitState& state) const {
+  const NominalTangents first = bench_.linearise(state);
+  const Fit once = bench_.quick().fit(state, &first, CLOSELY);
+  if (!once.converged) return once;
+  const NominalTangents there = bench_.linearise(once.state);
+  return bench_.quick().fit(once.state, &there, CLOSELY);
+}
+
+std::optional<FitState> Nameless::extend(SearchResult* found, std::vector<Finding>* unexplained) {
+  FitState named = found->best.state;
+  std::vector<Finding> left = *unexplained;
+  std::size_t added = 0;
+  for (; added < rule_.most && !left.empty() && !bench_.cancelled(); ++added) {
+    if (!addOne(found, left)) break;
+    left = findStructure(bench_.fitted(), found->best.residual, structure_);
   }
+  if (added == 0) return {};
+  // What is not known by name stays unexplained. Names that fell away explain nothing any more.
+  FitState kept = found->best.state;
+  kept.members.erase(
+      std::remove_if(kept.members.begin(), kept.members.end(),
+                     [](const Member& m) { return findEffect(m.hypothesis->effect)->empirical(); }),
+      kept.members.end());
+  if (kept.members.size() == named.members.size()) return named;
+  const Fit rest = fitted(kept);
+  if (!rest.converged) return named;
+  *unexplained = findStructure(bench_.fitted(), rest.residual, structure_);
+  return rest.state;
 }
 
 }  // namespace smartmill::discrepancy

@@ -36,15 +36,9 @@ Json findingsOf(const std::vector<Finding>& findings) {
   return list;
 }
 
-}  // namespace
-
-void writeReport(const Explanation& e, const std::string& folder) {
-  Json report;
-  report["format"] = "smartmill-report/1";
-  report["verdict"] = nameOf(e.verdict);
-  report["where"] = findingsOf(e.where);
-  report["effects"] = Json::array();
-  for (const FoundEffect& effect : e.effects) {
+Json effectsOf(const std::vector<FoundEffect>& effects) {
+  Json list = Json::array();
+  for (const FoundEffect& effect : effects) {
     Json parameters = Json::object();
     for (const FoundParameter& p : effect.parameters)
       parameters[p.key] = {{"value", rounded(p.value)}, {"std", rounded(p.std_dev)}};
@@ -60,8 +54,19 @@ void writeReport(const Explanation& e, const std::string& folder) {
                   {"heldout_gap_reduction", rounded(effect.heldout_gap_reduction)},
                   {"confidence", rounded(effect.confidence)},
                   {"alternatives", alternatives}});
-    report["effects"].push_back(entry);
+    list.push_back(entry);
   }
+  return list;
+}
+
+}  // namespace
+
+void writeReport(const Explanation& e, const std::string& folder) {
+  Json report;
+  report["format"] = "smartmill-report/1";
+  report["verdict"] = nameOf(e.verdict);
+  report["where"] = findingsOf(e.where);
+  report["effects"] = effectsOf(e.effects);
   report["not_separable"] = e.not_separable;
   report["suggested_test"] = e.suggested_test ? Json(*e.suggested_test) : Json(nullptr);
   report["unexplained"] = findingsOf(e.unexplained);

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <deque>
+#include <optional>
 #include <vector>
 
 #include "smartmill_discrepancy/explain/explain.h"
@@ -28,8 +29,9 @@ class Nameless {
       : bench_(bench), options_(options), structure_(structure) {}
 
   /// Adds what repeats; an effect with a name that is not needed beside it any more falls away.
-  /// @param found receives the effects @param unexplained what found leaves of the fit tests; looked for anew
-  void extend(SearchResult* found, std::vector<Finding>* unexplained);
+  /// @param found receives the effects @param unexplained what effects with a name leave of the fit tests
+  /// @return the state with these alone; nothing when none was added
+  std::optional<FitState> extend(SearchResult* found, std::vector<Finding>* unexplained);
 
  private:
   bool addOne(SearchResult* found, const std::vector<Finding>& unexplained);
@@ -37,6 +39,7 @@ class Nameless {
                               SearchResult* found) const;
   std::vector<Fit> fitsInstead(SearchResult* found) const;
   bool take(const Fit& start, const FitState& before, SearchResult* found) const;
+  Fit fitted(const FitState& state) const;
   bool repeats(const FitState& before, const Fit& with) const;
   Fit withoutNeedless(Fit fit, const NominalTangents& tangents) const;
 
