@@ -44,6 +44,14 @@ double valueOf(const FoundEffect& effect, const std::string& key) {
   return 0.0;
 }
 
+// Names are not what is looked for here.
+ExplainOptions quickly() {
+  ExplainOptions options;
+  options.search.most_effects = 1;
+  options.search.fitted_per_round = 1;
+  return options;
+}
+
 void expectGapClosed(const Explanation& e) {
   EXPECT_EQ(e.verdict, Verdict::unknown_effect);
   ASSERT_TRUE(e.named_only);
@@ -64,7 +72,7 @@ TEST(Nameless, aToneOfNoKnownFrequencyIsBuiltFromTheResidual) {
         addNoise(record, seed);
         return record;
       },
-      folder.file("."));
+      folder.file("."), quickly());
   expectGapClosed(e);
   ASSERT_EQ(e.effects.size(), 1u);
   EXPECT_EQ(e.effects[0].name, "empirical:tone");
@@ -90,7 +98,7 @@ TEST(Nameless, materialThatSoftensAfterEntryIsBuiltFromTheResidual) {
         addNoise(record, seed);
         return record;
       },
-      folder.file("."));
+      folder.file("."), quickly());
   expectGapClosed(e);
   ASSERT_EQ(e.effects.size(), 1u);
   EXPECT_EQ(e.effects[0].name, "empirical:cutting_time");
@@ -111,7 +119,7 @@ TEST(Nameless, whatDoesNotRepeatIsLeftAlone) {
         addNoise(record, seed);
         return record;
       },
-      folder.file("."));
+      folder.file("."), quickly());
   EXPECT_EQ(e.verdict, Verdict::unknown_effect);
   EXPECT_TRUE(e.effects.empty());
   EXPECT_TRUE(e.sentence.empty());

@@ -43,7 +43,7 @@ inline CampaignTest slot(const std::string& name, double rpm, double feed_mm, do
 /// Slots at three feeds and three speeds, a quarter of an hour long.
 /// @param record of a test, drawn with a seed
 inline Explanation explained(const std::function<Record(const CampaignTest&, std::uint64_t seed)>& record,
-                             const std::string& folder) {
+                             const std::string& folder, const ExplainOptions& options = {}) {
   Campaign campaign;
   campaign.folder = folder;
   campaign.model_file = "model.yaml";
@@ -54,7 +54,7 @@ inline Explanation explained(const std::function<Record(const CampaignTest&, std
   writeCampaign(campaign, folder);
   std::uint64_t seed = 1;
   for (const CampaignTest& test : campaign.tests) writeCsv(record(test, ++seed), folder + "/" + test.file);
-  return explain(loadDataset(campaign, readMachineModel(campaign.modelPath())), {}, folder);
+  return explain(loadDataset(campaign, readMachineModel(campaign.modelPath())), options, folder);
 }
 
 }  // namespace smartmill::discrepancy

@@ -13,11 +13,11 @@ namespace smartmill::discrepancy {
 /// fit, since a form without a name fits whatever it is shown.
 struct NamelessOptions {
   std::size_t most = 2;
-  std::size_t fitted = 5, examined = 2;  ///< forms a round
-  double least_share = 0.1;              ///< [1] of the squares above the noise, in fit and held-out tests
-  double least_repeated = 0.5;           ///< [1] of what it changes in the held-out tests
-  double least_deviations = 3.0;         ///< of the gain, by its scatter from revolution to revolution
-  double most_contradicted = 0.15;       ///< [1] of the gain, that one test may lose clearly
+  std::size_t fitted = 4, fitted_instead = 3, examined = 2;  ///< forms a round
+  double least_share = 0.1;         ///< [1] of the squares above the noise, in fit and held-out tests
+  double least_repeated = 0.5;      ///< [1] of what it changes in the held-out tests
+  double least_deviations = 3.0;    ///< of the gain, by its scatter from revolution to revolution
+  double most_contradicted = 0.15;  ///< [1] of the gain, that one test may lose clearly
 };
 
 /// Builds effects from what the catalogue leaves: forms in which something may act at one stage (chip, edge,
@@ -35,7 +35,7 @@ class Nameless {
 
  private:
   bool addOne(SearchResult* found, const std::vector<Finding>& unexplained);
-  std::vector<Fit> fitsBeside(const Fit& now, const NominalTangents& tangents, double least,
+  std::vector<Fit> fitsBeside(const Fit& now, const NominalTangents& tangents, double least, std::size_t most,
                               SearchResult* found) const;
   std::vector<Fit> fitsInstead(SearchResult* found) const;
   bool take(const Fit& start, const FitState& before, SearchResult* found) const;
