@@ -126,9 +126,13 @@ MachineModel nameEffects(const Workbench& bench, const SearchOptions& options, c
 }
 
 Verdict verdictOf(const Explanation& result) {
-  if (result.effects.empty())
-    return result.unexplained.empty() ? Verdict::no_disagreement : Verdict::unknown_effect;
-  return result.unexplained.empty() ? Verdict::explained : Verdict::partly_explained;
+  const auto empirical = static_cast<std::size_t>(
+      std::count_if(result.effects.begin(), result.effects.end(),
+                    [](const FoundEffect& f) { return findEffect(f.name)->empirical(); }));
+  const bool all_known = result.unexplained.empty() && empirical == 0;
+  if (result.effects.size() == empirical)
+    return all_known ? Verdict::no_disagreement : Verdict::unknown_effect;
+  return all_known ? Verdict::explained : Verdict::partly_explained;
 }
 
 }  // namespace smartmill::discrepancy

@@ -90,6 +90,7 @@ void head(std::ostream& out, const std::string& campaign) {
 
 void verdict(std::ostream& out, const Explanation& e) {
   out << "<p class=\"verdict\"><b>" << nameOf(e.verdict) << "</b>. " << sentenceOf(e.verdict) << "</p>\n";
+  if (!e.sentence.empty()) out << "<p><b>" << escaped(e.sentence) << "</b></p>\n";
   if (e.interrupted) out << "<p>The search was interrupted: this is what was found until then.</p>\n";
   out << "<table><tr><th>gap<th>before<th>after</tr><tr><td>fit tests<td>" << number(e.before.fit) << "<td>"
       << number(e.after.fit) << "</tr><tr><td>held-out tests<td>" << number(e.before.heldout) << "<td>"

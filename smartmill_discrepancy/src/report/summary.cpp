@@ -5,6 +5,7 @@
 namespace smartmill::discrepancy {
 std::string summaryOf(const Explanation& e) {
   std::string lines = std::string("verdict: ") + nameOf(e.verdict) + "\n";
+  if (!e.sentence.empty()) lines += e.sentence + "\n";
   for (const FoundEffect& effect : e.effects) {
     lines += effect.name + ":";
     for (const auto& [key, word] : effect.words) lines += " " + key + " " + word;

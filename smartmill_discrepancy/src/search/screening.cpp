@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 
 #include "smartmill_core/math/linear_algebra.h"
@@ -323,6 +324,31 @@ std::vector<Promise> screen(const Fitter& fitter, const Fit& now, const NominalT
   std::stable_sort(promises.begin(), promises.end(),
                    [](const Promise& a, const Promise& b) { return a.gain > b.gain; });
   return promises;
+}
+
+std::vector<double> bestStart(const Fitter& fitter, const Fit& now, const Promise& promise) {
+  if (promise.null.empty()) return promise.start;
+  std::vector<std::vector<double>> starts;
+  std::vector<MachineModel> models;
+  for (const double share : {1.0, 0.5, 0.2, 0.05}) {
+    std::vector<double> start = promise.null;
+    for (std::size_t c = 0; c < start.size(); ++c) start[c] += share * (promise.start[c] - promise.null[c]);
+    FitState with = now.state;
+    with.members.push_back({promise.hypothesis, start});
+    starts.push_back(std::move(start));
+    models.push_back(fitter.model(with));
+  }
+  const auto simulated = fitter.runner().simulate(models);
+  std::size_t best = 0;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t k = 0; k < simulated.size(); ++k) {
+    const double squares = squaresLeft(fitter.runner(), simulated[k]);
+    if (squares < least) {
+      least = squares;
+      best = k;
+    }
+  }
+  return starts[best];
 }
 
 }  // namespace smartmill::discrepancy

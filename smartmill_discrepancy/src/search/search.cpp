@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <optional>
 #include <utility>
@@ -76,32 +75,6 @@ std::optional<FitState> withPiecesJoined(const FitState& state, const std::vecto
     if (const auto one = joined(state, m.hypothesis->effect, hypotheses)) return one;
   }
   return {};
-}
-
-// The promise is linear: of shorter ways from the null point to its start the one that fits best.
-std::vector<double> startOf(const Fitter& fitter, const Fit& now, const Promise& promise) {
-  if (promise.null.empty()) return promise.start;
-  std::vector<std::vector<double>> starts;
-  std::vector<MachineModel> models;
-  for (const double share : {1.0, 0.5, 0.2, 0.05}) {
-    std::vector<double> start = promise.null;
-    for (std::size_t c = 0; c < start.size(); ++c) start[c] += share * (promise.start[c] - promise.null[c]);
-    FitState with = now.state;
-    with.members.push_back({promise.hypothesis, start});
-    starts.push_back(std::move(start));
-    models.push_back(fitter.model(with));
-  }
-  const auto simulated = fitter.runner().simulate(models);
-  std::size_t best = 0;
-  double least = std::numeric_limits<double>::infinity();
-  for (std::size_t k = 0; k < simulated.size(); ++k) {
-    const double squares = squaresLeft(fitter.runner(), simulated[k]);
-    if (squares < least) {
-      least = squares;
-      best = k;
-    }
-  }
-  return starts[best];
 }
 
 class Search {
@@ -227,7 +200,7 @@ bool Search::worthFitting(const Round& round, const Promise& promise, double lar
 
 void Search::fitPromise(const Promise& promise, Round& round) {
   FitState with = now_.state;
-  with.members.push_back({promise.hypothesis, startOf(quick_, now_, promise)});
+  with.members.push_back({promise.hypothesis, bestStart(quick_, now_, promise)});
   const auto begin = std::chrono::steady_clock::now();
   const std::size_t simulations = quick_.runner().simulations();
   const NominalTangents turns = tangents_.ofTurns();

@@ -24,7 +24,7 @@ CuttingMachine::CuttingMachine(const MachineModel& model, double time_step, Feed
       time_step_(time_step),
       sign_(model.force_sensor.measures_workpiece ? -1.0 : 1.0) {
   model_.effects.clear();
-  TwinSetup setup{std::move(model_), {}, {}};
+  TwinSetup setup{std::move(model_), {}, {}, {}};
   if (setup.model.tool) setup.radius_offset.assign(static_cast<std::size_t>(setup.model.tool->teeth), 0.0);
   effects_.setUp(setup);
   model_ = std::move(setup.model);
@@ -37,6 +37,7 @@ CuttingMachine::CuttingMachine(const MachineModel& model, double time_step, Feed
     const bool tables = feed == Feed::steady && !vibrates_;
     cutter_.emplace(*model_.tool, nominal_.law, time_step, setup.radius_offset, setup.corner_radius,
                     tables ? Cutter::Way::tables : Cutter::Way::history);
+    layers_ = EdgeLayers(setup, nominal_.law, time_step, tables);
   }
   state_ = nominal_;
   tip_.emplace_back(model_.tool_tip.x, rate, Hold::first_order);
@@ -70,6 +71,7 @@ ToolMotion CuttingMachine::fed(const ToolMotion& commanded) const {
 void CuttingMachine::engage(const std::vector<ContactArc>& arcs, const ToolMotion& now, double rise) {
   if (!cutter_) throw Error(model_.file + ": tool or cutting is missing (needed to simulate a cut)");
   if (!feed_start_) feed_start_ = now.centre;
+  if (arcs_.empty()) cut_time_ = 0.0;
   Input input;
   input.motion = now;
   update(input);
@@ -81,7 +83,9 @@ void CuttingMachine::engage(const std::vector<ContactArc>& arcs, const ToolMotio
   std::vector<ContactArc> actual = arcs;
   for (ContactArc& a : actual) a.depth = actualDepth(a.depth);
   depth_extra_ = state_.depth_extra;
-  if (!replayed()) cutter_->engage(actual, fed(now));
+  if (replayed()) return;
+  cutter_->engage(actual, fed(now));
+  layers_.engage(actual, fed(now));
 }
 
 double CuttingMachine::actualDepth(double commanded) const {
@@ -93,7 +97,9 @@ void CuttingMachine::setActualDepths() {
   std::vector<double> depths;
   for (const ContactArc& a : arcs_) depths.push_back(actualDepth(a.depth));
   depth_extra_ = state_.depth_extra;
-  if (cutter_ && !replayed()) cutter_->setDepths(depths);
+  if (!cutter_ || replayed()) return;
+  cutter_->setDepths(depths);
+  layers_.setDepths(depths);
 }
 
 void CuttingMachine::setDepth(double depth, double passed_over) {
@@ -121,9 +127,11 @@ void CuttingMachine::update(const Input& input) {
   now_.speed = input.motion.speed;
   now_.start_time = clock_.start_time;
   now_.edge_time = clock_.edge_time;
+  now_.cut_time = cut_time_;
   state_ = nominal_;
   effects_.update(now_, state_);
   if (cutter_) cutter_->setLaw(state_.law);
+  layers_.setLaw(state_.law);
   if (drive_) drive_->setFriction(state_.friction_extra, state_.friction_factor);
   // The first time exactly, then only when it has moved.
   const double moved = std::abs(state_.sensor_frequency / sensor_frequency_ - 1.0);
@@ -187,7 +195,9 @@ CuttingForce CuttingMachine::cut(const ToolMotion& commanded) {
     const std::array<double, 2>& f = tip_history_[axis];
     motion.displacement[axis] = tip_[axis].peek(2.0 * f[0] - f[1]);
   }
-  return cutter_->step(motion);
+  CuttingForce force = cutter_->step(motion);
+  layers_.add(motion, force);
+  return force;
 }
 
 void CuttingMachine::moveTip(const Input& input, Output& out) {
@@ -218,9 +228,12 @@ void CuttingMachine::settleTip(const Input& input, Output& out) {
     // A jump does not go on.
     tip_history_[axis] = {{tip[axis], engaged_ ? tip[axis] : tip_history_[axis][0]}};
   }
-  if (cutter_)
-    cutter_->settle(vibrates_ ? std::array<double, 2>{{channels[TOOL_X], channels[TOOL_Y]}}
-                              : std::array<double, 2>{{0.0, 0.0}});
+  if (cutter_) {
+    const std::array<double, 2> at =
+        vibrates_ ? std::array<double, 2>{{channels[TOOL_X], channels[TOOL_Y]}} : std::array<double, 2>{};
+    cutter_->settle(at);
+    layers_.settle(at);
+  }
 }
 
 void CuttingMachine::showForce(Output& out) {
@@ -244,6 +257,7 @@ void CuttingMachine::showLoad(double speed, Output& out) {
 void CuttingMachine::passTime(const ToolMotion& motion) {
   now_.record_time += time_step_;
   if (clock_.record || cutting()) clock_.edge_time += time_step_;
+  if (cutting()) cut_time_ += time_step_;
   if (!clock_.record) clock_.start_time += time_step_;
   if (state_.depth_slope != 0.0 && cutting()) {
     const std::array<double, 2>& v = motion.velocity;

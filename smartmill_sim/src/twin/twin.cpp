@@ -99,7 +99,7 @@ CuttingMachine::Clock clockOf(const MachineModel& model, const CampaignTest& tes
 // squares of sine and cosine on every channel that a tone is in, about the means. Clipped samples do not
 // count.
 void findPhases(const Record& recorded, const std::array<std::vector<double>*, CHANNELS>& early, double rate,
-                const CuttingMachine& machine, const std::vector<Tone*>& tones) {
+                double speed, const CuttingMachine& machine, const std::vector<Tone*>& tones) {
   const ChannelValues limits = machine.limits();
   const auto n = static_cast<Eigen::Index>(2 * tones.size());
   std::vector<double> amplitude;
@@ -126,7 +126,7 @@ void findPhases(const Record& recorded, const std::array<std::vector<double>*, C
       values[c] = (*early[c])[i];
       machine.finish(t, values);
       for (Eigen::Index k = 0; k < n / 2; ++k) {
-        const double a = units::TWO_PI * tones[static_cast<std::size_t>(k)]->frequency * t;
+        const double a = tones[static_cast<std::size_t>(k)]->rate(speed) * t;
         row(2 * k) = amplitudeOf(k, c) * std::sin(a);
         row(2 * k + 1) = amplitudeOf(k, c) * std::cos(a);
       }
@@ -217,7 +217,7 @@ void run(const MachineModel& model, const CampaignTest& test, const SimulationOp
   const std::vector<Tone*> tones = machine.tones();
   if (!tones.empty()) {
     if (recorded && !options.random_phases) {
-      findPhases(*recorded, out, test.sample_rate, machine, tones);
+      findPhases(*recorded, out, test.sample_rate, test.spindle_speed, machine, tones);
     } else {
       for (Tone* tone : tones)
         tone->phase = std::uniform_real_distribution<double>(0.0, units::TWO_PI)(random);

@@ -75,6 +75,8 @@ struct Explanation {
   std::vector<std::vector<std::string>> not_separable;
   std::optional<std::string> suggested_test;
   GapPair before, after;
+  std::optional<GapPair> named_only;  ///< gap without the effects that have no name, where there are any
+  std::string sentence;               ///< what a machinist should know; may be empty
   std::vector<BlockGap> gaps;
   std::vector<TriedEffect> ladder;
   std::vector<std::string> notes;

@@ -11,6 +11,7 @@
 #include "smartmill_sim/effects/delay_line.h"
 #include "smartmill_sim/effects/effect.h"
 #include "smartmill_sim/twin/cutter.h"
+#include "smartmill_sim/twin/edge_layers.h"
 #include "smartmill_sim/twin/spindle_drive.h"
 
 namespace smartmill::sim {
@@ -134,6 +135,7 @@ class CuttingMachine {
   Clock clock_;
   int steps_to_update_ = 0;
   std::optional<Cutter> cutter_;
+  EdgeLayers layers_;
   bool vibrates_ = false;
   CutTrace* kept_ = nullptr;
   const CutTrace* followed_ = nullptr;
@@ -142,6 +144,7 @@ class CuttingMachine {
   std::vector<ContactArc> arcs_;                     // as commanded
   double depth_extra_ = 0.0;                         // [m] that the depths hold now
   double feed_path_ = 0.0;                           // [m] since engagement
+  double cut_time_ = 0.0;                            // [s] since then
   std::optional<std::array<double, 2>> feed_start_;  // [m] where feed errors begin to count
   std::vector<ModalFilter> tip_;                     // x, y
   std::vector<ModalFilter> sensor_;                  // x, y, z

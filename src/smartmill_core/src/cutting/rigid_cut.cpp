@@ -103,7 +103,7 @@ void RigidCut::setDepths(const std::vector<double>& depths) {
 
 void RigidCut::setLaw(const CuttingLaw& law) {
   if (law.edge_chip != law_.edge_chip || law.size_exponent != law_.size_exponent ||
-      law.size_reference != law_.size_reference)
+      law.size_reference != law_.size_reference || law.course != law_.course)
     tables_.clear();
   law_ = law;
 }
