@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/units.h"
 
 namespace smartmill::discrepancy {
 namespace {
@@ -35,6 +36,19 @@ Json findingsOf(const std::vector<Finding>& findings) {
   return list;
 }
 
+// In the keys of a campaign's tests.
+Json cutOf(const CampaignTest& test) {
+  Json cut = {{"kind", test.engagement ? "cut" : "air"},
+              {"spindle_speed_rpm", rounded(units::rpmFromRadPerSec(test.spindle_speed))}};
+  if (!test.engagement) return cut;
+  const Engagement& e = *test.engagement;
+  cut["feed_per_tooth_mm"] = rounded(e.feed_per_tooth / units::MM);
+  cut["axial_depth_mm"] = rounded(e.axial_depth / units::MM);
+  cut["entry_deg"] = rounded(units::degFromRad(e.entry));
+  cut["exit_deg"] = rounded(units::degFromRad(e.exit));
+  return cut;
+}
+
 }  // namespace
 
 void writeReport(const Explanation& e, const std::string& folder) {
@@ -60,6 +74,7 @@ void writeReport(const Explanation& e, const std::string& folder) {
   }
   report["not_separable"] = e.not_separable;
   report["suggested_test"] = e.suggested_test ? Json(*e.suggested_test) : Json(nullptr);
+  if (e.suggested_cut) report["suggested_cut"] = cutOf(*e.suggested_cut);
   report["unexplained"] = findingsOf(e.unexplained);
   report["gap"] = {{"before", {{"fit", rounded(e.before.fit)}, {"heldout", rounded(e.before.heldout)}}},
                    {"after", {{"fit", rounded(e.after.fit)}, {"heldout", rounded(e.after.heldout)}}}};

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "smartmill_core/campaign/campaign.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_discrepancy/results/finding.h"
 #include "smartmill_discrepancy/results/tried_effect.h"
@@ -71,6 +72,7 @@ struct Explanation {
   std::vector<FoundEffect> effects;
   std::vector<std::vector<std::string>> not_separable;
   std::optional<std::string> suggested_test;
+  std::optional<CampaignTest> suggested_cut;  ///< the same, for who makes it
   GapPair before, after;
   std::vector<BlockGap> gaps;
   std::vector<TriedEffect> ladder;
