@@ -36,6 +36,22 @@ Json findingsOf(const std::vector<Finding>& findings) {
   return list;
 }
 
+Json sharesOf(const std::vector<ChannelShare>& channels) {
+  Json list = Json::array();
+  for (const ChannelShare& c : channels) {
+    Json share = {{"channel", c.channel},
+                  {"explained_before", rounded(c.explained_before)},
+                  {"explained_after", rounded(c.explained_after)}};
+    if (c.repeats) {
+      share["repeats"] = rounded(*c.repeats);
+      share["floor"] = rounded(c.floor);
+      share["floor_gap"] = rounded(c.floor_gap);
+    }
+    list.push_back(share);
+  }
+  return list;
+}
+
 // In the keys of a campaign's tests.
 Json cutOf(const CampaignTest& test) {
   Json cut = {{"kind", test.engagement ? "cut" : "air"},
@@ -88,6 +104,7 @@ void writeReport(const Explanation& e, const std::string& folder) {
          {"after", rounded(g.after)},
          {"interval", {rounded(g.after - 1.96 * g.std_dev), rounded(g.after + 1.96 * g.std_dev)}}});
   }
+  report["channels"] = sharesOf(e.channels);
   report["candidates"] = Json::array();
   for (const TriedEffect& t : e.ladder) {
     report["candidates"].push_back({{"round", t.round + 1},
