@@ -34,26 +34,13 @@ void declareChecks(PlanParameters& p, ParameterTable& table) {
   table.number("resonance_time", p.resonance_time, "s", Range::positive(), "longest steady stretch");
 }
 
-void declarePaths(PlanParameters& p, ParameterTable& table) {
-  table.section("Paths.");
-  table.number("lane_margin", p.lane_margin, "m", Range::positive(), "of stock left between two slots");
-  table.number("clearance", p.clearance, "m", Range::positive(),
-               "between tool and stock where the tool goes down");
-  table.number("safe_height", p.safe_height, "m", Range::positive(),
-               "above the stock: sideways motion is safe there");
-  table.number("plunge_feed", p.plunge_feed, "m/s", Range::positive(), "down into the material");
-  table.number("spin_up_time", p.spin_up_time, "s", Range::positive(),
-               "to any speed, where the model has no spindle acceleration");
-}
-
 }  // namespace
 
 void PlanParameters::declare(ParameterTable& table) {
-  table.text("tool", tool, "name under which everything about the tool is filed");
-  table.text("material", material, "of the stock; empty: the model's workpiece.material");
+  declareNames(table);
   declareTests(*this, table);
   declareChecks(*this, table);
-  declarePaths(*this, table);
+  declarePaths(table);
 }
 
 void PlanParameters::validate() const {

@@ -3,10 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <future>
-#include <thread>
 
-#include <smartmill_msgs/ArmMotion.h>
 #include <smartmill_msgs/SampleBlock.h>
 #include <smartmill_msgs/SpindleAngle.h>
 #include <boost/function.hpp>
@@ -21,16 +18,7 @@
 namespace smartmill::session {
 namespace {
 
-const ros::Duration GOAL_LEAD(0.2);    // a goal is with its node when its time comes
-constexpr double POLL = 0.01;          // [s]
-constexpr double FRESH = 0.5;          // [s] since the last message of a sensor
-constexpr double CANCEL_WAIT = 0.8;    // [s] for a cancelled goal to end
-constexpr double SERVICE_WAIT = 5.0;   // [s]
-constexpr double HURRY = 0.4;          // [s] of each thing done after Ctrl-C
-constexpr double STOP_TIMEOUT = 10.0;  // [s] for the spindle's stop after a failure
-
-/// Ctrl-C; no failure of a step.
-struct Interrupted {};
+constexpr double FRESH = 0.5;  // [s] since the last message of a sensor
 
 std::string format(const char* text, double a, double b = 0.0, double c = 0.0, double d = 0.0) {
   char line[300];
@@ -75,7 +63,7 @@ Session::Session(ros::NodeHandle nh, const ros::NodeHandle& private_nh, const st
       tool_frf_(nh_, names::MEASURE_TOOL_FRF, false),
       sensor_frf_(nh_, names::MEASURE_SENSOR_FRF, false),
       identify_(nh_, names::IDENTIFY_COEFFICIENTS, false),
-      program_(nh_, names::RUN_PROGRAM, false) {
+      driver_(nh_, [this] { return stop_.load(); }) {
   summary_.tool = parameters_.plan.tool;
   summary_.material = plan_.material();
   const auto subscribe = [this](const char* topic, auto example, auto use) {
@@ -88,7 +76,7 @@ Session::Session(ros::NodeHandle nh, const ros::NodeHandle& private_nh, const st
     heard_[topic] = ros::WallTime(0);
     subscribers_.push_back(nh_.subscribe<Message>(topic, 200, callback));
   };
-  subscribe(names::CNC_STATE, smartmill_msgs::CncState(), [this](const auto& m) { state_ = m; });
+  subscribe(names::CNC_STATE, smartmill_msgs::CncState(), [](const auto&) {});
   subscribe(names::HAMMER, smartmill_msgs::SampleBlock(), [](const auto&) {});
   subscribe(names::DYNAMOMETER, smartmill_msgs::SampleBlock(), [](const auto&) {});
   subscribe(names::SPINDLE_ANGLE, smartmill_msgs::SpindleAngle(), [](const auto&) {});
@@ -142,7 +130,7 @@ int Session::run() {
 void Session::job() {
   using smartmill_msgs::MeasureFrfAction;
   step("connect", [&] { return waitReady(); });
-  step("arm motion", [&] { return arm(true, SERVICE_WAIT); });
+  step("arm motion", [&] { return arm(true); });
   for (char direction : parameters_.tool_directions) {
     step(std::string("FRF of the tool in ") + direction, [&] {
       return measure(tool_frf_, names::MEASURE_TOOL_FRF, POINT_TOOL_TIP, {direction}, parameters_.hits,
@@ -177,12 +165,12 @@ void Session::job() {
   }
   step("disarm motion", [&] {
     waitVerdict();
-    return arm(false, SERVICE_WAIT);
+    return arm(false);
   });
 }
 
 void Session::step(const std::string& name, const std::function<std::string()>& work) {
-  checkStop();
+  driver_.checkStop();
   try {
     const std::string detail = work();
     say("ok", name, detail);
@@ -201,74 +189,12 @@ void Session::say(const char* mark, const std::string& name, const std::string& 
 
 // ---------------------------------------------------------------------------------------------- waiting
 
-void Session::checkStop() const {
-  if (stop_ || !ros::ok()) throw Interrupted();
-}
-
 void Session::pause(double seconds) const {
-  waitUntil([] { return false; }, seconds);
+  driver_.waitUntil([] { return false; }, seconds);
 }
 
 bool Session::waitUntil(const std::function<bool()>& ready, double seconds) const {
-  const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(seconds);
-  while (!ready()) {
-    checkStop();
-    if (ros::WallTime::now() > end) return false;
-    ros::WallDuration(POLL).sleep();
-  }
-  return true;
-}
-
-template <class Action, class Goal>
-auto Session::call(Client<Action>& client, const std::string& name, Goal goal, double timeout) {
-  checkStop();
-  if (!client.isServerConnected()) throw Error(name + ": its node is gone");
-  goal.header.stamp = ros::Time::now() + GOAL_LEAD;
-  client.sendGoal(goal);
-  bool ended = false;
-  std::string fault;
-  try {
-    ended = waitUntil(
-        [&] {
-          if (!client.isServerConnected()) fault = "its node is gone";
-          return !fault.empty() || client.getState().isDone();
-        },
-        timeout);
-  } catch (const Interrupted&) {
-    client.cancelGoal();
-    const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(CANCEL_WAIT);
-    while (ros::ok() && !client.getState().isDone() && ros::WallTime::now() < end)
-      ros::WallDuration(POLL).sleep();
-    throw;
-  }
-  if (!fault.empty()) throw Error(name + ": " + fault);
-  if (!ended) {
-    client.cancelGoal();
-    throw Error(name + format(": no result within %.0f s", timeout));
-  }
-  const auto result = client.getResult();
-  const auto state = client.getState();
-  if (!result || state != actionlib::SimpleClientGoalState::SUCCEEDED || result->code != 0) {
-    const std::string message = result ? result->message : "";
-    throw Error(name + ": " + (message.empty() ? state.toString() : message));
-  }
-  return *result;
-}
-
-template <class Service>
-bool Session::ask(const std::string& name, Service& service, double timeout) const {
-  // A call cannot be given a time limit: it is left behind in its thread when it takes too long.
-  auto shared = std::make_shared<Service>(service);
-  auto promise = std::make_shared<std::promise<bool>>();
-  std::future<bool> answer = promise->get_future();
-  std::thread([shared, promise, path = nh_.resolveName(name)] {
-    promise->set_value(ros::service::call(path, *shared));
-  }).detach();
-  if (answer.wait_for(std::chrono::duration<double>(timeout)) != std::future_status::ready || !answer.get()) {
-    return false;
-  }
-  service = *shared;
-  return true;
+  return driver_.waitUntil(ready, seconds);
 }
 
 std::string Session::missing() const {
@@ -277,7 +203,7 @@ std::string Session::missing() const {
   const auto server = [&](bool there, const char* name) {
     if (!there) add(std::string("action ") + name);
   };
-  server(program_.isServerConnected(), names::RUN_PROGRAM);
+  server(driver_.reachable(), names::RUN_PROGRAM);
   server(tool_frf_.isServerConnected(), names::MEASURE_TOOL_FRF);
   server(sensor_frf_.isServerConnected(), names::MEASURE_SENSOR_FRF);
   server(identify_.isServerConnected(), names::IDENTIFY_COEFFICIENTS);
@@ -285,7 +211,7 @@ std::string Session::missing() const {
   for (const auto& [topic, time] : heard_) {
     if ((ros::WallTime::now() - time).toSec() > FRESH) add("data on " + topic);
   }
-  if (!state_.connected) add("the controller's connection");
+  if (!driver_.state().connected) add("the controller's connection");
   if (!verdict_) add(std::string("a verdict on ") + names::CHATTER_STATE);
   return text;
 }
@@ -293,7 +219,8 @@ std::string Session::missing() const {
 std::string Session::recorderMissing() const {
   if (parameters_.recorder.empty()) return {};
   smartmill_msgs::Follow service;
-  if (!ask(parameters_.recorder + "/" + FOLLOW, service, SERVICE_WAIT)) return "the recorder";
+  if (!driver_.ask(parameters_.recorder + "/" + FOLLOW, service, MachineDriver::SERVICE_WAIT))
+    return "the recorder";
   const std::string topics = unconnected(service.response);
   return topics.empty() ? "" : "the recorder's connection with " + topics;
 }
@@ -309,17 +236,14 @@ std::string Session::waitReady() {
   waitUntil([&] { return (recorder = recorderMissing()).empty(); }, parameters_.ready_timeout);
   pause(parameters_.start_delay);
   return format("nodes, sensors and controller are there; the stock holds %.0f lanes",
-                static_cast<double>(plan_.lanes())) +
+                static_cast<double>(plan_.planner().lanes())) +
          (recorder.empty() ? "" : "; not there: " + recorder);
 }
 
-std::string Session::arm(bool on, double timeout) {
-  smartmill_msgs::ArmMotion service;
-  service.request.arm = on;
-  if (!ask(names::ARM_MOTION, service, timeout)) throw Error("cnc/arm_motion: no answer");
-  if (service.response.code != smartmill_msgs::ArmMotion::Response::OK) throw Error(service.response.message);
+std::string Session::arm(bool on) {
+  const std::string answer = driver_.arm(on);
   armed_ = on;
-  return service.response.message;
+  return answer;
 }
 
 std::string Session::measure(Client<smartmill_msgs::MeasureFrfAction>& client, const std::string& name,
@@ -333,38 +257,14 @@ std::string Session::measure(Client<smartmill_msgs::MeasureFrfAction>& client, c
   goal.modes = static_cast<std::uint32_t>(modes);
   goal.stickout = tool ? model_.stickout.value_or(0.0) : 0.0;
   goal.teeth = tool ? static_cast<std::uint32_t>(model_.tool->teeth) : 0;
-  const auto result = call(client, name, goal, parameters_.frf_timeout);
+  const auto result = driver_.call(client, name, goal, parameters_.frf_timeout);
   summary_.modes.push_back(fromMsg(result.modes));
   return modesText(result.modes);
 }
 
 std::string Session::runCut(const PlannedCut& cut) {
-  // The place where the last motion has ended: a state asked for after it.
-  const ros::Time now = ros::Time::now();
-  std::array<double, 3> position{};
-  const auto standing = [&] {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    if (state_.header.stamp < now || !state_.connected || state_.motion) return false;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      const auto name = std::find(state_.axes.begin(), state_.axes.end(), std::string(1, "XYZ"[axis]));
-      const auto index = static_cast<std::size_t>(name - state_.axes.begin());
-      if (index >= state_.position.size()) return false;
-      position[axis] = state_.position[index];
-    }
-    return true;
-  };
-  if (!waitUntil(standing, SERVICE_WAIT)) throw Error("cnc/state: no standing X, Y and Z axes are reported");
-  const double time = cut.duration();
   cut_from_ = ros::Time::now();
-  runProgram(cut.condition.name, plan_.program(cut, position), cut.condition,
-             time + parameters_.program_timeout);
-  std::string text = format("%.0f rpm", units::rpmFromRadPerSec(cut.condition.spindle_speed));
-  if (cut.feed > 0.0) {
-    const Engagement& engagement = cut.condition.engagement;
-    text += format(", %.2f mm deep, %.3f mm a tooth, %.0f mm/min", engagement.axial_depth / units::MM,
-                   engagement.feed_per_tooth / units::MM, cut.feed / units::MM * 60.0);
-  }
-  return text;
+  return driver_.run(plan_.planner(), cut, parameters_.program_timeout);
 }
 
 // The detector says at once that a condition has ended; it does so when it has seen all before.
@@ -379,21 +279,13 @@ void Session::waitVerdict() {
   }
 }
 
-void Session::runProgram(const std::string& name, const std::string& program,
-                         const std::optional<CuttingCondition>& condition, double timeout) {
-  smartmill_msgs::RunProgramGoal goal;
-  goal.name = name;
-  goal.program = program;
-  if (condition) goal.condition = toMsg(*condition);
-  call(program_, names::RUN_PROGRAM, goal, timeout);
-}
-
 std::string Session::identify(bool reset) {
   smartmill_msgs::IdentifyCoefficientsGoal goal;
   goal.tool = parameters_.plan.tool;
   goal.material = plan_.material();
   goal.reset = reset;
-  const auto result = call(identify_, names::IDENTIFY_COEFFICIENTS, goal, parameters_.identify_timeout);
+  const auto result =
+      driver_.call(identify_, names::IDENTIFY_COEFFICIENTS, goal, parameters_.identify_timeout);
   if (!reset) {
     coefficients_stamp_ = result.coefficients.header.stamp;
     summary_.coefficients = {fromMsg(result.coefficients)};
@@ -453,21 +345,9 @@ std::string Session::verify(const char* role, const PlannedCut& cut, CutVerdict:
 
 void Session::makeSafe() {
   if (!armed_ || !ros::ok()) return;
-  const bool hurry = stop_;
   try {
-    if (program_.isServerConnected()) {
-      smartmill_msgs::RunProgramGoal goal;
-      goal.header.stamp = ros::Time::now();
-      goal.name = "stop the spindle";
-      goal.program = "M5\n";
-      program_.sendGoal(goal);
-      const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(hurry ? HURRY : STOP_TIMEOUT);
-      while (ros::ok() && !program_.getState().isDone() && ros::WallTime::now() < end && (hurry || !stop_)) {
-        ros::WallDuration(POLL).sleep();
-      }
-      if (!program_.getState().isDone()) program_.cancelGoal();
-    }
-    say("stop", "disarm motion", arm(false, hurry ? HURRY : SERVICE_WAIT));
+    say("stop", "disarm motion", driver_.makeSafe(stop_));
+    armed_ = false;
   } catch (const Error& error) {
     say("FAIL", "disarm motion", error.what());
   }

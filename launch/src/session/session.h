@@ -9,15 +9,14 @@
 #include <string>
 #include <vector>
 
-#include <actionlib/client/simple_action_client.h>
 #include <ros/ros.h>
 #include <smartmill_msgs/ChatterState.h>
 #include <smartmill_msgs/CncState.h>
 #include <smartmill_msgs/IdentifyCoefficientsAction.h>
 #include <smartmill_msgs/MeasureFrfAction.h>
-#include <smartmill_msgs/RunProgramAction.h>
 #include <smartmill_msgs/StabilityChart.h>
 
+#include "session/machine_driver.h"
 #include "session_parameters.h"
 #include "session_summary.h"
 #include "smartmill_core/model/machine_model.h"
@@ -37,29 +36,18 @@ class Session {
   int run();
 
  private:
-  template <class Action>
-  using Client = actionlib::SimpleActionClient<Action>;
-
   void job();
   void step(const std::string& name, const std::function<std::string()>& work);
   void say(const char* mark, const std::string& name, const std::string& detail);
   void pause(double seconds) const;
-  void checkStop() const;
   bool waitUntil(const std::function<bool()>& ready, double seconds) const;
 
-  template <class Action, class Goal>
-  auto call(Client<Action>& client, const std::string& name, Goal goal, double timeout);
-  template <class Service>
-  bool ask(const std::string& name, Service& service, double timeout) const;
-
   std::string waitReady();
-  std::string arm(bool on, double timeout);
+  std::string arm(bool on);
   std::string measure(Client<smartmill_msgs::MeasureFrfAction>& client, const std::string& name,
                       const std::string& point, const std::string& direction, int hits, int modes);
   std::string runCut(const PlannedCut& cut);
   void waitVerdict();
-  void runProgram(const std::string& name, const std::string& program,
-                  const std::optional<CuttingCondition>& condition, double timeout);
   std::string identify(bool reset);
   std::string waitChart();
   std::string choose();
@@ -79,13 +67,12 @@ class Session {
 
   Client<smartmill_msgs::MeasureFrfAction> tool_frf_, sensor_frf_;
   Client<smartmill_msgs::IdentifyCoefficientsAction> identify_;
-  Client<smartmill_msgs::RunProgramAction> program_;
+  MachineDriver driver_;
   std::vector<ros::Subscriber> subscribers_;
   std::unique_ptr<ros::AsyncSpinner> spinner_;
 
   mutable std::mutex mutex_;  // of what subscribers write
   std::map<std::string, ros::WallTime> heard_;
-  smartmill_msgs::CncState state_;
   std::optional<smartmill_msgs::StabilityChart> chart_;
   std::map<std::string, std::vector<ChatterWindow>> windows_;  // by condition
   std::optional<smartmill_msgs::ChatterState> verdict_;        // the newest

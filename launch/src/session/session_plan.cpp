@@ -2,171 +2,54 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
+#include "session/shown.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::session {
 namespace {
 
-constexpr int DECIMALS = 3;                                   // of lengths in mm: the controller's increment
-constexpr double EXIT_MARGIN = 1e-3;                          // [m] kept from the stock's far side
-constexpr double RUN_OUT_TIME = 0.1;                          // [s] of feed beyond the steady stretch
-constexpr double SPIN_UP_RESERVE = 1.2, SPIN_UP_EXTRA = 0.3;  // [1], [s]
 constexpr std::size_t VERIFYING_CUTS = 2;
 
-std::string shown(double value, int decimals = 1) {
-  char text[64];
-  std::snprintf(text, sizeof text, "%.*f", decimals, value);
-  return text;
-}
-std::string mm(double length) {
-  return shown(length / units::MM, 2) + " mm";
-}
-
-/// The controller takes whole revolutions a minute.
-double wholeRpm(double speed) {
-  return std::round(units::rpmFromRadPerSec(speed));
+const PlanParameters& checked(const PlanParameters& parameters) {
+  parameters.validate();
+  return parameters;
 }
 
 }  // namespace
 
-double PlannedCut::duration() const {
-  return spin_up + dwell + (feed > 0.0 ? (to[0] - from[0]) / feed : 0.0);
-}
-
 SessionPlan::SessionPlan(const MachineModel& model, const PlanParameters& parameters)
-    : parameters_(parameters),
-      file_(model.file),
-      tool_(model.needTool("plan the cuts")),
-      spindle_(model.needSpindle("plan the cuts")),
-      axes_(model.needAxes("plan the cuts")),
-      stock_(model.needWorkpiece("plan the cuts")) {
-  parameters_.validate();
-  material_ = parameters_.material.empty() ? stock_.material : parameters_.material;
-  const double width = stock_.high[1] - stock_.low[1] - 2.0 * parameters_.lane_margin - tool_.diameter;
-  const double pitch = tool_.diameter + parameters_.lane_margin;
-  lanes_ = width < 0.0 ? 0 : static_cast<std::size_t>(std::floor(width / pitch + 1e-9)) + 1;
+    : parameters_(checked(parameters)), planner_(model, parameters) {
   const std::size_t verify = parameters_.slot_feeds.size();
   const bool with_resonance = parameters_.resonance_speed > 0.0;
   const std::size_t needed = verify + VERIFYING_CUTS + (with_resonance ? 1 : 0);
-  if (needed > lanes_) {
-    throw Error(file_ + ": the stock is " + mm(stock_.high[1] - stock_.low[1]) + " wide in y and holds " +
-                std::to_string(lanes_) + " slots of " + mm(tool_.diameter) + " side by side, " +
-                std::to_string(needed) + " are due (" + std::to_string(verify) + " slot tests, " +
-                std::to_string(needed - verify) + " verifying cuts)");
-  }
-  if (stock_.high[2] + parameters_.safe_height > axes_.travel[2][1]) {
-    throw Error(file_ + ": safe_height " + mm(parameters_.safe_height) +
-                " above the stock is beyond the travel of z");
-  }
-  for (double speed : parameters_.air_speeds) air_cuts_.push_back(airCut(speed));
+  planner_.needLanes(
+      needed, std::to_string(verify) + " slot tests, " + std::to_string(needed - verify) + " verifying cuts");
+  for (double speed : parameters_.air_speeds) air_cuts_.push_back(planner_.air(speed, parameters_.air_time));
   for (std::size_t i = 0; i < verify; ++i) {
-    slots_.push_back(cut({"slot_" + std::to_string(i + 1), i, parameters_.slot_speed, parameters_.slot_depth,
-                          parameters_.slot_feeds[i], parameters_.slot_time, parameters_.least_slot_time}));
+    slots_.push_back(
+        planner_.slot({"slot_" + std::to_string(i + 1), i, parameters_.slot_speed, parameters_.slot_depth,
+                       parameters_.slot_feeds[i], parameters_.slot_time, parameters_.least_slot_time}));
   }
   if (with_resonance) {
     const double least = parameters_.least_revolutions * units::TWO_PI / parameters_.resonance_speed;
-    resonance_ =
-        cut({"resonance", verify + VERIFYING_CUTS, parameters_.resonance_speed, parameters_.resonance_depth,
-             parameters_.resonance_feed, parameters_.resonance_time, least});
+    resonance_ = planner_.slot({"resonance", verify + VERIFYING_CUTS, parameters_.resonance_speed,
+                                parameters_.resonance_depth, parameters_.resonance_feed,
+                                parameters_.resonance_time, least});
   }
-}
-
-double SessionPlan::laneY(std::size_t lane) const {
-  return stock_.low[1] + parameters_.lane_margin + tool_.radius() +
-         static_cast<double>(lane) * (tool_.diameter + parameters_.lane_margin);
-}
-
-double SessionPlan::spinUp(double speed) const {
-  const double time = spindle_.acceleration ? speed / *spindle_.acceleration : parameters_.spin_up_time;
-  return SPIN_UP_RESERVE * time + SPIN_UP_EXTRA;
-}
-
-void SessionPlan::checkSpeed(const std::string& name, double speed) const {
-  if (spindle_.max_speed && wholeRpm(speed) > units::rpmFromRadPerSec(*spindle_.max_speed) * (1.0 + 1e-9)) {
-    throw Error(name + ": " + shown(wholeRpm(speed), 0) + " rpm, the spindle of " + file_ +
-                " turns at most " + shown(units::rpmFromRadPerSec(*spindle_.max_speed), 0) + " rpm");
-  }
-}
-
-PlannedCut SessionPlan::airCut(double speed) const {
-  PlannedCut air;
-  const double rpm = wholeRpm(speed);
-  air.condition.kind = CuttingCondition::Kind::air;
-  air.condition.name = "air_" + shown(rpm, 0);
-  air.condition.material = material_;
-  air.condition.tool_name = parameters_.tool;
-  air.condition.tool = tool_;
-  air.condition.tool.pitch.clear();
-  air.condition.spindle_speed = units::radPerSecFromRpm(rpm);
-  checkSpeed(air.condition.name, speed);
-  air.spin_up = spinUp(speed);
-  air.dwell = parameters_.air_time;
-  return air;
-}
-
-PlannedCut SessionPlan::cut(const Wish& wish) const {
-  checkSpeed(wish.name, wish.speed);
-  if (!(wish.depth > 0.0) || wish.depth > stock_.high[2] - stock_.low[2]) {
-    throw Error(wish.name + ": a depth of " + mm(wish.depth) + " in a stock " +
-                mm(stock_.high[2] - stock_.low[2]) + " high");
-  }
-  const double rpm = wholeRpm(wish.speed);
-  const double feed_a_turn = wish.feed_per_tooth * tool_.teeth;
-  PlannedCut planned;
-  planned.feed = feed_a_turn * rpm / 60.0;
-  if (planned.feed > axes_.rapid) {
-    throw Error(wish.name + ": a feed of " + shown(planned.feed / units::MM * 60.0) +
-                " mm/min, the axes of " + file_ + " do at most " + shown(axes_.rapid / units::MM * 60.0) +
-                " mm/min");
-  }
-  planned.spin_up = spinUp(wish.speed);
-  const double y = laneY(wish.lane), z = stock_.high[2] - wish.depth;
-  planned.from = {stock_.low[0] - tool_.radius() - parameters_.clearance, y, z};
-  const double steady_from = stock_.low[0] + tool_.radius() + feed_a_turn;
-  const double far_end = stock_.high[0] - tool_.radius() - EXIT_MARGIN;
-  const double run_out = planned.feed * RUN_OUT_TIME;
-  const double steady_to = std::min(far_end, steady_from + planned.feed * wish.time);
-  const double time = (steady_to - steady_from) / planned.feed;
-  if (!(time >= std::min(wish.least_time, wish.time))) {
-    throw Error(wish.name + ": cuts steadily for " + shown(std::max(time, 0.0), 2) + " s along the stock's " +
-                mm(stock_.high[0] - stock_.low[0]) + ", " + shown(wish.least_time, 2) +
-                " s are due (slower feed or longer stock)");
-  }
-  planned.to = {steady_to + run_out, y, z};
-  for (const std::array<double, 3>& place : {planned.from, planned.to}) {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      if (place[axis] < axes_.travel[axis][0] || place[axis] > axes_.travel[axis][1]) {
-        throw Error(wish.name + ": " + "xyz"[axis] + " = " + mm(place[axis]) +
-                    " is beyond the machine's travel");
-      }
-    }
-  }
-  CuttingCondition& condition = planned.condition;
-  condition.kind = CuttingCondition::Kind::cut;
-  condition.name = wish.name;
-  condition.material = material_;
-  condition.tool_name = parameters_.tool;
-  condition.tool = tool_;
-  condition.tool.pitch.clear();
-  condition.engagement = {0.0, units::PI, wish.depth, wish.feed_per_tooth};
-  condition.spindle_speed = units::radPerSecFromRpm(rpm);
-  condition.steady_from = {steady_from, y, z};
-  condition.steady_to = {steady_to, y, z};
-  return planned;
 }
 
 PlannedCut SessionPlan::stable(const Point& point, double feed_per_tooth) const {
-  return cut({"verify_stable", slots_.size(), point.spindle_speed, point.axial_depth, feed_per_tooth,
-              parameters_.stable_time, parameters_.least_revolutions * units::TWO_PI / point.spindle_speed});
+  return planner_.slot({"verify_stable", slots_.size(), point.spindle_speed, point.axial_depth,
+                        feed_per_tooth, parameters_.stable_time,
+                        parameters_.least_revolutions * units::TWO_PI / point.spindle_speed});
 }
 
 PlannedCut SessionPlan::unstable(const Point& point, double feed_per_tooth) const {
-  return cut({"verify_unstable", slots_.size() + 1, point.spindle_speed, point.axial_depth, feed_per_tooth,
-              parameters_.unstable_time,
-              parameters_.least_revolutions * units::TWO_PI / point.spindle_speed});
+  return planner_.slot({"verify_unstable", slots_.size() + 1, point.spindle_speed, point.axial_depth,
+                        feed_per_tooth, parameters_.unstable_time,
+                        parameters_.least_revolutions * units::TWO_PI / point.spindle_speed});
 }
 
 std::optional<Point> SessionPlan::firstStable(const std::vector<Point>& points, double feed_per_tooth,
@@ -193,45 +76,6 @@ std::optional<Point> SessionPlan::firstUnstable(const std::vector<Point>& points
     }
   }
   return std::nullopt;
-}
-
-std::string SessionPlan::program(const PlannedCut& cut, const std::array<double, 3>& position) const {
-  std::string text = "(" + cut.condition.name + ")\nG91\n";
-  // Rounding does not add up: every increment leads to a whole number of the controller's steps from the
-  // start.
-  std::array<long, 3> at{{0, 0, 0}};
-  const double step = units::MM * std::pow(10.0, -DECIMALS);
-  const auto go = [&](const std::array<std::optional<double>, 3>& target, double feed) {
-    std::string words;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      if (!target[axis]) continue;
-      const long goal = std::lround((*target[axis] - position[axis]) / step);
-      if (goal == at[axis]) continue;
-      words += " " + std::string(1, "XYZ"[axis]) +
-               shown(static_cast<double>(goal - at[axis]) * step / units::MM, DECIMALS);
-      at[axis] = goal;
-    }
-    if (words.empty()) return;
-    text +=
-        feed > 0.0 ? "G1 F" + shown(feed / units::MM * 60.0, DECIMALS) + words + "\n" : "G0" + words + "\n";
-  };
-  const auto dwell = [&](double time) { text += "G4 P" + std::to_string(std::lround(time * 1000.0)) + "\n"; };
-  const std::string speed = shown(units::rpmFromRadPerSec(cut.condition.spindle_speed), 0);
-  if (!(cut.feed > 0.0)) {
-    text += "S" + speed + " M3\n";
-    dwell(cut.spin_up + cut.dwell);
-    return text + "M5\n";
-  }
-  const double safe = stock_.high[2] + parameters_.safe_height;
-  if (position[2] < safe) go({std::nullopt, std::nullopt, safe}, 0.0);
-  go({cut.from[0], cut.from[1], std::nullopt}, 0.0);
-  go({std::nullopt, std::nullopt, safe}, 0.0);
-  text += "S" + speed + " M3\n";
-  dwell(cut.spin_up);
-  go({std::nullopt, std::nullopt, cut.from[2]}, parameters_.plunge_feed);
-  go({cut.to[0], std::nullopt, std::nullopt}, cut.feed);
-  go({std::nullopt, std::nullopt, safe}, 0.0);
-  return text + "M5\n";
 }
 
 const char* wordOf(CutVerdict::Kind kind) {

@@ -130,7 +130,7 @@ TEST(SessionPlan, ProgramEndsWhereThePlanSaysWithoutRoundingUp) {
   // A start that is no whole number of the controller's steps of 1 um.
   const std::array<double, 3> start{0.1234567, -0.0123456, -0.0501234};
   for (const PlannedCut& cut : plan.slots()) {
-    const Walk path = walk(plan.program(cut, start), start);
+    const Walk path = walk(plan.planner().program(cut, start), start);
     ASSERT_FALSE(path.places.empty());
     const double safe = -0.16 + PlanParameters().safe_height;
     for (std::size_t axis = 0; axis < 2; ++axis) EXPECT_NEAR(path.places.back()[axis], cut.to[axis], 0.6e-6);
@@ -157,7 +157,7 @@ TEST(SessionPlan, ProgramEndsWhereThePlanSaysWithoutRoundingUp) {
 TEST(SessionPlan, ALowToolIsLiftedBeforeItMovesSideways) {
   const SessionPlan plan(mill(), PlanParameters());
   const std::array<double, 3> low{0.2, 0.0, -0.19};
-  const Walk path = walk(plan.program(plan.slots()[0], low), low);
+  const Walk path = walk(plan.planner().program(plan.slots()[0], low), low);
   EXPECT_EQ(path.places[0][0], low[0]);
   EXPECT_NEAR(path.places[0][2], -0.15, 1e-6);
 }
@@ -168,7 +168,7 @@ TEST(SessionPlan, AirCutsTurnAtWholeRevolutionsAMinute) {
   ASSERT_EQ(plan.airCuts().size(), parameters.air_speeds.size());
   const PlannedCut& air = plan.airCuts()[0];
   EXPECT_NEAR(units::rpmFromRadPerSec(air.condition.spindle_speed), 3000.0, 1e-9);
-  const Walk path = walk(plan.program(air, {0, 0, 0}), {0, 0, 0});
+  const Walk path = walk(plan.planner().program(air, {0, 0, 0}), {0, 0, 0});
   EXPECT_TRUE(path.places.empty());
   EXPECT_NEAR(path.dwell, air.spin_up + parameters.air_time, 1e-3);
   EXPECT_NEAR(air.duration(), path.dwell, 1e-3);

@@ -89,7 +89,9 @@ void addAlternatives(const Workbench& bench, const SearchOptions& options, const
     // With more freedom and no other prediction anywhere it is but a wider name.
     if (!differs && rival.state.members.back().values.size() > best.members[member].values.size()) continue;
     result->not_separable.push_back({effect->name, rival.effect});
-    if (differs && !result->suggested_test) result->suggested_test = test->text;
+    if (!differs || result->suggested_test) continue;
+    result->suggested_test = test->text;
+    result->suggested_cut = test->test;
   }
 }
 

@@ -48,6 +48,7 @@ void writeOutcome(const Workbench& bench, const Remains& before, const MachineMo
   result->after = after.gap;
   addGaps(bench.fitted(), before.fit, after.fit, false, &result->gaps);
   addGaps(bench.heldout(), before.heldout, after.heldout, true, &result->gaps);
+  addChannelShares(bench, before, after, result);
   addCurves(bench.fitted(), before.fit, after.fit, result);
 }
 

@@ -27,7 +27,8 @@ MonitorNode::MonitorNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
       shell_(nh, private_nh, "none", INPUT_TIMEOUT),
       stretches_(parameters_.stretch, parameters_.hold_back,
                  [this](const Stretch& stretch) { judge(stretch); }),
-      state_(nh.advertise<smartmill_msgs::DiscrepancyState>(names::DISCREPANCY_STATE, 100)) {
+      state_(nh.advertise<smartmill_msgs::DiscrepancyState>(names::DISCREPANCY_STATE, 100)),
+      install_(nh.advertiseService(names::INSTALL_MODEL, &MonitorNode::install, this)) {
   connect(shell_.inputs(), stretches_);
   shell_.diagnose("model fits", [this](auto& status) { diagnose(status); });
 }
@@ -48,7 +49,8 @@ void MonitorNode::judge(const Stretch& stretch) {
   message.model_fits = last_.model_fits;
   state_.publish(message);
   shell_.tell();
-  if (!last_.model_fits && !last_.at_the_edge) record(stretch);
+  const bool wanted = !last_.model_fits || (parameters_.record_all && last_.aside.empty());
+  if (wanted && !last_.at_the_edge) record(stretch);
 }
 
 void MonitorNode::record(const Stretch& stretch) {
@@ -60,6 +62,23 @@ void MonitorNode::record(const Stretch& stretch) {
   recordStretch(model_, stretch, parameters_.record_folder);
   ++recorded_;
   ++of_condition;
+}
+
+// Between two stretches: services and streams come in the same thread.
+bool MonitorNode::install(smartmill_msgs::InstallModel::Request& request,
+                          smartmill_msgs::InstallModel::Response& response) {
+  try {
+    MachineModel model = readMachineModel(request.file);
+    if (!model.force_sensor.noise_rms)
+      throw Error(request.file + ": force_sensor.noise_rms_n is missing (needed to measure a gap)");
+    model_ = std::move(model);
+    response.message = "the monitor follows " + request.file;
+    ROS_INFO("monitor: model is %s now", request.file.c_str());
+  } catch (const Error& error) {
+    response.code = smartmill_msgs::InstallModel::Response::BAD_MODEL;
+    response.message = error.what();
+  }
+  return true;
 }
 
 void MonitorNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {

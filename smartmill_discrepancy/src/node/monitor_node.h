@@ -5,6 +5,8 @@
 
 #include <ros/node_handle.h>
 #include <ros/publisher.h>
+#include <ros/service_server.h>
+#include <smartmill_msgs/InstallModel.h>
 
 #include "node/monitor_parameters.h"
 #include "smartmill_core/model/machine_model.h"
@@ -22,6 +24,8 @@ class MonitorNode {
  private:
   void judge(const Stretch& stretch);
   void record(const Stretch& stretch);
+  bool install(smartmill_msgs::InstallModel::Request& request,
+               smartmill_msgs::InstallModel::Response& response);
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
   MonitorParameters parameters_;
@@ -33,6 +37,7 @@ class MonitorNode {
   int recorded_ = 0;
   std::map<std::string, int> recorded_of_;  // by condition
   ros::Publisher state_;
+  ros::ServiceServer install_;
 };
 
 }  // namespace smartmill::discrepancy

@@ -17,6 +17,7 @@ struct MonitorParameters {
   LiveGapOptions gap;
   std::string record_folder;
   double record_after = 0.4;
+  bool record_all = false;
   int most_recorded = 40;
   int most_per_condition = 2;
 
@@ -34,6 +35,7 @@ struct MonitorParameters {
     table.number(
         "record_after", record_after, "s", Range::notNegative(),
         "that a cut has run before a stretch is kept: vibrations of the entry die out slowly in light cuts");
+    table.flag("record_all", record_all, "stretches that fit are kept too");
     table.number("most_recorded", most_recorded, "1", Range::notNegative(), "stretches kept");
     table.number("most_per_condition", most_per_condition, "1", Range::notNegative(),
                  "of each cutting condition");

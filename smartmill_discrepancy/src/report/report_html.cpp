@@ -126,6 +126,22 @@ void effects(std::ostream& out, const Explanation& e) {
     out << "<p>A test that would tell them apart: " << escaped(*e.suggested_test) << ".</p>\n";
 }
 
+void shares(std::ostream& out, const std::vector<ChannelShare>& channels) {
+  if (channels.empty()) return;
+  out << "<h2>Shares of the variance in all cuts</h2>\n<table><tr><th>channel<th>explained "
+         "before<th>explained "
+         "after<th>comes again with the revolution<th>RMS of what does not<th>the same over the noise</tr>\n";
+  const auto percent = [](double share) { return number(100.0 * share, "%.2f %%"); };
+  for (const ChannelShare& c : channels) {
+    out << "<tr><td>" << c.channel << "<td>" << percent(c.explained_before) << "<td>"
+        << percent(c.explained_after);
+    if (c.repeats)
+      out << "<td>" << percent(*c.repeats) << "<td>" << number(c.floor) << "<td>" << number(c.floor_gap);
+    out << "</tr>\n";
+  }
+  out << "</table>\n";
+}
+
 void images(std::ostream& out, const std::vector<std::string>& pictures, const std::string& folder) {
   for (const std::string& name : pictures) {
     std::ifstream png(folder + "/" + name, std::ios::binary);
@@ -165,6 +181,7 @@ void writeHtml(const Explanation& e, const std::string& campaign, const std::vec
   head(out, campaign);
   verdict(out, e);
   effects(out, e);
+  shares(out, e.channels);
   findings(out, "What remains unexplained", e.unexplained);
   findings(out, "Where the nominal model differs", e.where);
   images(out, pictures, folder);

@@ -7,6 +7,7 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/effect_catalogue.h"
+#include "smartmill_core/units.h"
 
 namespace smartmill::discrepancy {
 namespace {
@@ -34,6 +35,35 @@ Json findingsOf(const std::vector<Finding>& findings) {
                     {"amplitude", rounded(f.amplitude)}});
   }
   return list;
+}
+
+Json sharesOf(const std::vector<ChannelShare>& channels) {
+  Json list = Json::array();
+  for (const ChannelShare& c : channels) {
+    Json share = {{"channel", c.channel},
+                  {"explained_before", rounded(c.explained_before)},
+                  {"explained_after", rounded(c.explained_after)}};
+    if (c.repeats) {
+      share["repeats"] = rounded(*c.repeats);
+      share["floor"] = rounded(c.floor);
+      share["floor_gap"] = rounded(c.floor_gap);
+    }
+    list.push_back(share);
+  }
+  return list;
+}
+
+// In the keys of a campaign's tests.
+Json cutOf(const CampaignTest& test) {
+  Json cut = {{"kind", test.engagement ? "cut" : "air"},
+              {"spindle_speed_rpm", rounded(units::rpmFromRadPerSec(test.spindle_speed))}};
+  if (!test.engagement) return cut;
+  const Engagement& e = *test.engagement;
+  cut["feed_per_tooth_mm"] = rounded(e.feed_per_tooth / units::MM);
+  cut["axial_depth_mm"] = rounded(e.axial_depth / units::MM);
+  cut["entry_deg"] = rounded(units::degFromRad(e.entry));
+  cut["exit_deg"] = rounded(units::degFromRad(e.exit));
+  return cut;
 }
 
 Json effectsOf(const std::vector<FoundEffect>& effects) {
@@ -72,6 +102,7 @@ void writeReport(const Explanation& e, const std::string& folder) {
     report["resembles"].push_back({{"name", r.name}, {"variant", r.variant}, {"reason", r.reason}});
   report["not_separable"] = e.not_separable;
   report["suggested_test"] = e.suggested_test ? Json(*e.suggested_test) : Json(nullptr);
+  if (e.suggested_cut) report["suggested_cut"] = cutOf(*e.suggested_cut);
   report["unexplained"] = findingsOf(e.unexplained);
   report["gap"] = {{"before", {{"fit", rounded(e.before.fit)}, {"heldout", rounded(e.before.heldout)}}},
                    {"after", {{"fit", rounded(e.after.fit)}, {"heldout", rounded(e.after.heldout)}}}};
@@ -89,6 +120,7 @@ void writeReport(const Explanation& e, const std::string& folder) {
          {"after", rounded(g.after)},
          {"interval", {rounded(g.after - 1.96 * g.std_dev), rounded(g.after + 1.96 * g.std_dev)}}});
   }
+  report["channels"] = sharesOf(e.channels);
   report["candidates"] = Json::array();
   for (const TriedEffect& t : e.ladder) {
     report["candidates"].push_back({{"round", t.round + 1},

@@ -23,6 +23,13 @@ std::string summaryOf(const Explanation& e) {
   }
   lines += formatted("gap: fit %.4f -> %.4f, held out %.4f -> %.4f\n", e.before.fit, e.after.fit,
                      e.before.heldout, e.after.heldout);
+  for (const ChannelShare& c : e.channels) {
+    lines += formatted("%s: %.2f -> %.2f %% of the variance explained", c.channel.c_str(),
+                       100.0 * c.explained_before, 100.0 * c.explained_after);
+    lines += c.repeats ? formatted(", %.2f %% come again with the revolution (all but a gap of %.3f)\n",
+                                   100.0 * *c.repeats, c.floor_gap)
+                       : std::string("\n");
+  }
   if (e.interrupted) lines += "interrupted: this is what was found until then\n";
   return lines;
 }

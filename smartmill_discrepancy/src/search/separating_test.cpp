@@ -54,7 +54,7 @@ std::optional<SeparatingTest> separatingTest(const Dataset& data, const MachineM
             continue;  // the twin does not run this one
           }
           if (value <= (best ? best->difference : 0.0)) continue;
-          best = SeparatingTest{"", value};
+          best = SeparatingTest{"", test, value};
           if (test.engagement) {
             best->text = formatted(
                 "a cut at %.0f rpm, %.3g mm a tooth, %.3g mm deep, from %.0f to %.0f deg: the two "

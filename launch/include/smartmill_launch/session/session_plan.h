@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <optional>
 #include <string>
@@ -9,14 +8,12 @@
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/parameters/parameter_table.h"
 #include "smartmill_core/signal/streams.h"
+#include "smartmill_launch/session/cut_planner.h"
 
 namespace smartmill::session {
 
 /// What the job is made of.
-struct PlanParameters {
-  std::string tool = "end_mill";
-  std::string material;
-
+struct PlanParameters : PathParameters {
   std::vector<double> air_speeds{314.2, 628.3, 942.5, 1256.6};
   double air_time = 1.5;
 
@@ -33,12 +30,6 @@ struct PlanParameters {
   double resonance_feed = 1.0e-4;
   double resonance_time = 0.8;
 
-  double lane_margin = 2.0e-3;
-  double clearance = 2.0e-3;
-  double safe_height = 10.0e-3;
-  double plunge_feed = 20.0e-3;
-  double spin_up_time = 3.0;
-
   void declare(ParameterTable& table);
   /// @throws Error naming key and value.
   void validate() const;
@@ -52,17 +43,6 @@ struct Point {
   double chatter_frequency = NOT_A_NUMBER;  ///< [Hz] at the limit
 };
 
-/// One test or cut, ready to be sent.
-struct PlannedCut {
-  CuttingCondition condition;
-  std::array<double, 3> from{{0, 0, 0}};  ///< [m] tool tip beside the stock at cutting height; machine frame
-  std::array<double, 3> to{{0, 0, 0}};    ///< [m] where the feed ends
-  double feed = 0.0;                      ///< [m/s]; 0: in air, no motion
-  double spin_up = 0.0;                   ///< [s] waited after M3
-  double dwell = 0.0;                     ///< [s] at speed, in air
-  double duration() const;                ///< [s] of spin-up, feed and dwell, without rapid motion
-};
-
 /// The paths of the whole job in the stock of the believed model: each cut in a lane of its own along +x,
 /// full slots, lanes side by side in y. All positions are of the tool tip's centre in the machine frame.
 class SessionPlan {
@@ -70,7 +50,7 @@ class SessionPlan {
   /// @throws Error of one line when the model lacks something or the job does not fit machine or stock.
   SessionPlan(const MachineModel& model, const PlanParameters& parameters);
 
-  const std::string& material() const { return material_; }
+  const std::string& material() const { return planner_.material(); }
   const std::vector<PlannedCut>& airCuts() const { return air_cuts_; }
   const std::vector<PlannedCut>& slots() const { return slots_; }
   const std::optional<PlannedCut>& resonance() const { return resonance_; }
@@ -86,31 +66,11 @@ class SessionPlan {
   std::optional<Point> firstUnstable(const std::vector<Point>& points, double feed_per_tooth,
                                      std::string& why) const;
 
-  /// NC program of a cut (dialect of smartmill_cnc), in increments from where the machine stands, free of
-  /// work offsets. @param position [m] of the machine before it.
-  std::string program(const PlannedCut& cut, const std::array<double, 3>& position) const;
-
-  std::size_t lanes() const { return lanes_; }  ///< that the stock holds
+  const CutPlanner& planner() const { return planner_; }
 
  private:
-  struct Wish {
-    std::string name;
-    std::size_t lane;
-    double speed, depth, feed_per_tooth, time, least_time;
-  };
-  PlannedCut cut(const Wish& wish) const;
-  PlannedCut airCut(double speed) const;
-  double spinUp(double speed) const;
-  void checkSpeed(const std::string& name, double speed) const;
-  double laneY(std::size_t lane) const;
-
   PlanParameters parameters_;
-  std::string file_, material_;
-  ToolGeometry tool_;
-  Spindle spindle_;
-  MachineAxes axes_;
-  Workpiece stock_;
-  std::size_t lanes_ = 0;
+  CutPlanner planner_;
   std::vector<PlannedCut> air_cuts_, slots_;
   std::optional<PlannedCut> resonance_;
 };

@@ -20,6 +20,10 @@ Remains remainsOf(const Workbench& bench, const MachineModel& model);
 void writeOutcome(const Workbench& bench, const Remains& before, const MachineModel& improved,
                   const std::string& folder, Explanation* result);
 
+/// Shares of the variance explained and repeated, channel by channel over all cuts.
+void addChannelShares(const Workbench& bench, const Remains& before, const Remains& after,
+                      Explanation* explanation);
+
 /// Curves of the test and channels in which nominal model and records differ most.
 void addCurves(const TwinRunner& runner, const std::vector<double>& before, const std::vector<double>& after,
                Explanation* explanation);

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "smartmill_core/campaign/campaign.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_discrepancy/results/finding.h"
 #include "smartmill_discrepancy/results/tried_effect.h"
@@ -49,6 +50,17 @@ struct BlockGap {
   double std_dev = 0.0;  ///< of a gap at the noise floor, by chance alone
 };
 
+/// One channel over all cuts: how much of it the models explain, and how much of it comes again with the
+/// revolution.
+struct ChannelShare {
+  std::string channel;
+  double explained_before = 0.0,
+         explained_after = 0.0;   ///< [1] of the variance; below 0: worse than the mean
+  std::optional<double> repeats;  ///< [1] of the variance; unknown in short cuts
+  double floor = 0.0;             ///< [unit of the channel] RMS of what does not come again
+  double floor_gap = 0.0;         ///< [1] the same over the noise: the gap of the best model of steady cuts
+};
+
 /// One channel of one test over the spindle angle: the mean of the record's revolutions in bins.
 struct RevolutionCurve {
   std::string test, channel;
@@ -74,10 +86,12 @@ struct Explanation {
   std::vector<Resemblance> resembles;
   std::vector<std::vector<std::string>> not_separable;
   std::optional<std::string> suggested_test;
+  std::optional<CampaignTest> suggested_cut;  ///< the same, for who makes it
   GapPair before, after;
   std::optional<GapPair> named_only;  ///< gap without the effects that have no name, where there are any
   std::string sentence;               ///< what a machinist should know; may be empty
   std::vector<BlockGap> gaps;
+  std::vector<ChannelShare> channels;
   std::vector<TriedEffect> ladder;
   std::vector<std::string> notes;
   std::vector<RevolutionCurve> revolutions;

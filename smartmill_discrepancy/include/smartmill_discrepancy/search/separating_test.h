@@ -11,6 +11,7 @@ namespace smartmill::discrepancy {
 /// A test that would tell two models apart.
 struct SeparatingTest {
   std::string text;         ///< for people
+  CampaignTest test;        ///< as one of the campaign, begun anew
   double difference = 0.0;  ///< [1] RMS of what the predictions differ by, over the noise
 };
 

@@ -40,6 +40,7 @@ constexpr const char* TRUE_VIBRATION = "sim/truth/vibration";
 constexpr const char* MEASURE_TOOL_FRF = "hammer/measure_frf";
 constexpr const char* MEASURE_SENSOR_FRF = "kalman/measure_frf";
 constexpr const char* IDENTIFY_COEFFICIENTS = "loadmeter/identify_coefficients";
+constexpr const char* DISCOVER = "discover";
 constexpr const char* RUN_PROGRAM = "cnc/run_program";
 constexpr const char* JOG = "cnc/jog";
 constexpr const char* ORIENT_SPINDLE = "cnc/orient_spindle";
@@ -47,6 +48,7 @@ constexpr const char* ORIENT_SPINDLE = "cnc/orient_spindle";
 // Services.
 constexpr const char* STRIKE = "daq/strike";
 constexpr const char* ARM_MOTION = "cnc/arm_motion";
+constexpr const char* INSTALL_MODEL = "discrepancy/install_model";
 constexpr const char* SET_MACRO = "cnc/set_macro";
 constexpr const char* FIND_COEFFICIENTS = "loadmeter/find_coefficients";
 constexpr const char* PREDICT_STABILITY = "stability/predict";

@@ -1,0 +1,161 @@
+// rosrun smartmill_launch discover: arms, asks the running machine for a discovery, and says what came of it.
+
+#include <atomic>
+#include <cmath>
+#include <csignal>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include <actionlib/client/simple_action_client.h>
+#include <ros/ros.h>
+#include <smartmill_msgs/ArmMotion.h>
+#include <smartmill_msgs/DiscoverAction.h>
+#include <nlohmann/json.hpp>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/names.h"
+#include "smartmill_core/program.h"
+
+namespace {
+
+using namespace smartmill;
+using Goal = smartmill_msgs::DiscoverGoal;
+using Result = smartmill_msgs::DiscoverResult;
+using Feedback = smartmill_msgs::DiscoverFeedback;
+using Json = nlohmann::ordered_json;
+
+constexpr int INTERRUPTED = 130;      // exit status
+constexpr double CANCEL_WAIT = 30.0;  // [s] for the machine to be safe
+
+std::atomic<bool> stop{false};
+void onSignal(int) {
+  stop = true;
+}
+
+struct Request {
+  std::string out;
+  bool arm = false, install = true;
+  int tests = 3;
+  double timeout = 900.0, ready = 60.0;
+};
+
+void arm(bool on) {
+  smartmill_msgs::ArmMotion service;
+  service.request.arm = on;
+  const std::string name = names::absolute(names::ARM_MOTION);
+  if (!ros::service::waitForService(name, ros::Duration(30.0)) || !ros::service::call(name, service))
+    throw Error(name + ": no answer");
+  if (service.response.code != 0) throw Error(name + ": " + service.response.message);
+}
+
+Json number(double value) {
+  return std::isfinite(value) ? Json(value) : Json(nullptr);  // JSON knows no NaN
+}
+
+void write(const Result& r, const std::string& file) {
+  const Json json{{"code", r.code},
+                  {"message", r.message},
+                  {"verdict", r.verdict},
+                  {"effects", r.effects},
+                  {"tests", r.tests},
+                  {"gap_before", number(r.gap_before)},
+                  {"gap_after", number(r.gap_after)},
+                  {"report", r.report},
+                  {"model", r.model}};
+  std::error_code ignored;  // the stream will tell
+  std::filesystem::create_directories(std::filesystem::absolute(file).parent_path(), ignored);
+  std::ofstream out(file);
+  out << json.dump(2) << "\n";
+  out.close();
+  if (!out) throw Error(file + ": cannot be written");
+}
+
+class Asking {
+ public:
+  explicit Asking(const Request& request)
+      : request_(request), client_(names::absolute(names::DISCOVER), true), begin_(ros::WallTime::now()) {
+    if (!client_.waitForServer(ros::Duration(request.ready)))
+      throw Error("action " + names::absolute(names::DISCOVER) + ": nobody offers it");
+  }
+
+  // The controller may still be on its way up.
+  void armWhenConnected() const {
+    const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(request_.ready);
+    for (;;) {
+      try {
+        arm(true);
+        return;
+      } catch (const Error&) {
+        if (stop || ros::WallTime::now() > end) throw;
+        ros::WallDuration(0.5).sleep();
+      }
+    }
+  }
+
+  Result result() {
+    Goal goal;
+    goal.header.stamp = ros::Time::now();
+    goal.most_tests = static_cast<std::uint32_t>(request_.tests);
+    goal.install = request_.install;
+    client_.sendGoal(goal, {}, {}, [this](const smartmill_msgs::DiscoverFeedbackConstPtr& f) { say(*f); });
+    bool ended = false;
+    while (!ended && !stop && (ros::WallTime::now() - begin_).toSec() < request_.timeout)
+      ended = client_.waitForResult(ros::Duration(0.1));
+    if (!ended) {
+      client_.cancelGoal();
+      ended = client_.waitForResult(ros::Duration(CANCEL_WAIT));
+    }
+    if (!ended || !client_.getResult()) throw Error("discover: no result");
+    return *client_.getResult();
+  }
+
+ private:
+  void say(const Feedback& f) const {
+    std::printf("discover [%6.1f s] %s\n", (ros::WallTime::now() - begin_).toSec(), f.stage.c_str());
+    std::fflush(stdout);
+  }
+
+  Request request_;
+  actionlib::SimpleActionClient<smartmill_msgs::DiscoverAction> client_;
+  ros::WallTime begin_;
+};
+
+// @return exit status
+int run(const Request& request) {
+  Asking asking(request);
+  if (request.arm) asking.armWhenConnected();
+  const Result result = asking.result();
+  if (request.arm && result.code == Result::OK) arm(false);
+  std::printf("discover: %s\n", result.message.c_str());
+  for (const std::string& test : result.tests) std::printf("discover: test asked for: %s\n", test.c_str());
+  std::fflush(stdout);
+  if (!request.out.empty()) write(result, request.out);
+  return stop ? INTERRUPTED : result.code == Result::OK ? 0 : 1;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  ros::init(argc, argv, "discover_client", ros::init_options::NoSigintHandler);
+  std::signal(SIGINT, onSignal);
+  std::signal(SIGTERM, onSignal);
+  Request request;
+  smartmill::CommandLine line{"Asks the running machine to find out why it differs from its model."};
+  line.option("-o,--out", request.out, "JSON file for the result");
+  line.option("--tests", request.tests, "suggested tests that may be made").within(0, 100);
+  line.option("--timeout", request.timeout, "[s] of the whole").positive();
+  line.flag("--arm", request.arm, "arm motion before and disarm after; else the operator does");
+  line.flag("!--no-install", request.install, "leave the model as it is");
+  // What roslaunch adds (__name:= and the like) is no option.
+  std::vector<std::string> words;
+  ros::removeROSArgs(argc, argv, words);
+  std::vector<const char*> left;
+  for (const std::string& word : words) left.push_back(word.c_str());
+  return smartmill::runProgram(line, static_cast<int>(left.size()), left.data(), [&] {
+    const ros::NodeHandle keep;
+    return run(request);
+  });
+}

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "smartmill_launch/session/cut_planner.h"
+
+namespace smartmill::discovery {
+
+/// Everything that discover_node is told.
+struct DiscoveryParameters {
+  std::string model;
+  std::string record_folder;
+  std::string folder;
+
+  std::vector<double> watch_speeds{418.9, 439.8, 397.9, 680.7, 471.2, 261.8};
+  std::vector<double> watch_feeds{5.0e-5, 1.5e-4, 1.0e-4, 1.1e-4, 9.0e-5, 1.2e-4};
+  std::vector<double> watch_depths{1.0e-3, 1.2e-3, 1.3e-3, 1.4e-3, 2.0e-3, 1.5e-3};
+  std::vector<double> watch_air{523.6};
+  double slot_time = 0.9, least_slot_time = 0.8;
+  double air_time = 1.0;
+
+  int threads = 2;
+  double ready_timeout = 30.0;
+  double program_timeout = 60.0;
+  double judged_timeout = 10.0;
+  double quiet_time = 1.0;
+  double explain_timeout = 300.0;
+
+  session::PathParameters paths;
+
+  void declare(ParameterTable& table);
+  /// @throws Error naming key and value.
+  void validate() const;
+
+  /// The cuts that are watched first, in order, slots from a lane on. @param prefix of their names
+  /// @throws Error saying what does not fit machine or stock.
+  std::vector<session::PlannedCut> watched(const session::CutPlanner& planner, const std::string& prefix,
+                                           std::size_t lane) const;
+  /// A slot's frame: its name and lane, times.
+  session::SlotWish frame(const std::string& name, std::size_t lane) const;
+};
+
+}  // namespace smartmill::discovery

@@ -1,0 +1,66 @@
+#include "session/child.h"
+
+#include <fcntl.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <chrono>
+#include <cstring>
+#include <thread>
+
+#include "smartmill_core/error.h"
+
+namespace smartmill::session {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr std::chrono::milliseconds POLL(20);
+constexpr std::chrono::seconds GRACE(10);  // for what a program does on Ctrl-C
+constexpr int NOT_STARTED = 127;
+
+[[noreturn]] void become(const std::vector<std::string>& command, int log) {
+  // A group of its own: whatever it starts hears the signals too, and no Ctrl-C but ours reaches it.
+  setpgid(0, 0);
+  dup2(log, STDOUT_FILENO);
+  dup2(log, STDERR_FILENO);
+  signal(SIGINT, SIG_DFL);
+  signal(SIGTERM, SIG_DFL);
+  std::vector<char*> words;
+  for (const std::string& word : command) words.push_back(const_cast<char*>(word.c_str()));
+  words.push_back(nullptr);
+  execvp(words[0], words.data());
+  _exit(NOT_STARTED);
+}
+
+}  // namespace
+
+int runChild(const std::vector<std::string>& command, const std::string& log,
+             const std::function<bool()>& stopped) {
+  const int out = open(log.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+  if (out < 0) throw Error(log + ": " + std::strerror(errno));
+  const pid_t child = fork();
+  if (child == 0) become(command, out);
+  close(out);
+  if (child < 0) throw Error(command.front() + ": " + std::strerror(errno));
+  setpgid(child, child);
+  bool asked = false;
+  Clock::time_point since;
+  int status = 0;
+  while (waitpid(child, &status, WNOHANG) == 0) {
+    if (!asked && stopped()) {
+      asked = true;
+      since = Clock::now();
+      kill(-child, SIGINT);
+    }
+    if (asked && Clock::now() > since + GRACE) kill(-child, SIGKILL);
+    std::this_thread::sleep_for(POLL);
+  }
+  const int code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  if (code == NOT_STARTED) throw Error(command.front() + ": cannot be started");
+  return code;
+}
+
+}  // namespace smartmill::session

@@ -1,0 +1,318 @@
+#include "session/discovery.h"
+
+#include <algorithm>
+#include <cmath>
+#include <exception>
+#include <filesystem>
+#include <utility>
+
+#include <smartmill_msgs/InstallModel.h>
+#include <boost/function.hpp>
+
+#include "session/child.h"
+#include "smartmill_core/cutting/coefficient_set.h"
+#include "smartmill_core/modal/results.h"
+#include "smartmill_core/names.h"
+#include "smartmill_ros/conversions.h"
+#include "smartmill_ros/parameter_reader.h"
+
+namespace smartmill::session {
+namespace {
+
+namespace fs = std::filesystem;
+using discovery::Explained;
+
+constexpr const char* FOUND_NOTHING = "no_disagreement";
+
+std::string joined(const std::vector<std::string>& parts) {
+  std::string text;
+  for (const std::string& part : parts) text += (text.empty() ? "" : "; ") + part;
+  return text;
+}
+
+}  // namespace
+
+Discovery::Discovery(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
+    : nh_(std::move(nh)),
+      parameters_(ParameterReader::fromServer(private_nh).readAll<Parameters>()),
+      model_(readMachineModel(parameters_.model)),
+      planner_(model_, parameters_.paths),
+      place_(parameters_.folder, parameters_.model),
+      driver_(nh_, [this] { return cancel_.load(); }),
+      coefficients_(nh_.advertise<smartmill_msgs::CuttingCoefficients>(names::COEFFICIENTS, 10, true)),
+      modes_(nh_, names::TOOL_MODES) {
+  parameters_.watched(planner_, "", 0);
+  states_ = nh_.subscribe<smartmill_msgs::DiscrepancyState>(
+      names::DISCREPANCY_STATE, 100,
+      boost::function<void(const smartmill_msgs::DiscrepancyState&)>([this](const auto& m) {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        judged_.insert(m.condition);
+        last_judged_ = ros::WallTime::now();
+      }));
+  server_ = std::make_unique<Server>(
+      nh_, names::DISCOVER, boost::function<void(Handle)>([this](Handle handle) { onGoal(handle); }),
+      boost::function<void(Handle)>([this](const Handle& handle) { onCancel(handle); }), false);
+  server_->start();
+}
+
+Discovery::~Discovery() {
+  cancel_ = true;
+  if (thread_.joinable()) thread_.join();
+}
+
+void Discovery::onGoal(Handle handle) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (active_) {
+    Result busy;
+    busy.code = Result::BUSY;
+    busy.message = "another discovery is running";
+    busy.gap_before = busy.gap_after = NOT_A_NUMBER;
+    handle.setRejected(busy, busy.message);
+    return;
+  }
+  if (thread_.joinable()) thread_.join();  // it has nothing left to do
+  handle.setAccepted();
+  active_ = handle;
+  cancel_ = false;
+  thread_ = std::thread([this, handle] { work(handle); });
+}
+
+void Discovery::onCancel(const Handle& handle) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (active_ && *active_ == handle) cancel_ = true;
+}
+
+void Discovery::stage(const std::string& text) {
+  ROS_INFO("discover: %s", text.c_str());
+  feedback_.stage = text;
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (active_) active_->publishFeedback(feedback_);
+}
+
+void Discovery::work(Handle handle) {
+  Result result;
+  result.gap_before = result.gap_after = NOT_A_NUMBER;
+  moved_ = false;
+  feedback_ = {};
+  ++goals_;
+  try {
+    discover(*handle.getGoal(), result);
+  } catch (const Interrupted&) {
+    result.code = Result::CANCELLED;
+    result.message = "cancelled; what was recorded and explained until then is kept";
+  } catch (const Failure& failure) {
+    result.code = failure.code;
+    result.message = failure.why;
+  } catch (const std::exception& error) {
+    result.code = Result::CUT_FAILED;
+    result.message = error.what();
+  }
+  if (result.code != Result::OK && moved_) makeSafe(result);
+  finish(handle, result);
+}
+
+void Discovery::finish(Handle& handle, const Result& result) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  active_.reset();
+  if (!ros::ok()) return;
+  if (result.code == Result::OK) {
+    ROS_INFO("discover: %s", result.message.c_str());
+    handle.setSucceeded(result, result.message);
+  } else if (result.code == Result::CANCELLED) {
+    ROS_WARN("discover: %s", result.message.c_str());
+    handle.setCanceled(result, result.message);
+  } else {
+    ROS_ERROR("discover: %s", result.message.c_str());
+    handle.setAborted(result, result.message);
+  }
+}
+
+void Discovery::makeSafe(Result& result) {
+  try {
+    driver_.makeSafe(!ros::ok());
+    result.message += "; motion is disarmed";
+  } catch (const Error& error) {
+    result.message += std::string("; disarming failed: ") + error.what();
+  }
+}
+
+// ---------------------------------------------------------------------------------------------- the steps
+
+void Discovery::discover(const smartmill_msgs::DiscoverGoal& goal, Result& result) {
+  ready();
+  watch();
+  Explained explained = explain(result);
+  while (explained.wanted && makeWanted(*explained.wanted, goal, result)) explained = explain(result);
+  std::vector<std::string> said{explained.verdict};
+  for (const std::string& effect : result.effects) said.push_back(effect);
+  for (const std::string& rivals : explained.rivals) said.push_back("not told apart: " + rivals);
+  if (goal.install && explained.verdict != FOUND_NOTHING && explained.better) {
+    install(result);
+    said.push_back("installed, the model before is kept in " + place_.kept());
+  }
+  result.message = joined(said);
+}
+
+void Discovery::ready() {
+  stage("waiting for nodes and controller");
+  const ros::Time now = ros::Time::now();
+  const auto missing = [&] {
+    std::string text;
+    if (!driver_.reachable()) text = std::string("action ") + names::RUN_PROGRAM;
+    if (!driver_.state().connected || driver_.state().header.stamp < now)
+      text += (text.empty() ? "" : ", ") + std::string("the controller");
+    if (states_.getNumPublishers() == 0) text += (text.empty() ? "" : ", ") + std::string("the monitor");
+    return text;
+  };
+  if (!driver_.waitUntil([&] { return missing().empty(); }, parameters_.ready_timeout)) {
+    throw Failure{Result::NOT_READY,
+                  "after " + shown(parameters_.ready_timeout, 0) + " s still missing: " + missing()};
+  }
+  if (!driver_.state().armed) {
+    throw Failure{Result::NOT_ARMED,
+                  std::string("motion is not armed (service ") + names::ARM_MOTION + "); nothing has moved"};
+  }
+}
+
+void Discovery::watch() {
+  std::vector<PlannedCut> cuts;
+  try {
+    cuts = parameters_.watched(planner_, goals_ == 1 ? "" : "again_" + std::to_string(goals_) + "_", lane_);
+  } catch (const Error& error) {
+    throw Failure{Result::CUT_FAILED, error.what()};
+  }
+  for (const PlannedCut& planned : cuts) cut(planned);
+}
+
+void Discovery::cut(const PlannedCut& planned) {
+  const std::string& name = planned.condition.name;
+  stage("cut " + name);
+  moved_ = true;
+  if (planned.feed > 0.0) ++lane_;
+  try {
+    driver_.run(planner_, planned, parameters_.program_timeout);
+    const auto judged = [&] {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      return judged_.count(name) > 0;
+    };
+    if (!driver_.waitUntil(judged, parameters_.judged_timeout))
+      throw Error("the monitor has judged no stretch of it");
+  } catch (const Error& error) {
+    throw Failure{Result::CUT_FAILED, "cut " + name + ": " + error.what()};
+  }
+  ++feedback_.cuts_done;
+}
+
+Explained Discovery::explain(Result& result) {
+  const std::string out = parameters_.folder + "/explain_" + std::to_string(++explained_);
+  // The monitor may be at the last stretch yet.
+  driver_.waitUntil(
+      [&] {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        return (ros::WallTime::now() - last_judged_).toSec() > parameters_.quiet_time;
+      },
+      parameters_.judged_timeout + parameters_.quiet_time);
+  stage("explaining " + std::to_string(feedback_.cuts_done) + " cuts");
+  if (!fs::exists(parameters_.record_folder + "/campaign.yaml")) {
+    throw Failure{
+        Result::EXPLAIN_FAILED,
+        parameters_.record_folder + ": the monitor has kept nothing there (record_folder, record_all)"};
+  }
+  std::error_code failed;
+  fs::create_directories(out, failed);
+  if (failed) throw Failure{Result::EXPLAIN_FAILED, out + ": " + failed.message()};
+  const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(parameters_.explain_timeout);
+  const std::string log = out + "/explain.log";
+  int code = 0;
+  try {
+    code = runChild({"rosrun", "smartmill_discrepancy", "explain", parameters_.record_folder, "--model",
+                     place_.inUse(), "-o", out, "--threads", std::to_string(parameters_.threads)},
+                    log, [&] { return cancel_ || !ros::ok() || ros::WallTime::now() > end; });
+  } catch (const Error& error) {
+    throw Failure{Result::EXPLAIN_FAILED, error.what()};
+  }
+  driver_.checkStop();
+  if (code == 1)
+    throw Failure{Result::EXPLAIN_FAILED, "explain: the records cannot be worked with, see " + log};
+  try {
+    const Explained explained = discovery::readExplained(out + "/report.json");
+    result.verdict = explained.verdict;
+    result.effects.clear();
+    for (const Explained::Effect& effect : explained.effects) result.effects.push_back(effect.text());
+    result.gap_before = explained.gap_before;
+    result.gap_after = explained.gap_after;
+    result.report = out;
+    return explained;
+  } catch (const Error& error) {
+    throw Failure{Result::EXPLAIN_FAILED, error.what()};
+  }
+}
+
+bool Discovery::makeWanted(const Explained::Wanted& wanted, const smartmill_msgs::DiscoverGoal& goal,
+                           Result& result) {
+  if (feedback_.tests_done >= goal.most_tests) {
+    result.tests.push_back("not made, the tests are used up: " + wanted.text);
+    return false;
+  }
+  const std::string name = "asked_" + std::to_string(goals_) + "_" + std::to_string(feedback_.tests_done + 1);
+  PlannedCut planned;
+  try {
+    planned = planWanted(planner_, wanted, parameters_.frame(name, lane_), parameters_.air_time);
+  } catch (const Error& error) {
+    result.tests.push_back("refused, " + std::string(error.what()) + ": " + wanted.text);
+    stage(result.tests.back());
+    return false;
+  }
+  stage("asked for " + wanted.text);
+  cut(planned);
+  ++feedback_.tests_done;
+  result.tests.push_back("made: " + wanted.text);
+  return true;
+}
+
+void Discovery::install(Result& result) {
+  stage("installing the improved model");
+  try {
+    place_.install(result.report + "/model.yaml");
+  } catch (const Error& error) {
+    throw Failure{Result::NOT_INSTALLED, error.what()};
+  }
+  smartmill_msgs::InstallModel service;
+  service.request.file = place_.inUse();
+  const bool answered = driver_.ask(names::INSTALL_MODEL, service, MachineDriver::SERVICE_WAIT);
+  if (!answered || service.response.code != smartmill_msgs::InstallModel::Response::OK) {
+    place_.undo();
+    throw Failure{Result::NOT_INSTALLED,
+                  std::string(names::INSTALL_MODEL) + ": " +
+                      (answered ? service.response.message : std::string("no answer"))};
+  }
+  result.model = place_.inUse();
+  // In the thread of the callbacks, which hands late subscribers what was said.
+  const MachineModel installed = readMachineModel(place_.inUse());
+  tell_ = nh_.createWallTimer(
+      ros::WallDuration(0.0), [this, installed](const ros::WallTimerEvent&) { tellCharts(installed); }, true);
+}
+
+// Charts are made of what these topics say.
+void Discovery::tellCharts(const MachineModel& model) {
+  CoefficientSet set;
+  set.stamp = toSec(ros::Time::now());
+  set.tool = parameters_.paths.tool;
+  set.material = planner_.material();
+  set.source = "force";
+  set.value = model.needCutting("tell the charts");
+  set.std_dev = NOT_IDENTIFIED;
+  coefficients_.publish(toMsg(set));
+  for (const char axis : {'x', 'y'}) {
+    MeasuredModes modes;
+    modes.stamp = set.stamp;
+    modes.tool = set.tool;
+    modes.point = POINT_TOOL_TIP;
+    modes.direction = axis;
+    modes.unit = "m/N";
+    modes.model = axis == 'x' ? model.tool_tip.x : model.tool_tip.y;
+    if (!modes.model.modes.empty()) modes_.publish(modes.direction, toMsg(modes));
+  }
+}
+
+}  // namespace smartmill::session

@@ -1,0 +1,109 @@
+#include "session/machine_driver.h"
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+#include <smartmill_msgs/ArmMotion.h>
+#include <boost/function.hpp>
+
+#include "smartmill_core/names.h"
+#include "smartmill_core/units.h"
+#include "smartmill_ros/conversions.h"
+
+namespace smartmill::session {
+namespace {
+
+constexpr double HURRY = 0.4;          // [s] of each thing done when the program is to end
+constexpr double STOP_TIMEOUT = 10.0;  // [s] for the spindle's stop after a failure
+
+}  // namespace
+
+MachineDriver::MachineDriver(ros::NodeHandle nh, std::function<bool()> stopped)
+    : nh_(std::move(nh)), stopped_(std::move(stopped)), program_(nh_, names::RUN_PROGRAM, false) {
+  subscriber_ = nh_.subscribe<smartmill_msgs::CncState>(
+      names::CNC_STATE, 200,
+      boost::function<void(const smartmill_msgs::CncState&)>([this](const smartmill_msgs::CncState& m) {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        state_ = m;
+      }));
+}
+
+smartmill_msgs::CncState MachineDriver::state() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return state_;
+}
+
+void MachineDriver::checkStop() const {
+  if (stopped_() || !ros::ok()) throw Interrupted();
+}
+
+bool MachineDriver::waitUntil(const std::function<bool()>& ready, double seconds) const {
+  const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(seconds);
+  while (!ready()) {
+    checkStop();
+    if (ros::WallTime::now() > end) return false;
+    ros::WallDuration(POLL).sleep();
+  }
+  return true;
+}
+
+std::string MachineDriver::arm(bool on, double timeout) {
+  smartmill_msgs::ArmMotion service;
+  service.request.arm = on;
+  if (!ask(names::ARM_MOTION, service, timeout)) throw Error(std::string(names::ARM_MOTION) + ": no answer");
+  if (service.response.code != smartmill_msgs::ArmMotion::Response::OK) throw Error(service.response.message);
+  return service.response.message;
+}
+
+// The place where the last motion has ended: a state asked for after it.
+std::array<double, 3> MachineDriver::standing() const {
+  const ros::Time now = ros::Time::now();
+  std::array<double, 3> position{};
+  const auto stands = [&] {
+    const smartmill_msgs::CncState seen = state();
+    if (seen.header.stamp < now || !seen.connected || seen.motion) return false;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto name = std::find(seen.axes.begin(), seen.axes.end(), std::string(1, "XYZ"[axis]));
+      const auto index = static_cast<std::size_t>(name - seen.axes.begin());
+      if (index >= seen.position.size()) return false;
+      position[axis] = seen.position[index];
+    }
+    return true;
+  };
+  if (!waitUntil(stands, SERVICE_WAIT)) throw Error("cnc/state: no standing X, Y and Z axes are reported");
+  return position;
+}
+
+std::string MachineDriver::run(const CutPlanner& planner, const PlannedCut& cut, double patience) {
+  const std::array<double, 3> position = standing();
+  smartmill_msgs::RunProgramGoal goal;
+  goal.name = cut.condition.name;
+  goal.program = planner.program(cut, position);
+  goal.condition = toMsg(cut.condition);
+  call(program_, names::RUN_PROGRAM, goal, cut.duration() + patience);
+  std::string text = shown(units::rpmFromRadPerSec(cut.condition.spindle_speed), 0) + " rpm";
+  if (cut.feed > 0.0) {
+    const Engagement& engagement = cut.condition.engagement;
+    text += ", " + mm(engagement.axial_depth) + " deep, " + shown(engagement.feed_per_tooth / units::MM, 3) +
+            " mm a tooth, " + shown(cut.feed / units::MM * 60.0, 0) + " mm/min";
+  }
+  return text;
+}
+
+std::string MachineDriver::makeSafe(bool hurry) {
+  if (program_.isServerConnected()) {
+    smartmill_msgs::RunProgramGoal goal;
+    goal.header.stamp = ros::Time::now();
+    goal.name = "stop the spindle";
+    goal.program = "M5\n";
+    program_.sendGoal(goal);
+    const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(hurry ? HURRY : STOP_TIMEOUT);
+    while (ros::ok() && !program_.getState().isDone() && ros::WallTime::now() < end)
+      ros::WallDuration(POLL).sleep();
+    if (!program_.getState().isDone()) program_.cancelGoal();
+  }
+  return arm(false, hurry ? HURRY : SERVICE_WAIT);
+}
+
+}  // namespace smartmill::session

@@ -1,0 +1,124 @@
+#pragma once
+
+#include <array>
+#include <functional>
+#include <future>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+
+#include <actionlib/client/simple_action_client.h>
+#include <ros/ros.h>
+#include <smartmill_msgs/CncState.h>
+#include <smartmill_msgs/RunProgramAction.h>
+
+#include "session/shown.h"
+#include "smartmill_core/error.h"
+#include "smartmill_launch/session/cut_planner.h"
+
+namespace smartmill::session {
+
+/// Who asked for the work wants it ended; no failure of a step.
+struct Interrupted {};
+
+template <class Action>
+using Client = actionlib::SimpleActionClient<Action>;
+
+/// Speaks the actions and services of the nodes for one who takes steps in order: waits with an end, a cause
+/// and an ear for being stopped; leads cuts through cnc/run_program.
+class MachineDriver {
+ public:
+  static constexpr double POLL = 0.01;         // [s]
+  static constexpr double SERVICE_WAIT = 5.0;  // [s]
+
+  /// @param stopped asked again and again from the waiting thread @param subscriptions in whose queue the
+  /// controller's state is heard, from another thread
+  MachineDriver(ros::NodeHandle nh, std::function<bool()> stopped);
+
+  void checkStop() const;
+  /// @throws Interrupted
+  bool waitUntil(const std::function<bool()>& ready, double seconds) const;
+
+  /// @throws Error naming the action when it fails; Interrupted, the goal cancelled
+  template <class Action, class Goal>
+  auto call(Client<Action>& client, const std::string& name, Goal goal, double timeout) const;
+  /// @return false: no answer in time
+  template <class Service>
+  bool ask(const std::string& name, Service& service, double timeout) const;
+
+  bool reachable() const { return program_.isServerConnected(); }  ///< cnc/run_program
+  smartmill_msgs::CncState state() const;
+
+  std::string arm(bool on, double timeout = SERVICE_WAIT);
+  /// From wherever the machine stands. @param patience [s] beyond the cut's own time @return what it was
+  std::string run(const CutPlanner& planner, const PlannedCut& cut, double patience);
+  /// Stops the spindle and disarms. @param hurry the program is to end
+  std::string makeSafe(bool hurry);
+
+ private:
+  std::array<double, 3> standing() const;
+
+  ros::NodeHandle nh_;
+  std::function<bool()> stopped_;
+  Client<smartmill_msgs::RunProgramAction> program_;
+  mutable std::mutex mutex_;
+  smartmill_msgs::CncState state_;
+  ros::Subscriber subscriber_;
+};
+
+template <class Action, class Goal>
+auto MachineDriver::call(Client<Action>& client, const std::string& name, Goal goal, double timeout) const {
+  static constexpr double GOAL_LEAD = 0.2;    // [s] a goal is with its node when its time comes
+  static constexpr double CANCEL_WAIT = 0.8;  // [s] for a cancelled goal to end
+  checkStop();
+  if (!client.isServerConnected()) throw Error(name + ": its node is gone");
+  goal.header.stamp = ros::Time::now() + ros::Duration(GOAL_LEAD);
+  client.sendGoal(goal);
+  bool ended = false;
+  std::string fault;
+  try {
+    ended = waitUntil(
+        [&] {
+          if (!client.isServerConnected()) fault = "its node is gone";
+          return !fault.empty() || client.getState().isDone();
+        },
+        timeout);
+  } catch (const Interrupted&) {
+    client.cancelGoal();
+    const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(CANCEL_WAIT);
+    while (ros::ok() && !client.getState().isDone() && ros::WallTime::now() < end)
+      ros::WallDuration(POLL).sleep();
+    throw;
+  }
+  if (!fault.empty()) throw Error(name + ": " + fault);
+  if (!ended) {
+    client.cancelGoal();
+    throw Error(name + ": no result within " + shown(timeout, 0) + " s");
+  }
+  const auto result = client.getResult();
+  const auto state = client.getState();
+  if (!result || state != actionlib::SimpleClientGoalState::SUCCEEDED || result->code != 0) {
+    const std::string message = result ? result->message : "";
+    throw Error(name + ": " + (message.empty() ? state.toString() : message));
+  }
+  return *result;
+}
+
+template <class Service>
+bool MachineDriver::ask(const std::string& name, Service& service, double timeout) const {
+  // A call cannot be given a time limit: it is left behind in its thread when it takes too long.
+  auto shared = std::make_shared<Service>(service);
+  auto promise = std::make_shared<std::promise<bool>>();
+  std::future<bool> answer = promise->get_future();
+  std::thread([shared, promise, path = nh_.resolveName(name)] {
+    promise->set_value(ros::service::call(path, *shared));
+  }).detach();
+  if (answer.wait_for(std::chrono::duration<double>(timeout)) != std::future_status::ready || !answer.get()) {
+    return false;
+  }
+  service = *shared;
+  return true;
+}
+
+}  // namespace smartmill::session

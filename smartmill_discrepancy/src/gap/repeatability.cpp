@@ -1,0 +1,105 @@
+#include "smartmill_discrepancy/gap/repeatability.h"
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+
+#include "smartmill_core/signal/statistics.h"
+#include "smartmill_core/units.h"
+
+namespace smartmill::discrepancy {
+namespace {
+
+using Complex = std::complex<double>;
+
+constexpr int MOST_STEPS = 30;   // of conjugate gradients: the columns are nearly orthogonal
+constexpr double CLOSE = 1e-10;  // of the first gradient's squares
+constexpr double HIGHEST = 0.9;  // of half the sample rate, up to which orders count
+
+double turnedOver(const std::vector<double>& angle) {
+  double turned = 0.0;
+  for (std::size_t i = 1; i < angle.size(); ++i)
+    turned += std::remainder(angle[i] - angle[i - 1], units::TWO_PI);
+  return std::abs(turned) / units::TWO_PI;
+}
+
+// Mean and orders 1..K of the angle as columns: cos(k a), sin(k a).
+class Orders {
+ public:
+  Orders(const std::vector<double>& angle, std::size_t count) : count_(count) {
+    for (const double a : angle) unit_.push_back(std::polar(1.0, a));
+  }
+  std::vector<double> times(const std::vector<double>& x) const {
+    std::vector<double> y(unit_.size());
+    for (std::size_t i = 0; i < y.size(); ++i) {
+      Complex power = 1.0;
+      double sum = x[0];
+      for (std::size_t k = 1; k <= count_; ++k) {
+        power *= unit_[i];
+        sum += x[2 * k - 1] * power.real() + x[2 * k] * power.imag();
+      }
+      y[i] = sum;
+    }
+    return y;
+  }
+  std::vector<double> transposed(const std::vector<double>& y) const {
+    std::vector<double> x(2 * count_ + 1, 0.0);
+    for (std::size_t i = 0; i < y.size(); ++i) {
+      Complex power = 1.0;
+      x[0] += y[i];
+      for (std::size_t k = 1; k <= count_; ++k) {
+        power *= unit_[i];
+        x[2 * k - 1] += y[i] * power.real();
+        x[2 * k] += y[i] * power.imag();
+      }
+    }
+    return x;
+  }
+
+ private:
+  std::vector<Complex> unit_;
+  std::size_t count_;
+};
+
+double dot(const std::vector<double>& a, const std::vector<double>& b) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < a.size(); ++i) sum += a[i] * b[i];
+  return sum;
+}
+
+// Squares that the orders leave: conjugate gradients on the normal equations (Hestenes & Stiefel 1952, CGLS).
+double squaresLeft(const Orders& orders, std::vector<double> left) {
+  std::vector<double> s = orders.transposed(left), p = s;
+  double gamma = dot(s, s);
+  const double first = gamma;
+  for (int step = 0; step < MOST_STEPS && gamma > CLOSE * first; ++step) {
+    const std::vector<double> q = orders.times(p);
+    const double alpha = gamma / dot(q, q);
+    for (std::size_t i = 0; i < left.size(); ++i) left[i] -= alpha * q[i];
+    s = orders.transposed(left);
+    const double next = dot(s, s);
+    for (std::size_t i = 0; i < p.size(); ++i) p[i] = s[i] + next / gamma * p[i];
+    gamma = next;
+  }
+  return dot(left, left);
+}
+
+}  // namespace
+
+std::optional<Repeatability> repeatability(const std::vector<double>& values,
+                                           const std::vector<double>& angle) {
+  const double turns = turnedOver(angle), samples = static_cast<double>(values.size());
+  if (values.size() != angle.size() || turns < LEAST_TURNS) return {};
+  const auto orders = static_cast<std::size_t>(std::max(1.0, std::floor(HIGHEST * 0.5 * samples / turns)));
+  const double level = mean(values);
+  std::vector<double> about = values;
+  for (double& v : about) v -= level;
+  Repeatability result;
+  result.samples = values.size();
+  result.variance = dot(about, about) / samples;
+  const double free = samples - 2.0 * static_cast<double>(orders) - 1.0;
+  result.floor = std::sqrt(squaresLeft(Orders(angle, orders), std::move(about)) / free);
+  return result;
+}
+
+}  // namespace smartmill::discrepancy

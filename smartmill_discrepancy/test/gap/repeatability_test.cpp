@@ -1,0 +1,72 @@
+#include "smartmill_discrepancy/gap/repeatability.h"
+
+#include <cmath>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "smartmill_core/units.h"
+
+namespace smartmill::discrepancy {
+namespace {
+
+struct Course {
+  std::vector<double> values, angle;
+};
+
+// A force with sharp corners that comes again each turn, a turn of no whole number of samples, and noise.
+Course course(double samples_a_turn, std::size_t samples, double noise, unsigned seed, double aside = 0.0) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal(0.0, 1.0);
+  Course c;
+  for (std::size_t i = 0; i < samples; ++i) {
+    const double turned = units::TWO_PI * static_cast<double>(i) / samples_a_turn + 0.7;
+    c.angle.push_back(std::fmod(turned, units::TWO_PI));
+    double force = 40.0;
+    for (int k = 1; k <= 60; ++k) force += 100.0 / (k * k) * std::cos(k * turned - 0.3 * k * k);
+    c.values.push_back(force + noise * normal(random) + aside * std::sin(1.618034 * turned));
+  }
+  return c;
+}
+
+double varianceOfOrders() {
+  double sum = 0.0;
+  for (int k = 1; k <= 60; ++k) sum += 0.5 * std::pow(100.0 / (k * k), 2);
+  return sum;
+}
+
+// Floor of noise of deviation s: s, to four deviations of a chi-square with the samples that are left.
+TEST(Repeatability, theFloorOfNoiseIsTheNoise) {
+  for (const double turn : {384.0, 256.37, 143.9}) {
+    for (const double noise : {0.5, 3.0}) {
+      const Course c = course(turn, 7680, noise, 3);
+      const auto r = repeatability(c.values, c.angle);
+      ASSERT_TRUE(r);
+      const double free = 7680.0 - 0.9 * turn;
+      EXPECT_NEAR(r->floor, noise, 4.0 * noise / std::sqrt(2.0 * free)) << turn;
+      const double whole = varianceOfOrders() + noise * noise;
+      EXPECT_NEAR(r->variance, whole, 0.02 * whole);  // the record ends within a turn
+      EXPECT_NEAR(r->repeats(), varianceOfOrders() / whole, 2e-4);
+    }
+  }
+}
+
+TEST(Repeatability, whatComesAgainExactlyHasNoFloor) {
+  const Course c = course(256.37, 4000, 0.0, 1);
+  EXPECT_LT(repeatability(c.values, c.angle)->floor, 1e-3);
+}
+
+// A line beside the orders (a tool that chatters) is floor; so is noise.
+TEST(Repeatability, aLineBesideTheOrdersDoesNotComeAgain) {
+  const Course c = course(300.0, 9000, 1.0, 5, 6.0);
+  // Of a sine that the orders do not hold, 30 turns leave all but a little.
+  EXPECT_NEAR(repeatability(c.values, c.angle)->floor, std::sqrt(1.0 + 18.0), 0.15);
+}
+
+TEST(Repeatability, fewTurnsSayNothing) {
+  const Course c = course(300.0, 1400, 1.0, 5);
+  EXPECT_FALSE(repeatability(c.values, c.angle));
+}
+
+}  // namespace
+}  // namespace smartmill::discrepancy
