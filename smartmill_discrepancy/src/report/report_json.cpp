@@ -121,6 +121,10 @@ void writeReport(const Explanation& e, const std::string& folder) {
          {"interval", {rounded(g.after - 1.96 * g.std_dev), rounded(g.after + 1.96 * g.std_dev)}}});
   }
   report["channels"] = sharesOf(e.channels);
+  for (const ChannelShare& c : e.channels) {
+    if (c.explained_heldout) report["explained_share"][c.channel] = rounded(*c.explained_heldout);
+    if (c.repeats) report["repeatability_floor"][c.channel] = rounded(c.floor);
+  }
   report["candidates"] = Json::array();
   for (const TriedEffect& t : e.ladder) {
     report["candidates"].push_back({{"round", t.round + 1},

@@ -55,10 +55,11 @@ struct BlockGap {
 struct ChannelShare {
   std::string channel;
   double explained_before = 0.0,
-         explained_after = 0.0;   ///< [1] of the variance; below 0: worse than the mean
-  std::optional<double> repeats;  ///< [1] of the variance; unknown in short cuts
-  double floor = 0.0;             ///< [unit of the channel] RMS of what does not come again
-  double floor_gap = 0.0;         ///< [1] the same over the noise: the gap of the best model of steady cuts
+         explained_after = 0.0;             ///< [1] of the variance; below 0: worse than the mean
+  std::optional<double> explained_heldout;  ///< [1] after, of the held-out cuts alone
+  std::optional<double> repeats;            ///< [1] of the variance; unknown in short cuts
+  double floor = 0.0;                       ///< [unit of the channel] RMS of what does not come again
+  double floor_gap = 0.0;  ///< [1] the same over the noise: the gap of the best model of steady cuts
 };
 
 /// One channel of one test over the spindle angle: the mean of the record's revolutions in bins.
