@@ -15,10 +15,10 @@ namespace smartmill::discrepancy {
 ///     |r + d|^2 - |r|^2 = |d|^2 (2 a - 1)
 ///
 /// the better model shrinks the gap of that test when a > 1/2; where a > 3/2 the test would be nearer still
-/// with twice of it, and it is the size that the tests do not agree about. What it leaves is noise and whatever it lacks
-/// besides; where the phases of that have nothing to do with those of d, d.r has the variance
-/// sum_k |D_k|^2 |R_k|^2 over the frequencies: little where what is left lies elsewhere, much where it lies
-/// just where d acts.
+/// with twice of it, and it is the size that the tests do not agree about. What it leaves is noise and
+/// whatever it lacks besides; where the phases of that have nothing to do with those of d, d.r has the
+/// variance sum_k |D_k|^2 |R_k|^2 over the frequencies: little where what is left lies elsewhere, much where
+/// it lies just where d acts.
 struct AskedShare {
   double share = 0.5;    ///< [1] mean of the a, by their variances
   double std_dev = 0.0;  ///< [1] of it; where the tests differ by more than their variances say, as they do

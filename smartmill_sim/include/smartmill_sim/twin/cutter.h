@@ -33,7 +33,8 @@ class Cutter {
 
   Way way() const { return way_; }
   /// Of tables: from here on the sums of each step are kept, or taken from what was kept over the same steps
-  /// by a cutter that differed in coefficients and factors of the law only. @param sums must outlive the steps
+  /// by a cutter that differed in coefficients and factors of the law only. @param sums must outlive the
+  /// steps
   void keep(std::vector<EdgeSums>* sums) { kept_ = sums; }
   void follow(const std::vector<EdgeSums>* sums) { followed_ = sums; }
 
@@ -64,7 +65,7 @@ class Cutter {
   std::vector<EdgeSums>* kept_ = nullptr;
   const std::vector<EdgeSums>* followed_ = nullptr;
   std::size_t place_ = 0;  // in what is followed
-  bool fresh_ = false;  // the arcs are other ones than those of the last step
+  bool fresh_ = false;     // the arcs are other ones than those of the last step
 };
 
 }  // namespace smartmill::sim

@@ -228,12 +228,11 @@ std::vector<EffectKind> makeCatalogue() {
           {key("h_um", "um", positive, EffectValue::series),
            key("factor", "1", positive, EffectValue::series)},
           {Need::cuts}, chipForms),
-      empirical(
-          "law", "cutting_time", Stage::cutting_law,
-          "chip coefficients times 1 + amplitude exp(-t / constant), t since this cut began",
-          "exponential approach",
-          {key("amplitude", "1", Range::above(-1.0)), key("time_constant_s", "s", positive)},
-          {Need::cuts}, timeForms),
+      empirical("law", "cutting_time", Stage::cutting_law,
+                "chip coefficients times 1 + amplitude exp(-t / constant), t since this cut began",
+                "exponential approach",
+                {key("amplitude", "1", Range::above(-1.0)), key("time_constant_s", "s", positive)},
+                {Need::cuts}, timeForms),
       empirical(
           "law", "depth_profile", Stage::cutting_law,
           "chip coefficients times factor over this height from the tip up, or below the work's surface",
