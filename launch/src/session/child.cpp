@@ -18,7 +18,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::milliseconds POLL(20);
-constexpr std::chrono::seconds GRACE(10);  // for what a program does on Ctrl-C
+constexpr std::chrono::seconds GRACE(5);  // for what a program does on Ctrl-C
 constexpr int NOT_STARTED = 127;
 
 [[noreturn]] void become(const std::vector<std::string>& command, int log) {

@@ -55,17 +55,22 @@ Discovery::Discovery(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
   server_->start();
 }
 
-Discovery::~Discovery() {
-  cancel_ = true;
-  if (thread_.joinable()) thread_.join();
+void Discovery::stop() {
+  std::thread thread;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    stopping_ = cancel_ = true;
+    thread = std::move(thread_);
+  }
+  if (thread.joinable()) thread.join();
 }
 
 void Discovery::onGoal(Handle handle) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (active_) {
+  if (active_ || stopping_) {
     Result busy;
     busy.code = Result::BUSY;
-    busy.message = "another discovery is running";
+    busy.message = stopping_ ? "the node is ending" : "another discovery is running";
     busy.gap_before = busy.gap_after = NOT_A_NUMBER;
     handle.setRejected(busy, busy.message);
     return;
@@ -129,7 +134,7 @@ void Discovery::finish(Handle& handle, const Result& result) {
 
 void Discovery::makeSafe(Result& result) {
   try {
-    driver_.makeSafe(!ros::ok());
+    driver_.makeSafe(stopping_);
     result.message += "; motion is disarmed";
   } catch (const Error& error) {
     result.message += std::string("; disarming failed: ") + error.what();
@@ -227,7 +232,7 @@ Explained Discovery::explain(Result& result) {
   try {
     code = runChild({"rosrun", "smartmill_discrepancy", "explain", parameters_.record_folder, "--model",
                      place_.inUse(), "-o", out, "--threads", std::to_string(parameters_.threads)},
-                    log, [&] { return cancel_ || !ros::ok() || ros::WallTime::now() > end; });
+                    log, [&] { return cancel_ || ros::WallTime::now() > end; });
   } catch (const Error& error) {
     throw Failure{Result::EXPLAIN_FAILED, error.what()};
   }

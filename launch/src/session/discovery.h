@@ -31,7 +31,11 @@ class Discovery {
   using Parameters = discovery::DiscoveryParameters;
   /// @throws Error on a wrong parameter or model, or cuts that do not fit.
   Discovery(ros::NodeHandle nh, const ros::NodeHandle& private_nh);
-  ~Discovery();
+  ~Discovery() { stop(); }
+
+  /// The program is to end: a running discovery is cancelled, the machine made safe. Callbacks go on
+  /// meanwhile.
+  void stop();
 
  private:
   using Server = actionlib::ActionServer<smartmill_msgs::DiscoverAction>;
@@ -71,7 +75,7 @@ class Discovery {
   std::set<std::string> judged_;  // conditions
   ros::WallTime last_judged_;
   std::optional<Handle> active_;
-  std::atomic<bool> cancel_{false};
+  std::atomic<bool> cancel_{false}, stopping_{false};
   std::thread thread_;
 
   // Of the thread.
