@@ -36,18 +36,25 @@ void addLine(const std::vector<Hypothesis>& forms, const char* form, const Findi
   }
 }
 
-// Whether a state has a tone on that channel so near that no record tells the two apart: together they would
-// give each record an amplitude of its own.
-bool hasToneNear(const Dataset& data, const FitState& state, const Finding& f) {
+double longestRecord(const Dataset& data) {
   double longest = 0.0;
   for (const TestData& t : data.tests) {
     if (t.record.size() > 1) longest = std::max(longest, t.record.time.back() - t.record.time.front());
   }
-  return std::any_of(state.members.begin(), state.members.end(), [&](const Member& m) {
-    const EffectEntry e = m.hypothesis->entry(m.values);
-    return e.name == std::string(EMPIRICAL) + ":tone" && e.words.at("channel") == f.channel &&
-           std::abs(e.numbers.at("frequency_hz") - f.location.at("frequency_hz")) < 2.0 / longest;
-  });
+  return longest;
+}
+
+// Whether a line can be told from a slow wander, which any sine of its own phase in each record follows, and
+// from a tone that a state has on that channel: together they would give each record an amplitude of its own.
+bool isTone(const Dataset& data, const FitState& state, const Finding& f) {
+  constexpr double LEAST_CYCLES = 4.0, RESOLVED = 2.0;
+  const double frequency = f.location.at("frequency_hz"), longest = longestRecord(data);
+  return frequency * longest > LEAST_CYCLES &&
+         std::none_of(state.members.begin(), state.members.end(), [&](const Member& m) {
+           const EffectEntry e = m.hypothesis->entry(m.values);
+           return e.name == std::string(EMPIRICAL) + ":tone" && e.words.at("channel") == f.channel &&
+                  std::abs(e.numbers.at("frequency_hz") - frequency) * longest < RESOLVED;
+         });
 }
 
 // What may act without a name, lines at the places where the residual shows some.
@@ -58,7 +65,7 @@ std::vector<Hypothesis> formsFor(const Dataset& data, const FitState& state,
   std::vector<Hypothesis> lines;
   for (const Finding& f : unexplained) {
     if (lines.size() >= MOST_LINES) break;
-    if (f.domain == "frequency" && !hasToneNear(data, state, f))
+    if (f.domain == "frequency" && isTone(data, state, f))
       addLine(all, "tone", f, f.location.at("frequency_hz"), &lines);
     if (f.domain == "order") addLine(all, "order", f, f.location.at("order"), &lines);
   }
@@ -151,11 +158,11 @@ bool Nameless::repeats(const FitState& before, const Fit& with) const {
   const Said fit = sumOf(fitted), held = sumOf(heldout);
   const double against = std::max(contradiction(fitted, rule_.least_deviations) / std::max(fit.gain, 1.0),
                                   contradiction(heldout, rule_.least_deviations) / std::max(held.gain, 1.0));
-  const bool holds = fit.gain > rule_.least_share * fit.left &&
-                     held.gain / held.left > rule_.least_repeated * fit.gain / fit.left &&
-                     held.gain > rule_.least_repeated * held.change &&
-                     held.gain > rule_.least_deviations * std::sqrt(held.variance) &&
-                     against < rule_.most_contradicted;
+  const bool holds =
+      fit.gain > rule_.least_share * fit.left &&
+      held.gain / held.left > rule_.least_repeated * fit.gain / fit.left &&
+      held.gain > rule_.least_repeated * held.change && rule_.least_repeated * held.gain < held.change &&
+      held.gain > rule_.least_deviations * std::sqrt(held.variance) && against < rule_.most_contradicted;
   options_.search.say(formatted(
       "  without a name: %s takes %.3f of what is left, held out %.3f (%.2f of what it changes there, %.1f "
       "deviations), contradicted %.2f: %s",
