@@ -163,9 +163,9 @@ TEST(EffectsWithoutName, linesTakeTheirPhaseFromTheRecord) {
       EXPECT_NEAR(found.column("fx")[i], pure.column("fx")[i], 1e-9);
     }
   };
-  expectFound(
-      effectEntry("empirical:tone", {{"frequency_hz", 36.8}, {"amplitude", 3.5}}, {{"channel", "fz"}}),
-      TWO_PI * 36.8);
+  expectFound(effectEntry("empirical:tone", {{"frequency_hz", 36.8}, {"amplitude", 3.5}},
+                          {{"channel", "fz"}, {"while", "turning"}}),
+              TWO_PI * 36.8);
   expectFound(effectEntry("empirical:order", {{"order", 0.5}, {"amplitude", 3.5}}, {{"channel", "fz"}}),
               0.5 * EVEN_SPEED);
 }

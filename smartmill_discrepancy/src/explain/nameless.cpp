@@ -23,9 +23,9 @@ void addLine(const std::vector<Hypothesis>& forms, const char* form, const Findi
              std::vector<Hypothesis>* lines) {
   const bool by_order = f.domain == "order";
   for (const Hypothesis& h : forms) {
-    if (h.effect != std::string(EMPIRICAL) + ":" + form || h.variant != f.channel) continue;
+    if (h.effect != std::string(EMPIRICAL) + ":" + form || h.variant.rfind(f.channel, 0) != 0) continue;
     Hypothesis line = h;
-    line.named(f.channel + formatted(by_order ? ", order %.4g" : ", %.4g Hz", place));
+    line.named(h.variant + formatted(by_order ? ", order %.4g" : ", %.4g Hz", place));
     const double size = std::max(f.amplitude, h.coordinates.back().step);
     if (by_order) {
       line.number("order", place).probe({0.0}, {{size}});
@@ -36,14 +36,37 @@ void addLine(const std::vector<Hypothesis>& forms, const char* form, const Findi
   }
 }
 
+double longestRecord(const Dataset& data) {
+  double longest = 0.0;
+  for (const TestData& t : data.tests) {
+    if (t.record.size() > 1) longest = std::max(longest, t.record.time.back() - t.record.time.front());
+  }
+  return longest;
+}
+
+// Whether a line can be told from a slow wander, which any sine of its own phase in each record follows, and
+// from a tone that a state has on that channel: together they would give each record an amplitude of its own.
+bool isTone(const Dataset& data, const FitState& state, const Finding& f) {
+  constexpr double LEAST_CYCLES = 4.0, RESOLVED = 2.0;
+  const double frequency = f.location.at("frequency_hz"), longest = longestRecord(data);
+  return frequency * longest > LEAST_CYCLES &&
+         std::none_of(state.members.begin(), state.members.end(), [&](const Member& m) {
+           const EffectEntry e = m.hypothesis->entry(m.values);
+           return e.name == std::string(EMPIRICAL) + ":tone" && e.words.at("channel") == f.channel &&
+                  std::abs(e.numbers.at("frequency_hz") - frequency) * longest < RESOLVED;
+         });
+}
+
 // What may act without a name, lines at the places where the residual shows some.
-std::vector<Hypothesis> formsFor(const Dataset& data, const std::vector<Finding>& unexplained) {
-  constexpr std::size_t MOST_LINES = 8;
+std::vector<Hypothesis> formsFor(const Dataset& data, const FitState& state,
+                                 const std::vector<Finding>& unexplained) {
+  constexpr std::size_t MOST_LINES = 12;
   const std::vector<Hypothesis> all = empiricalHypotheses(data);
   std::vector<Hypothesis> lines;
   for (const Finding& f : unexplained) {
     if (lines.size() >= MOST_LINES) break;
-    if (f.domain == "frequency") addLine(all, "tone", f, f.location.at("frequency_hz"), &lines);
+    if (f.domain == "frequency" && isTone(data, state, f))
+      addLine(all, "tone", f, f.location.at("frequency_hz"), &lines);
     if (f.domain == "order") addLine(all, "order", f, f.location.at("order"), &lines);
   }
   std::vector<Hypothesis> forms;
@@ -135,10 +158,11 @@ bool Nameless::repeats(const FitState& before, const Fit& with) const {
   const Said fit = sumOf(fitted), held = sumOf(heldout);
   const double against = std::max(contradiction(fitted, rule_.least_deviations) / std::max(fit.gain, 1.0),
                                   contradiction(heldout, rule_.least_deviations) / std::max(held.gain, 1.0));
-  const bool holds = fit.gain > rule_.least_share * fit.left && held.gain > rule_.least_share * held.left &&
-                     held.gain > rule_.least_repeated * held.change &&
-                     held.gain > rule_.least_deviations * std::sqrt(held.variance) &&
-                     against < rule_.most_contradicted;
+  const bool holds =
+      fit.gain > rule_.least_share * fit.left &&
+      held.gain / held.left > rule_.least_repeated * fit.gain / fit.left &&
+      held.gain > rule_.least_repeated * held.change && rule_.least_repeated * held.gain < held.change &&
+      held.gain > rule_.least_deviations * std::sqrt(held.variance) && against < rule_.most_contradicted;
   options_.search.say(formatted(
       "  without a name: %s takes %.3f of what is left, held out %.3f (%.2f of what it changes there, %.1f "
       "deviations), contradicted %.2f: %s",
@@ -219,23 +243,27 @@ bool Nameless::take(const Fit& start, const FitState& before, SearchResult* foun
 }
 
 bool Nameless::addOne(SearchResult* found, const std::vector<Finding>& unexplained) {
-  forms_.push_back(formsFor(bench_.data(), unexplained));
+  forms_.push_back(formsFor(bench_.data(), found->best.state, unexplained));
   const FitState before = found->best.state;
   const NominalTangents tangents = bench_.linearise(before);
   const double least =
       std::max(options_.search.least_gain, rule_.least_share * (found->best.chi2 - bench_.samples()));
-  std::vector<Fit> fits = fitsBeside(found->best, tangents, least, rule_.fitted, found);
+  const std::vector<Fit> beside = fitsBeside(found->best, tangents, least, rule_.fitted, found);
   const bool named = std::any_of(before.members.begin(), before.members.end(), [](const Member& m) {
     return !findEffect(m.hypothesis->effect)->empirical();
   });
+  // One cause in the place of several names is the simpler answer.
   if (named && forms_.size() == 1) {
     const std::vector<Fit> instead = fitsInstead(found);
-    fits.insert(fits.end(), instead.begin(), instead.end());
+    if (takeOne(instead, {before.nominal, {}, before.turns}, found)) return true;
   }
+  return takeOne(beside, before, found);
+}
+
+bool Nameless::takeOne(std::vector<Fit> fits, const FitState& before, SearchResult* found) const {
   std::sort(fits.begin(), fits.end(), [](const Fit& a, const Fit& b) { return a.bic < b.bic; });
   for (std::size_t k = 0; k < std::min(fits.size(), rule_.examined) && !bench_.cancelled(); ++k) {
-    const bool instead = fits[k].state.members.size() < before.members.size() + 1;
-    if (take(fits[k], instead ? FitState{before.nominal, {}, before.turns} : before, found)) return true;
+    if (take(fits[k], before, found)) return true;
   }
   return false;
 }

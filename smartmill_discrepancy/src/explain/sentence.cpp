@@ -107,9 +107,11 @@ std::string ofCurve(const FoundEffect& effect) {
 
 std::string ofTone(const FoundEffect& effect) {
   const std::string& channel = effect.words.at("channel");
-  return formatted("%s carries a tone of %.3g %s at %.5g Hz in every record, whatever the spindle does",
-                   channel.c_str(), valueOf(effect, "amplitude"), unitOf(channel),
-                   valueOf(effect, "frequency_hz"));
+  return formatted("%s carries a tone of %.3g %s at %.5g Hz, %s", channel.c_str(),
+                   valueOf(effect, "amplitude"), unitOf(channel), valueOf(effect, "frequency_hz"),
+                   effect.words.at("while") == "turning"
+                       ? "at any speed of the spindle, but not while it stands"
+                       : "whatever the spindle does");
 }
 
 std::string ofOrder(const FoundEffect& effect) {

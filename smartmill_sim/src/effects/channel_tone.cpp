@@ -12,12 +12,14 @@ class ChannelTone : public Effect {
 
   void measure(const Instant& now, ChannelValues& c) const override {
     const double rate = tone_.rate(now.speed);
-    if (rate > 0.0) c[channel_] += tone_.amplitude[channel_] * std::sin(rate * now.record_time + tone_.phase);
+    if (rate > 0.0 && (always_ || now.speed > 0.0))
+      c[channel_] += tone_.amplitude[channel_] * std::sin(rate * now.record_time + tone_.phase);
   }
   Tone* tone() override { return &tone_; }
 
  protected:
   Tone tone_;
+  bool always_ = true;  // not only while the spindle turns
 
  private:
   std::size_t channel_;
@@ -27,6 +29,7 @@ class FrequencyTone : public ChannelTone {
  public:
   explicit FrequencyTone(const EffectEntry& entry) : ChannelTone(entry) {
     tone_.frequency = valueOf(entry, "frequency_hz");
+    always_ = wordOf(entry, "while") == "always";
   }
 };
 

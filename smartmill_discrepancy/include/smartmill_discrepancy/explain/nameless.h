@@ -14,8 +14,10 @@ namespace smartmill::discrepancy {
 struct NamelessOptions {
   std::size_t most = 2;
   std::size_t fitted = 4, fitted_instead = 3, examined = 2;  ///< forms a round
-  double least_share = 0.1;         ///< [1] of the squares above the noise, in fit and held-out tests
-  double least_repeated = 0.5;      ///< [1] of what it changes in the held-out tests
+  double least_share = 0.05;  ///< [1] of the squares above the noise of the fit tests
+  /// [1] of that share it must take of the held-out tests, and of what it changes in them; of the gain there
+  /// the change must be as much
+  double least_repeated = 0.5;
   double least_deviations = 3.0;    ///< of the gain, by its scatter from revolution to revolution
   double most_contradicted = 0.15;  ///< [1] of the gain, that one test may lose clearly
 };
@@ -38,6 +40,7 @@ class Nameless {
   std::vector<Fit> fitsBeside(const Fit& now, const NominalTangents& tangents, double least, std::size_t most,
                               SearchResult* found) const;
   std::vector<Fit> fitsInstead(SearchResult* found) const;
+  bool takeOne(std::vector<Fit> fits, const FitState& before, SearchResult* found) const;
   bool take(const Fit& start, const FitState& before, SearchResult* found) const;
   Fit fitted(const FitState& state) const;
   bool repeats(const FitState& before, const Fit& with) const;

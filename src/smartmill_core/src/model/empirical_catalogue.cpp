@@ -18,7 +18,8 @@ using Stage = EffectStage;
 using Values = std::vector<double>;
 
 const std::vector<std::string> CHANNELS{"fx", "fy", "fz", "load_meter"};
-const FitRange LOGARITHM{-1.6, 1.6, 1e-4, 0.5};  // of a factor
+const std::vector<std::string> TIMES{"always", "turning"};  // of the spindle
+const FitRange LOGARITHM{-1.6, 1.6, 1e-4, 0.5};             // of a factor
 
 EffectParameter key(const char* name, const char* unit, const Range& range = {},
                     EffectValue value = EffectValue::number) {
@@ -188,11 +189,18 @@ Forms curves(const Scope& scope) {
 
 // Where the line lies only the residual tells.
 Forms tones(const Scope& scope) {
-  return onChannels(scope, [](const std::string& channel) {
-    const double unit = unitOf(channel);
-    return EffectForm({amplitude("frequency_hz", {1.0, 6000.0, 2e-3, 1000.0}, 100.0),
-                       amplitude("amplitude", {0.0, 1e3 * unit, 5e-4 * unit, 10.0 * unit})});
-  });
+  Forms forms;
+  for (const std::string& when : TIMES) {
+    for (EffectForm& form : onChannels(scope, [](const std::string& channel) {
+           const double unit = unitOf(channel);
+           return EffectForm({amplitude("frequency_hz", {1.0, 6000.0, 2e-3, 1000.0}, 100.0),
+                              amplitude("amplitude", {0.0, 1e3 * unit, 5e-4 * unit, 10.0 * unit})});
+         })) {
+      if (when != TIMES.front()) form.named(form.variant + ", " + when);
+      forms.push_back(form.word("while", when));
+    }
+  }
+  return forms;
 }
 
 Forms orders(const Scope& scope) {
@@ -247,9 +255,10 @@ std::vector<EffectKind> makeCatalogue() {
                  orZero("cubic_per_kn2", "1/kN2")},
                 {Need::forces}, curves),
       empirical("channel", "tone", Stage::signal,
-                "a sine at a fixed frequency on one channel; its phase is found in each record",
+                "a sine at a fixed frequency on one channel, always or while the spindle turns; its phase is "
+                "found in each record",
                 "line that is not locked to the spindle",
-                {oneOf("channel", CHANNELS), key("frequency_hz", "Hz", positive),
+                {oneOf("channel", CHANNELS), oneOf("while", TIMES), key("frequency_hz", "Hz", positive),
                  key("amplitude", "N or V", not_negative)},
                 {}, tones),
       empirical(
