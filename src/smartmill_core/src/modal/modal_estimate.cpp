@@ -4,6 +4,7 @@
 #include <cmath>
 #include <string>
 
+#include "modal_residuals.h"
 #include "modal_search.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/signal/statistics.h"
@@ -28,25 +29,11 @@ constexpr double CLEARLY = 3.0;
 /// Noise of a line is at least this share of the tallest: what digits of a file and of the solver leave.
 constexpr double DIGITS = 1e-7;
 
-/// Standard deviations from the scatter of a few hits are themselves scattered, and lean towards lines that
-/// happen to agree: the root mean square over neighbours is the better weight.
-std::vector<double> smoothed(const std::vector<double>& deviation) {
-  constexpr std::size_t NEAR = 5;
-  std::vector<double> result(deviation.size());
-  for (std::size_t i = 0; i < deviation.size(); ++i) {
-    const std::size_t first = i > NEAR ? i - NEAR : 0, last = std::min(i + NEAR, deviation.size() - 1);
-    double sum = 0.0;
-    for (std::size_t j = first; j <= last; ++j) sum += deviation[j] * deviation[j];
-    result[i] = std::sqrt(sum / static_cast<double>(last - first + 1));
-  }
-  return result;
-}
-
 std::vector<double> noiseOf(const FrequencyResponse& band) {
-  const bool stated = band.std_dev.size() == band.size() &&
-                      std::all_of(band.std_dev.begin(), band.std_dev.end(),
-                                  [](double d) { return std::isfinite(d) && d > 0.0; });
-  return stated ? smoothed(band.std_dev) : lineNoise(band.value);
+  const bool stated =
+      band.std_dev.size() == band.size() && std::all_of(band.std_dev.begin(), band.std_dev.end(),
+                                                        [](double d) { return std::isfinite(d) && d > 0.0; });
+  return stated ? smoothedDeviation(band.std_dev) : lineNoise(band.value);
 }
 
 WeightedLines weighted(const std::vector<FrequencyResponse>& frfs, const ModalEstimateOptions& options,
@@ -103,7 +90,8 @@ void merge(std::vector<Pole>& all, const std::vector<Pole>& more, double line) {
 }
 
 /// Stable poles of the band's halves, quarters .. that overlap by half; only those inside count.
-bool addParts(const WeightedLines& lines, const ModalEstimateOptions& options, std::vector<Pole>& candidates) {
+bool addParts(const WeightedLines& lines, const ModalEstimateOptions& options,
+              std::vector<Pole>& candidates) {
   const std::size_t n = lines.size();
   for (std::size_t part = n / 4; part >= LEAST_PART; part /= 4) {
     for (std::size_t first = 0; first + part <= n; first += part / 2) {
@@ -111,7 +99,8 @@ bool addParts(const WeightedLines& lines, const ModalEstimateOptions& options, s
       const PoleSearch search{first, std::min(n, first + part), PART_ORDER, PART_ORDER_STEP};
       const std::size_t quarter = part / 4;
       const double low = first == 0 ? 0.0 : lines.frequency[first + quarter];
-      const double high = first + part + part / 2 > n ? lines.frequency.back() : lines.frequency[first + 3 * quarter];
+      const double high =
+          first + part + part / 2 > n ? lines.frequency.back() : lines.frequency[first + 3 * quarter];
       std::vector<Pole> inside;
       for (const Pole& p : persistentPoles(polesByOrder(lines, search), search)) {
         if (p.frequency < low || p.frequency > high) continue;
@@ -164,7 +153,8 @@ bool turnsBackwards(const std::vector<FrequencyResponse>& frfs) {
         squares += bend * bend;
       }
     }
-    if (squares > 0.0 && std::abs(turn) > std::abs(clearest) * std::sqrt(squares)) clearest = turn / std::sqrt(squares);
+    if (squares > 0.0 && std::abs(turn) > std::abs(clearest) * std::sqrt(squares))
+      clearest = turn / std::sqrt(squares);
   }
   return clearest > CLEARLY;
 }
@@ -190,8 +180,10 @@ ModalEstimate estimateModes(const std::vector<FrequencyResponse>& frfs, const Mo
     }
     return chosen;
   };
-  result.cancelled = !(addParts(start, options, candidates) && search.startWith(steady()) && search.settle(1, false) &&
-                       search.addCandidates(candidates) && search.addLoudest(10) && search.settle(2, true));
+  result.cancelled =
+      !(addParts(start, options, candidates) && search.startWith(steady()) && search.settle(1, false) &&
+        search.addCandidates(candidates) && search.addLoudest(10) && search.settle(2, true));
+  search.addByMagnitude();
   result.modes = search.results(true);
   result.doubts = search.results(false);
   return result;

@@ -31,8 +31,7 @@ struct LineSums {
 
 LineSums sumsOf(const WeightedLines& lines, std::size_t frf, const PoleSearch& search) {
   const Index size = search.largest_order + 1;
-  const double f0 = lines.frequency[search.first],
-               turn = TURN / (lines.frequency[search.last - 1] - f0);
+  const double f0 = lines.frequency[search.first], turn = TURN / (lines.frequency[search.last - 1] - f0);
   LineSums sums{VectorXcd::Zero(size), VectorXcd::Zero(size), VectorXcd::Zero(size), VectorXcd::Zero(size)};
   double scale = 0.0;
   for (std::size_t i = search.first; i < search.last; ++i)

@@ -16,9 +16,16 @@ double ModalLines::reference() const {
   return std::max(low, frequency.front());
 }
 
-Complex unitMode(double f, double f0, double zeta) {
-  const double r = f / f0;
-  return 1.0 / Complex(1.0 - r * r, 2.0 * zeta * r);
+std::vector<double> smoothedDeviation(const std::vector<double>& deviation) {
+  constexpr std::size_t NEAR = 5;
+  std::vector<double> result(deviation.size());
+  for (std::size_t i = 0; i < deviation.size(); ++i) {
+    const std::size_t first = i > NEAR ? i - NEAR : 0, last = std::min(i + NEAR, deviation.size() - 1);
+    double sum = 0.0;
+    for (std::size_t j = first; j <= last; ++j) sum += deviation[j] * deviation[j];
+    result[i] = std::sqrt(sum / static_cast<double>(last - first + 1));
+  }
+  return result;
 }
 
 bool ModalResiduals::evaluate(const Eigen::VectorXd& at, Eigen::VectorXd* residual,

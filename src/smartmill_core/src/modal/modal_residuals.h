@@ -3,6 +3,7 @@
 #include <complex>
 #include <vector>
 
+#include "modal_window.h"
 #include "smartmill_core/fit/least_squares.h"
 
 namespace smartmill {
@@ -27,8 +28,9 @@ struct ModalLines {
   double reference() const;
 };
 
-/// w_n^2 / (w_n^2 - w^2 + 2 i zeta w_n w)
-std::complex<double> unitMode(double f, double f0, double zeta);
+/// Standard deviations from the scatter of a few hits are themselves scattered, and lean towards lines that
+/// happen to agree: the root mean square over neighbours is the better weight.
+std::vector<double> smoothedDeviation(const std::vector<double>& deviation);
 
 /// Weighted (fit - measured), real and imaginary part line by line, over log f0, log zeta, gain / scale of
 /// each mode, then direct / scale, then mass line / scale.

@@ -16,13 +16,18 @@ constexpr double REACH = 8.0, LEAST_LINES = 20.0;
 /// Modes nearer than this many times their half widths are fitted together.
 constexpr double TOGETHER = 4.0;
 constexpr std::size_t MOST_TOGETHER = 6, MOST_AT_START = 16;
-/// A mode must stand so many lines, and half widths, inside the band: of a peak that is cut nothing is proven.
+/// A mode must stand so many lines, and half widths, inside the band: of a peak that is cut nothing is
+/// proven.
 constexpr double FROM_END = 2.5, HALF_WIDTHS_FROM_END = 1.5;
 /// Widest peak that still is one: beyond, the parabola under the modes shows the same.
 constexpr double WIDEST_DAMPING = 0.25;
 constexpr std::size_t MOST_TRIES = 20;
-/// Evidence from which a mode is proven; above the second it stays in the fit as a doubt, so that what it explains
-/// does not stand against the others.
+/// A peak so many times as high as the lines about it (a stretch to either side) is a mode whatever its
+/// phase.
+constexpr double CLEAR_PEAK = 12.0;
+constexpr std::size_t ABOUT = 50;
+/// Evidence from which a mode is proven; above the second it stays in the fit as a doubt, so that what it
+/// explains does not stand against the others.
 constexpr double PROVEN = 1.0, DOUBTFUL = 0.35;
 /// Of start values, before any fit: below it one stands on another.
 constexpr double DUPLICATE = 0.02;
@@ -155,7 +160,8 @@ WeightedLines ModalSearch::cut(const std::vector<EstimatedMode>& all, const std:
                                double lines_a_half_width) const {
   double narrowest = INFINITY;
   for (const EstimatedMode& m : all) narrowest = std::min(narrowest, m.frequency * m.damping_ratio);
-  const auto group = static_cast<std::size_t>(std::clamp(narrowest / lines_a_half_width / lines_.step(), 1.0, 1e6));
+  const auto group =
+      static_cast<std::size_t>(std::clamp(narrowest / lines_a_half_width / lines_.step(), 1.0, 1e6));
   return thinned(window(spanOf(all), members), group);
 }
 
@@ -175,7 +181,8 @@ double ModalSearch::score(const Pole& candidate) const {
   return w.explained(m.frequency, m.damping_ratio);
 }
 
-void ModalSearch::take(const std::vector<std::size_t>& members, const ModalWindow& window, const WindowFit& fit) {
+void ModalSearch::take(const std::vector<std::size_t>& members, const ModalWindow& window,
+                       const WindowFit& fit) {
   for (auto k = members.rbegin(); k != members.rend(); ++k) {
     subtract(modes_[*k], -1.0);
     modes_.erase(modes_.begin() + static_cast<std::ptrdiff_t>(*k));
@@ -234,7 +241,8 @@ void ModalSearch::fitCluster(const std::vector<Pole>& cluster) {
   ModalWindow w(cut(all, {}, SEARCH_LINES), options_.real_modes, lines_.size());
   WindowFit fit = w.judged(poles);
   if (w.addMisfit(fit)) fit = w.judged(poles);
-  for (Index k = worst(fit, DUPLICATE); k >= 0; k = worst(fit, DUPLICATE)) fit = w.judged(fit.poles.without(k));
+  for (Index k = worst(fit, DUPLICATE); k >= 0; k = worst(fit, DUPLICATE))
+    fit = w.judged(fit.poles.without(k));
   if (fit.poles.modes() == 0) return;
   fit = w.judged(w.refined(fit.poles, STEPS, ROUGHLY));
   for (Index k = worst(fit, DOUBTFUL); k >= 0; k = worst(fit, DOUBTFUL))
@@ -285,7 +293,8 @@ bool ModalSearch::addCandidates(std::vector<Pole> candidates) {
   const std::size_t all = candidates.size();
   // However many candidates: as many tries as modes could come of them, and some.
   for (std::size_t tries = 2 * modes_.size() + MOST_TRIES; tries > 0 && !candidates.empty(); --tries) {
-    if (!goOn(0.2 + 0.5 * (1.0 - static_cast<double>(candidates.size()) / static_cast<double>(all)))) return false;
+    if (!goOn(0.2 + 0.5 * (1.0 - static_cast<double>(candidates.size()) / static_cast<double>(all))))
+      return false;
     const auto best = std::max_element(scores.begin(), scores.end()) - scores.begin();
     if (!(scores[static_cast<std::size_t>(best)] > DOUBTFUL)) break;
     const Pole c = candidates[static_cast<std::size_t>(best)];
@@ -352,6 +361,79 @@ bool ModalSearch::settle(int sweeps, bool last) {
       }
     }
   }
+  return true;
+}
+
+void ModalSearch::addByMagnitude() {
+  const std::size_t n = lines_.size();
+  std::vector<double> magnitude(n, 0.0);
+  for (std::size_t o = 0; o < lines_.frfs(); ++o) {
+    for (std::size_t i = 0; i < n; ++i) magnitude[i] += std::norm(lines_.value[o][i]);
+  }
+  for (double& m : magnitude) m = std::sqrt(m);
+  for (std::size_t i = 4; i + 4 < n; ++i) {
+    const auto begin = magnitude.begin() + static_cast<std::ptrdiff_t>(i > ABOUT ? i - ABOUT : 0);
+    const auto end = magnitude.begin() + static_cast<std::ptrdiff_t>(std::min(n, i + ABOUT + 1));
+    if (magnitude[i] < *std::max_element(begin, end) || magnitude[i] < CLEAR_PEAK * median({begin, end}))
+      continue;
+    const double f = lines_.frequency[i], room = 4.0 * lines_.step();
+    const auto here = [&](const EstimatedMode& m) {
+      return std::abs(m.frequency - f) < room + m.frequency * m.damping_ratio;
+    };
+    if (std::any_of(modes_.begin(), modes_.end(),
+                    [&](const EstimatedMode& m) { return here(m) && m.evidence >= PROVEN; }))
+      continue;
+    if (!fitMagnitude(magnitude, i)) continue;
+    const EstimatedMode kept = modes_.back();
+    modes_.pop_back();
+    modes_.erase(std::remove_if(modes_.begin(), modes_.end(), here), modes_.end());
+    modes_.push_back(kept);
+  }
+}
+
+bool ModalSearch::fitMagnitude(const std::vector<double>& magnitude, std::size_t peak) {
+  EstimatedMode m;
+  m.frequency = lines_.frequency[peak];
+  const ModalWindow w(window(spanOf({m}), {}), options_.real_modes, lines_.size());
+  const std::vector<double>& f = w.lines().frequency;
+  const auto first =
+      static_cast<std::size_t>(std::lower_bound(lines_.frequency.begin(), lines_.frequency.end(), f.front()) -
+                               lines_.frequency.begin());
+  const auto count = static_cast<Index>(f.size());
+  // log |H| = log a + log |unitMode|, a where it fits best
+  const fit::FunctionResiduals residuals(count, [&](const Eigen::VectorXd& at, Eigen::VectorXd& left) {
+    for (Index i = 0; i < count; ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      left[i] = std::log(magnitude[first + k] / std::abs(unitMode(f[k], std::exp(at[0]), std::exp(at[1]))));
+    }
+    left.array() -= left.mean();
+  });
+  const double line = lines_.step() / m.frequency, at = std::log(m.frequency);
+  fit::Options options;
+  options.name = "mode by magnitude";
+  const fit::Result found = fit::minimise(residuals,
+                                          {{at, at - 2.0 * line, at + 2.0 * line, line},
+                                           {std::log(0.5 * line), std::log(0.02 * line), std::log(0.1), 0.3}},
+                                          options);
+  if (!found.usable()) return false;
+  Eigen::VectorXd plain(count);
+  for (Index i = 0; i < count; ++i) plain[i] = std::log(magnitude[first + static_cast<std::size_t>(i)]);
+  plain.array() -= plain.mean();
+  const double variance = found.squares / static_cast<double>(count - 3);
+  const double height = plain[static_cast<Index>(peak - first)];
+  const double evidence = (plain.squaredNorm() - height * height - found.squares) / variance / w.limit(2);
+  if (!(evidence >= PROVEN)) return false;
+  const WindowFit fit = w.judged(PoleList{found.value});
+  m = describe(w, fit, 0);
+  const fit::Covariance covariance = fit::covarianceOf(found.jacobian);
+  const auto deviation = [&](Index i, double most) {
+    const double d = std::sqrt(variance) * covariance.deviation(i);
+    return std::isfinite(d) && d > 0.0 ? std::min(d, most) : most;
+  };
+  m.frequency_std = m.frequency * deviation(0, line);
+  m.damping_ratio_std = m.damping_ratio * deviation(1, 2.0);
+  m.evidence = evidence;
+  modes_.push_back(m);
   return true;
 }
 

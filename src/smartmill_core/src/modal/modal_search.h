@@ -16,8 +16,9 @@ class ModalSearch {
  public:
   ModalSearch(const WeightedLines& lines, const ModalEstimateOptions& options);
 
-  /// Starts with candidates together, neighbours with neighbours, and drops the weakest until all that stay are
-  /// proven: in dense bands one mode alone proves nothing while the others are missing. @return false: cancelled
+  /// Starts with candidates together, neighbours with neighbours, and drops the weakest until all that stay
+  /// are proven: in dense bands one mode alone proves nothing while the others are missing. @return false:
+  /// cancelled
   bool startWith(std::vector<Pole> candidates);
   /// Tries candidates in the order of what each alone explains. @return false: cancelled
   bool addCandidates(std::vector<Pole> candidates);
@@ -26,6 +27,10 @@ class ModalSearch {
   /// Fits every mode again with its neighbours as they are now, and drops what is no longer proven.
   /// @param last with all lines and to the end
   bool settle(int sweeps, bool last);
+
+  /// Peaks that stand clear of all about them while their phase tells of no mode (few lines on a peak, random
+  /// excitation): a mode fitted to the logarithm of the magnitude.
+  void addByMagnitude();
 
   std::size_t modes() const { return modes_.size(); }
   /// Those that are proven, or those that are not; lowest frequency first.
@@ -50,6 +55,7 @@ class ModalSearch {
   void fitCluster(const std::vector<Pole>& cluster);
   void take(const std::vector<std::size_t>& members, const ModalWindow& window, const WindowFit& fit);
   void subtract(const EstimatedMode& mode, double sign);
+  bool fitMagnitude(const std::vector<double>& magnitude, std::size_t peak);
   bool inBand(double frequency, double damping) const;
   double loudest() const;
   bool goOn(double share) const;

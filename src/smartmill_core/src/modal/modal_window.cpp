@@ -148,8 +148,8 @@ bool ModalWindow::evaluate(const VectorXd& at_poles, VectorXd* residual, MatrixX
 }
 
 double ModalWindow::limit(std::size_t shares) const {
-  // Largest chi-square of so many degrees that chance gives (bound of Laurent and Massart, 2000); frequency and
-  // damping were sought too.
+  // Largest chi-square of so many degrees that chance gives (bound of Laurent and Massart, 2000); frequency
+  // and damping were sought too.
   const auto degrees = static_cast<double>(2 + shares);
   return degrees + 2.0 * std::sqrt(degrees * chance_) + 2.0 * chance_;
 }
@@ -213,7 +213,8 @@ WindowFit ModalWindow::judged(const PoleList& poles) const {
 // Misfit where a mode acts, with the correlation from line to line: coloured misfit tells less.
 double ModalWindow::localVariance(const WindowFit& fit, Index mode) const {
   const std::size_t n = lines_.size();
-  const double f0 = fit.poles.frequency(mode), reach = std::max(fit.poles.halfWidth(mode), 3.0 * lines_.step());
+  const double f0 = fit.poles.frequency(mode),
+               reach = std::max(fit.poles.halfWidth(mode), 3.0 * lines_.step());
   double power = 0.0, weight = 0.0, along = 0.0;
   for (const WindowShares& s : fit.frfs) {
     for (std::size_t i = 0; i < n; ++i) {
@@ -225,7 +226,8 @@ double ModalWindow::localVariance(const WindowFit& fit, Index mode) const {
     }
   }
   const double numbers = static_cast<double>(2 * n * lines_.frfs());
-  const double fitted = static_cast<double>(2 * fit.poles.modes() + at(lines_.frfs()) * fit.frfs[0].share.size());
+  const double fitted =
+      static_cast<double>(2 * fit.poles.modes() + at(lines_.frfs()) * fit.frfs[0].share.size());
   const double variance = power / weight * numbers / std::max(numbers - fitted, 0.1 * numbers);
   const double correlation = std::clamp(along / std::max(power, 1e-300), 0.0, 0.98);
   return std::max(variance, 1e-30) * (1.0 + correlation) / (1.0 - correlation) * fit.alike;

@@ -42,7 +42,8 @@ struct WindowFit {
   double alike = 1.0;                       // FRFs over those whose misfit tells something of its own
   Eigen::MatrixXd pole_covariance;          // for residuals of variance 1
   std::vector<Eigen::MatrixXd> covariance;  // of each FRF's shares, the poles' part included
-  std::vector<double> variance;  // [1] of the misfit about each mode, times the lines over which it hangs together
+  std::vector<double>
+      variance;  // [1] of the misfit about each mode, times the lines over which it hangs together
   std::vector<double> evidence;  // of each mode: Wald's statistic over what chance gives at most
 
   Eigen::Index weakest() const;
@@ -55,12 +56,15 @@ class ModalWindow : public fit::Residuals {
   ModalWindow(WeightedLines lines, bool real_modes, std::size_t lines_searched);
 
   Eigen::Index count() const override;
-  bool evaluate(const Eigen::VectorXd& at, Eigen::VectorXd* residual, Eigen::MatrixXd* jacobian) const override;
+  bool evaluate(const Eigen::VectorXd& at, Eigen::VectorXd* residual,
+                Eigen::MatrixXd* jacobian) const override;
 
   Eigen::Index sharesPerMode() const { return real_modes_ ? 1 : 2; }
   const WeightedLines& lines() const { return lines_; }
 
   WindowShares shares(std::size_t frf, const PoleList& poles) const;
+  /// Most that a chi-square shows by chance where so many shares stand for a mode.
+  double limit(std::size_t shares) const;
   /// What one mode explains of the lines, over what chance gives; the misfit counted as noise without colour.
   double explained(double frequency, double damping) const;
   /// Poles where the misfit is least.
@@ -73,7 +77,6 @@ class ModalWindow : public fit::Residuals {
 
  private:
   Eigen::MatrixXd slopes(std::size_t frf, const PoleList& poles, const WindowShares& shares) const;
-  double limit(std::size_t shares) const;
   double localVariance(const WindowFit& fit, Eigen::Index mode) const;
   double alike(const WindowFit& fit) const;
   double evidence(const WindowFit& fit, Eigen::Index mode) const;

@@ -19,8 +19,8 @@ struct ModalEstimateOptions {
   std::function<bool(double)> progress = {};
 };
 
-/// One mode in all FRFs: (gain + i phase_part f / f_n) f_n^2 / (f_n^2 - f^2 + 2 i zeta f_n f). A phase part of 0
-/// is a mode of proportional damping.
+/// One mode in all FRFs: (gain + i phase_part f / f_n) f_n^2 / (f_n^2 - f^2 + 2 i zeta f_n f). A phase part
+/// of 0 is a mode of proportional damping.
 struct EstimatedMode {
   double frequency = 0.0, damping_ratio = 0.0;          ///< [Hz], [1]
   double frequency_std = 0.0, damping_ratio_std = 0.0;  ///< finite
@@ -48,9 +48,10 @@ std::vector<double> lineNoise(const std::vector<std::complex<double>>& value);
 bool turnsBackwards(const std::vector<FrequencyResponse>& frfs);
 
 /// Modes of FRFs on common lines, with common poles: start values by the poly-reference least-squares complex
-/// frequency method over the band and over its parts, picked by their stability; each candidate is then fitted
-/// with its neighbours (variable projection over Ceres) and stays while the misfit proves it. Lines are weighted
-/// by their standard deviation (by the noise seen where none is given), and by the misfit where that is larger.
+/// frequency method over the band and over its parts, picked by their stability; each candidate is then
+/// fitted with its neighbours (variable projection over Ceres) and stays while the misfit proves it. Lines
+/// are weighted by their standard deviation (by the noise seen where none is given), and by the misfit where
+/// that is larger.
 /// @throws Error on unequal lines, too few of them, or values that are not finite.
 ModalEstimate estimateModes(const std::vector<FrequencyResponse>& frfs, const ModalEstimateOptions& options);
 

@@ -8,9 +8,9 @@ namespace smartmill {
 
 /// FRFs on common lines, each line with its weight.
 struct WeightedLines {
-  std::vector<double> frequency;                          ///< [Hz] rising
-  std::vector<std::vector<std::complex<double>>> value;   ///< [unit] per FRF and line
-  std::vector<std::vector<double>> weight;                ///< [1/unit] of real and imaginary part each
+  std::vector<double> frequency;                         ///< [Hz] rising
+  std::vector<std::vector<std::complex<double>>> value;  ///< [unit] per FRF and line
+  std::vector<std::vector<double>> weight;               ///< [1/unit] of real and imaginary part each
 
   std::size_t size() const { return frequency.size(); }
   std::size_t frfs() const { return value.size(); }
@@ -34,11 +34,11 @@ struct PoleSearch {
   int order_step = 1;
 };
 
-/// Poles by the poly-reference least-squares complex frequency method (Peeters, Van der Auweraer, Guillaume and
-/// Leuridan, 2004; here one common denominator with complex coefficients in z = exp(i turn (f - f0) / span), so
-/// that any stretch of the lines can be taken alone), for every order up to the largest: the points of a
-/// stabilization diagram. The lowest coefficient is 1, which gives the poles of noise negative damping; these are
-/// left out.
+/// Poles by the poly-reference least-squares complex frequency method (Peeters, Van der Auweraer, Guillaume
+/// and Leuridan, 2004; here one common denominator with complex coefficients in z = exp(i turn (f - f0) /
+/// span), so that any stretch of the lines can be taken alone), for every order up to the largest: the points
+/// of a stabilization diagram. The lowest coefficient is 1, which gives the poles of noise negative damping;
+/// these are left out.
 std::vector<Pole> polesByOrder(const WeightedLines& lines, const PoleSearch& search);
 
 /// Poles that stay in place over the orders: `order` tells over how many, most persistent first.
