@@ -8,6 +8,7 @@
 #include "modal_search.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/signal/statistics.h"
+#include "smartmill_core/units.h"
 
 namespace smartmill {
 namespace {
@@ -95,7 +96,7 @@ bool addParts(const WeightedLines& lines, const ModalEstimateOptions& options,
   const std::size_t n = lines.size();
   for (std::size_t part = n / 4; part >= LEAST_PART; part /= 4) {
     for (std::size_t first = 0; first + part <= n; first += part / 2) {
-      if (options.progress && !options.progress(0.1)) return false;
+      if (options.progress && !options.progress(0.05)) return false;
       const PoleSearch search{first, std::min(n, first + part), PART_ORDER, PART_ORDER_STEP};
       const std::size_t quarter = part / 4;
       const double low = first == 0 ? 0.0 : lines.frequency[first + quarter];
@@ -114,7 +115,42 @@ bool addParts(const WeightedLines& lines, const ModalEstimateOptions& options,
   return true;
 }
 
+/// Lower and upper residual of what modes and doubts leave, by least squares.
+ModalFlanks flanksOf(const WeightedLines& lines, const ModalEstimate& estimate, std::size_t o) {
+  const double reference = units::TWO_PI * lines.frequency[lines.size() / 2];
+  double a = 0.0, b = 0.0, c = 0.0;  // normal equations of (1, -(reference / w)^2)
+  Complex one, two;
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    const double w = lines.weight[o][i] * lines.weight[o][i];
+    const double mass = -std::pow(reference / (units::TWO_PI * lines.frequency[i]), 2);
+    Complex left = lines.value[o][i];
+    for (const std::vector<EstimatedMode>* modes : {&estimate.modes, &estimate.doubts}) {
+      for (const EstimatedMode& m : *modes) left -= m.response(o, lines.frequency[i]);
+    }
+    a += w;
+    b += w * mass;
+    c += w * mass * mass;
+    one += w * left;
+    two += w * mass * left;
+  }
+  const double determinant = a * c - b * b;
+  if (!(determinant > 1e-12 * a * c)) return {one / a, 0.0};
+  return {(c * one - b * two) / determinant, (a * two - b * one) / determinant * reference * reference};
+}
+
 }  // namespace
+
+Complex ModalFlanks::response(double f) const {
+  const double w = units::TWO_PI * f;
+  return upper - lower / (w * w);
+}
+
+Complex fittedResponse(const ModalEstimate& estimate, std::size_t frf, double f) {
+  Complex sum = estimate.flanks[frf].response(f);
+  for (const EstimatedMode& m : estimate.modes) sum += m.response(frf, f);
+  for (const EstimatedMode& m : estimate.doubts) sum += m.response(frf, f);
+  return estimate.conjugated ? std::conj(sum) : sum;
+}
 
 Complex EstimatedMode::response(std::size_t frf, double f) const {
   return Complex(gain[frf], phase_part[frf] * f / frequency) * unitMode(f, frequency, damping_ratio);
@@ -186,6 +222,7 @@ ModalEstimate estimateModes(const std::vector<FrequencyResponse>& frfs, const Mo
   search.addByMagnitude();
   result.modes = search.results(true);
   result.doubts = search.results(false);
+  for (std::size_t o = 0; o < lines.frfs(); ++o) result.flanks.push_back(flanksOf(start, result, o));
   return result;
 }
 

@@ -261,7 +261,7 @@ bool ModalSearch::startWith(std::vector<Pole> candidates) {
       const bool apart = !cluster.empty() && p.frequency - cluster.back().frequency >
                                                  TOGETHER * (p.halfWidth() + cluster.back().halfWidth());
       if (apart || cluster.size() >= MOST_AT_START) {
-        if (!goOn(0.2 + 0.1 * pass)) return false;
+        if (!goOn(0.1 + 0.05 * pass)) return false;
         fitCluster(cluster);
         cluster.clear();
       }
@@ -293,7 +293,7 @@ bool ModalSearch::addCandidates(std::vector<Pole> candidates) {
   const std::size_t all = candidates.size();
   // However many candidates: as many tries as modes could come of them, and some.
   for (std::size_t tries = 2 * modes_.size() + MOST_TRIES; tries > 0 && !candidates.empty(); --tries) {
-    if (!goOn(0.2 + 0.5 * (1.0 - static_cast<double>(candidates.size()) / static_cast<double>(all))))
+    if (!goOn(0.25 + 0.45 * (1.0 - static_cast<double>(candidates.size()) / static_cast<double>(all))))
       return false;
     const auto best = std::max_element(scores.begin(), scores.end()) - scores.begin();
     if (!(scores[static_cast<std::size_t>(best)] > DOUBTFUL)) break;
@@ -353,7 +353,7 @@ bool ModalSearch::settle(int sweeps, bool last) {
     for (const EstimatedMode& m : modes_) due.push_back(m.frequency);
     std::sort(due.begin(), due.end());
     for (const double f : due) {
-      if (!goOn(0.85 + 0.07 * sweep)) return false;
+      if (!goOn(last ? 0.85 + 0.07 * sweep : 0.2)) return false;
       for (std::size_t k = 0; k < modes_.size(); ++k) {
         if (std::abs(modes_[k].frequency - f) > 0.1 * modes_[k].damping_ratio * f) continue;
         refit(neighbours(modes_[k].frequency, modes_[k].damping_ratio), nullptr, last && sweep + 1 == sweeps);

@@ -31,14 +31,26 @@ struct EstimatedMode {
   std::complex<double> response(std::size_t frf, double f) const;  ///< [unit] at f [Hz]
 };
 
+/// What modes outside the lines leave inside: upper - lower / (2 pi f)^2.
+struct ModalFlanks {
+  std::complex<double> upper;  ///< [unit] of modes above, as an even share
+  std::complex<double> lower;  ///< [unit/s2] of modes below, as a mass line
+
+  std::complex<double> response(double f) const;  ///< [unit] at f [Hz]
+};
+
 struct ModalEstimate {
   std::vector<EstimatedMode> modes;   ///< proven, lowest frequency first
   std::vector<EstimatedMode> doubts;  ///< seen, not proven
+  std::vector<ModalFlanks> flanks;    ///< per FRF, beside modes and doubts
   std::vector<Pole> diagram;          ///< of the whole band: the stabilization diagram
   /// Phase rises through resonances: the record's e^{-i w t} was turned before the fit.
   bool conjugated = false;
   bool cancelled = false;
 };
+
+/// What modes, doubts and flanks make of an FRF at f [Hz], in the record's own sign of phase. [unit]
+std::complex<double> fittedResponse(const ModalEstimate& estimate, std::size_t frf, double f);
 
 /// Noise of each line, E|error|^2 = noise^2: from what its neighbours leave of a parabola, the median over a
 /// stretch, which a peak does not move. [unit]
