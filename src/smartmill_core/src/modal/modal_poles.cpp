@@ -19,8 +19,10 @@ using Eigen::VectorXcd;
 
 /// Angle of z over the lines: beyond their ends there is room for poles that are not.
 constexpr double TURN = 0.95 * units::PI;
-/// How far a pole may wander from order to order and be the same: of frequency, of damping.
-constexpr double SAME_FREQUENCY = 0.003, SAME_DAMPING = 0.1;
+/// How far a pole may wander from order to order and be the same.
+constexpr double SAME_FREQUENCY = 0.003;
+/// The same for the diagram's sake: of frequency, of damping.
+constexpr double STABLE_FREQUENCY = 0.01, STABLE_DAMPING = 0.2;
 /// Orders over which a pole must stay.
 constexpr std::size_t LEAST_SEEN = 3;
 
@@ -88,8 +90,8 @@ VectorXcd denominator(const std::vector<LineSums>& sums, int order) {
 }
 
 bool samePlace(const Pole& a, const Pole& b) {
-  return std::abs(a.frequency - b.frequency) < SAME_FREQUENCY * b.frequency &&
-         std::abs(a.damping_ratio - b.damping_ratio) < SAME_DAMPING * b.damping_ratio + 2e-5;
+  return std::abs(a.frequency - b.frequency) < STABLE_FREQUENCY * b.frequency &&
+         std::abs(a.damping_ratio - b.damping_ratio) < STABLE_DAMPING * b.damping_ratio + 2e-5;
 }
 
 /// The same pole through the orders.

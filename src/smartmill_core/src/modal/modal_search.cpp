@@ -26,9 +26,10 @@ constexpr std::size_t MOST_TRIES = 20;
 /// phase.
 constexpr double CLEAR_PEAK = 12.0;
 constexpr std::size_t ABOUT = 50;
-/// Evidence from which a mode is proven; above the second it stays in the fit as a doubt, so that what it
-/// explains does not stand against the others.
-constexpr double PROVEN = 1.0, DOUBTFUL = 0.35;
+/// Evidence from which a mode is proven, more than one because the misfit of real records is no even noise;
+/// above the second it stays in the fit as a doubt, so that what it explains does not stand against the
+/// others.
+constexpr double PROVEN = 2.5, DOUBTFUL = 0.35;
 /// Of start values, before any fit: below it one stands on another.
 constexpr double DUPLICATE = 0.02;
 constexpr int STEPS = 8, LAST_STEPS = 25;

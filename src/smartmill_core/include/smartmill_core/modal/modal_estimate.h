@@ -26,7 +26,7 @@ struct EstimatedMode {
   double frequency_std = 0.0, damping_ratio_std = 0.0;  ///< finite
   std::vector<double> gain, gain_std;                   ///< [unit of the FRF] per FRF
   std::vector<double> phase_part, phase_part_std;       ///< [unit of the FRF] per FRF
-  double evidence = 0.0;  ///< Wald's statistic over what chance gives: proven above 1
+  double evidence = 0.0;  ///< Wald's statistic over what chance gives: proven from 2.5 on
 
   std::complex<double> response(std::size_t frf, double f) const;  ///< [unit] at f [Hz]
 };
