@@ -7,9 +7,12 @@
 #include <cstdlib>
 #include <fstream>
 #include <sstream>
+#include <utility>
 
 #include "smartmill_core/campaign/record.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/io/csv.h"
+#include "smartmill_core/io/text_file.h"
 #include "smartmill_core/io/uff.h"
 #include "smartmill_core/units.h"
 
@@ -252,6 +255,18 @@ TapFile readTapUff(const std::string& file) {
   return result;
 }
 
+/// What frf.csv says beside the three columns.
+void readDeviations(const std::string& file, FrequencyResponse& frf) {
+  const NumberTable table = readNumberTable(file);
+  for (const auto& [name, values] :
+       {std::pair("coherence", &frf.coherence), std::pair("std", &frf.std_dev)}) {
+    if (!table.has(name)) continue;
+    const std::vector<double>& column = table.column(name);
+    const std::size_t unused = column.size() - frf.size();  // the line at zero
+    values->assign(column.begin() + static_cast<std::ptrdiff_t>(unused), column.end());
+  }
+}
+
 }  // namespace
 
 TapFormat detectFormat(const std::string& file) {
@@ -321,6 +336,7 @@ FrequencyResponse readFrfText(const std::string& file) {
     frf.frequency.push_back(columns.a[i]);
     frf.value.emplace_back(columns.b[i], columns.c[i]);
   }
+  if (readText(file).rfind("frequency_hz", 0) == 0) readDeviations(file, frf);
   return frf;
 }
 

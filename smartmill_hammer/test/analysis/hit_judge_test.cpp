@@ -100,7 +100,7 @@ TEST(HitJudge, NamesEachFault) {
                    {20.0, 0.1, 0.0, 0.0}),
                "weak");
   EXPECT_PRED2(holds, reason([](Hit& h) {
-                 for (std::size_t i = 0; i < h.force.size(); i += 2) h.force[i] += 12.0;
+                 for (std::size_t i = 0; i < h.force.size(); i += 2) h.force[i] += 30.0;
                }),
                "weak");
   EXPECT_PRED2(holds, reason([](Hit&) {}, {0.0, 0.1, 0.0, 9000.0}), "dull");

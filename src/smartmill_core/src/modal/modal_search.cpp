@@ -378,6 +378,11 @@ void ModalSearch::addByMagnitude() {
     if (magnitude[i] < *std::max_element(begin, end) || magnitude[i] < CLEAR_PEAK * median({begin, end}))
       continue;
     const double f = lines_.frequency[i], room = 4.0 * lines_.step();
+    // Where the force has no power, noise stands up like a peak.
+    double noise = 0.0;
+    for (std::size_t o = 0; o < lines_.frfs(); ++o)
+      noise += 2.0 / (lines_.weight[o][i] * lines_.weight[o][i]);
+    if (magnitude[i] < CLEAR_PEAK * std::sqrt(noise)) continue;
     const auto here = [&](const EstimatedMode& m) {
       return std::abs(m.frequency - f) < room + m.frequency * m.damping_ratio;
     };
