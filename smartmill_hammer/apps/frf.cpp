@@ -23,6 +23,9 @@ namespace smartmill {
 namespace hammer {
 namespace {
 
+/// FRFs drawn of many.
+constexpr std::size_t MOST_PICTURES = 12;
+
 struct Options {
   std::vector<std::string> inputs;
   std::string out = "frf", format = "auto", model, average = "h1";
@@ -80,7 +83,7 @@ void write(const Options& options, const std::string& suffix, const std::vector<
     const std::string stem = folder + "frf" + suffix + (o > 0 ? "_" + std::to_string(o + 1) : "");
     writeFrfCsv(frfs[o].frf, stem + ".csv");
     writeCutPro(frfs[o].frf, stem + ".frf");
-    if (!options.no_picture) drawFrf(frfs[o].frf, estimate, o, frfs[o].name, stem + ".png");
+    if (!options.no_picture && o < MOST_PICTURES) drawFrf(frfs[o].frf, estimate, o, frfs[o].name, stem + ".png");
     names.push_back(frfs[o].name);
   }
   writeFrfUff(frfs, folder + "frf" + suffix + ".uff", options.binary);
@@ -110,17 +113,16 @@ std::vector<NamedFrf> readFrfs(const Options& options, const std::vector<TapForm
     const TapFrfOptions average{{options.weak_force, p.second_hit_share, 0.0, options.high},
                                 p.exponential_time,
                                 AVERAGES.at(options.average)};
-    for (const TapRecord& tap : taps) verdicts.push_back({tap.file, hitReason(tap.hit, average.judge)});
-    writeHitsCsv(verdicts, options.out + "/hits.csv");  // also when no hit is left
     const TapFrf frf = averageTaps(taps, average);
     verdicts = frf.hits;
-    const int hits = frf.receptance.averages;
-    frfs.push_back({std::to_string(hits) + (hits == 1 ? " hit" : " hits"), frf.receptance});
     for (const TapVerdict& v : verdicts)
       std::printf("%s: %s\n", v.file.c_str(), v.accepted() ? "accepted" : ("refused: " + v.reason).c_str());
+    const int hits = frf.receptance.averages;
+    if (hits > 0) frfs.push_back({std::to_string(hits) + (hits == 1 ? " hit" : " hits"), frf.receptance});
     if (!options.no_picture) drawHits(taps, verdicts, options.out + "/hits.png");
   }
   writeHitsCsv(verdicts, options.out + "/hits.csv");
+  if (frfs.empty()) throw Error("no hit is left; " + verdicts.back().file + ": " + verdicts.back().reason);
   return frfs;
 }
 

@@ -75,7 +75,8 @@ struct TapFrf {
   std::vector<TapVerdict> hits;  ///< one a record, in order
 };
 
-/// @throws Error when no hit is left or the records differ in length, rate or kind of response.
+/// Without a hit left the FRFs are empty. @throws Error when the records differ in length, rate or kind of
+/// response.
 TapFrf averageTaps(const std::vector<TapRecord>& taps, const TapFrfOptions& options);
 
 }  // namespace hammer

@@ -107,6 +107,7 @@ Head readHead(Bytes& bytes) {
   f.response_direction = field(lines[5], 51, 4);
   f.reference_node = field(lines[5], 66, 10);
   f.reference_direction = field(lines[5], 76, 4);
+  std::replace(lines[6].begin(), lines[6].end(), 'D', 'E');
   const std::vector<double> form = numbersOf(lines[6]);
   if (form.size() < 5) bytes.fail("its seventh line is no form of data");
   head.data_type = static_cast<int>(form[0]);
