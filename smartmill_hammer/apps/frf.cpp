@@ -32,7 +32,7 @@ struct Options {
   NodeParameters parameters;
   ChannelNames channels;
   double low = 0.0, high = 0.0, weak_force = 0.0;
-  int max_modes = 60;
+  int modes = 0, max_modes = 100;
   bool real_modes = false, binary = false, no_picture = false;
 };
 
@@ -83,7 +83,8 @@ void write(const Options& options, const std::string& suffix, const std::vector<
     const std::string stem = folder + "frf" + suffix + (o > 0 ? "_" + std::to_string(o + 1) : "");
     writeFrfCsv(frfs[o].frf, stem + ".csv");
     writeCutPro(frfs[o].frf, stem + ".frf");
-    if (!options.no_picture && o < MOST_PICTURES) drawFrf(frfs[o].frf, estimate, o, frfs[o].name, stem + ".png");
+    if (!options.no_picture && o < MOST_PICTURES)
+      drawFrf(frfs[o].frf, estimate, o, frfs[o].name, stem + ".png");
     names.push_back(frfs[o].name);
   }
   writeFrfUff(frfs, folder + "frf" + suffix + ".uff", options.binary);
@@ -126,6 +127,19 @@ std::vector<NamedFrf> readFrfs(const Options& options, const std::vector<TapForm
   return frfs;
 }
 
+/// So many modes, those with the most evidence, whether proven or not.
+void keep(ModalEstimate& estimate, std::size_t count) {
+  std::vector<EstimatedMode> all = estimate.modes;
+  all.insert(all.end(), estimate.doubts.begin(), estimate.doubts.end());
+  std::sort(all.begin(), all.end(),
+            [](const EstimatedMode& a, const EstimatedMode& b) { return a.evidence > b.evidence; });
+  const auto end = all.begin() + static_cast<std::ptrdiff_t>(std::min(count, all.size()));
+  estimate.modes.assign(all.begin(), end);
+  estimate.doubts.assign(end, all.end());
+  std::sort(estimate.modes.begin(), estimate.modes.end(),
+            [](const EstimatedMode& a, const EstimatedMode& b) { return a.frequency < b.frequency; });
+}
+
 void runFiles(const Options& options, const std::vector<TapFormat>& formats) {
   const std::vector<NamedFrf> frfs = readFrfs(options, formats);
   const bool receptance = frfs.front().frf.unit == "m/N";
@@ -143,6 +157,7 @@ void runFiles(const Options& options, const std::vector<TapFormat>& formats) {
     return true;
   };
   ModalEstimate estimate = estimateModes(all, search);
+  if (options.modes > 0) keep(estimate, static_cast<std::size_t>(options.modes));
   const double window = options.parameters.measurement.exponential_time;
   for (std::vector<EstimatedMode>* modes : {&estimate.modes, &estimate.doubts}) {
     // The exponential window's own damping.
@@ -224,7 +239,9 @@ int main(int argc, char** argv) {
   line.option("--low", o.low, "modes from here [Hz] (bags: fit_low of --params)").notNegative();
   line.option("--high", o.high, "to here [Hz], up to where hits must have force; 0: the whole record")
       .notNegative();
-  line.option("--max-modes", o.max_modes, "at most").within(1, 200).showDefault();
+  line.option("--modes", o.modes, "so many, those with the most evidence; 0: as many as are proven")
+      .within(0, 200);
+  line.option("--max-modes", o.max_modes, "at most, when the data decide").within(1, 200).showDefault();
   line.flag("--real-modes", o.real_modes, "proportional damping: gains without phase");
   line.option("--average", o.average, "of hits: h1, h2 or hv").oneOf({"h1", "h2", "hv"}).showDefault();
   line.option("--weak-force", o.weak_force, "[N] a lower peak is no hit; 0: told by the noise").notNegative();

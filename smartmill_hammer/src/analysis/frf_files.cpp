@@ -138,7 +138,7 @@ ModalEstimate estimateOf(const ModalModel& model) {
     mode.gain = {m.gain};
     mode.gain_std = {m.gain_std};
     mode.phase_part = mode.phase_part_std = {0.0};
-    mode.evidence = 1.0;
+    mode.evidence = UNKNOWN;
     estimate.modes.push_back(mode);
   }
   estimate.flanks.push_back({model.direct, 0.0});

@@ -181,6 +181,7 @@ TapRecord readTapDynoware(const std::string& file, const ChannelNames& channels)
   return tapOf(readDynoware(file, {{"hammer", force}, {kind, response}}), {"", kind});
 }
 
+/// Of a function's values; where the file does not say, by their unit.
 ResponseKind kindOf(const UffFunction& f, const std::string& file) {
   switch (f.numerator) {
     case uff::ACCELERATION:
@@ -192,9 +193,17 @@ ResponseKind kindOf(const UffFunction& f, const std::string& file) {
     case uff::REACTION_FORCE:
     case uff::EXCITATION_FORCE:
       return ResponseKind::force;
+    case 0:
+    case 1:
+      break;
     default:
       throw Error(file + ": " + f.name + ": kind of data " + std::to_string(f.numerator) + " is no response");
   }
+  const std::string& u = f.unit;
+  if (u == "g" || u == "G" || u == "g/N" || (u.rfind("m/s", 0) == 0 && u.find('2') != std::string::npos))
+    return ResponseKind::acceleration;
+  if (u.rfind("m/s", 0) == 0) return ResponseKind::velocity;
+  return u.rfind("N", 0) == 0 || u.rfind("kN", 0) == 0 ? ResponseKind::force : ResponseKind::displacement;
 }
 
 /// SI value of one in the file; units that are none of these are taken for SI.
@@ -211,45 +220,73 @@ std::vector<double> realParts(const UffFunction& f) {
   return values;
 }
 
+NamedFrf frfOf(const UffFunction& f, const std::string& name, const std::string& file) {
+  const ResponseKind kind = kindOf(f, file);
+  NamedFrf result{name, {}};
+  result.frf.unit = UNIT[index(kind)];
+  for (std::size_t i = 0; i < f.value.size(); ++i) {
+    if (!(f.abscissa[i] > 0.0)) continue;
+    result.frf.frequency.push_back(f.abscissa[i]);
+    result.frf.value.push_back(f.value[i] * siOf(f.unit));
+  }
+  result.frf = receptanceOf(result.frf, kind);
+  return result;
+}
+
+void addCoherence(const UffFunction& f, FrequencyResponse& frf) {
+  std::vector<double> coherence;
+  for (std::size_t i = 0; i < f.value.size(); ++i) {
+    if (f.abscissa[i] > 0.0) coherence.push_back(f.value[i].real());
+  }
+  if (coherence.size() == frf.size()) frf.coherence = std::move(coherence);
+}
+
+/// Forces and responses over time become hits: as many of both are pairs in their order, otherwise a response
+/// belongs to the last force before it.
+std::vector<TapRecord> hitsOf(const std::vector<const UffFunction*>& functions, const std::string& file) {
+  const bool named = std::any_of(functions.begin(), functions.end(),
+                                 [](const UffFunction* f) { return f->numerator == uff::EXCITATION_FORCE; });
+  const auto isHammer = [&](const UffFunction& f) {
+    return named ? f.numerator == uff::EXCITATION_FORCE : kindOf(f, file) == ResponseKind::force;
+  };
+  std::vector<const UffFunction*> forces, responses, before;
+  for (const UffFunction* f : functions) {
+    if (isHammer(*f)) {
+      forces.push_back(f);
+      continue;
+    }
+    responses.push_back(f);
+    before.push_back(forces.empty() ? nullptr : forces.back());
+  }
+  std::vector<TapRecord> taps;
+  for (std::size_t r = 0; r < responses.size() && !forces.empty(); ++r) {
+    const UffFunction& force = responses.size() == forces.size() ? *forces[r]
+                               : before[r]                       ? *before[r]
+                                                                 : *forces.front();
+    TapRecord tap;
+    tap.file = responses.size() > 1 ? file + ":" + std::to_string(r + 1) : file;
+    tap.kind = kindOf(*responses[r], file);
+    tap.hit.force = realParts(force);
+    tap.hit.response = realParts(*responses[r]);
+    tap.hit.sample_rate = sampleRate(force.abscissa, file);
+    tap.hit.pre_trigger = onset(tap.hit.force);
+    taps.push_back(std::move(tap));
+  }
+  return taps;
+}
+
 TapFile readTapUff(const std::string& file) {
   TapFile result;
   const std::vector<UffFunction> functions = readUff(file);
-  const UffFunction* hammer = nullptr;
+  std::vector<const UffFunction*> over_time;
   int number = 0;
   for (const UffFunction& f : functions) {
     const std::string name = file + (functions.size() > 1 ? ":" + std::to_string(++number) : "");
-    if (f.type == uff::FREQUENCY_RESPONSE) {
-      const ResponseKind kind = kindOf(f, file);
-      NamedFrf frf{name, {}};
-      frf.frf.unit = UNIT[index(kind)];
-      for (std::size_t i = 0; i < f.value.size(); ++i) {
-        if (!(f.abscissa[i] > 0.0)) continue;
-        frf.frf.frequency.push_back(f.abscissa[i]);
-        frf.frf.value.push_back(f.value[i] * siOf(f.unit));
-      }
-      frf.frf = receptanceOf(frf.frf, kind);
-      result.frfs.push_back(std::move(frf));
-    } else if (f.type == uff::COHERENCE && !result.frfs.empty()) {
-      FrequencyResponse& last = result.frfs.back().frf;
-      last.coherence.clear();
-      for (std::size_t i = 0; i < f.value.size(); ++i) {
-        if (f.abscissa[i] > 0.0) last.coherence.push_back(f.value[i].real());
-      }
-      if (last.coherence.size() != last.size()) last.coherence.clear();
-    } else if (f.type == uff::TIME_RESPONSE && (f.numerator == uff::EXCITATION_FORCE || !hammer)) {
-      // A hit begins with its force; what follows are responses to it.
-      hammer = &f;
-    } else if (f.type == uff::TIME_RESPONSE) {
-      TapRecord tap;
-      tap.file = name;
-      tap.kind = kindOf(f, file);
-      tap.hit.force = realParts(*hammer);
-      tap.hit.response = realParts(f);
-      tap.hit.sample_rate = sampleRate(f.abscissa, file);
-      tap.hit.pre_trigger = onset(tap.hit.force);
-      result.taps.push_back(std::move(tap));
-    }
+    if (f.type == uff::FREQUENCY_RESPONSE) result.frfs.push_back(frfOf(f, name, file));
+    if (f.type == uff::COHERENCE && !result.frfs.empty()) addCoherence(f, result.frfs.back().frf);
+    if (f.type == uff::TIME_RESPONSE) over_time.push_back(&f);
   }
+  result.taps = hitsOf(over_time, file);
   if (result.taps.empty() && result.frfs.empty())
     throw Error(file + ": holds neither FRFs nor a force and its response over time");
   return result;

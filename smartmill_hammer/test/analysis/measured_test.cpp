@@ -1,11 +1,13 @@
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <fstream>
 #include <functional>
 
 #include <gtest/gtest.h>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/io/uff.h"
 #include "smartmill_core/modal/modal_estimate.h"
 #include "smartmill_core/testing/shared_data.h"
 #include "smartmill_hammer/analysis/tap_records.h"
@@ -118,6 +120,55 @@ TEST(MeasuredFiveHits, GiveOnePoleSet) {
   for (const double due : {810.0, 900.0, 2640.0, 3669.0, 3690.0, 4093.0, 4128.0, 4164.0, 4392.0, 5969.0})
     EXPECT_NEAR(nearest(estimate, due).frequency, due, 4.0);
   expectFinite(estimate);
+}
+
+// A hit and an FRF through a universal file, response before force, and acceleration in g; a DynoWare export.
+TEST(TapRecords, ReadUniversalFilesAndDynoWare) {
+  const std::string file = testing::TempDir() + "smartmill_tap.uff";
+  UffFunction force, response, frf;
+  force.type = response.type = uff::TIME_RESPONSE;
+  force.numerator = uff::EXCITATION_FORCE;
+  force.unit = "N";
+  response.numerator = uff::ACCELERATION;
+  response.unit = "g";
+  std::string dynoware = "DynoWare,Version 2.5\nTime,Ax,Hammer\ns,m/s2,N\n";
+  for (int i = 0; i < 64; ++i) {
+    force.abscissa.push_back(1e-4 * i);
+    response.abscissa.push_back(1e-4 * i);
+    force.value.emplace_back(i == 10 ? 50.0 : 0.0);
+    response.value.emplace_back(0.5 * i);
+    dynoware += std::to_string(1e-4 * i) + "," + std::to_string(i) + "," + (i == 10 ? "50" : "0") + "\n";
+  }
+  frf.type = uff::FREQUENCY_RESPONSE;
+  frf.numerator = uff::ACCELERATION;
+  frf.denominator = uff::EXCITATION_FORCE;
+  frf.unit = "m/s2";
+  for (int i = 0; i < 8; ++i) {
+    frf.abscissa.push_back(10.0 * i);
+    frf.value.emplace_back(2.0, -1.0);
+  }
+  writeUff({response, force}, file, true);
+  ASSERT_EQ(detectFormat(file), TapFormat::uff);
+  const TapFile hit = readTapFile(file, TapFormat::uff, {});
+  ASSERT_EQ(hit.taps.size(), 1u);
+  EXPECT_EQ(hit.taps[0].kind, ResponseKind::acceleration);
+  EXPECT_DOUBLE_EQ(hit.taps[0].hit.sample_rate, 10000.0);
+  EXPECT_DOUBLE_EQ(hit.taps[0].hit.force[10], 50.0);
+  EXPECT_NEAR(hit.taps[0].hit.response[2], 9.80665, 1e-12);
+  writeUff({frf}, file, false);
+  const TapFile lines = readTapFile(file, TapFormat::uff, {});
+  ASSERT_EQ(lines.frfs.size(), 1u);
+  EXPECT_EQ(lines.frfs[0].frf.unit, "m/N");
+  ASSERT_EQ(lines.frfs[0].frf.size(), 7u);  // none at rest
+  const double square = std::pow(2.0 * 3.14159265358979 * 10.0, 2);
+  EXPECT_NEAR(std::abs(lines.frfs[0].frf.value[0] + std::complex<double>(2.0, -1.0) / square), 0.0, 1e-15);
+  std::ofstream(file) << dynoware;
+  ASSERT_EQ(detectFormat(file), TapFormat::dynoware);
+  const TapFile channels = readTapFile(file, TapFormat::dynoware, {});
+  ASSERT_EQ(channels.taps.size(), 1u);
+  EXPECT_EQ(channels.taps[0].kind, ResponseKind::acceleration);
+  EXPECT_DOUBLE_EQ(channels.taps[0].hit.force[10], 50.0);
+  EXPECT_DOUBLE_EQ(channels.taps[0].hit.response[7], 7.0);
 }
 
 TEST(TapRecords, NameWhatIsWrong) {

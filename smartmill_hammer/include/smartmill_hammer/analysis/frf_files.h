@@ -30,7 +30,7 @@ void writeModesYaml(const ModalEstimate& estimate, const std::string& unit,
 /// Columns file,accepted,reason. @throws Error.
 void writeHitsCsv(const std::vector<TapVerdict>& hits, const std::string& file);
 
-/// Real modes as the estimator would state them.
+/// Real modes as the estimator would state them; their evidence is not known (NaN).
 ModalEstimate estimateOf(const ModalModel& model);
 
 /// Static gain of a mode in one FRF with its standard deviation: size of the residue, sign of its real part.

@@ -13,7 +13,7 @@ namespace smartmill {
 struct ModalEstimateOptions {
   double low = 0.0, high = 0.0;  ///< [Hz] band; high 0: to the last line
   int largest_order = 60;        ///< of the stabilization diagram over the whole band
-  int max_modes = 60;
+  int max_modes = 100;
   bool real_modes = false;  ///< proportional damping: gains without phase
   /// Called with the share done, 0..1. @return false to end with what is found so far
   std::function<bool(double)> progress = {};
