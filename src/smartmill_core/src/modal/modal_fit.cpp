@@ -30,7 +30,7 @@ struct Solution {
   double cost = std::numeric_limits<double>::infinity();  // sum of squared weighted residuals
 };
 
-// Gains, direct and mass line that fit best for given frequencies and damping ratios.
+// Gains and direct share that fit best for given frequencies and damping ratios.
 void solveLinear(const ModalLines& problem, Solution& solution) {
   const int free = problem.parameters(solution.modes) - 2 * solution.modes;
   if (free == 0) return;
@@ -50,8 +50,7 @@ void solveLinear(const ModalLines& problem, Solution& solution) {
                                  std::exp(solution.parameters[3 * k + 1]));
       set(column++, problem.scale * (problem.unit_static_gain ? h - 1.0 : h));
     }
-    if (problem.direct) set(column++, problem.scale);
-    if (problem.mass) set(column, problem.scale * problem.massTerm(i));
+    if (problem.direct) set(column, problem.scale);
     const Complex due = problem.value[i] - (problem.unit_static_gain ? 1.0 : 0.0);
     b(row) = w * due.real();
     b(row + 1) = w * due.imag();
@@ -97,8 +96,7 @@ ModalLines prepare(const FrequencyResponse& frf, const ModalFitOptions& options)
   problem.low = options.low;
   problem.high = options.high;
   problem.unit_static_gain = options.unit_static_gain;
-  problem.direct = options.fit_direct && !options.unit_static_gain;
-  problem.mass = options.fit_mass_line;
+  problem.direct = !options.unit_static_gain;
   problem.positive = options.positive_gains;
   double largest = 0.0;
   std::size_t known = 0;
@@ -208,6 +206,7 @@ ModalFit describe(const ModalLines& problem, const Solution& solution) {
                      : problem.direct         ? problem.scale * solution.parameters[3 * solution.modes]
                                               : 0.0;
   fit.model.direct_std = std::sqrt(fit.covariance(outer - 1, outer - 1));
+  if (!std::isfinite(fit.model.direct_std)) fit.model.direct_std = NOT_TOLD * std::abs(fit.model.direct);
   double error = 0.0, norm = 0.0;
   for (std::size_t i = 0; i < problem.lines(); ++i) {
     error +=
@@ -219,37 +218,6 @@ ModalFit describe(const ModalLines& problem, const Solution& solution) {
 }
 
 }  // namespace
-
-std::vector<double> findPeaks(const FrequencyResponse& frf, double low, double high, double share) {
-  std::vector<double> height;
-  std::vector<double> frequency;
-  for (std::size_t i = 0; i < frf.size(); ++i) {
-    if (frf.frequency[i] < low || frf.frequency[i] > high) continue;
-    frequency.push_back(frf.frequency[i]);
-    height.push_back(std::abs(frf.value[i]));
-  }
-  struct Peak {
-    std::size_t line;
-    double prominence;
-  };
-  std::vector<Peak> peaks;
-  for (std::size_t i = 1; i + 1 < height.size(); ++i) {
-    if (!(height[i] > height[i - 1] && height[i] >= height[i + 1])) continue;
-    double left = height[i], right = height[i];
-    for (std::size_t j = i; j-- > 0 && height[j] <= height[i];) left = std::min(left, height[j]);
-    for (std::size_t j = i + 1; j < height.size() && height[j] <= height[i]; ++j)
-      right = std::min(right, height[j]);
-    peaks.push_back({i, height[i] - std::max(left, right)});
-  }
-  std::sort(peaks.begin(), peaks.end(),
-            [](const Peak& a, const Peak& b) { return a.prominence > b.prominence; });
-  std::vector<double> result;
-  for (const Peak& peak : peaks) {
-    if (peak.prominence < share * peaks.front().prominence) break;
-    result.push_back(frequency[peak.line]);
-  }
-  return result;
-}
 
 ModalFit fitModes(const FrequencyResponse& frf, const ModalFitOptions& options) {
   const ModalLines problem = prepare(frf, options);

@@ -8,10 +8,6 @@ namespace smartmill {
 using Complex = std::complex<double>;
 using Eigen::Index;
 
-double ModalLines::massTerm(std::size_t i) const {
-  return -std::pow(reference() / frequency[i], 2);
-}
-
 double ModalLines::reference() const {
   return std::max(low, frequency.front());
 }
@@ -50,14 +46,10 @@ bool ModalResiduals::evaluate(const Eigen::VectorXd& at, Eigen::VectorXd* residu
       set(3 * k + 1, -gain * h * h * Complex(0.0, 2.0 * zeta * r));
       set(3 * k + 2, s * shape);
     }
-    Index next = 3 * modes_;
+    const Index next = 3 * modes_;
     if (lines_.direct) {
       model += s * at[next];
-      set(next++, s);
-    }
-    if (lines_.mass) {
-      model += s * at[next] * lines_.massTerm(i);
-      set(next, s * lines_.massTerm(i));
+      set(next, s);
     }
     (*residual)[row] = w * (model.real() - lines_.value[i].real());
     (*residual)[row + 1] = w * (model.imag() - lines_.value[i].imag());
