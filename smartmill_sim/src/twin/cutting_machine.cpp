@@ -84,7 +84,7 @@ void CuttingMachine::engage(const std::vector<ContactArc>& arcs, const ToolMotio
   std::vector<ContactArc> actual = arcs;
   for (ContactArc& a : actual) a.depth = actualDepth(a.depth);
   depth_extra_ = state_.depth_extra;
-  if (process_) process_->engage(actual, fed(now));
+  if (process_ && !followed_) process_->engage(actual, fed(now));
   if (rigid_) rigid_->engage(actual, feedOf(fed(now)));
 }
 
@@ -97,7 +97,7 @@ void CuttingMachine::setActualDepths() {
   std::vector<double> depths;
   for (const ContactArc& a : arcs_) depths.push_back(actualDepth(a.depth));
   depth_extra_ = state_.depth_extra;
-  if (process_) process_->setDepths(depths);
+  if (process_ && !followed_) process_->setDepths(depths);
   if (rigid_) rigid_->setDepths(depths);
 }
 
@@ -183,8 +183,16 @@ void CuttingMachine::takeOver(const Input& input) {
   now_.speed = input.motion.speed;
 }
 
+CuttingForce CuttingMachine::rigidCut(double angle) {
+  if (followed_) return rigid_->force(followed_->sums.at(place_++));
+  const EdgeSums sums = rigid_->sumsAt(angle);
+  if (kept_) kept_->sums.push_back(sums);
+  return rigid_->force(sums);
+}
+
 CuttingForce CuttingMachine::cut(const ToolMotion& commanded) {
-  if (rigid_) return rigid_->at(commanded.angle);
+  if (rigid_) return rigidCut(commanded.angle);
+  if (followed_) return followed_->steps.at(place_).force;
   if (!process_) return {};
   ToolMotion motion = fed(commanded);
   // The tip's place needs this step's force and the force needs the place: the force is first taken to go
@@ -197,6 +205,25 @@ CuttingForce CuttingMachine::cut(const ToolMotion& commanded) {
 }
 
 void CuttingMachine::moveTip(const Input& input, Output& out) {
+  if (rigid_) return;
+  ChannelValues& channels = out.early;
+  double acceleration = 0.0;
+  if (followed_) {
+    const CutTrace::Step& step = followed_->steps.at(place_++);
+    channels[TOOL_X] = step.displacement[0];
+    channels[TOOL_Y] = step.displacement[1];
+    acceleration = step.acceleration;
+  } else {
+    settleTip(input, out);
+    if (probe_) acceleration = tip_[*probe_].acceleration();
+    if (kept_) kept_->steps.push_back({out.force, {{channels[TOOL_X], channels[TOOL_Y]}}, acceleration});
+  }
+  if (!probe_) return;
+  channels[DISPLACEMENT] = channels[TOOL_X + *probe_];
+  channels[ACCELERATION] = acceleration;
+}
+
+void CuttingMachine::settleTip(const Input& input, Output& out) {
   const std::array<double, 2> tip{{out.force.fx + input.tip_force[0], out.force.fy + input.tip_force[1]}};
   ChannelValues& channels = out.early;
   for (std::size_t axis = 0; axis < 2 && vibrates_; ++axis) {
@@ -204,10 +231,6 @@ void CuttingMachine::moveTip(const Input& input, Output& out) {
     channels[TOOL_X + axis] = jump_ != 0.0 ? tip_[axis].jump(before, tip[axis]) : tip_[axis].step(before);
     // A jump does not go on.
     tip_history_[axis] = {{tip[axis], engaged_ ? tip[axis] : tip_history_[axis][0]}};
-  }
-  if (probe_) {
-    channels[DISPLACEMENT] = channels[TOOL_X + *probe_];
-    channels[ACCELERATION] = tip_[*probe_].acceleration();
   }
   if (process_)
     process_->settle(vibrates_ ? std::array<double, 2>{{channels[TOOL_X], channels[TOOL_Y]}}

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <functional>
 #include <random>
 #include <string>
 #include <utility>
@@ -17,6 +16,7 @@
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/signal/window.h"
 #include "smartmill_core/units.h"
+#include "smartmill_sim/twin/cut_traces.h"
 #include "smartmill_sim/twin/cutting_machine.h"
 
 namespace smartmill::sim {
@@ -182,9 +182,9 @@ TapTarget targetOf(const Record& record, std::size_t axis) {
 // Runs the machine over the record, with substeps between the samples; recorded columns are kept.
 // input(i, share): what happens at a share 0..1 of the way from sample i to the next.
 // recorded: nullptr when there is none.
+template <class Input>
 void run(const MachineModel& model, const CampaignTest& test, const SimulationOptions& options,
-         CuttingMachine& machine, const std::function<CuttingMachine::Input(std::size_t, double)>& input,
-         const Record* recorded, Record& record) {
+         CuttingMachine& machine, const Input& input, const Record* recorded, Record& record) {
   machine.setClock(clockOf(model, test, record));
   if (record.has("load_meter")) {
     model.needSpindle("simulate load_meter");
@@ -336,10 +336,8 @@ void fillAngle(Record& record, double phase, double speed) {
   }
 }
 
-Record simulate(const MachineModel& model, const CampaignTest& test, const Record* recorded, Record record,
-                double phase, const SimulationOptions& options) {
-  if (options.substeps < 1) throw Error("simulation: substeps below 1");
-  CuttingMachine machine(model, 1.0 / (test.sample_rate * options.substeps), Feed::steady);
+Record simulateOn(CuttingMachine& machine, const MachineModel& model, const CampaignTest& test,
+                  const Record* recorded, Record record, double phase, const SimulationOptions& options) {
   if (test.kind == TestKind::tap)
     return simulateTap(model, test, recorded, std::move(record), options, machine);
   fillAngle(record, phase, test.spindle_speed);
@@ -355,6 +353,24 @@ Record simulate(const MachineModel& model, const CampaignTest& test, const Recor
       [&](std::size_t i, double share) { return steady.next(record.time[i] + share * dt); }, recorded,
       record);
   return record;
+}
+
+Record simulate(const MachineModel& model, const CampaignTest& test, const Record* recorded, Record record,
+                double phase, const SimulationOptions& options) {
+  if (options.substeps < 1) throw Error("simulation: substeps below 1");
+  CuttingMachine machine(model, 1.0 / (test.sample_rate * options.substeps), Feed::steady);
+  const bool worth = options.traces && (test.kind == TestKind::cut || machine.vibrates());
+  if (!worth) return simulateOn(machine, model, test, recorded, std::move(record), phase, options);
+  std::vector<double> values = valuesOfTrace(model, test.kind);
+  if (const auto held = options.traces->find(values)) {
+    machine.follow(held.get());
+    return simulateOn(machine, model, test, recorded, std::move(record), phase, options);
+  }
+  const auto kept = std::make_shared<CutTrace>();
+  machine.keep(kept.get());
+  Record simulated = simulateOn(machine, model, test, recorded, std::move(record), phase, options);
+  options.traces->hold(std::move(values), kept);
+  return simulated;
 }
 
 }  // namespace

@@ -79,6 +79,8 @@ class Effect {
   virtual void setUp(TwinSetup&) const {}
   /// Motion, cutting law, speed-dependent sensor, friction.
   virtual void update(const Instant&, TwinState&) const {}
+  /// Whether update() sets nothing of the cut but coefficients and factors of the law.
+  virtual bool scalesForce() const { return false; }
   /// Adds to the force on the sensor [N].
   virtual void addForce(const Instant&, Axes3&) const {}
   /// Sensor output and signal: changes measured channels.

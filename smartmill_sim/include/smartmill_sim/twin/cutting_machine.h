@@ -20,6 +20,17 @@ namespace smartmill::sim {
 /// record of a campaign); without tool-tip modes tables over a revolution then give the forces.
 enum class Feed { any, steady };
 
+/// What cut and tool do in each step, which no sensor, drive or signal has a part in.
+struct CutTrace {
+  struct Step {
+    CuttingForce force;
+    std::array<double, 2> displacement;  ///< [m] of the tip
+    double acceleration;                 ///< [m/s2] where a probe stands
+  };
+  std::vector<EdgeSums> sums;  ///< of a tool without modes: coefficients and factors of the law act later
+  std::vector<Step> steps;     ///< of one with modes
+};
+
 /// Process, tool structure, force sensor, spindle drive and measuring chain of one machine with the effects
 /// that its model lists, in steps of constant length.
 class CuttingMachine {
@@ -76,6 +87,12 @@ class CuttingMachine {
   /// Displacement and acceleration sensors stand at the tip, in x (0) or y (1).
   void setProbe(std::size_t axis) { probe_ = axis; }
 
+  /// From here on what cut and tool do is kept; or is taken from what another machine kept over the same
+  /// steps, which differed behind the tool only (of a tool without modes: in coefficients and factors of the
+  /// law too). @param trace must outlive the steps
+  void keep(CutTrace* trace) { kept_ = trace; }
+  void follow(const CutTrace* trace) { followed_ = trace; }
+
   /// The load meter stands at the steady value of cutting air.
   void resetLoadMeter(double spindle_speed);
 
@@ -91,7 +108,9 @@ class CuttingMachine {
   // A step, in this order.
   void takeOver(const Input& input);  // what effects set anew
   CuttingForce cut(const ToolMotion& commanded);
+  CuttingForce rigidCut(double angle);
   void moveTip(const Input& input, Output& out);
+  void settleTip(const Input& input, Output& out);
   void showForce(Output& out);
   void showLoad(double speed, Output& out);
   void passTime(const ToolMotion& motion);
@@ -110,6 +129,9 @@ class CuttingMachine {
   std::optional<MillingProcess> process_;
   std::optional<RigidCut> rigid_;  // instead of the process: steady, no modes
   bool vibrates_ = false;
+  CutTrace* kept_ = nullptr;
+  const CutTrace* followed_ = nullptr;
+  std::size_t place_ = 0;  // in what is followed
   std::optional<std::size_t> probe_;
   std::vector<ContactArc> arcs_;                     // as commanded
   double depth_extra_ = 0.0;                         // [m] that the depths hold now

@@ -10,6 +10,8 @@
 
 namespace smartmill::sim {
 
+class CutTraces;
+
 struct SimulationOptions {
   bool noise = true;       ///< sensor noise and rounding of the load meter
   std::uint64_t seed = 1;  ///< of the noise and, without recorded angle, of the phase
@@ -18,6 +20,9 @@ struct SimulationOptions {
   std::optional<double> phase;
   /// Tones (mains hum) with a phase of the seed, not with the one that the recorded signals show.
   bool random_phases = false;
+  /// What cut and tool did in this very test (record, phase, substeps) under other models: taken from there
+  /// where the model has the same values, and put there. nullptr: each simulation by itself.
+  CutTraces* traces = nullptr;
 };
 
 /// [1] The force of a cut comes on over this part of a sample before the engagement: a step of the programs
