@@ -67,20 +67,28 @@ double CampaignCost::precision(std::size_t coordinate) const {
   return prior_weight_ / (std_dev * std_dev);
 }
 
-// @return false where the twin refuses
+// @return false where the twin refuses or gives no numbers
 bool CampaignCost::simulate(const VectorXd& at) const {
   if (same(simulated_at_, at)) return true;
+  const TwinRunner& runner = fitter_.runner();
   try {
-    simulated_ = fitter_.runner().simulate(modelAt(at));
+    simulated_ = std::move(runner.simulateBlocks({modelAt(at)}).front());
   } catch (const Error&) {
     return false;  // a point that the twin refuses is no better point
   }
+  apart_ = asVector(runner.joined(simulated_)) - asVector(runner.measured());
+  apart_squares_ = apart_.squaredNorm();
+  if (!std::isfinite(apart_squares_)) {
+    simulated_at_.resize(0);
+    return false;
+  }
+  if (frozen_) frozen_along_ = frozen_->columns.along(apart_);
   simulated_at_ = at;
   return true;
 }
 
 // Columns along what is not frozen. simulate() stands at the point.
-bool CampaignCost::tangentsAt(const VectorXd& at, MatrixXd* own) const {
+bool CampaignCost::tangentsAt(const VectorXd& at, BlockColumns* own) const {
   const Index first = frozen_ ? static_cast<Index>(nominal_) : 0;
   std::vector<MachineModel> models;
   Values step;
@@ -91,51 +99,56 @@ bool CampaignCost::tangentsAt(const VectorXd& at, MatrixXd* own) const {
     moved[c] += step.back();
     models.push_back(modelAt(moved));
   }
-  std::vector<Values> simulated;
   try {
-    simulated = fitter_.runner().simulate(models);
+    *own = BlockColumns(fitter_.runner(), simulated_, fitter_.runner().simulateBlocks(models), step);
   } catch (const Error&) {
     return false;
   }
-  own->resize(static_cast<Index>(simulated_.size()), static_cast<Index>(step.size()));
-  for (std::size_t k = 0; k < step.size(); ++k)
-    own->col(static_cast<Index>(k)) = (asVector(simulated[k]) - asVector(simulated_)) / step[k];
   return own->allFinite();
 }
 
-void CampaignCost::normalEquations(const MatrixXd& own, Linear* linear) const {
-  const auto all = static_cast<Index>(coordinates_.size());
-  const Index moving = own.cols(), fixed = all - moving;
-  linear->information.setZero(all, all);
-  linear->gradient.resize(all);
-  linear->gradient.tail(moving).noalias() = own.transpose() * linear->residual;
-  linear->information.bottomRightCorner(moving, moving).noalias() = own.transpose() * own;
-  if (fixed == 0) return;
-  if (frozen_information_.size() == 0)
-    frozen_information_.noalias() = frozen_->columns.transpose() * frozen_->columns;
-  linear->information.topLeftCorner(fixed, fixed) = frozen_information_;
-  linear->information.topRightCorner(fixed, moving).noalias() = frozen_->columns.transpose() * own;
-  linear->information.bottomLeftCorner(moving, fixed) =
-      linear->information.topRightCorner(fixed, moving).transpose();
-  linear->gradient.head(fixed).noalias() = frozen_->columns.transpose() * linear->residual;
+// Of the frozen nominal values from where their tangents were taken.
+VectorXd CampaignCost::shiftAt(const VectorXd& at) const {
+  return at.head(static_cast<Index>(nominal_)) - asVector(frozen_->at).head(static_cast<Index>(nominal_));
 }
 
-bool CampaignCost::residualAt(const VectorXd& at, VectorXd* residual) const {
-  if (!simulate(at)) return false;
-  *residual = asVector(simulated_) - asVector(fitter_.runner().measured());
-  if (frozen_ && nominal_ > 0) {
-    VectorXd shift = at.head(static_cast<Index>(nominal_)) - asVector(frozen_->at);
-    residual->noalias() += frozen_->columns * shift;
-  }
-  return residual->allFinite();
+// Squares of apart_ + frozen tangents * shift, without going over the samples again.
+double CampaignCost::squaresAt(const VectorXd& at) const {
+  if (!frozen_ || nominal_ == 0) return apart_squares_;
+  const VectorXd shift = shiftAt(at);
+  return apart_squares_ + shift.dot(2.0 * frozen_along_ + frozen_->information * shift);
+}
+
+void CampaignCost::normalEquations(const VectorXd& at, const BlockColumns& own, Linear* linear) const {
+  const auto all = static_cast<Index>(coordinates_.size());
+  const Index moving = own.cols(), fixed = all - moving;
+  linear->squares = squaresAt(at);
+  linear->information.setZero(all, all);
+  linear->gradient.resize(all);
+  linear->gradient.tail(moving) = own.along(apart_);
+  linear->information.bottomRightCorner(moving, moving) = own.gram();
+  if (fixed == 0) return;
+  const MatrixXd cross = frozen_->columns.cross(own);
+  const VectorXd shift = shiftAt(at);
+  linear->information.topLeftCorner(fixed, fixed) = frozen_->information;
+  linear->information.topRightCorner(fixed, moving) = cross;
+  linear->information.bottomLeftCorner(moving, fixed) = cross.transpose();
+  linear->gradient.head(fixed) = frozen_along_ + frozen_->information * shift;
+  linear->gradient.tail(moving) += cross.transpose() * shift;
+}
+
+VectorXd CampaignCost::residual(const VectorXd& at) const {
+  VectorXd residual = apart_;
+  if (frozen_ && nominal_ > 0) frozen_->columns.addTo(shiftAt(at), &residual);
+  return residual;
 }
 
 const CampaignCost::Linear* CampaignCost::linearise(const VectorXd& at) const {
   if (same(linearised_at_, at)) return &linear_;
   linearised_at_.resize(0);
-  MatrixXd own;
-  if (!residualAt(at, &linear_.residual) || !tangentsAt(at, &own)) return nullptr;
-  normalEquations(own, &linear_);
+  BlockColumns own;
+  if (!simulate(at) || !tangentsAt(at, &own)) return nullptr;
+  normalEquations(at, own, &linear_);
   linearised_at_ = at;
   return &linear_;
 }
@@ -150,9 +163,8 @@ bool CampaignCost::evaluate(const VectorXd& at, VectorXd* residual, MatrixXd* ja
     r[n + 1 + c] = prior_root * (at[c] - k.null) / k.prior_std;
   }
   if (!jacobian) {
-    VectorXd all;
-    if (!residualAt(at, &all)) return false;
-    r[n] = all.norm();
+    if (!simulate(at)) return false;
+    r[n] = std::sqrt(std::max(squaresAt(at), 0.0));
     return true;
   }
   const Linear* at_point = linearise(at);
@@ -162,7 +174,7 @@ bool CampaignCost::evaluate(const VectorXd& at, VectorXd* residual, MatrixXd* ja
   MatrixXd& j = *jacobian;
   j.topRows(n) = root.root;
   r.head(n) = root.along;
-  r[n] = std::sqrt(std::max(at_point->residual.squaredNorm() - r.head(n).squaredNorm(), 0.0));
+  r[n] = std::sqrt(std::max(at_point->squares - r.head(n).squaredNorm(), 0.0));
   for (Index c = 0; c < n; ++c)
     j(n + 1 + c, c) = prior_root / coordinates_[static_cast<std::size_t>(c)].prior_std;
   return true;

@@ -29,6 +29,7 @@ std::optional<Eigen::VectorXd> solve(const CampaignCost& cost, const FitOptions&
   solver.iterations = options.iterations;
   solver.function_tolerance = options.tolerance;
   solver.parameter_tolerance = 1e-7;
+  solver.dear_derivatives = true;
   solver.finish_at_bounds = false;  // simulations are dear, and the next round comes back
   solver.progress = [&](const fit::Progress&) { return !cancelled || !cancelled(); };
   std::vector<fit::Parameter> parameters = cost.parameters();
@@ -57,9 +58,10 @@ bool describe(const CampaignCost& cost, const Eigen::VectorXd& at, double sample
   const CampaignCost::Linear* point = cost.linearise(at);
   if (!point) return false;
   fit.state = cost.stateAt(at);
-  fit.chi2 = point->residual.squaredNorm();
-  fit.residual.resize(static_cast<std::size_t>(point->residual.size()));
-  Eigen::Map<Eigen::VectorXd>(fit.residual.data(), point->residual.size()) = -point->residual;
+  const Eigen::VectorXd residual = cost.residual(at);
+  fit.chi2 = residual.squaredNorm();
+  fit.residual.resize(static_cast<std::size_t>(residual.size()));
+  Eigen::Map<Eigen::VectorXd>(fit.residual.data(), residual.size()) = -residual;
   MatrixXd information = point->information;
   for (Index c = 0; c < at.size(); ++c) {
     const auto k = static_cast<std::size_t>(c);
@@ -94,20 +96,18 @@ MachineModel Fitter::model(const FitState& state) const {
 NominalTangents Fitter::nominalTangents(const FitState& state) const {
   const std::vector<Coordinate>& coordinates = freedom_.coordinates();
   std::vector<MachineModel> models{model(state)};
+  Values steps;
   for (std::size_t c = 0; c < coordinates.size(); ++c) {
     FitState moved = state;
-    moved.nominal[c] += TANGENT * coordinates[c].step;
+    steps.push_back(TANGENT * coordinates[c].step);
+    moved.nominal[c] += steps.back();
     models.push_back(model(moved));
   }
-  const std::vector<Values> simulated = runner_.simulate(models);
-  const auto column = [&](std::size_t k) {
-    return Eigen::Map<const Eigen::VectorXd>(simulated[k].data(), static_cast<Index>(runner_.size()));
-  };
-  NominalTangents tangents{
-      state.nominal, MatrixXd(static_cast<Index>(runner_.size()), static_cast<Index>(coordinates.size()))};
-  for (std::size_t c = 0; c < coordinates.size(); ++c)
-    tangents.columns.col(static_cast<Index>(c)) =
-        (column(c + 1) - column(0)) / (TANGENT * coordinates[c].step);
+  std::vector<SimulatedBlocks> simulated = runner_.simulateBlocks(models);
+  const SimulatedBlocks base = std::move(simulated.front());
+  simulated.erase(simulated.begin());
+  NominalTangents tangents{state.nominal, BlockColumns(runner_, base, simulated, steps), {}};
+  tangents.information = tangents.columns.gram();
   return tangents;
 }
 

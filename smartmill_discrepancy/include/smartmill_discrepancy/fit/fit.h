@@ -6,6 +6,7 @@
 
 #include <Eigen/Core>
 
+#include "smartmill_discrepancy/gap/block_columns.h"
 #include "smartmill_discrepancy/gap/twin_runner.h"
 #include "smartmill_discrepancy/hypotheses/hypothesis.h"
 #include "smartmill_discrepancy/hypotheses/nominal_freedom.h"
@@ -41,8 +42,9 @@ struct Fit {
 
 /// Tangents of the nominal coordinates about a state.
 struct NominalTangents {
-  std::vector<double> at;   ///< nominal coordinates
-  Eigen::MatrixXd columns;  ///< samples x coordinates
+  std::vector<double> at;       ///< nominal coordinates
+  BlockColumns columns;         ///< one a coordinate
+  Eigen::MatrixXd information;  ///< columns' * columns
 };
 
 struct FitOptions {
