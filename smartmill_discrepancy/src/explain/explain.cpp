@@ -85,6 +85,7 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
   result.unexplained = findStructure(bench.fitted(), found.best.residual, structure);
   challenge(bench, options, structure, &found, &result.unexplained);
   result.interrupted = bench.cancelled();
+  bench.turnTo(found.best.state);
 
   const MachineModel improved = nameEffects(bench, searched, found, &result);
   writeOutcome(bench, before, improved, folder, &result);

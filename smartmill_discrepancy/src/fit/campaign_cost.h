@@ -42,10 +42,14 @@ class CampaignCost : public fit::Residuals {
   /// (simulated - measured) / noise where linearise() stands.
   Eigen::VectorXd residual(const Eigen::VectorXd& at) const;
 
+  /// From which coordinate on they are turns of records: what a prior holds of them only keeps steps short.
+  std::size_t turnsBegin() const { return coordinates_.size() - turns_; }
+
   /// Of a coordinate's prior.
   double precision(std::size_t coordinate) const;
 
  private:
+  void addTurns();
   MachineModel modelAt(const Eigen::VectorXd& at) const;
   bool simulate(const Eigen::VectorXd& at) const;
   bool tangentsAt(const Eigen::VectorXd& at, BlockColumns* own) const;
@@ -57,8 +61,9 @@ class CampaignCost : public fit::Residuals {
   FitState start_;
   const NominalTangents* frozen_;
   double prior_weight_;
-  std::size_t nominal_ = 0;
-  std::vector<Coordinate> coordinates_;
+  std::size_t nominal_ = 0, turns_ = 0;
+  std::vector<Coordinate> coordinates_;                   // nominal ones, members', turns
+  std::vector<Eigen::Index> frozen_places_, own_places_;  // of the coordinates
   // The solver comes back to the points where it is.
   mutable Eigen::VectorXd simulated_at_, linearised_at_;
   mutable SimulatedBlocks simulated_;

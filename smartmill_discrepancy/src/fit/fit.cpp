@@ -65,7 +65,8 @@ bool describe(const CampaignCost& cost, const Eigen::VectorXd& at, double sample
   MatrixXd information = point->information;
   for (Index c = 0; c < at.size(); ++c) {
     const auto k = static_cast<std::size_t>(c);
-    fit.penalty += cost.precision(k) * std::pow(at[c] - cost.coordinates()[k].null, 2);
+    if (k < cost.turnsBegin())
+      fit.penalty += cost.precision(k) * std::pow(at[c] - cost.coordinates()[k].null, 2);
     information(c, c) += cost.precision(k);
   }
   fit.bic = fit.chi2 + fit.penalty;
@@ -85,6 +86,15 @@ FitState without(const FitState& state, std::size_t member) {
 
 Fitter::Fitter(const TwinRunner& runner, const NominalFreedom& freedom, std::function<bool()> cancelled)
     : runner_(runner), freedom_(freedom), cancelled_(std::move(cancelled)) {
+  for (std::size_t k = 0; k < runner.tests().size(); ++k) {
+    for (const TurnFreedom& free : turnFreedoms(runner.data().tests[runner.tests()[k]]))
+      turns_.push_back({k, free});
+  }
+}
+
+NominalTangents NominalTangents::ofTurns() const {
+  const auto count = static_cast<Index>(turns.size());
+  return {{}, turns, columns.right(count), information.bottomRightCorner(count, count)};
 }
 
 MachineModel Fitter::model(const FitState& state) const {
@@ -106,7 +116,15 @@ NominalTangents Fitter::nominalTangents(const FitState& state) const {
   std::vector<SimulatedBlocks> simulated = runner_.simulateBlocks(models);
   const SimulatedBlocks base = std::move(simulated.front());
   simulated.erase(simulated.begin());
-  NominalTangents tangents{state.nominal, BlockColumns(runner_, base, simulated, steps), {}};
+  simulated.resize(coordinates.size() + turns_.size());
+  for (const TurnOf& t : turns_) steps.push_back(t.freedom.step);
+  runParallel(turns_.size(), runner_.threads(), [&](std::size_t k) {
+    Turn by;
+    by.*turns_[k].freedom.value = turns_[k].freedom.step;
+    simulated[coordinates.size() + k] = runner_.turned(models.front(), base, turns_[k].chosen, by);
+  });
+  NominalTangents tangents{state.nominal, state.turns, BlockColumns(runner_, base, simulated, steps), {}};
+  tangents.turns.resize(turns_.size(), 0.0);
   tangents.information = tangents.columns.gram();
   return tangents;
 }

@@ -51,6 +51,20 @@ bool BlockColumns::allFinite() const {
   return std::all_of(parts_.begin(), parts_.end(), [](const Part& p) { return p.values.allFinite(); });
 }
 
+BlockColumns BlockColumns::right(Index count) const {
+  BlockColumns few;
+  few.cols_ = count;
+  for (const Part& p : parts_) {
+    Part part{p.offset, p.size, {}, {}};
+    for (const Index column : p.columns) {
+      if (column >= cols_ - count) part.columns.push_back(column - (cols_ - count));
+    }
+    part.values = p.values.rightCols(static_cast<Index>(part.columns.size()));
+    few.parts_.push_back(std::move(part));
+  }
+  return few;
+}
+
 MatrixXd BlockColumns::gram() const {
   return cross(*this);
 }

@@ -71,10 +71,17 @@ TwinRunner::TwinRunner(const Dataset& data, std::vector<std::size_t> tests, int 
 void TwinRunner::readPhases() {
   for (std::size_t k = 0; k < tests_.size(); ++k) {
     const TestData& test = data_.tests[tests_[k]];
-    const std::lock_guard<std::mutex> lock(kept_[k].mutex);
-    kept_[k].phase = sim::recordedPhase(test.test, test.record);
-    kept_[k].results.clear();
-    kept_[k].traces->clear();
+    Kept& kept = kept_[k];
+    const std::lock_guard<std::mutex> lock(kept.mutex);
+    const double phase = sim::recordedPhase(test.test, test.record);
+    const bool same = phase == kept.phase && test.early_entry == kept.early_entry &&
+                      test.test.spindle_speed == kept.test.spindle_speed;
+    kept.phase = phase;
+    kept.early_entry = test.early_entry;
+    kept.test = test.test;
+    if (same) continue;
+    kept.results.clear();
+    kept.traces->clear();
   }
 }
 
@@ -87,10 +94,22 @@ void TwinRunner::setSubsteps(int substeps) {
   }
 }
 
+SimulatedBlocks TwinRunner::blocksOf(const MachineModel& model, std::size_t chosen, const CampaignTest& test,
+                                     const sim::SimulationOptions& options) const {
+  const Record record = sim::simulateTest(model, test, kept_[chosen].record, options);
+  ++simulations_;
+  SimulatedBlocks result;
+  for (std::size_t b = first_block_[chosen]; b < first_block_[chosen + 1]; ++b) {
+    std::vector<double> values = record.column(blocks_[b].channel);
+    for (double& v : values) v /= blocks_[b].noise;
+    result.push_back(std::make_shared<const std::vector<double>>(std::move(values)));
+  }
+  return result;
+}
+
 SimulatedBlocks TwinRunner::simulateOne(const MachineModel& model, std::size_t chosen) const {
-  const TestData& test = data_.tests[tests_[chosen]];
   Kept& kept = kept_[chosen];
-  std::vector<double> key = sim::valuesOfRecord(model, test.test.kind);
+  std::vector<double> key = sim::valuesOfRecord(model, kept.test.kind);
   {
     const std::lock_guard<std::mutex> lock(kept.mutex);
     for (const auto& [values, result] : kept.results) {
@@ -101,19 +120,28 @@ SimulatedBlocks TwinRunner::simulateOne(const MachineModel& model, std::size_t c
   options.noise = false;
   options.substeps = substeps_;
   options.phase = kept.phase;
+  options.early_entry = kept.early_entry;
   options.traces = kept.traces.get();
-  const Record record = sim::simulateTest(model, test.test, kept.record, options);
-  ++simulations_;
-  SimulatedBlocks result;
-  for (std::size_t b = first_block_[chosen]; b < first_block_[chosen + 1]; ++b) {
-    std::vector<double> values = record.column(blocks_[b].channel);
-    for (double& v : values) v /= blocks_[b].noise;
-    result.push_back(std::make_shared<const std::vector<double>>(std::move(values)));
-  }
+  SimulatedBlocks result = blocksOf(model, chosen, kept.test, options);
   const std::lock_guard<std::mutex> lock(kept.mutex);
   kept.results.emplace_front(std::move(key), result);
   if (kept.results.size() > KEPT_RESULTS) kept.results.pop_back();
   return result;
+}
+
+SimulatedBlocks TwinRunner::turned(const MachineModel& model, const SimulatedBlocks& base, std::size_t chosen,
+                                   const Turn& by) const {
+  const Kept& kept = kept_[chosen];
+  CampaignTest test = kept.test;
+  test.spindle_speed = turnedSpeed(data_.tests[tests_[chosen]], test.spindle_speed, by);
+  sim::SimulationOptions options;
+  options.noise = false;
+  options.substeps = substeps_;
+  options.phase = turnedPhase(kept.phase, by);
+  options.early_entry = kept.early_entry + by.entry;
+  SimulatedBlocks of_test = blocksOf(model, chosen, test, options), all = base;
+  std::move(of_test.begin(), of_test.end(), all.begin() + static_cast<std::ptrdiff_t>(first_block_[chosen]));
+  return all;
 }
 
 std::vector<SimulatedBlocks> TwinRunner::simulateBlocks(const std::vector<MachineModel>& models) const {

@@ -28,6 +28,7 @@ double moved(const FitState& from, const FitState& to, const Eigen::MatrixXd& co
   };
   compare(from.nominal, to.nominal);
   for (std::size_t m = 0; m < from.members.size(); ++m) compare(from.members[m].values, to.members[m].values);
+  if (from.turns.size() == to.turns.size()) compare(from.turns, to.turns);
   return largest;
 }
 
@@ -96,6 +97,7 @@ std::vector<const Rung*> rivalsOf(const FitState& state, std::size_t member,
 bool refine(Workbench& bench, const FitState& state, const SearchOptions& options, SearchResult* result) {
   const Settled settled = settle(bench, state, &result->best);
   if (!settled.converged) return false;
+  bench.turnTo(result->best.state);
   const FitOptions compared = weighted(COMPARED, settled.weight);
   const FitState& at = result->best.state;
   result->contribution.clear();

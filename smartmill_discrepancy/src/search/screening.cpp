@@ -13,7 +13,8 @@ namespace {
 
 using Eigen::Index;
 
-// Orthogonal projection off the nominal tangents (with their priors) and off the tangents of the members.
+// Orthogonal projection off the nominal tangents (with their priors), off where the records lie, and off the
+// tangents of the members.
 class Projection {
  public:
   Projection(const Fitter& fitter, const Fit& now, const NominalTangents& tangents)
@@ -24,14 +25,19 @@ class Projection {
         residual_(Eigen::Map<const Eigen::VectorXd>(now.residual.data(),
                                                     static_cast<Index>(fitter.runner().size()))) {
     addMembers(fitter, now.state);
-    const auto nominal = static_cast<Index>(freedom_.size());
     information_.resize(prior_.size(), prior_.size());
-    information_.leftCols(nominal) = stacked(tangents.information, members_.cross(tangents.columns));
+    information_.leftCols(tangents.columns.cols()) =
+        stacked(tangents.information, members_.cross(tangents.columns));
     information_.rightCols(members_.cols()) = stacked(tangents.columns.cross(members_), members_.gram());
     information_.diagonal() += prior_;
     Eigen::VectorXd right = stacked(tangents.columns.along(residual_), members_.along(residual_));
     for (std::size_t c = 0; c < freedom_.size(); ++c)
       right[static_cast<Index>(c)] -= nominal_[c] * prior_[static_cast<Index>(c)];
+    for (std::size_t k = 0; k < tangents.turns.size(); ++k) {
+      const auto at = static_cast<Index>(freedom_.size() + k);
+      if (fitter.turns()[k].freedom.value == &Turn::entry && !now.state.turns.empty())
+        right[at] -= now.state.turns[k] * prior_[at];
+    }
     solveWithinBounds(right);
   }
 
@@ -99,8 +105,10 @@ class Projection {
     base_ = std::move(simulated.front());
     simulated.erase(simulated.begin());
     members_ = BlockColumns(fitter.runner(), base_, simulated, steps);
-    const auto nominal = static_cast<Index>(freedom_.size());
-    prior_.resize(nominal + members_.cols());
+    const Index beside = tangents_.columns.cols();
+    prior_.resize(beside + members_.cols());
+    for (std::size_t k = 0; k < tangents_.turns.size(); ++k)
+      prior_[static_cast<Index>(freedom_.size() + k)] = std::pow(fitter.turns()[k].freedom.prior_std, -2.0);
     for (std::size_t c = 0; c < freedom_.size(); ++c)
       prior_[static_cast<Index>(c)] = 1.0 / (freedom_[c].prior_std * freedom_[c].prior_std);
     prior_.tail(members_.cols()) = 1e-12 + 1e-9 * members_.squares().array();

@@ -51,7 +51,7 @@ std::optional<Member> formOf(const std::string& effect, const Pieces& pieces,
 std::optional<FitState> joined(const FitState& state, const std::string& effect,
                                const std::vector<Hypothesis>& hypotheses) {
   Pieces pieces;
-  FitState merged{state.nominal, {}};
+  FitState merged{state.nominal, {}, state.turns};
   std::size_t members = 0;
   for (const Member& m : state.members) {
     if (m.hypothesis->effect != effect) {
@@ -187,14 +187,18 @@ Fit Search::withPhasesTurned(Fit fit) {
 
 void Search::fitNominal() {
   now_.state.nominal.assign(bench_.freedom().coordinates().size(), 0.0);
-  // Nominal values that are off far: tangents are taken anew where the fit went.
-  for (int pass = 0; pass < 3; ++pass) {
+  // Nominal values that are off far: tangents are taken anew where the fit went. Where records lie is told
+  // from what the nominal values do to their last noise.
+  const int passes = bench_.phasesEstimated() ? 8 : 3;
+  const double share =
+      bench_.phasesEstimated() ? 1e-6 : 1e-3;  // of the cost, by which the last pass may gain
+  for (int pass = 0; pass < passes; ++pass) {
     tangents_ = linearise(now_.state);
     Fit fit = quick_.fit(now_.state, &tangents_, {8, 1e-5, true});
     if (!fit.converged && pass == 0)
       throw Error(bench_.data().campaign.folder + ": the twin gives no numbers for the nominal model");
     if (!fit.converged) break;
-    const bool settled = pass > 0 && std::abs(now_.bic - fit.bic) < std::max(1.0, 1e-3 * fit.bic);
+    const bool settled = pass > 0 && std::abs(now_.bic - fit.bic) < std::max(1.0, share * fit.bic);
     now_ = std::move(fit);
     if (settled || bench_.cancelled()) break;
   }
@@ -222,7 +226,8 @@ void Search::fitPromise(const Promise& promise, Round& round) {
   with.members.push_back({promise.hypothesis, startOf(quick_, now_, promise)});
   const auto begin = std::chrono::steady_clock::now();
   const std::size_t simulations = quick_.runner().simulations();
-  const Fit tried = quick_.fit(with, round.strained ? nullptr : &tangents_, {6, 1e-3, true});
+  const NominalTangents turns = tangents_.ofTurns();
+  const Fit tried = quick_.fit(with, round.strained ? &turns : &tangents_, {6, 1e-3, true});
   const Member& newest = tried.state.members.back();
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   round.rungs.push_back({{round.number, promise.hypothesis->effect, promise.hypothesis->variant, promise.gain,

@@ -261,9 +261,15 @@ Record simulateTap(const MachineModel& model, const CampaignTest& test, const Re
 class SteadyTest {
  public:
   // @param phase of tooth 1 [rad] at the time `begin` [s] of the first sample
-  SteadyTest(const MachineModel& model, const CampaignTest& test, double phase, double begin, int substeps,
-             CuttingMachine& machine)
-      : test_(test), phase_(phase), begin_(begin), substeps_(substeps), machine_(machine) {
+  SteadyTest(const MachineModel& model, const CampaignTest& test, double phase, double begin,
+             const SimulationOptions& options, CuttingMachine& machine)
+      : test_(test),
+        phase_(phase),
+        begin_(begin),
+        substeps_(options.substeps),
+        // Half of what comes on linearly is there before the step ends.
+        rise_(engagementRise(machine.vibrates()) + 2.0 * options.early_entry),
+        machine_(machine) {
     if (!cut()) return;
     model.needCutting("simulate a cut");
     feed_ = test.engagement->feed_per_tooth * model.needTool("simulate a cut").teeth * test.spindle_speed /
@@ -313,14 +319,14 @@ class SteadyTest {
  private:
   bool cut() const { return test_.kind == TestKind::cut; }
   void engage(const ToolMotion& now, double depth) {
-    machine_.engage({{test_.engagement->entry, test_.engagement->exit, depth}}, now,
-                    engagementRise(machine_.vibrates()) * substeps_);
+    machine_.engage({{test_.engagement->entry, test_.engagement->exit, depth}}, now, rise_ * substeps_);
     engaged_ = true;
   }
 
   const CampaignTest& test_;
   double phase_, begin_;
   int substeps_;
+  double rise_;  // [samples]
   CuttingMachine& machine_;
   double feed_ = 0.0;  // [m/s]
   bool engaged_ = false;
@@ -341,7 +347,7 @@ Record simulateOn(CuttingMachine& machine, const MachineModel& model, const Camp
   if (test.kind == TestKind::tap)
     return simulateTap(model, test, recorded, std::move(record), options, machine);
   fillAngle(record, phase, test.spindle_speed);
-  SteadyTest steady(model, test, phase, record.time.front(), options.substeps, machine);
+  SteadyTest steady(model, test, phase, record.time.front(), options, machine);
   if (test.running_before) {
     machine.setClock(clockOf(model, test, record));
     if (record.has("load_meter")) machine.resetLoadMeter(test.spindle_speed);

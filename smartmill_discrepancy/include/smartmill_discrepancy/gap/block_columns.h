@@ -22,6 +22,8 @@ class BlockColumns {
 
   Eigen::Index cols() const { return cols_; }
   bool allFinite() const;
+  /// The last columns.
+  BlockColumns right(Eigen::Index count) const;
 
   /// this' * this, this' * other, this' * vector.
   Eigen::MatrixXd gram() const;

@@ -12,7 +12,9 @@
 #include "smartmill_core/campaign/record.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_discrepancy/data/dataset.h"
+#include "smartmill_discrepancy/data/phase.h"
 #include "smartmill_sim/twin/cut_traces.h"
+#include "smartmill_sim/twin/twin.h"
 
 namespace smartmill::discrepancy {
 
@@ -51,7 +53,8 @@ class TwinRunner {
   /// is. Takes the error of few substeps out, which is nearly alike for models nearby.
   void correctTo(const MachineModel& reference, const std::vector<double>& exact);
 
-  /// The phases and speeds of the dataset's records are others now.
+  /// Phases, speeds and entries of the dataset's records are others now; until then those of the last call
+  /// stand.
   void readPhases();
 
   /// Steps of the twin a sample from here on.
@@ -64,6 +67,9 @@ class TwinRunner {
 
   /// The same in blocks, without what correctTo() adds to each model alike.
   std::vector<SimulatedBlocks> simulateBlocks(const std::vector<MachineModel>& models) const;
+  /// What a model says when one of the chosen tests lies elsewhere, beside what it says of all of them.
+  SimulatedBlocks turned(const MachineModel& model, const SimulatedBlocks& base, std::size_t chosen,
+                         const Turn& by) const;
   /// In one vector, with it.
   std::vector<double> joined(const SimulatedBlocks& blocks) const;
 
@@ -75,12 +81,15 @@ class TwinRunner {
   // a fit moves leaves much as it was.
   struct Kept {
     Record record;
-    double phase = 0.0;
+    CampaignTest test;
+    double phase = 0.0, early_entry = 0.0;
     std::mutex mutex;
     std::deque<std::pair<std::vector<double>, SimulatedBlocks>> results;
     std::unique_ptr<sim::CutTraces> traces;
   };
   SimulatedBlocks simulateOne(const MachineModel& model, std::size_t chosen) const;
+  SimulatedBlocks blocksOf(const MachineModel& model, std::size_t chosen, const CampaignTest& test,
+                           const sim::SimulationOptions& options) const;
 
   const Dataset& data_;
   std::vector<std::size_t> tests_;

@@ -44,18 +44,25 @@ class Workbench {
   NominalTangents linearise(const FitState& state, double* exact_squares = nullptr);
 
   /// What the exact twin leaves of the fit tests at a state.
-  double exactSquares(const FitState& state) const;
+  double exactSquares(const FitState& state);
 
   /// Smaller steps for the quick twin. @return false: they are as small as the exact one's
   bool refineQuick();
 
   bool phasesEstimated() const { return phases_estimated_; }  ///< some records have no spindle angle
 
-  /// Turns the records without spindle angle to where a state fits best. @return by how much [rad]
-  double turnPhases(const FitState& state);
+  /// Turns the records without spindle angle, of the state and held out, to where the lines of the state's
+  /// forces say, where it then fits better: another tooth, another turn in air. @return by how much [rad]
+  double turnPhases(FitState& state);
+
+  /// The records lie where a state has them, those held out where it fits them best.
+  void turnTo(const FitState& state);
 
  private:
-  Dataset data_;  // its records without spindle angle are turned as the model becomes better
+  void turnFitted(const FitState& state);
+
+  Dataset data_;                  // its records without spindle angle are turned as the model becomes better
+  std::vector<TestData> loaded_;  // those to be fitted, as they were loaded
   NominalFreedom freedom_;
   bool phases_estimated_;
   std::function<bool()> cancelled_;

@@ -18,6 +18,9 @@ struct SimulationOptions {
   int substeps = 4;        ///< integration steps a sample, >= 1
   /// [rad] spindle angle at the first sample, instead of the recorded angle's.
   std::optional<double> phase;
+  /// [samples] The force of a cut comes on so much earlier, in the mean, than engage_time and
+  /// engagementRise() say.
+  double early_entry = 0.0;
   /// Tones (mains hum) with a phase of the seed, not with the one that the recorded signals show.
   bool random_phases = false;
   /// What cut and tool did in this very test (record, phase, substeps) under other models: taken from there
