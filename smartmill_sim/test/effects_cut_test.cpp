@@ -1,11 +1,14 @@
 // Effects of geometry, motion, cutting law and structure against their closed forms (catalogue of effects).
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 
 #include <gtest/gtest.h>
 
 #include "smartmill_core/signal/statistics.h"
+#include "smartmill_sim/twin/cutter.h"
 #include "smartmill_sim/twin/milling_process.h"
 
 #include "effects_rig.h"
@@ -167,6 +170,109 @@ TEST(Effects, helixIsThatOfAnotherTool) {
     EXPECT_NEAR(record.column("fx")[i], f.fx, 0.01);
     EXPECT_NEAR(record.column("fz")[i], f.fz, 0.01);
   }
+}
+
+// One upright edge of a ball end, in over its whole radius: quarter circles in closed form.
+TEST(Effects, cornerRadiusTurnsTheForcesOfABallEnd) {
+  const MachineModel model = with(mill(2, 0.0), {effectEntry("corner_radius", {{"corner_radius_mm", 10.0}})});
+  const double r = 10e-3, c = 1e-4;
+  const CuttingCoefficients& k = *model.cutting;
+  const Record record = run(model, slotCut(EVEN_RPM, r, c), 0.1);
+  const auto shown = [&](const char* channel) { return at(record, channel, 0.5 * PI, EVEN_SPEED); };
+  EXPECT_NEAR(shown("fy"), k.ktc * c * r + k.kte * r * PI / 2.0, 1e-6);
+  EXPECT_NEAR(shown("fx"), -(k.krc * c * r * PI / 4.0 + k.kre * r - k.kac * c * r / 2.0 - k.kae * r), 1e-6);
+  EXPECT_NEAR(shown("fz"), k.krc * c * r / 2.0 + k.kre * r + k.kac * c * r * PI / 4.0 + k.kae * r, 1e-6);
+}
+
+// A bull-nose mill with helix against elements of its edge: normal n = (sin kappa, -cos kappa) across and
+// along the tool, Fr against it, Fa across it.
+CuttingForce bullNose(const MachineModel& model, double corner, const CampaignTest& test, double angle,
+                      double size_exponent) {
+  const CuttingCoefficients& k = *model.cutting;
+  const double depth = test.engagement->axial_depth, lag = model.tool->lag();
+  CuttingForce sum;
+  constexpr int ELEMENTS = 2000;
+  for (int i = 0; i < ELEMENTS; ++i) {
+    // Finer towards the tip, where a height holds ever more edge.
+    const double t = (i + 0.5) / ELEMENTS, z = depth * t * t, dz = 2.0 * depth * t / ELEMENTS;
+    const double up = 1.0 - std::min(z / corner, 1.0);
+    const double sine = std::sqrt(1.0 - up * up), length = dz / sine, radius = 0.01 - corner * (1.0 - sine);
+    for (int j = 0; j < model.tool->teeth; ++j) {
+      const double phi = std::fmod(angle + j * TWO_PI / model.tool->teeth - lag * z + 4.0 * PI, TWO_PI);
+      if (phi <= 0.0 || phi >= PI) continue;
+      const double h = test.engagement->feed_per_tooth * std::sin(phi) * sine;
+      const double chip = h * std::pow(h / 50e-6, -size_exponent);
+      const double ft = (k.ktc * chip + k.kte) * length, fr = (k.krc * chip + k.kre) * length,
+                   fa = (k.kac * chip + k.kae) * length;
+      const double across = fr * sine - fa * up;
+      sum.fx += -ft * std::cos(phi) - across * std::sin(phi);
+      sum.fy += ft * std::sin(phi) - across * std::cos(phi);
+      sum.fz += fr * up + fa * sine;
+      sum.torque += ft * radius;
+    }
+  }
+  return sum;
+}
+
+TEST(Effects, cornerRadiusIsTheSumOverTheElementsOfTheEdge) {
+  for (const auto& [corner, depth, exponent] :
+       {std::array<double, 3>{3.0, 5e-3, 0.0}, {3.0, 5e-3, 0.3}, {6.0, 2e-3, 0.0}, {0.0, 2e-3, 0.0}}) {
+    MachineModel model = with(mill(3, 35.0), {effectEntry("corner_radius", {{"corner_radius_mm", corner}})});
+    if (exponent > 0.0) {
+      model.effects.push_back(
+          effectEntry("size_effect", {{"exponent", exponent}, {"reference_chip_um", 50.0}}));
+    }
+    const CampaignTest test = slotCut(EVEN_RPM, depth, 1e-4);
+    const Record record = run(model, test, REVOLUTION);
+    double most = 0.0, error = 0.0;
+    for (std::size_t i = 3; i < record.size(); i += 37) {
+      const double angle = record.column("spindle_angle")[i];
+      const CuttingForce due = bullNose(model, std::max(1e-9, 1e-3 * corner), test, angle, exponent);
+      most = std::max({most, std::abs(due.fx), std::abs(due.fy)});
+      error =
+          std::max({error, std::abs(record.column("fx")[i] - due.fx),
+                    std::abs(record.column("fy")[i] - due.fy), std::abs(record.column("fz")[i] - due.fz)});
+    }
+    // Twelve slices in which the turn by the helix is even: most where an edge comes in or leaves.
+    EXPECT_LT(error, 2.5e-3 * most) << corner << " " << exponent;
+  }
+}
+
+// By tables and by the history of passes, the same tool also where its depth changes within the corner.
+TEST(Effects, cornerRadiusIsTheSameByHistory) {
+  const MachineModel model = mill(3, 35.0);
+  CuttingLaw law;
+  law.coefficients = *model.cutting;
+  const double speed = 300.0, dt = TWO_PI / speed / 1024.0;
+  Cutter tables(*model.tool, law, dt, {}, 4e-3, Cutter::Way::tables),
+      history(*model.tool, law, dt, {}, 4e-3, Cutter::Way::history);
+  ToolMotion motion;
+  motion.speed = speed;
+  motion.velocity[0] = 3e-4 * speed / TWO_PI;
+  tables.engage({{0.0, PI, 1.3e-3}}, motion);
+  history.engage({{0.0, PI, 1.3e-3}}, motion);
+  double most = 0.0;
+  for (int i = 0; i < 3000; ++i) {
+    motion.angle = std::fmod(speed * dt * i, TWO_PI);
+    motion.centre[0] = 3e-4 * speed * dt * i / TWO_PI;
+    if (i == 1100 || i == 2100) {
+      const double depth = i == 1100 ? 0.9e-3 : 4.7e-3;
+      tables.setDepths({depth});
+      history.setDepths({depth});
+    }
+    const CuttingForce a = tables.step(motion), b = history.step(motion);
+    history.settle({{0.0, 0.0}});
+    most = std::max({most, std::abs(a.fx)});
+    ASSERT_NEAR(a.fx, b.fx, 1e-4 * most + 1e-9) << i;
+    ASSERT_NEAR(a.fz, b.fz, 1e-4 * most + 1e-9) << i;
+    ASSERT_NEAR(a.torque, b.torque, 1e-6 * most) << i;
+  }
+}
+
+TEST(Effects, cornerRadiusFitsItsTool) {
+  EXPECT_THROW(run(with(mill(2, 0.0), {effectEntry("corner_radius", {{"corner_radius_mm", 10.5}})}),
+                   slotCut(EVEN_RPM), 0.1),
+               std::runtime_error);
 }
 
 TEST(Effects, feedErrorScalesTheChip) {

@@ -78,6 +78,17 @@ class Law {
   double speed_ = 0.0, chip_factor_ = 1.0, now_ = 1.0, edge_ = 1.0;
 };
 
+/// A slice of the tool.
+struct Slab {
+  double low = 0.0, high = 0.0;      // [m] above the tip
+  double across = 1.0, along = 0.0;  // of the edge's normal, which points out of the tool and down
+  double length = 1.0;               // of edge over height
+  double inset = 0.0;                // [m] of the radius
+};
+
+/// Up to a height; those of a round corner turn the normal by the same angle each.
+std::vector<Slab> slabsOf(double corner_radius, double height, double thickness);
+
 /// Slices of the tool in the work.
 class Cutting {
  public:
@@ -87,19 +98,17 @@ class Cutting {
   };
 
   Cutting(const Plant& plant, const Hidden& hidden, const CampaignTest& test, double slice, double step_angle)
-      : plant_(plant),
-        teeth_(teethOf(plant, hidden)),
-        law_(plant, hidden, test),
-        cut_(*test.engagement),
-        slice_(slice) {
+      : plant_(plant), teeth_(teethOf(plant, hidden)), law_(plant, hidden, test), cut_(*test.engagement) {
     depth_ = cut_.axial_depth;
     if (hidden.has("thermal_growth"))
       depth_ +=
           units::UM * hidden("thermal_growth", "growth_um") *
           (1.0 - std::exp(-test.start_time.value_or(0.0) / hidden("thermal_growth", "time_constant_s")));
     tilt_ = 1e-3 * hidden("depth_tilt", "slope_um_per_mm");
-    slices_ = static_cast<std::size_t>(std::ceil((depth_ + std::abs(tilt_) * 0.02) / slice_));
-    fronts_.assign(slices_, Front(0.5 * plant.tool.diameter, plant.tool.teeth, step_angle));
+    slabs_ = slabsOf(units::MM * hidden("corner_radius", "corner_radius_mm"), depth_ + std::abs(tilt_) * 0.02,
+                     slice);
+    for (const Slab& slab : slabs_)
+      fronts_.emplace_back(0.5 * plant.tool.diameter - slab.inset, plant.tool.teeth, step_angle);
   }
 
   /// One step. @param axis of the tool [m] @param rate [m/s] of its vibration @param fed [m] since engagement
@@ -108,23 +117,27 @@ class Cutting {
     Result sum;
     const double depth = depth_ + tilt_ * fed, radius = 0.5 * plant_.tool.diameter;
     law_.setTime(unsteadiness, in_cut);
-    for (std::size_t s = 0; s < slices_; ++s) {
-      const double low = s * slice_, share = std::clamp((depth - low) / slice_, 0.0, 1.0);
-      if (share <= 0.0) continue;
-      const double height = low + 0.5 * share * slice_;
+    for (std::size_t s = 0; s < slabs_.size(); ++s) {
+      const Slab& slab = slabs_[s];
+      const double rise = std::min(depth, slab.high) - slab.low;
+      if (rise <= 0.0) continue;
+      const double height = slab.low + 0.5 * rise, local = radius - slab.inset;
       for (std::size_t k = 0; k < teeth_.angle.size(); ++k) {
         if (k == 0 && isOutside(plant_, "lost_corner") && height < plant_.outside->place) continue;
         const double phi = angle + teeth_.angle[k] - teeth_.lag * height;
         const double sin = std::sin(phi), cos = std::cos(phi);
-        const Point tip{axis.x + teeth_.radius[k] * sin, axis.y + teeth_.radius[k] * cos};
-        const double chip = fronts_[s].pass(k, axis, tip);
-        if (chip <= 0.0 || !inWork(tip, sin, radius)) continue;
-        const auto [ft, fr, fa] = law_.force(chip, rate.x * sin + rate.y * cos, height, depth);
-        const double length = share * slice_;
+        const double reach = teeth_.radius[k] - slab.inset;
+        const Point tip{axis.x + reach * sin, axis.y + reach * cos};
+        const double chip = fronts_[s].pass(k, axis, tip) * slab.across;
+        if (chip <= 0.0 || !inWork(tip, sin, local)) continue;
+        const auto [ft, normal, fa] =
+            law_.force(chip, (rate.x * sin + rate.y * cos) * slab.across, height, depth);
+        // Against the edge's normal and beside it.
+        const double fr = normal * slab.across - fa * slab.along, length = rise * slab.length;
         sum.force[0] += (-ft * cos - fr * sin) * length;
         sum.force[1] += (ft * sin - fr * cos) * length;
-        sum.force[2] += fa * length;
-        sum.torque += ft * length * radius;
+        sum.force[2] += (normal * slab.along + fa * slab.across) * length;
+        sum.torque += ft * length * local;
       }
     }
     return sum;
@@ -143,8 +156,8 @@ class Cutting {
   Teeth teeth_;
   Law law_;
   Engagement cut_;
-  double slice_, depth_ = 0.0, tilt_ = 0.0;
-  std::size_t slices_ = 0;
+  double depth_ = 0.0, tilt_ = 0.0;
+  std::vector<Slab> slabs_;
   std::vector<Front> fronts_;
 };
 

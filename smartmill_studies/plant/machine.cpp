@@ -106,7 +106,8 @@ void requireKnown(const Plant& plant) {
                                        "saturation",     "stribeck_friction", "friction_warmup",
                                        "load_meter_lag", "depth_tilt",        "feed_error",
                                        "tooth_radius",   "thermal_growth",    "chip_coefficients",
-                                       "edge_buildup",   "spindle_order",     "zero_offset"};
+                                       "edge_buildup",   "spindle_order",     "zero_offset",
+                                       "corner_radius"};
   for (const EffectEntry& e : plant.effects) {
     if (std::find(known.begin(), known.end(), e.name) == known.end())
       throw Error("plant: effect '" + e.name + "' is unknown");

@@ -27,7 +27,6 @@ constexpr double FRESH = 0.5;          // [s] since the last message of a sensor
 constexpr double CANCEL_WAIT = 0.8;    // [s] for a cancelled goal to end
 constexpr double SERVICE_WAIT = 5.0;   // [s]
 constexpr double HURRY = 0.4;          // [s] of each thing done after Ctrl-C
-constexpr double VERDICT_WAIT = 1.0;   // [s] after a cut until the detector has seen all of it
 constexpr double STOP_TIMEOUT = 10.0;  // [s] for the spindle's stop after a failure
 
 /// Ctrl-C; no failure of a step.
@@ -102,8 +101,9 @@ Session::Session(ros::NodeHandle nh, const ros::NodeHandle& private_nh, const st
   subscribers_.push_back(nh_.subscribe<smartmill_msgs::ChatterState>(
       names::CHATTER_STATE, 1000,
       boost::function<void(const smartmill_msgs::ChatterState&)>([this](const auto& m) {
-        if (!m.valid) return;
         const std::lock_guard<std::mutex> lock(mutex_);
+        verdict_ = m;
+        if (!m.valid) return;
         windows_[m.condition].push_back({m.chatter != 0, m.frequency, m.severity});
       })));
   spinner_ = std::make_unique<ros::AsyncSpinner>(2);
@@ -175,7 +175,10 @@ void Session::job() {
   if (plan_.resonance()) {
     step("cut at the sensor's resonance", [&] { return runCut(*plan_.resonance()); });
   }
-  step("disarm motion", [&] { return arm(false, SERVICE_WAIT); });
+  step("disarm motion", [&] {
+    waitVerdict();
+    return arm(false, SERVICE_WAIT);
+  });
 }
 
 void Session::step(const std::string& name, const std::function<std::string()>& work) {
@@ -283,6 +286,7 @@ std::string Session::missing() const {
     if ((ros::WallTime::now() - time).toSec() > FRESH) add("data on " + topic);
   }
   if (!state_.connected) add("the controller's connection");
+  if (!verdict_) add(std::string("a verdict on ") + names::CHATTER_STATE);
   return text;
 }
 
@@ -351,6 +355,7 @@ std::string Session::runCut(const PlannedCut& cut) {
   };
   if (!waitUntil(standing, SERVICE_WAIT)) throw Error("cnc/state: no standing X, Y and Z axes are reported");
   const double time = cut.duration();
+  cut_from_ = ros::Time::now();
   runProgram(cut.condition.name, plan_.program(cut, position), cut.condition,
              time + parameters_.program_timeout);
   std::string text = format("%.0f rpm", units::rpmFromRadPerSec(cut.condition.spindle_speed));
@@ -360,6 +365,18 @@ std::string Session::runCut(const PlannedCut& cut) {
                    engagement.feed_per_tooth / units::MM, cut.feed / units::MM * 60.0);
   }
   return text;
+}
+
+// The detector says at once that a condition has ended; it does so when it has seen all before.
+void Session::waitVerdict() {
+  const auto passed = [&] {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return verdict_ && verdict_->condition.empty() && verdict_->header.stamp > cut_from_;
+  };
+  if (!waitUntil(passed, parameters_.program_timeout)) {
+    throw Error(
+        format("chatter/state: %.0f s after the cut its end is not judged", parameters_.program_timeout));
+  }
 }
 
 void Session::runProgram(const std::string& name, const std::string& program,
@@ -415,7 +432,7 @@ std::string Session::choose() {
 
 std::string Session::verify(const char* role, const PlannedCut& cut, CutVerdict::Kind due) {
   const std::string detail = runCut(cut);
-  pause(VERDICT_WAIT);
+  waitVerdict();
   SessionSummary::Verified verified;
   {
     const std::lock_guard<std::mutex> lock(mutex_);

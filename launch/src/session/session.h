@@ -57,6 +57,7 @@ class Session {
   std::string measure(Client<smartmill_msgs::MeasureFrfAction>& client, const std::string& name,
                       const std::string& point, const std::string& direction, int hits, int modes);
   std::string runCut(const PlannedCut& cut);
+  void waitVerdict();
   void runProgram(const std::string& name, const std::string& program,
                   const std::optional<CuttingCondition>& condition, double timeout);
   std::string identify(bool reset);
@@ -87,7 +88,9 @@ class Session {
   smartmill_msgs::CncState state_;
   std::optional<smartmill_msgs::StabilityChart> chart_;
   std::map<std::string, std::vector<ChatterWindow>> windows_;  // by condition
+  std::optional<smartmill_msgs::ChatterState> verdict_;        // the newest
 
+  ros::Time cut_from_;
   ros::Time coefficients_stamp_;
   smartmill_msgs::StabilityChart used_chart_;
   Point stable_, unstable_;

@@ -55,6 +55,19 @@ void addChatter(const Dataset& data, Explanation* result) {
   }
 }
 
+// What makes the model worse than the nominal one explains nothing.
+void withdraw(const SearchResult& found, Explanation* result) {
+  for (std::size_t m = 0; m < result->effects.size(); ++m) {
+    const Hypothesis& hypothesis = *found.best.state.members[m].hypothesis;
+    result->resembles.push_back(
+        {hypothesis.effect, hypothesis.variant,
+         "nearest shape in the catalogue, but the model with it is worse than the nominal one"});
+  }
+  result->effects.clear();
+  result->not_separable.clear();
+  result->suggested_test.reset();
+}
+
 }  // namespace
 
 Explanation explain(const Dataset& data, const ExplainOptions& options, const std::string& folder) {
@@ -82,12 +95,18 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
   StructureOptions structure = options.structure;
   structure.squares_of_gap = std::max(found.null.chi2 - bench.samples(), 1.0);
   result.where = findStructure(bench.fitted(), found.null.residual, structure);
+  challenge(bench, searched, &found, &result.resembles);
   result.unexplained = findStructure(bench.fitted(), found.best.residual, structure);
-  challenge(bench, options, structure, &found, &result.unexplained);
   result.interrupted = bench.cancelled();
   bench.turnTo(found.best.state);
 
-  const MachineModel improved = nameEffects(bench, searched, found, &result);
+  MachineModel improved = nameEffects(bench, searched, found, &result);
+  const GapPair after = remainsOf(bench, improved).gap;
+  if (!(after.fit <= before.gap.fit && after.heldout <= before.gap.heldout)) {
+    improved = data.nominal;
+    withdraw(found, &result);
+    result.unexplained = findStructure(bench.fitted(), found.null.residual, structure);
+  }
   writeOutcome(bench, before, improved, folder, &result);
   addChatter(bench.data(), &result);
   result.verdict = verdictOf(result);

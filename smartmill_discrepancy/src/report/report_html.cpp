@@ -114,6 +114,11 @@ void effects(std::ostream& out, const Explanation& e) {
     }
     out << "</table>\n";
   }
+  for (const Resemblance& r : e.resembles) {
+    out << "<p>Not named: <b>" << r.name << "</b>"
+        << (r.variant.empty() ? "" : " (" + escaped(r.variant) + ")") << ", " << escaped(r.reason)
+        << ".</p>\n";
+  }
   for (const auto& group : e.not_separable)
     out << "<p>Not to be told apart on this campaign: " << joined(group) << ".</p>\n";
   if (e.suggested_test)

@@ -58,6 +58,9 @@ void writeReport(const Explanation& e, const std::string& folder) {
                                  {"confidence", rounded(effect.confidence)},
                                  {"alternatives", alternatives}});
   }
+  report["resembles"] = Json::array();
+  for (const Resemblance& r : e.resembles)
+    report["resembles"].push_back({{"name", r.name}, {"variant", r.variant}, {"reason", r.reason}});
   report["not_separable"] = e.not_separable;
   report["suggested_test"] = e.suggested_test ? Json(*e.suggested_test) : Json(nullptr);
   report["unexplained"] = findingsOf(e.unexplained);

@@ -12,6 +12,9 @@ std::string summaryOf(const Explanation& e) {
       lines += " " + p.key + formatted(" %.5g +- %.2g", p.value, p.std_dev);
     lines += "\n";
   }
+  for (const Resemblance& r : e.resembles)
+    lines +=
+        "not named: " + r.name + (r.variant.empty() ? "" : " (" + r.variant + ")") + ", " + r.reason + "\n";
   for (const Finding& f : e.unexplained) {
     lines += "unexplained: " + f.channel + ", " + f.domain;
     for (const auto& [key, value] : f.location) lines += " " + key + formatted(" %.5g", value);

@@ -102,11 +102,13 @@ bool refine(Workbench& bench, const FitState& state, const SearchOptions& option
   const FitState& at = result->best.state;
   result->contribution.clear();
   result->needed.clear();
+  result->lacking.clear();
   result->rivals.clear();
   for (std::size_t m = 0; m < at.members.size(); ++m) {
     const FitState less = without(at, m);
     const Fit rest = bench.quick().fit(less, &settled.tangents, compared);
     result->contribution.push_back(rest.bic - result->best.bic);
+    result->lacking.push_back(rest.state);
     result->needed.push_back(tells(bench.quick().runner(), rest, result->best, options));
     for (const Rung* rival : rivalsOf(at, m, result->ladder)) {
       FitState with = less;

@@ -14,6 +14,7 @@
 #include "smartmill_discrepancy/search/evidence.h"
 #include "smartmill_discrepancy/search/refinement.h"
 #include "smartmill_discrepancy/search/screening.h"
+#include "smartmill_discrepancy/search/standing.h"
 
 namespace smartmill::discrepancy {
 namespace {
@@ -129,9 +130,11 @@ class Search {
   bool isBetter(const Round& round) const;
   void settle(Fit best);
   void dropNeedless();
-  void stepBack(const Fit& before, const Hypothesis* newest);
+  bool helpsElsewhere(const Fit& before, const Hypothesis& newest);
+  void stepBack(const Fit& before);
+  void refuse(const Fit& before, const Hypothesis* newest);
   void finish();
-  void takeBetterRivals();
+  bool takeBetterRivals();
 
   NominalTangents linearise(const FitState& where);
   Fit refit(const Fit& from, const FitOptions& options) const;
@@ -151,6 +154,7 @@ class Search {
   double exact_now_ = 0.0;  // squares that the exact twin leaves
   std::vector<const Hypothesis*> refused_;
   std::size_t repeated_ = 0;  // rounds that did not count
+  std::size_t in_vain_ = 0;   // of them one after the other
   SearchResult result_;
 };
 
@@ -296,14 +300,18 @@ void Search::dropNeedless() {
   }
 }
 
-// Back to before a round that the exact twin does not bear out, with smaller steps or without its effect.
-void Search::stepBack(const Fit& before, const Hypothesis* newest) {
+// What does not shrink the gap of tests that it was not fitted to takes the shape of something else.
+bool Search::helpsElsewhere(const Fit& before, const Hypothesis& newest) {
+  const AskedShare asked = standingOf(bench_, now_.state, before.state).heldout;
+  if (!std::isfinite(asked.std_dev) || asked.share > 0.5) return true;
+  options_.say(
+      formatted("held-out tests ask for %.2g +- %.2g of it, not taken: ", asked.share, asked.std_dev) +
+      newest.title());
+  return false;
+}
+
+void Search::stepBack(const Fit& before) {
   ++repeated_;
-  if (bench_.refineQuick()) {
-    options_.say("  again with smaller steps");
-  } else {
-    refused_.push_back(newest);
-  }
   now_ = before;
   bench_.turnPhases(now_.state);
   tangents_ = linearise(now_.state);
@@ -311,8 +319,15 @@ void Search::stepBack(const Fit& before, const Hypothesis* newest) {
   exact_now_ = bench_.exactSquares(now_.state);
 }
 
+void Search::refuse(const Fit& before, const Hypothesis* newest) {
+  ++in_vain_;
+  refused_.push_back(newest);
+  stepBack(before);
+}
+
 // @return false: nothing more is to be added
 bool Search::addEffect(std::size_t number) {
+  constexpr std::size_t MOST_IN_VAIN = 3;
   Round round = fitPromises(number);
   const bool better = isBetter(round) && !bench_.cancelled();
   const Hypothesis* const newest = better ? round.best.state.members.back().hypothesis : nullptr;
@@ -325,9 +340,20 @@ bool Search::addEffect(std::size_t number) {
   const double exact_squares = bench_.exactSquares(now_.state);
   if (!(exact_squares < exact_now_)) {
     options_.say(gapText(exact_squares) + " when simulated exactly, not taken: " + newest->title());
-    stepBack(before, newest);
+    if (bench_.refineQuick()) {
+      options_.say("  again with smaller steps");
+      stepBack(before);
+    } else {
+      refuse(before, newest);
+    }
     return true;
   }
+  if (!helpsElsewhere(before, *newest)) {
+    result_.refused.push_back(newest);
+    refuse(before, newest);
+    return in_vain_ < MOST_IN_VAIN;
+  }
+  in_vain_ = 0;
   for (std::size_t k = first; k < result_.ladder.size(); ++k)
     result_.ladder[k].tried.taken = result_.ladder[k].hypothesis == newest;
   exact_now_ = exact_squares;
@@ -346,18 +372,20 @@ void Search::finish() {
     options_.say("  not needed any more: " + result_.best.state.members[m].hypothesis->title());
     refined = refine(bench_, without(result_.best.state, m), options_, &result_);
   }
-  if (refined) takeBetterRivals();
+  if (refined) refined = takeBetterRivals();
+  if (!refined) result_.forgetMembers();
   for (const Member& m : result_.best.state.members) options_.say("found " + describe(m));
 }
 
 // A round compares fits that have not settled; which of two that explain as much is better shows only now.
-void Search::takeBetterRivals() {
+// @return false: the twin gives no numbers there
+bool Search::takeBetterRivals() {
   constexpr int SWAPS = 3;
   for (int swap = 0; swap < SWAPS; ++swap) {
     const auto ahead = [&](const Rival& r) { return r.delta_bic - result_.contribution[r.member]; };
     const auto best = std::max_element(result_.rivals.begin(), result_.rivals.end(),
                                        [&](const Rival& a, const Rival& b) { return ahead(a) < ahead(b); });
-    if (best == result_.rivals.end() || ahead(*best) <= 0.0) return;
+    if (best == result_.rivals.end() || ahead(*best) <= 0.0) return true;
     const Hypothesis& old = *result_.best.state.members[best->member].hypothesis;
     const Hypothesis& better = *best->state.members.back().hypothesis;
     options_.say("  better in the place of " + old.title() + ": " + better.title());
@@ -366,8 +394,9 @@ void Search::takeBetterRivals() {
       if (r.tried.effect == better.effect && r.tried.variant == better.variant) r.tried.taken = true;
     }
     const FitState state = best->state;
-    if (!refine(bench_, state, options_, &result_)) return;
+    if (!refine(bench_, state, options_, &result_)) return false;
   }
+  return true;
 }
 
 SearchResult Search::run() {

@@ -87,6 +87,11 @@ TEST(HiddenEffects, aChippedToothIsFound) {
   expectFound(hidden);
 }
 
+// All cuts are of one depth: only the shape of the forces tells a round corner from other coefficients.
+TEST(HiddenEffects, aRoundCornerIsFound) {
+  expectFound(effectEntry("corner_radius", {{"corner_radius_mm", 0.8}}));
+}
+
 // All cuts start within a few time constants.
 TEST(HiddenEffects, aWarmingSpindleIsFound) {
   expectFound(effectEntry("thermal_growth", {{"growth_um", 58.0}, {"time_constant_s", 190.0}}));

@@ -54,9 +54,7 @@ TEST(KalmanNode, compensatesInTheMachinesFrame) {
   node.begin();
   node.expect(blocks);
   node.expect(angles);
-  ASSERT_TRUE(waitUntil([&] {
-    return sub1.getNumPublishers() > 0 && sub2.getNumPublishers() > 0 && sub3.getNumPublishers() > 0;
-  }));
+  for (const ros::Subscriber& listener : {sub1, sub2, sub3}) node.expect(listener);
 
   ModalModel sensor;
   sensor.modes = {{930.0, 0.03, 0.9}};
@@ -118,9 +116,7 @@ TEST(KalmanNode, takesSixSensorsInTheSpindle) {
   node.begin();
   node.expect(blocks);
   node.expect(angles);
-  ASSERT_TRUE(waitUntil([&] {
-    return sub1.getNumPublishers() > 0 && sub2.getNumPublishers() > 0 && sub3.getNumPublishers() > 0;
-  }));
+  for (const ros::Subscriber& listener : {sub1, sub2, sub3}) node.expect(listener);
   constexpr int COUNT = 60, BAD = 50;
   const double start = std::floor(ros::Time::now().toSec());
   for (int b = 0; b < COUNT; ++b) {

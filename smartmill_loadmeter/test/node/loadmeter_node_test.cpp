@@ -55,6 +55,7 @@ TEST(LoadMeterNode, identifiesPublishesAndAnswers) {
   Followers node({names::absolute("loadmeter")});
   node.begin();
   for (const ros::Publisher& publisher : {states, loads, currents, conditions}) node.expect(publisher);
+  node.expect(forces);
   // A goal keeps no order with the streams: it is there before they go on.
   const auto send = [&](double stamp, bool reset) {
     client.sendGoal(goalAt(stamp, reset));

@@ -34,11 +34,9 @@ CuttingMachine::CuttingMachine(const MachineModel& model, double time_step, Feed
   if (model_.tool) nominal_.radius = model_.tool->radius();
   if (model_.tool && model_.cutting) {
     nominal_.law.coefficients = model_.needCutting("simulate a cut");
-    if (feed == Feed::steady && !vibrates_) {
-      rigid_.emplace(*model_.tool, nominal_.law, setup.radius_offset);
-    } else {
-      process_.emplace(*model_.tool, nominal_.law, time_step, setup.radius_offset);
-    }
+    const bool tables = feed == Feed::steady && !vibrates_;
+    cutter_.emplace(*model_.tool, nominal_.law, time_step, setup.radius_offset, setup.corner_radius,
+                    tables ? Cutter::Way::tables : Cutter::Way::history);
   }
   state_ = nominal_;
   tip_.emplace_back(model_.tool_tip.x, rate, Hold::first_order);
@@ -70,8 +68,7 @@ ToolMotion CuttingMachine::fed(const ToolMotion& commanded) const {
 }
 
 void CuttingMachine::engage(const std::vector<ContactArc>& arcs, const ToolMotion& now, double rise) {
-  if (!process_ && !rigid_)
-    throw Error(model_.file + ": tool or cutting is missing (needed to simulate a cut)");
+  if (!cutter_) throw Error(model_.file + ": tool or cutting is missing (needed to simulate a cut)");
   if (!feed_start_) feed_start_ = now.centre;
   Input input;
   input.motion = now;
@@ -84,8 +81,7 @@ void CuttingMachine::engage(const std::vector<ContactArc>& arcs, const ToolMotio
   std::vector<ContactArc> actual = arcs;
   for (ContactArc& a : actual) a.depth = actualDepth(a.depth);
   depth_extra_ = state_.depth_extra;
-  if (process_ && !followed_) process_->engage(actual, fed(now));
-  if (rigid_) rigid_->engage(actual, feedOf(fed(now)));
+  if (!replayed()) cutter_->engage(actual, fed(now));
 }
 
 double CuttingMachine::actualDepth(double commanded) const {
@@ -97,8 +93,7 @@ void CuttingMachine::setActualDepths() {
   std::vector<double> depths;
   for (const ContactArc& a : arcs_) depths.push_back(actualDepth(a.depth));
   depth_extra_ = state_.depth_extra;
-  if (process_ && !followed_) process_->setDepths(depths);
-  if (rigid_) rigid_->setDepths(depths);
+  if (cutter_ && !replayed()) cutter_->setDepths(depths);
 }
 
 void CuttingMachine::setDepth(double depth, double passed_over) {
@@ -128,8 +123,7 @@ void CuttingMachine::update(const Input& input) {
   now_.edge_time = clock_.edge_time;
   state_ = nominal_;
   effects_.update(now_, state_);
-  if (process_) process_->setLaw(state_.law);
-  if (rigid_) rigid_->setLaw(state_.law);
+  if (cutter_) cutter_->setLaw(state_.law);
   if (drive_) drive_->setFriction(state_.friction_extra, state_.friction_factor);
   // The first time exactly, then only when it has moved.
   const double moved = std::abs(state_.sensor_frequency / sensor_frequency_ - 1.0);
@@ -183,17 +177,9 @@ void CuttingMachine::takeOver(const Input& input) {
   now_.speed = input.motion.speed;
 }
 
-CuttingForce CuttingMachine::rigidCut(double angle) {
-  if (followed_) return rigid_->force(followed_->sums.at(place_++));
-  const EdgeSums sums = rigid_->sumsAt(angle);
-  if (kept_) kept_->sums.push_back(sums);
-  return rigid_->force(sums);
-}
-
 CuttingForce CuttingMachine::cut(const ToolMotion& commanded) {
-  if (rigid_) return rigidCut(commanded.angle);
-  if (followed_) return followed_->steps.at(place_).force;
-  if (!process_) return {};
+  if (replayed()) return followed_->steps.at(place_).force;
+  if (!cutter_) return {};
   ToolMotion motion = fed(commanded);
   // The tip's place needs this step's force and the force needs the place: the force is first taken to go
   // on in a straight line, which errs by the square of the step.
@@ -201,11 +187,11 @@ CuttingForce CuttingMachine::cut(const ToolMotion& commanded) {
     const std::array<double, 2>& f = tip_history_[axis];
     motion.displacement[axis] = tip_[axis].peek(2.0 * f[0] - f[1]);
   }
-  return process_->step(motion);
+  return cutter_->step(motion);
 }
 
 void CuttingMachine::moveTip(const Input& input, Output& out) {
-  if (rigid_) return;
+  if (rigid()) return;
   ChannelValues& channels = out.early;
   double acceleration = 0.0;
   if (followed_) {
@@ -232,9 +218,9 @@ void CuttingMachine::settleTip(const Input& input, Output& out) {
     // A jump does not go on.
     tip_history_[axis] = {{tip[axis], engaged_ ? tip[axis] : tip_history_[axis][0]}};
   }
-  if (process_)
-    process_->settle(vibrates_ ? std::array<double, 2>{{channels[TOOL_X], channels[TOOL_Y]}}
-                               : std::array<double, 2>{{0.0, 0.0}});
+  if (cutter_)
+    cutter_->settle(vibrates_ ? std::array<double, 2>{{channels[TOOL_X], channels[TOOL_Y]}}
+                              : std::array<double, 2>{{0.0, 0.0}});
 }
 
 void CuttingMachine::showForce(Output& out) {

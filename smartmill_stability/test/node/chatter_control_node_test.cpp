@@ -30,6 +30,7 @@ TEST(ChatterControlNode, learnsFromItsStreams) {
   node.begin();
   node.expect(angles);
   node.expect(blocks);
+  node.expect(listener);
   const TurningProcess process = kimProcess(2.0);
   node.publish(angles, toMsg(SpindleAngle{99.0, 0.0, units::TWO_PI / process.period}));
   node.settle();  // another topic keeps no order with this one

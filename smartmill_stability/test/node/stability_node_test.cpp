@@ -100,6 +100,7 @@ TEST_F(StabilityNode, findsChatterInReplayedForce) {
     void operator()(const ForceBlock& b) const { node.publish(forces, toMsg(b, "machine")); }
   };
   node_.begin();
+  node_.expect(subscriber);
   const Sink sink{conditions, cnc, angles, forces, node_};
   Scene scene;
   play(scene, sink, 100.0);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "plant/beam.h"
 #include "plant/draw.h"
@@ -10,6 +11,7 @@
 #include "plant/oscillator.h"
 #include "plant/plate.h"
 #include "smartmill_core/campaign/campaign.h"
+#include "smartmill_core/model/effect_catalogue.h"
 #include "smartmill_core/testing/shared_data.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_core/units.h"
@@ -178,6 +180,35 @@ TEST(Machine, MeanForcesOfASlot) {
                         : c == 1 ? na * p.cutting.kte / units::PI
                                  : 0.0;
     EXPECT_NEAR(mean / (expected[c] + edge), 1.0, 4e-3) << names[c];
+  }
+}
+
+// The same of a bull-nose mill: its edge and what a chip gets, along a quarter of a circle in closed form.
+TEST(Machine, MeanForcesOfABullNoseInASlot) {
+  std::mt19937_64 random(1);
+  RunOptions o;
+  o.noise = false;
+  o.steps = 16;
+  const double feed = 0.05e-3, depth = 2e-3, corner = 1.5e-3, straight = depth - corner, pi = units::PI;
+  Plant p = rigidPlant();
+  p.effects.push_back(effectEntry("corner_radius", {{"corner_radius_mm", 1.5}}));
+  const Record r = run(p, slot(3000.0, feed, depth), o, random);
+  const CuttingCoefficients& k = p.cutting;
+  const double upright = corner * pi / 4.0 + straight, leaning = corner / 2.0;
+  const double chip_across = k.krc * upright - k.kac * leaning,
+               chip_along = k.krc * leaning + k.kac * upright;
+  const double edge_across = k.kre * depth - k.kae * corner, edge_along = k.kre * corner + k.kae * depth;
+  const double edge_tangential = k.kte * (corner * pi / 2.0 + straight);
+  const std::vector<double> due{-4.0 * (chip_across * feed / 4.0 + edge_across / pi),
+                                4.0 * (k.ktc * depth * feed / 4.0 + edge_tangential / pi),
+                                4.0 * (chip_along * feed / pi + edge_along / 2.0)};
+  const std::vector<std::string> names{"fx", "fy", "fz"};
+  for (std::size_t c = 0; c < 3; ++c) {
+    const std::vector<double>& force = r.column(names[c]);
+    const std::size_t whole = 512 * (force.size() / 512);
+    const double mean =
+        std::accumulate(force.begin(), force.begin() + static_cast<std::ptrdiff_t>(whole), 0.0);
+    EXPECT_NEAR(mean / static_cast<double>(whole) / due[c], 1.0, 5e-3) << names[c];
   }
 }
 

@@ -90,7 +90,7 @@ void Followers::begin(double patience) {
         patience);
     node.begun = node.taken;
   }
-  for (int round = 0; round < ROUNDS; ++round) look();
+  lookOften();
   for (Node& node : nodes_) node.begun = node.taken;
 }
 
@@ -103,6 +103,21 @@ void Followers::expect(const ros::Publisher& publisher, double patience) {
         return publisher.getNumSubscribers() >= due ? "" : topic + ": a node has not connected";
       },
       patience);
+}
+
+// A subscriber counts its publisher when it has asked for the connection; the publisher's thread that takes
+// the request answers the questions too.
+void Followers::expect(const ros::Subscriber& listener, double patience) {
+  waitFor(
+      [&]() -> std::string {
+        return listener.getNumPublishers() > 0 ? "" : listener.getTopic() + ": nobody publishes";
+      },
+      patience);
+  lookOften();
+}
+
+void Followers::lookOften() {
+  for (int round = 0; round < ROUNDS; ++round) look();
 }
 
 std::uint64_t Followers::look() {

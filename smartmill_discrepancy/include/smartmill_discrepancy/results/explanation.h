@@ -31,12 +31,14 @@ struct FoundEffect {
   double delta_bic = 0.0;  ///< BIC that is lost without it
   /// [1] share of the held-out squares above the noise that it takes away
   double heldout_gap_reduction = 0.0;
-  /// [1] variance over the tests of the size in which each test shows it; 0 where all agree
-  double evenness = 0.0;
-  /// [1] that the tests as a body prefer this effect to its best rival (or to none), were they drawn anew:
-  /// Vuong's comparison of two models over tests.
-  double confidence = 0.0;
+  double confidence = 0.0;  ///< [1] that it shrinks the gap of tests it was not fitted to, against none and
+                            ///< against its rivals (Standing)
   std::vector<std::pair<std::string, double>> alternatives;  ///< other effects in its place: name, delta_bic
+};
+
+/// An effect of the catalogue that comes nearest to what is left and does not hold.
+struct Resemblance {
+  std::string name, variant, reason;
 };
 
 /// Gap of one channel of one test before and after.
@@ -69,6 +71,7 @@ struct Explanation {
   Verdict verdict = Verdict::no_disagreement;
   std::vector<Finding> where, unexplained;
   std::vector<FoundEffect> effects;
+  std::vector<Resemblance> resembles;
   std::vector<std::vector<std::string>> not_separable;
   std::optional<std::string> suggested_test;
   GapPair before, after;

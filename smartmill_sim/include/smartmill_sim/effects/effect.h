@@ -38,6 +38,7 @@ struct TwinSetup {
   MachineModel model;                  ///< without effects
   std::vector<double> radius_offset;   ///< [m] of each tooth
   std::array<double, CHANNELS> delay;  ///< [s] of each channel
+  double corner_radius = 0.0;          ///< [m] of the tool
 };
 
 /// Now.

@@ -6,12 +6,11 @@
 #include <utility>
 #include <vector>
 
-#include "smartmill_core/cutting/rigid_cut.h"
 #include "smartmill_core/modal/modal_filter.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_sim/effects/delay_line.h"
 #include "smartmill_sim/effects/effect.h"
-#include "smartmill_sim/twin/milling_process.h"
+#include "smartmill_sim/twin/cutter.h"
 #include "smartmill_sim/twin/spindle_drive.h"
 
 namespace smartmill::sim {
@@ -90,8 +89,14 @@ class CuttingMachine {
   /// From here on what cut and tool do is kept; or is taken from what another machine kept over the same
   /// steps, which differed behind the tool only (of a tool without modes: in coefficients and factors of the
   /// law too). @param trace must outlive the steps
-  void keep(CutTrace* trace) { kept_ = trace; }
-  void follow(const CutTrace* trace) { followed_ = trace; }
+  void keep(CutTrace* trace) {
+    kept_ = trace;
+    if (rigid()) cutter_->keep(&trace->sums);
+  }
+  void follow(const CutTrace* trace) {
+    followed_ = trace;
+    if (rigid()) cutter_->follow(&trace->sums);
+  }
 
   /// The load meter stands at the steady value of cutting air.
   void resetLoadMeter(double spindle_speed);
@@ -108,13 +113,15 @@ class CuttingMachine {
   // A step, in this order.
   void takeOver(const Input& input);  // what effects set anew
   CuttingForce cut(const ToolMotion& commanded);
-  CuttingForce rigidCut(double angle);
   void moveTip(const Input& input, Output& out);
   void settleTip(const Input& input, Output& out);
   void showForce(Output& out);
   void showLoad(double speed, Output& out);
   void passTime(const ToolMotion& motion);
 
+  bool rigid() const { return cutter_ && cutter_->way() == Cutter::Way::tables; }
+  // Cut and tool are taken from a trace, step by step.
+  bool replayed() const { return followed_ && !rigid(); }
   double actualDepth(double commanded) const;  // [m]
   void setActualDepths();
   ToolMotion fed(const ToolMotion& commanded) const;
@@ -126,8 +133,7 @@ class CuttingMachine {
   Instant now_;
   Clock clock_;
   int steps_to_update_ = 0;
-  std::optional<MillingProcess> process_;
-  std::optional<RigidCut> rigid_;  // instead of the process: steady, no modes
+  std::optional<Cutter> cutter_;
   bool vibrates_ = false;
   CutTrace* kept_ = nullptr;
   const CutTrace* followed_ = nullptr;

@@ -196,6 +196,13 @@ Forms thermalGrowth(const Scope& scope) {
   return {form};
 }
 
+// Up to a ball end.
+Forms cornerRadius(const Scope& scope) {
+  const double most = scope.nominal.tool->radius() / units::MM;
+  return {EffectForm({amplitude("corner_radius_mm", {0.0, most, 1e-4 * most, 0.3 * most})})
+              .straight({0.02 * most, 0.1 * most, 0.4 * most})};
+}
+
 // ---- draws
 
 double between(Random& random, double low, double high) {
@@ -225,6 +232,10 @@ void drawTeeth(const MachineModel& machine, Random& random, EffectEntry& entry) 
   offset[std::uniform_int_distribution<std::size_t>(0, teeth - 1)(random)] -= between(random, 8.0, 30.0);
   const double mean = std::accumulate(offset.begin(), offset.end(), 0.0) / static_cast<double>(teeth);
   for (double& o : offset) o -= mean;
+}
+
+void drawCorner(const MachineModel& machine, Random& random, EffectEntry& entry) {
+  entry.numbers["corner_radius_mm"] = between(random, 0.08, 0.5) * machine.tool->radius() / units::MM;
 }
 
 void drawHelix(const MachineModel& machine, Random& random, EffectEntry& entry) {
@@ -301,6 +312,15 @@ std::vector<EffectKind> geometry() {
                           .straight({helix > 60.0 ? -1.0 : 1.0})};
        },
        drawHelix},
+      {"corner_radius",
+       Stage::geometry,
+       "bull-nose or ball end: below this height the edge's normal turns from radial to axial; chip, local "
+       "radius and split of forces follow",
+       "Altintas & Lee 1996; Engin & Altintas 2001",
+       {number("corner_radius_mm", "mm", NOT_NEGATIVE)},
+       {Need::cuts},
+       cornerRadius,
+       drawCorner},
   };
 }
 

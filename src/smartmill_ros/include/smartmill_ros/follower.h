@@ -9,6 +9,7 @@
 #include <ros/node_handle.h>
 #include <ros/publisher.h>
 #include <ros/service_client.h>
+#include <ros/subscriber.h>
 #include <smartmill_msgs/Follow.h>
 
 namespace smartmill {
@@ -35,6 +36,10 @@ class Followers {
   /// Waits until every node that listens to the topic is connected with this publisher.
   /// @throws Error as begin()
   void expect(const ros::Publisher& publisher, double patience = PATIENCE);
+
+  /// Waits until this subscriber hears somebody: what a node says to it from now on arrives.
+  /// @throws Error as begin()
+  void expect(const ros::Subscriber& listener, double patience = PATIENCE);
 
   /// One message more was published on a topic.
   void sent(const std::string& topic) { ++sent_[topic]; }
@@ -73,6 +78,7 @@ class Followers {
   Response ask(Node& node, std::uint8_t phase);
   bool answers(Node& node, std::uint8_t phase, Response& response);
   std::uint64_t look();
+  void lookOften();
   std::uint64_t behind() const;
   void waitFor(const std::function<std::string()>& missing, double patience);
 

@@ -187,8 +187,9 @@ inline void addForce(const CuttingLaw& law, const ChipShape& shape, const Stretc
     const double chip = std::max(shape.at(s, c), LEAST_CHIP);
     const double h = law.chip_factor * effectiveChip(law, chip), e = law.edge_factor * edgeShare(law, chip);
     const double damping = damping_x * s + damping_y * c;
-    sum.add(weight, k.ktc * h + k.kte * e + TANGENTIAL_DAMPING * damping, k.krc * h + k.kre * e + damping,
-            k.kac * h + k.kae * e, s, c);
+    sum.add(weight, k.ktc * h + k.kte * e + TANGENTIAL_DAMPING * damping,
+            k.krc * h + k.kre * e + law.damping_radial * damping,
+            k.kac * h + k.kae * e + law.damping_axial * damping, s, c);
   });
 }
 

@@ -22,6 +22,8 @@ struct CuttingLaw {
   double size_exponent = 0.0;    ///< [1]
   double size_reference = 1e-4;  ///< [m]
   double damping = 0.0;          ///< [N/m]
+  double damping_radial = 1.0;   ///< [1] share of d across the tool; below 1 where the edge leans (corner.h)
+  double damping_axial = 0.0;    ///< [1] share of d along it
 };
 
 /// [1] Tangential over radial force of process damping.

@@ -1,0 +1,110 @@
+#include "smartmill_sim/twin/cutter.h"
+
+#include <algorithm>
+
+namespace smartmill::sim {
+
+Cutter::Cutter(const ToolGeometry& tool, const CuttingLaw& law, double time_step,
+               const std::vector<double>& radius_offset, double corner_radius, Way way)
+    : way_(way), corner_radius_(corner_radius), lag_(tool.lag()), law_(law) {
+  for (const EdgeSlice& slice : edgeSlices(tool, corner_radius)) {
+    Part part;
+    part.slice = part.actual = slice;
+    part.top = slice.high;
+    const ToolGeometry straight = toolOf(slice, tool);
+    if (way == Way::tables) {
+      part.rigid.emplace(straight, lawOf(slice, law), radius_offset);
+    } else {
+      part.process.emplace(straight, lawOf(slice, law), time_step, radius_offset);
+    }
+    parts_.push_back(std::move(part));
+  }
+}
+
+// The edge of a slice stands where a tip would that lags so far.
+ToolMotion Cutter::motionOf(const Part& part, const ToolMotion& now) const {
+  ToolMotion motion = now;
+  motion.angle -= lag_ * part.slice.low;
+  return motion;
+}
+
+// What of the arcs' heights lies in a slice.
+void Cutter::place(Part& part) {
+  std::vector<ContactArc> arcs;
+  double top = 0.0;
+  for (const ContactArc& arc : arcs_) {
+    const double height = std::min(arc.depth, part.slice.high);
+    if (height <= part.slice.low) continue;
+    arcs.push_back({arc.entry, arc.exit, height - part.slice.low});
+    top = std::max(top, height);
+  }
+  const bool leans = part.slice.high <= corner_radius_ * (1.0 + 1e-9);
+  if (leans && !arcs.empty() && top != part.top) {
+    part.top = top;
+    part.actual = top == part.slice.high ? part.slice : upTo(top, part.slice, corner_radius_);
+    const CuttingLaw law = lawOf(part.actual, law_);
+    if (part.process) part.process->setLaw(law);
+    if (part.rigid) part.rigid->setLaw(law);
+  }
+  if (fresh_ || arcs.size() != part.arcs) {
+    if (part.process) part.process->engage(arcs, motionOf(part, now_));
+    if (part.rigid) part.rigid->engage(arcs, feedOf(now_));
+    part.arcs = arcs.size();
+    return;
+  }
+  std::vector<double> depths;
+  for (const ContactArc& arc : arcs) depths.push_back(arc.depth);
+  if (part.process) part.process->setDepths(depths);
+  if (part.rigid) part.rigid->setDepths(depths);
+}
+
+void Cutter::engage(const std::vector<ContactArc>& arcs, const ToolMotion& now) {
+  arcs_ = arcs;
+  now_ = now;
+  fresh_ = true;
+  for (Part& part : parts_) place(part);
+  fresh_ = false;
+}
+
+void Cutter::setDepths(const std::vector<double>& depths) {
+  for (std::size_t a = 0; a < arcs_.size(); ++a) arcs_[a].depth = depths.at(a);
+  for (Part& part : parts_) place(part);
+}
+
+void Cutter::setLaw(const CuttingLaw& law) {
+  law_ = law;
+  for (Part& part : parts_) {
+    const CuttingLaw own = lawOf(part.actual, law);
+    if (part.process) part.process->setLaw(own);
+    if (part.rigid) part.rigid->setLaw(own);
+  }
+}
+
+CuttingForce Cutter::fromTables(Part& part, double angle) {
+  const EdgeSums sums = followed_ ? followed_->at(place_++) : part.rigid->sumsAt(angle);
+  if (kept_) kept_->push_back(sums);
+  return part.rigid->force(sums);
+}
+
+CuttingForce Cutter::step(const ToolMotion& now) {
+  now_ = now;
+  CuttingForce sum;
+  for (Part& part : parts_) {
+    if (part.arcs == 0) continue;
+    const ToolMotion motion = motionOf(part, now);
+    const CuttingForce force = part.rigid ? fromTables(part, motion.angle) : part.process->step(motion);
+    sum.fx += force.fx;
+    sum.fy += force.fy;
+    sum.fz += force.fz;
+    sum.torque += force.torque;
+  }
+  return sum;
+}
+
+void Cutter::settle(const std::array<double, 2>& displacement) {
+  for (Part& part : parts_) {
+    if (part.process) part.process->settle(displacement);
+  }
+}
+
+}  // namespace smartmill::sim
