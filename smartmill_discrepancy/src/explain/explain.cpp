@@ -98,6 +98,7 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
   challenge(bench, searched, &found, &result.resembles);
   result.unexplained = findStructure(bench.fitted(), found.best.residual, structure);
   result.interrupted = bench.cancelled();
+  bench.guide(false);
   bench.turnTo(found.best.state);
 
   MachineModel improved = nameEffects(bench, searched, found, &result);
