@@ -113,6 +113,7 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
   const std::optional<FitState> named_only = nameless.extend(&found, &result.unexplained);
   tellFallen(named, found.best.state, &result.resembles);
   result.interrupted = bench.cancelled();
+  bench.guide(false);
   bench.turnTo(found.best.state);
 
   for (const Rung& r : found.ladder) result.ladder.push_back(r.tried);

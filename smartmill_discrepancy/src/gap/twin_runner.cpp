@@ -85,6 +85,17 @@ void TwinRunner::readPhases() {
   }
 }
 
+void TwinRunner::setGuided(bool guided) {
+  if (guided == guided_) return;
+  guided_ = guided;
+  correction_.clear();
+  for (Kept& kept : kept_) {
+    const std::lock_guard<std::mutex> lock(kept.mutex);
+    kept.results.clear();
+    kept.traces->clear();
+  }
+}
+
 void TwinRunner::setSubsteps(int substeps) {
   substeps_ = substeps;
   for (Kept& kept : kept_) {
@@ -119,6 +130,7 @@ SimulatedBlocks TwinRunner::simulateOne(const MachineModel& model, std::size_t c
   sim::SimulationOptions options;
   options.noise = false;
   options.substeps = substeps_;
+  options.guided = guided_;
   options.phase = kept.phase;
   options.early_entry = kept.early_entry;
   options.traces = kept.traces.get();
@@ -137,6 +149,7 @@ SimulatedBlocks TwinRunner::turned(const MachineModel& model, const SimulatedBlo
   sim::SimulationOptions options;
   options.noise = false;
   options.substeps = substeps_;
+  options.guided = guided_;
   options.phase = turnedPhase(kept.phase, by);
   options.early_entry = kept.early_entry + by.entry;
   SimulatedBlocks of_test = blocksOf(model, chosen, test, options), all = base;

@@ -106,6 +106,7 @@ class Search {
   bool helpsElsewhere(const Fit& before, const Hypothesis& newest);
   void stepBack(const Fit& before);
   void refuse(const Fit& before, const Hypothesis* newest);
+  void letGo();
   void finish();
   bool takeBetterRivals();
 
@@ -275,6 +276,7 @@ void Search::dropNeedless() {
 
 // What does not shrink the gap of tests that it was not fitted to takes the shape of something else.
 bool Search::helpsElsewhere(const Fit& before, const Hypothesis& newest) {
+  bench_.turnTo(now_.state);
   const AskedShare asked = standingOf(bench_, now_.state, before.state).heldout;
   if (!std::isfinite(asked.std_dev) || asked.share > 0.5) return true;
   options_.say(
@@ -372,11 +374,22 @@ bool Search::takeBetterRivals() {
   return true;
 }
 
+// The free simulation judges, where it can follow the records at all.
+void Search::letGo() {
+  constexpr double FOLLOWS = 2.0;  // times the squares of the guided one
+  const double guided = bench_.exactSquares(now_.state), free = bench_.freeSquares(now_.state);
+  options_.say("guided by the tool's displacement " + gapText(guided) + ", simulated freely " +
+               gapText(free));
+  if (free < FOLLOWS * guided) bench_.guide(false);
+}
+
 SearchResult Search::run() {
+  bench_.guide(bench_.canGuide());
   fitNominal();
   for (std::size_t round = 0; round < options_.most_effects + repeated_ && !bench_.cancelled(); ++round) {
     if (!addEffect(round)) break;
   }
+  if (bench_.guided()) letGo();
   finish();
   return std::move(result_);
 }

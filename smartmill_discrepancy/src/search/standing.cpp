@@ -110,7 +110,7 @@ Standing standingOf(const Workbench& bench, const FitState& better, const FitSta
   const MachineModel first = bench.exact().model(better), second = bench.exact().model(other);
   const std::vector<AskedTest> heldout = askedBy(bench.heldout(), first, second);
   std::vector<AskedTest> fitted = askedBy(bench.fitted(), first, second);
-  const double variance = std::max(1.0, bench.exactSquares(better) / bench.samples());
+  const double variance = std::max(1.0, bench.exactSquaresHere(better) / bench.samples());
   fitted.push_back(askedByStated(bench.freedom(), better, other, variance));
   const double squares = std::accumulate(heldout.begin(), heldout.end(), 0.0,
                                          [](double sum, const AskedTest& t) { return sum + t.squares; });

@@ -16,6 +16,12 @@ std::vector<std::size_t> testsOf(const Dataset& data, bool heldout) {
   return tests;
 }
 
+bool guides(const TestData& test, const MachineModel& nominal) {
+  const bool modes = !nominal.tool_tip.x.modes.empty() || !nominal.tool_tip.y.modes.empty();
+  return modes && test.test.kind == TestKind::cut && !test.heldout && !test.test.running_before &&
+         test.record.has("tool_x") && test.record.has("tool_y");
+}
+
 // One step of Gauss and Newton of where each record lies. @return the largest turn [rad]
 double turnOnce(const TwinRunner& runner, const MachineModel& model, Dataset* data) {
   constexpr double MOST = 0.3;  // [rad]
@@ -64,11 +70,15 @@ Workbench::Workbench(const Dataset& data, const WorkbenchOptions& options)
       phases_estimated_(std::any_of(data.tests.begin(), data.tests.end(),
                                     [](const TestData& t) { return t.phase_estimated; })),
       cancelled_(options.cancelled),
+      can_guide_(std::any_of(data.tests.begin(), data.tests.end(),
+                             [&](const TestData& t) { return guides(t, data.nominal); })),
       quick_runner_(data_, testsOf(data_, false), options.threads, options.screening_substeps),
       exact_runner_(data_, testsOf(data_, false), options.threads, options.final_substeps),
+      guided_runner_(data_, testsOf(data_, false), options.threads, options.final_substeps),
       heldout_runner_(data_, testsOf(data_, true), options.threads, options.final_substeps),
       quick_(quick_runner_, freedom_, options.cancelled),
       exact_(exact_runner_, freedom_, options.cancelled) {
+  guided_runner_.setGuided(true);
   for (const std::size_t t : exact_runner_.tests()) loaded_.push_back(data_.tests[t]);
 }
 
@@ -86,21 +96,37 @@ void Workbench::turnFitted(const FitState& state) {
     by[quick_.turns()[k].chosen].*quick_.turns()[k].freedom.value = state.turns[k];
   for (std::size_t k = 0; k < tests.size(); ++k) turnRecord(data_.tests[tests[k]], by[k]);
   exact_runner_.readPhases();
+  guided_runner_.readPhases();
 }
 
 NominalTangents Workbench::linearise(const FitState& state, double* exact_squares) {
   const MachineModel model = quick_.model(state);
   turnFitted(state);
   quick_runner_.readPhases();
-  const std::vector<double> simulated = exact_runner_.simulate(model);
-  if (exact_squares) *exact_squares = squaresLeft(exact_runner_, simulated);
+  const std::vector<double> simulated = fitted().simulate(model);
+  if (exact_squares) *exact_squares = squaresLeft(fitted(), simulated);
   quick_runner_.correctTo(model, simulated);
   return quick_.nominalTangents(state);
 }
 
 double Workbench::exactSquares(const FitState& state) {
   turnFitted(state);
+  return exactSquaresHere(state);
+}
+
+double Workbench::freeSquares(const FitState& state) {
+  turnFitted(state);
   return squaresLeft(exact_runner_, exact_runner_.simulate(quick_.model(state)));
+}
+
+void Workbench::guide(bool guided) {
+  guided_ = guided && can_guide_;
+  quick_runner_.setGuided(guided_);
+  heldout_runner_.setGuided(guided_);
+}
+
+double Workbench::exactSquaresHere(const FitState& state) const {
+  return squaresLeft(fitted(), fitted().simulate(quick_.model(state)));
 }
 
 bool Workbench::refineQuick() {

@@ -154,7 +154,7 @@ CuttingMachine::Output CuttingMachine::step(const Input& input) {
 
 void CuttingMachine::step(const Input& input, Output& out) {
   takeOver(input);
-  out.force = cut(input.motion);
+  out.force = cut(input);
   out.applied = {{out.force.fx + input.sensor_force[0], out.force.fy + input.sensor_force[1],
                   out.force.fz + input.sensor_force[2]}};
   if (effects_.has(Stage::sensor_force)) effects_.addForce(now_, out.applied);
@@ -185,10 +185,14 @@ void CuttingMachine::takeOver(const Input& input) {
   now_.speed = input.motion.speed;
 }
 
-CuttingForce CuttingMachine::cut(const ToolMotion& commanded) {
+CuttingForce CuttingMachine::cut(const Input& input) {
   if (replayed()) return followed_->steps.at(place_).force;
   if (!cutter_) return {};
-  ToolMotion motion = fed(commanded);
+  ToolMotion motion = fed(input.motion);
+  if (input.tip) {
+    motion.displacement = *input.tip;
+    return cutter_->step(motion);
+  }
   // The tip's place needs this step's force and the force needs the place: the force is first taken to go
   // on in a straight line, which errs by the square of the step.
   for (std::size_t axis = 0; axis < 2 && vibrates_; ++axis) {
@@ -228,12 +232,15 @@ void CuttingMachine::settleTip(const Input& input, Output& out) {
     // A jump does not go on.
     tip_history_[axis] = {{tip[axis], engaged_ ? tip[axis] : tip_history_[axis][0]}};
   }
-  if (cutter_) {
-    const std::array<double, 2> at =
-        vibrates_ ? std::array<double, 2>{{channels[TOOL_X], channels[TOOL_Y]}} : std::array<double, 2>{};
-    cutter_->settle(at);
-    layers_.settle(at);
+  if (!cutter_) return;
+  std::array<double, 2> at{};
+  if (input.tip) {
+    at = *input.tip;
+  } else if (vibrates_) {
+    at = {{channels[TOOL_X], channels[TOOL_Y]}};
   }
+  cutter_->settle(at);
+  layers_.settle(at);
 }
 
 void CuttingMachine::showForce(Output& out) {

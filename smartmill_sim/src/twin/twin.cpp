@@ -342,6 +342,15 @@ void fillAngle(Record& record, double phase, double speed) {
   }
 }
 
+bool isGuide(const CampaignTest& test, const Record* recorded, const CuttingMachine& machine) {
+  return test.kind == TestKind::cut && !test.running_before && machine.vibrates() && recorded &&
+         recorded->has(TIP[0]) && recorded->has(TIP[1]);
+}
+
+std::array<double, 2> tipAt(const Record& recorded, std::size_t i, double share) {
+  return {{interpolated(recorded.column(TIP[0]), i, share), interpolated(recorded.column(TIP[1]), i, share)}};
+}
+
 Record simulateOn(CuttingMachine& machine, const MachineModel& model, const CampaignTest& test,
                   const Record* recorded, Record record, double phase, const SimulationOptions& options) {
   if (test.kind == TestKind::tap)
@@ -354,10 +363,15 @@ Record simulateOn(CuttingMachine& machine, const MachineModel& model, const Camp
     steady.lead();
   }
   const double dt = 1.0 / test.sample_rate;
+  const bool guided = options.guided && isGuide(test, recorded, machine);
   run(
       model, test, options, machine,
-      [&](std::size_t i, double share) { return steady.next(record.time[i] + share * dt); }, recorded,
-      record);
+      [&](std::size_t i, double share) {
+        CuttingMachine::Input input = steady.next(record.time[i] + share * dt);
+        if (guided) input.tip = tipAt(*recorded, i, share);
+        return input;
+      },
+      recorded, record);
   return record;
 }
 

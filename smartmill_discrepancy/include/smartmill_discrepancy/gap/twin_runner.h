@@ -57,6 +57,9 @@ class TwinRunner {
   /// stand.
   void readPhases();
 
+  /// Whether tools with modes are guided by the displacement that cuts' records show, see SimulationOptions.
+  void setGuided(bool guided);
+
   /// Steps of the twin a sample from here on.
   void setSubsteps(int substeps);
   int substeps() const { return substeps_; }
@@ -95,6 +98,7 @@ class TwinRunner {
   std::vector<std::size_t> tests_;
   mutable std::deque<Kept> kept_;
   int threads_, substeps_;
+  bool guided_ = false;
   std::vector<Block> blocks_;
   std::vector<std::size_t> first_block_;  // of each chosen test; one more at the end
   std::size_t size_ = 0;

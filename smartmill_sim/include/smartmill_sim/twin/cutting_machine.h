@@ -40,6 +40,8 @@ class CuttingMachine {
     ToolMotion motion;                              ///< displacement is not read: the structure gives it
     std::array<double, 2> tip_force{{0, 0}};        ///< [N] on the tool besides cutting (a hammer)
     std::array<double, 3> sensor_force{{0, 0, 0}};  ///< [N] on the sensor besides cutting
+    /// [m] where the tip is known to be, x and y: the chip is of that, whatever the structure would do.
+    std::optional<std::array<double, 2>> tip;
   };
   /// At the end of a step.
   struct Output {
@@ -113,7 +115,7 @@ class CuttingMachine {
   void update(const Input& input);
   // A step, in this order.
   void takeOver(const Input& input);  // what effects set anew
-  CuttingForce cut(const ToolMotion& commanded);
+  CuttingForce cut(const Input& input);
   void moveTip(const Input& input, Output& out);
   void settleTip(const Input& input, Output& out);
   void showForce(Output& out);

@@ -21,6 +21,10 @@ struct SimulationOptions {
   /// [samples] The force of a cut comes on so much earlier, in the mean, than engage_time and
   /// engagementRise() say.
   double early_entry = 0.0;
+  /// Of a tool with modes, where a cut's record shows tool_x and tool_y: chips are those of the displacement
+  /// that was measured, the structure only shows what these forces do to it. Nothing can run away, a
+  /// chattering cut is followed, and what is left is an error of prediction.
+  bool guided = false;
   /// Tones (mains hum) with a phase of the seed, not with the one that the recorded signals show.
   bool random_phases = false;
   /// What cut and tool did in this very test (record, phase, substeps) under other models: taken from there
