@@ -17,6 +17,7 @@
 #include "smartmill_core/testing/shared_data.h"
 #include "smartmill_core/units.h"
 #include "smartmill_sim/effects/effect.h"
+#include "smartmill_sim/twin/cut_traces.h"
 #include "smartmill_sim/twin/spindle_drive.h"
 
 namespace smartmill::sim {
@@ -93,6 +94,79 @@ Record tapOf(const std::string& answering) {
   for (std::size_t i = 0; i < 20; ++i)
     record.add("hammer")[hit + i] = 100.0 * std::pow(std::sin(units::PI * static_cast<double>(i) / 20.0), 2);
   return record;
+}
+
+// Columns to be simulated.
+Record blank() {
+  Record record;
+  for (int i = 0; i < 2560; ++i) record.time.push_back(i / 25600.0);
+  for (const char* c : {"fx", "fy", "fz", "tool_x", "tool_y"}) record.add(c).assign(record.time.size(), 0.0);
+  return record;
+}
+
+MachineModel flexibleMill() {
+  MachineModel model = mill();
+  model.tool_tip.x.modes = {{1210.0, 0.031, 1.0 / 28e6}};
+  model.tool_tip.y.modes = {{1180.0, 0.029, 1.0 / 31e6}};
+  model.force_sensor.axis[0].modes = {{930.0, 0.02, 0.9}};
+  return model;
+}
+
+// What cut and tool did for one model serves others that differ behind the tool, and of a rigid tool in
+// coefficients and wear: to the digit.
+TEST(Twin, heldTracesChangeNothing) {
+  MachineModel rigid = flexibleMill();
+  rigid.tool_tip = {};
+  for (const MachineModel& first : {rigid, flexibleMill()}) {
+    MachineModel sensor = first, harder = first, worn = first;
+    sensor.force_sensor.axis[0].modes.front().frequency *= 1.1;
+    harder.cutting->ktc *= 1.2;
+    EffectEntry wear;
+    wear.name = "tool_wear";
+    wear.numbers["edge_growth_per_min"] = 2.0;
+    worn.effects = {wear};
+    CampaignTest test = slot();
+    test.engage_time = 0.01;
+    test.cut_time_before = 10.0;
+    CutTraces traces(2);
+    SimulationOptions alone, held;
+    alone.noise = held.noise = false;
+    alone.phase = held.phase = 1.0;
+    held.traces = &traces;
+    for (const MachineModel& model : {first, sensor, harder, worn, first}) {
+      const Record a = simulateTest(model, test, blank(), alone),
+                   b = simulateTest(model, test, blank(), held);
+      for (const char* c : {"fx", "fy", "fz", "tool_x", "tool_y"}) EXPECT_EQ(a.column(c), b.column(c)) << c;
+    }
+  }
+}
+
+// Guided by the displacement that was measured, forces are those of the cut whatever is believed of the
+// structure, which shows in the displacement alone; with what is true of it that is the measured one.
+TEST(Twin, guidedByItsDisplacementTheStructureOnlyShows) {
+  CampaignTest test = slot();
+  test.engage_time = 0.01;
+  SimulationOptions options;
+  options.noise = false;
+  options.phase = 1.0;
+  options.substeps = 8;
+  const Record measured = simulateTest(flexibleMill(), test, blank(), options);
+  options.guided = true;
+  MachineModel softer = flexibleMill();
+  softer.tool_tip.x.modes.front().gain *= 2.0;
+  const Record same = simulateTest(flexibleMill(), test, measured, options);
+  const Record soft = simulateTest(softer, test, measured, options);
+  double error = 0.0, force = 0.0, shift = 0.0, displacement = 0.0;
+  for (std::size_t i = 0; i < measured.size(); ++i) {
+    force += std::pow(measured.column("fx")[i], 2);
+    error += std::pow(measured.column("fx")[i] - same.column("fx")[i], 2);
+    displacement += std::pow(measured.column("tool_x")[i], 2);
+    shift += std::pow(measured.column("tool_x")[i] - same.column("tool_x")[i], 2);
+    ASSERT_EQ(soft.column("fx")[i], same.column("fx")[i]);
+    ASSERT_NEAR(soft.column("tool_x")[i], 2.0 * same.column("tool_x")[i], 1e-12);
+  }
+  EXPECT_LT(std::sqrt(error / force), 0.01);
+  EXPECT_LT(std::sqrt(shift / displacement), 0.01);
 }
 
 // A record out of the midst of a cut begins in the steady state: it comes again with every tooth from its

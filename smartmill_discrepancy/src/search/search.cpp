@@ -96,6 +96,7 @@ class Search {
   };
 
   void fitNominal();
+  void fitNominalHere();
   bool addEffect(std::size_t number);
   Round fitPromises(std::size_t number);
   bool worthFitting(const Round& round, const Promise& promise, double largest) const;
@@ -163,7 +164,8 @@ Fit Search::withPhasesTurned(Fit fit) {
   return fit;
 }
 
-void Search::fitNominal() {
+void Search::fitNominalHere() {
+  now_ = Fit{};
   now_.state.nominal.assign(bench_.freedom().coordinates().size(), 0.0);
   // Nominal values that are off far: tangents are taken anew where the fit went. Where records lie is told
   // from what the nominal values do to their last noise.
@@ -186,6 +188,24 @@ void Search::fitNominal() {
   options_.say("nominal model, values free within their uncertainty: " + gapText(now_.chi2));
   // The quick twin may lie far from where it was corrected: near its stability limit a tool vibrates in it
   // that is quiet in the exact one, or the reverse.
+  exact_now_ = bench_.exactSquares(now_.state);
+}
+
+// A tool with modes is guided by its displacement where that leaves less than the free simulation, which may
+// have run away; a displacement that is measured wrongly guides no better.
+void Search::fitNominal() {
+  fitNominalHere();
+  if (!bench_.canGuide() || excess(now_) < 0.02 * bench_.samples() || bench_.cancelled()) return;
+  const Fit free = now_;
+  bench_.guide(true);
+  fitNominalHere();
+  if (now_.chi2 < free.chi2) {
+    options_.say("  guided by the displacement of the tool");
+    return;
+  }
+  bench_.guide(false);
+  now_ = result_.null = free;
+  tangents_ = linearise(now_.state);
   exact_now_ = bench_.exactSquares(now_.state);
 }
 
@@ -384,7 +404,6 @@ void Search::letGo() {
 }
 
 SearchResult Search::run() {
-  bench_.guide(bench_.canGuide());
   fitNominal();
   for (std::size_t round = 0; round < options_.most_effects + repeated_ && !bench_.cancelled(); ++round) {
     if (!addEffect(round)) break;

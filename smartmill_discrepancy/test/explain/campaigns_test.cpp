@@ -125,7 +125,7 @@ void writeLess(const Campaign& full, const std::string& folder) {
     for (const std::string& name : all.names) {
       if (name == "spindle_angle") continue;
       std::vector<double>& values = record.add(name);
-      for (std::size_t i = 0; i < all.size(); i += 2) values[i / 2] = all.column(name)[i];
+      for (std::size_t i = 0; i < all.size(); i += 2) values.push_back(all.column(name)[i]);
     }
     writeCsv(record, folder + "/" + test.file);
     test.sample_rate *= 0.5;
