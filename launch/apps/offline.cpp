@@ -50,22 +50,25 @@ Agreement compareFrf(const SessionRecording& live, const fs::path& folder) {
       real.push_back(value.real());
       imag.push_back(value.imag());
     }
-    agreement.add(frf->frf.frequency, lines.column("frequency"));
+    agreement.add(frf->frf.frequency, lines.column("frequency_hz"));
     agreement.add(real, lines.column("real"));
     agreement.add(imag, lines.column("imag"));
     agreement.add(frf->frf.coherence, lines.column("coherence"));
-    const NumberTable table = readNumberTable(folder / ("modes_" + std::string(direction) + ".csv"));
-    std::vector<double> frequency, frequency_std, damping, stiffness;
+    const std::string file = (folder / ("modes_" + std::string(direction) + ".yaml")).string();
+    std::vector<double> frequency, damping, stiffness, found_frequency, found_damping, found_stiffness;
     for (const Mode& mode : modes->model.modes) {
       frequency.push_back(mode.frequency);
-      frequency_std.push_back(mode.frequency_std);
       damping.push_back(mode.damping_ratio);
       stiffness.push_back(stiffnessOf(mode).first / units::N_PER_UM);
     }
-    agreement.add(frequency, table.column("frequency"));
-    agreement.add(frequency_std, table.column("frequency_std"));
-    agreement.add(damping, table.column("damping_ratio"));
-    agreement.add(stiffness, table.column("stiffness"));
+    for (const StrictYaml& mode : StrictYaml::fromFile(file).maps("modes")) {
+      found_frequency.push_back(mode.number("frequency_hz"));
+      found_damping.push_back(mode.number("damping_ratio"));
+      found_stiffness.push_back(mode.number("stiffness_n_per_um"));
+    }
+    agreement.add(frequency, found_frequency);
+    agreement.add(damping, found_damping);
+    agreement.add(stiffness, found_stiffness);
   }
   return agreement;
 }

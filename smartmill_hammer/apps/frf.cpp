@@ -5,8 +5,8 @@
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
+#include <iterator>
 #include <map>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,6 +14,8 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/program.h"
 #include "smartmill_core/units.h"
+#include "smartmill_hammer/analysis/frf_files.h"
+#include "smartmill_hammer/analysis/frf_pictures.h"
 #include "smartmill_hammer/analysis/tap_records.h"
 #include "smartmill_ros/parameter_options.h"
 
@@ -21,134 +23,149 @@ namespace smartmill {
 namespace hammer {
 namespace {
 
+/// FRFs drawn of many.
+constexpr std::size_t MOST_PICTURES = 12;
+
 struct Options {
   std::vector<std::string> inputs;
-  std::string out = "frf", format = "auto", model;
+  std::string out = "frf", format = "auto", model, average = "h1";
   NodeParameters parameters;
-  double low = 500.0, high = 3500.0, peak_share = 0.02;
-  int modes = 0, max_modes = 8, max_peaks = 20;
-  bool mass_line = false, no_picture = false;
+  ChannelNames channels;
+  double low = 0.0, high = 0.0, weak_force = 0.0;
+  int modes = 0, max_modes = 100;
+  bool real_modes = false, binary = false, no_picture = false;
 };
 
-const std::map<std::string, TapFormat> FORMATS = {{"auto", TapFormat::automatic},
-                                                  {"bag", TapFormat::bag},
-                                                  {"csv", TapFormat::csv},
-                                                  {"text", TapFormat::text},
-                                                  {"frf", TapFormat::frf}};
+const std::map<std::string, TapFormat> FORMATS = {
+    {"auto", TapFormat::automatic}, {"bag", TapFormat::bag}, {"csv", TapFormat::csv},
+    {"text", TapFormat::text},      {"frf", TapFormat::frf}, {"dynoware", TapFormat::dynoware},
+    {"uff", TapFormat::uff}};
+const std::map<std::string, FrfAverage> AVERAGES = {
+    {"h1", FrfAverage::h1}, {"h2", FrfAverage::h2}, {"hv", FrfAverage::hv}};
 
-/// A row's plus-minus, where it is known.
+/// A row's plus-minus.
 std::string pm(const char* format, double value, double std) {
   char text[80];
   std::snprintf(text, sizeof text, format, value, std);
   return text;
 }
 
-void printModes(const std::vector<ModeReading>& rows) {
-  std::printf("  %-22s %-22s %-24s %s\n", "frequency [Hz]", "damping ratio [%]", "stiffness [N/um]",
-              "Im receptance [um/N]");
-  for (const ModeReading& row : rows) {
-    const Mode& m = row.mode;
-    const double stiffness = 1.0 / m.gain / units::N_PER_UM;
-    std::printf("  %-22s %-22s %-24s %.4f\n", pm("%.2f +- %.2f", m.frequency, m.frequency_std).c_str(),
-                pm("%.3f +- %.3f", 100.0 * m.damping_ratio, 100.0 * m.damping_ratio_std).c_str(),
-                pm("%.3f +- %.3f", stiffness, std::abs(stiffness * m.gain_std / m.gain)).c_str(),
-                row.receptance.imag() / units::UM);
+void printModes(const std::vector<EstimatedMode>& modes, bool receptance) {
+  std::printf("  %-24s %-24s %-26s %s\n", "frequency [Hz]", "damping ratio [%]",
+              receptance ? "stiffness [N/um]" : "gain [1]", "phase [deg]  evidence");
+  for (const EstimatedMode& m : modes) {
+    const Gain gain = gainOf(m, 0);
+    const double shown = receptance ? 1.0 / gain.value / units::N_PER_UM : gain.value;
+    std::printf("  %-24s %-24s %-26s %8.1f  %10.1f\n",
+                pm("%.3f +- %.3f", m.frequency, m.frequency_std).c_str(),
+                pm("%.4f +- %.4f", 100.0 * m.damping_ratio, 100.0 * m.damping_ratio_std).c_str(),
+                pm("%.4g +- %.2g", shown, std::abs(shown * gain.std / gain.value)).c_str(),
+                units::degFromRad(gain.phase), m.evidence);
   }
 }
 
-void write(const Options& options, const std::string& suffix, const std::string& title,
-           const FrequencyResponse& receptance, const ModalModel& model, double low, double high) {
+void printEstimate(const ModalEstimate& estimate, bool receptance) {
+  if (estimate.conjugated) std::printf("phase rises through the resonances: turned before the fit\n");
+  std::printf("%zu modes proven\n", estimate.modes.size());
+  printModes(estimate.modes, receptance);
+  if (estimate.doubts.empty()) return;
+  std::printf("doubts, seen but not proven:\n");
+  printModes(estimate.doubts, receptance);
+}
+
+/// @param suffix of a measurement among several
+void write(const Options& options, const std::string& suffix, const std::vector<NamedFrf>& frfs,
+           const ModalEstimate& estimate) {
   std::filesystem::create_directories(options.out);
-  const std::string stem = options.out + "/frf" + suffix;
-  writeFrfCsv(receptance, model, stem + ".csv");
-  writeModesCsv(model, options.out + "/modes" + suffix + ".csv");
-  std::printf("  written: %s.csv, %s/modes%s.csv", stem.c_str(), options.out.c_str(), suffix.c_str());
-  if (!options.no_picture) {
-    const bool coherent = receptance.averages > 1 && !receptance.coherence.empty();
-    plotFrf(stem + ".csv", stem + ".png", title, low, high, coherent);
-    std::printf(", %s.png", stem.c_str());
+  const std::string folder = options.out + "/";
+  std::vector<std::string> names;
+  for (std::size_t o = 0; o < frfs.size(); ++o) {
+    const std::string stem = folder + "frf" + suffix + (o > 0 ? "_" + std::to_string(o + 1) : "");
+    writeFrfCsv(frfs[o].frf, stem + ".csv");
+    writeCutPro(frfs[o].frf, stem + ".frf");
+    if (!options.no_picture && o < MOST_PICTURES)
+      drawFrf(frfs[o].frf, estimate, o, frfs[o].name, stem + ".png");
+    names.push_back(frfs[o].name);
   }
-  std::printf("\n");
+  writeFrfUff(frfs, folder + "frf" + suffix + ".uff", options.binary);
+  writeModesYaml(estimate, frfs.front().frf.unit, names, folder + "modes" + suffix + ".yaml");
+  if (!options.no_picture && !estimate.diagram.empty())
+    drawStabilization(frfs, estimate, folder + "stabilization" + suffix + ".png");
+  std::printf("written: %sfrf%s.csv, .frf, .uff, modes%s.yaml\n", folder.c_str(), suffix.c_str(),
+              suffix.c_str());
 }
 
-/// What the files hold: the receptance, and the response in which peaks are read.
-struct Response {
-  FrequencyResponse receptance, peaks_of;
-  std::string title;
-};
-
-Response readResponse(const Options& options, TapFormat format) {
-  if (format == TapFormat::frf) {
-    if (options.inputs.size() != 1) throw Error(options.inputs[1] + ": one FRF file at a time");
-    const FrequencyResponse read = readFrfText(options.inputs[0]);
-    return {read, read, std::filesystem::path(options.inputs[0]).filename().string()};
-  }
+/// Hits become one FRF; FRFs stay as they are.
+std::vector<NamedFrf> readFrfs(const Options& options, const std::vector<TapFormat>& formats) {
   std::vector<TapRecord> taps;
-  for (const std::string& file : options.inputs) {
-    std::cerr << "reading " << file << "\n";
-    taps.push_back(format == TapFormat::csv ? readTapCsv(file) : readTapText(file));
+  std::vector<NamedFrf> frfs;
+  for (std::size_t i = 0; i < options.inputs.size(); ++i) {
+    std::cerr << "reading " << options.inputs[i] << "\n";
+    TapFile file = readTapFile(options.inputs[i], formats[i], options.channels);
+    std::move(file.taps.begin(), file.taps.end(), std::back_inserter(taps));
+    std::move(file.frfs.begin(), file.frfs.end(), std::back_inserter(frfs));
   }
-  const HammerParameters& parameters = options.parameters.measurement;
-  const TapFrf frf = averageTaps(taps, {parameters.weak_force, parameters.second_hit_share, 0.0},
-                                 parameters.exponential_time);
-  for (const std::string& note : frf.notes) std::cerr << "frf: " << note << "\n";
-  const int hits = frf.receptance.averages;
-  return {frf.receptance, frf.measured, std::to_string(hits) + (hits == 1 ? " hit" : " hits")};
+  if (!taps.empty() && !frfs.empty()) throw Error(frfs.front().name + ": an FRF among hits over time");
+  std::filesystem::create_directories(options.out);
+  std::vector<TapVerdict> verdicts;
+  for (const NamedFrf& frf : frfs) verdicts.push_back({frf.name, ""});
+  if (!taps.empty()) {
+    const HammerParameters& p = options.parameters.measurement;
+    const TapFrfOptions average{{options.weak_force, p.second_hit_share, 0.0, options.high},
+                                p.exponential_time,
+                                AVERAGES.at(options.average)};
+    const TapFrf frf = averageTaps(taps, average);
+    verdicts = frf.hits;
+    for (const TapVerdict& v : verdicts)
+      std::printf("%s: %s\n", v.file.c_str(), v.accepted() ? "accepted" : ("refused: " + v.reason).c_str());
+    const int hits = frf.receptance.averages;
+    if (hits > 0) frfs.push_back({std::to_string(hits) + (hits == 1 ? " hit" : " hits"), frf.receptance});
+    if (!options.no_picture) drawHits(taps, verdicts, options.out + "/hits.png");
+  }
+  writeHitsCsv(verdicts, options.out + "/hits.csv");
+  if (frfs.empty()) throw Error("no hit is left; " + verdicts.back().file + ": " + verdicts.back().reason);
+  return frfs;
 }
 
-void printPeaks(const Options& options, const FrequencyResponse& response) {
-  std::printf("peaks of %s, %g..%g Hz (prominence above %g of the largest):\n",
-              response.unit == "m/N" ? "the receptance" : "the accelerance", options.low, options.high,
-              options.peak_share);
-  std::vector<double> peaks =
-      findPeaks(response, options.low, options.high, options.peak_share);  // strongest first
-  if (peaks.size() > static_cast<std::size_t>(options.max_peaks))
-    peaks.resize(static_cast<std::size_t>(options.max_peaks));
-  std::sort(peaks.begin(), peaks.end());
-  for (const double f : peaks) {
-    std::printf("  %9.2f Hz  |H| %11.5g %s\n", f, std::abs(response.at(f)), response.unit.c_str());
-  }
+/// So many modes, those with the most evidence, whether proven or not.
+void keep(ModalEstimate& estimate, std::size_t count) {
+  std::vector<EstimatedMode> all = estimate.modes;
+  all.insert(all.end(), estimate.doubts.begin(), estimate.doubts.end());
+  std::sort(all.begin(), all.end(),
+            [](const EstimatedMode& a, const EstimatedMode& b) { return a.evidence > b.evidence; });
+  const auto end = all.begin() + static_cast<std::ptrdiff_t>(std::min(count, all.size()));
+  estimate.modes.assign(all.begin(), end);
+  estimate.doubts.assign(end, all.end());
+  std::sort(estimate.modes.begin(), estimate.modes.end(),
+            [](const EstimatedMode& a, const EstimatedMode& b) { return a.frequency < b.frequency; });
 }
 
-// All modes at once, without the damping of the exponential window.
-ModalFit fitTogether(const Options& options, const FrequencyResponse& receptance) {
-  ModalFitOptions fit_options;
-  fit_options.low = options.low;
-  fit_options.high = options.high;
-  fit_options.modes = options.modes;
-  fit_options.max_modes = options.max_modes;
-  fit_options.fit_mass_line = options.mass_line;
-  fit_options.positive_gains = looksDirect(receptance, options.low, options.high);
-  ModalFit fit = fitModes(receptance, fit_options);
-  if (options.parameters.measurement.exponential_time > 0.0) {
-    ImpactOptions window;
-    window.exponential_time = options.parameters.measurement.exponential_time;
-    ImpactAnalysis(window).removeWindowDamping(fit.model);
+void runFiles(const Options& options, const std::vector<TapFormat>& formats) {
+  const std::vector<NamedFrf> frfs = readFrfs(options, formats);
+  const bool receptance = frfs.front().frf.unit == "m/N";
+  std::vector<FrequencyResponse> all;
+  for (const NamedFrf& frf : frfs) all.push_back(frf.frf);
+  ModalEstimateOptions search;
+  search.low = options.low;
+  search.high = options.high;
+  search.max_modes = options.max_modes;
+  search.real_modes = options.real_modes;
+  int told = -1;
+  search.progress = [&told](double share) {
+    const int percent = static_cast<int>(10.0 * share) * 10;
+    if (percent > told) std::cerr << "modes: " << (told = percent) << " %\n";
+    return true;
+  };
+  ModalEstimate estimate = estimateModes(all, search);
+  if (options.modes > 0) keep(estimate, static_cast<std::size_t>(options.modes));
+  const double window = options.parameters.measurement.exponential_time;
+  for (std::vector<EstimatedMode>* modes : {&estimate.modes, &estimate.doubts}) {
+    // The exponential window's own damping.
+    for (EstimatedMode& m : *modes)
+      m.damping_ratio -= window > 0.0 ? 1.0 / (window * units::TWO_PI * m.frequency) : 0.0;
   }
-  std::printf("modes fitted together (%serror of the fit %.1f %% of the receptance in the band):\n",
-              fit_options.positive_gains ? "direct point, gains kept positive; " : "",
-              100.0 * fit.relative_error);
-  return fit;
-}
-
-void runTaps(const Options& options, TapFormat format) {
-  const Response response = readResponse(options, format);
-  const FrequencyResponse& receptance = response.receptance;
-  std::printf("%s\n", response.title.c_str());
-  printPeaks(options, response.peaks_of);
-  std::cerr << "fitting modes\n";
-  std::printf(
-      "modes at the peaks of |Im| of the receptance, each fitted alone above its half-power height:\n");
-  const std::vector<ModeReading> peak_modes = peakModes(
-      receptance, options.low, options.high, options.peak_share, static_cast<std::size_t>(options.max_peaks));
-  printModes(peak_modes);
-  const ModalFit fit = fitTogether(options, receptance);
-  printModes(readModes(fit.model, receptance));
-  write(options, "", response.title, receptance, fit.model, options.low, options.high);
-  ModalModel alone;
-  for (const ModeReading& row : peak_modes) alone.modes.push_back(row.mode);
-  writeModesCsv(alone, options.out + "/peak_modes.csv");
-  std::printf("           %s/peak_modes.csv (modes fitted alone)\n", options.out.c_str());
+  printEstimate(estimate, receptance);
+  write(options, "", frfs, estimate);
 }
 
 void runBag(const Options& options) {
@@ -158,38 +175,43 @@ void runBag(const Options& options) {
       replayBag(options.inputs[0], options.model, options.parameters);
   if (results.empty()) throw Error(options.inputs[0] + ": holds no goal of hammer/measure_frf");
   int good = 0;
+  std::vector<TapVerdict> verdicts;
   for (const MeasureFrfResult& result : results) {
     std::printf("%s %s: %s\n", result.frf.tool.c_str(), result.frf.direction.c_str(), result.message.c_str());
-    if (result.code != FrfCode::ok) continue;
-    ++good;
+    const bool ok = result.code == FrfCode::ok;
+    verdicts.push_back({options.inputs[0] + ":" + result.frf.direction, ok ? "" : result.message});
+    if (!ok) continue;
     std::printf("  sensitivity %.4f +- %.4f um/V, flute at the hammer %.2f deg\n",
                 result.sensitivity / units::UM, result.sensitivity_std / units::UM,
                 units::degFromRad(result.flute_hammer));
-    printModes(readModes(result.modes.model, result.frf.frf));
-    write(options, "_" + result.frf.direction,
-          "tool tip " + result.frf.direction + ", " + std::to_string(result.frf.frf.averages) + " hits",
-          result.frf.frf, result.modes.model, options.parameters.measurement.fit_low,
-          options.parameters.measurement.fit_high);
+    const ModalEstimate estimate = estimateOf(result.modes.model);
+    printModes(estimate.modes, true);
+    const NamedFrf frf{
+        "tool tip " + result.frf.direction + ", " + std::to_string(result.frf.frf.averages) + " hits",
+        result.frf.frf};
+    write(options, "_" + result.frf.direction, {frf}, estimate);
+    if (++good == 1) write(options, "", {frf}, estimate);
   }
+  std::filesystem::create_directories(options.out);
+  writeHitsCsv(verdicts, options.out + "/hits.csv");
   if (good == 0)
     throw Error(options.inputs[0] + ": no measurement came to its end; the last: " + results.back().message);
 }
 
 void run(const Options& options) {
-  TapFormat format = FORMATS.at(options.format);
-  if (format == TapFormat::automatic) {
-    format = detectFormat(options.inputs.front());
-    for (const std::string& file : options.inputs) {
-      if (detectFormat(file) != format)
-        throw Error(file + ": another kind of file than " + options.inputs.front());
-    }
+  std::vector<TapFormat> formats;
+  for (const std::string& file : options.inputs) {
+    const TapFormat given = FORMATS.at(options.format);
+    formats.push_back(given == TapFormat::automatic ? detectFormat(file) : given);
+    if ((formats.back() == TapFormat::bag) != (formats.front() == TapFormat::bag))
+      throw Error(file + ": another kind of file than " + options.inputs.front());
   }
-  if (!(options.high > options.low))
+  if (options.high > 0.0 && !(options.high > options.low))
     throw Error("--high: " + std::to_string(options.high) + " is not above --low");
-  if (format == TapFormat::bag) {
+  if (formats.front() == TapFormat::bag) {
     runBag(options);
   } else {
-    runTaps(options, format);
+    runFiles(options, formats);
   }
 }
 
@@ -201,29 +223,35 @@ int main(int argc, char** argv) {
   using smartmill::hammer::FORMATS;
   smartmill::hammer::Options o;
   smartmill::CommandLine line(
-      "Frequency response and modes from hammer tests: a recorded session (bag), hammer records of one point "
-      "(CSV with "
-      "time[s],hammer[N],acceleration[m/s2] or displacement[m]; or three columns without header), or a "
-      "measured receptance "
-      "(three columns Hz, Re, Im in m/N).");
-  line.option("input", o.inputs, "files; several hammer records are averaged as hits of one point")
+      "Frequency response and modes from hammer tests: hits of one point (CSV with time[s],hammer[N] and "
+      "acceleration[m/s2], "
+      "displacement[m] or a force; DynoWare; universal file 58; three columns without header), measured FRFs "
+      "(universal file 58, "
+      "frf.csv, three columns Hz, Re, Im), fitted together with common poles, or a recorded session (bag).");
+  line.option("input", o.inputs,
+              "files; hammer records are averaged as hits of one point, FRFs are fitted together")
       .required();
-  line.option("-o,--out", o.out, "folder for frf.csv, modes.csv and frf.png").showDefault();
-  line.option("--format", o.format, "auto (by content), bag, csv, text or frf")
-      .oneOf({"auto", "bag", "csv", "text", "frf"})
+  line.option("-o,--out", o.out, "folder for frf.csv, frf.frf, frf.uff, modes.yaml, hits.csv and pictures")
       .showDefault();
-  line.option("--low", o.low, "fit from here [Hz] (bags: fit_low of --params)").showDefault();
-  line.option("--high", o.high, "to here [Hz]").showDefault();
-  line.option("--modes", o.modes, "modes to fit; 0: as many as the data prove").within(0, 20);
-  line.option("--max-modes", o.max_modes, "at most, when the data decide").within(1, 20).showDefault();
-  line.flag("--mass-line", o.mass_line, "free structure: fit a rigid-body mass line too");
-  line.option("--peak-share", o.peak_share, "least prominence of a listed peak, of the largest")
+  line.option("--format", o.format, "auto (by content), bag, csv, dynoware, frf, text or uff")
+      .oneOf({"auto", "bag", "csv", "dynoware", "frf", "text", "uff"})
       .showDefault();
-  line.option("--max-peaks", o.max_peaks, "strongest peaks kept").within(1, 1000).showDefault();
+  line.option("--low", o.low, "modes from here [Hz] (bags: fit_low of --params)").notNegative();
+  line.option("--high", o.high, "to here [Hz], up to where hits must have force; 0: the whole record")
+      .notNegative();
+  line.option("--modes", o.modes, "so many, those with the most evidence; 0: as many as are proven")
+      .within(0, 200);
+  line.option("--max-modes", o.max_modes, "at most, when the data decide").within(1, 200).showDefault();
+  line.flag("--real-modes", o.real_modes, "proportional damping: gains without phase");
+  line.option("--average", o.average, "of hits: h1, h2 or hv").oneOf({"h1", "h2", "hv"}).showDefault();
+  line.option("--weak-force", o.weak_force, "[N] a lower peak is no hit; 0: told by the noise").notNegative();
+  line.option("--force-channel", o.channels.force,
+              "column or channel of the hammer, where it is not named so");
+  line.option("--response-channel", o.channels.response, "column or channel of the response");
+  line.flag("--binary", o.binary, "frf.uff with binary values (58b)");
   line.option("--model", o.model, "machine model (bags)");
   const smartmill::ParameterTable table = smartmill::tableOf(o.parameters);
   smartmill::ParameterOptions parameters(line, table, "launch/config/hammer.yaml");
-  parameters.add("--weak-force", "weak_force");
   parameters.add("--second-hit-share", "second_hit_share");
   parameters.add("--exponential-time", "exponential_time");
   line.flag("--no-picture", o.no_picture, "no PNG");

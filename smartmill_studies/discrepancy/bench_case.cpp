@@ -78,10 +78,16 @@ Explanation look(const std::string& folder, const std::function<void(const std::
   return e;
 }
 
+bool isEmpirical(const FoundEffect& f) {
+  return findEffect(f.name)->empirical();
+}
+
 bool isRight(const plant::Case& hidden, const Explanation& e) {
   if (hidden.kind == "none") return e.effects.empty();
   // Of a cause without a name none is right; something must be left to be told.
-  if (hidden.kind == "outside") return e.effects.empty() && e.verdict == Verdict::unknown_effect;
+  if (hidden.kind == "outside")
+    return std::all_of(e.effects.begin(), e.effects.end(), isEmpirical) &&
+           e.verdict == Verdict::unknown_effect;
   const auto found = [&](const std::string& name) {
     return std::any_of(e.effects.begin(), e.effects.end(),
                        [&](const FoundEffect& f) { return standsFor(e, f.name, name); });
@@ -107,6 +113,11 @@ void score(const plant::Case& hidden, const plant::Drawn& drawn, const Explanati
   bool false_effect = false;
   std::vector<double> all;
   for (const FoundEffect& f : e.effects) {
+    if (isEmpirical(f)) {
+      out["empirical"].push_back(f.name.substr(f.name.find(':') + 1));
+      false_effect = false_effect || hidden.kind == "none";
+      continue;
+    }
     const bool right = hidden.kind != "outside" && isHidden(hidden, e, f.name);
     false_effect = false_effect || !right;
     out["named"].push_back({{"name", f.name}, {"confidence", f.confidence}, {"right", right}});
@@ -122,6 +133,7 @@ void score(const plant::Case& hidden, const plant::Drawn& drawn, const Explanati
   out["largest_z"] = all.empty() ? 0.0 : *std::max_element(all.begin(), all.end());
   out["gap_before"] = e.before.fit;
   out["gap_after"] = e.after.fit;
+  out["heldout_before"] = (e.named_only ? *e.named_only : e.after).heldout;
   out["heldout_after"] = e.after.heldout;
   out["seconds"] = e.seconds;
 }
@@ -132,8 +144,8 @@ json runBenchCase(const plant::Case& hidden, int number, const std::string& fold
                   const std::function<void(const std::string&)>& progress) {
   json line{{"case", number},         {"kind", hidden.kind},
             {"hidden", hidden.names}, {"vibrating", hidden.vibrating},
-            {"named", json::array()}, {"right", false},
-            {"false_effect", false}};
+            {"named", json::array()}, {"empirical", json::array()},
+            {"right", false},         {"false_effect", false}};
   const plant::Drawn drawn = plant::draw(hidden);
   const std::vector<Record> records = plant::runCampaign(drawn, hidden);
   plant::writeCampaignOf(drawn, records, folder);

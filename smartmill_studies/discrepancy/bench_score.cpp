@@ -38,12 +38,19 @@ bool hidesNames(const json& line) {
 
 void printShares(const std::vector<json>& lines) {
   std::map<std::string, Share> kinds;
-  Share low_gap;
+  Share low_gap, halved, halved_above_floor;
   int false_effects = 0, parameters = 0, inside = 0;
   for (const json& line : lines) {
     const std::string kind = line["kind"];
     kinds[kind + (line["vibrating"] ? ", vibrating" : ", rigid")].add(line["right"]);
     kinds[kind].add(line["right"]);
+    if (line["kind"] == "outside" && line.contains("heldout_before")) {
+      // What repeats of a gap is what stands above that of two runs of the plant.
+      const double before = line["heldout_before"], after = line["heldout_after"], floor = line["floor"];
+      halved.add(after <= 0.5 * before);
+      if (before > floor)
+        halved_above_floor.add(after * after - floor * floor <= 0.25 * (before * before - floor * floor));
+    }
     if (!hidesNames(line)) false_effects += line["false_effect"].get<bool>();
     if (!hidesNames(line) || !line["right"]) continue;
     low_gap.add(line["heldout_after"] <= 1.1 * line["floor"].get<double>());
@@ -53,6 +60,11 @@ void printShares(const std::vector<json>& lines) {
   for (const auto& [kind, share] : kinds)
     std::printf("%s: %d of %d right\n", kind.c_str(), share.right, share.all);
   std::printf("named where no effect of the catalogue was hidden: %d\n", false_effects);
+  if (halved.all > 0)
+    std::printf(
+        "causes outside the catalogue: held-out gap halved in %d of %d; what of it stands above the "
+        "plant's floor, where any does, in %d of %d\n",
+        halved.right, halved.all, halved_above_floor.right, halved_above_floor.all);
   if (low_gap.all > 0)
     std::printf("held-out gap at most 1.1 of the plant's floor: %d of %d named cases\n", low_gap.right,
                 low_gap.all);

@@ -90,6 +90,25 @@ Lines linesOf(const Dataset& data, const TestData& t, const Record& model, std::
   return lines;
 }
 
+double firstAngle(const TestData& t) {
+  return t.record.column("spindle_angle").front();
+}
+
+double halfSpan(const TestData& t) {
+  return 0.5 * static_cast<double>(t.record.size()) / t.test.sample_rate;
+}
+
+// Squares over noise that a simulation leaves of a record's forces.
+double squaresLeft(const Dataset& data, const TestData& t, const Record& simulated) {
+  double squares = 0.0;
+  for (const std::string& channel : FORCES) {
+    if (!t.record.has(channel) || data.noise.count(channel) == 0) continue;
+    const std::vector<double>&a = t.record.column(channel), &b = simulated.column(channel);
+    for (std::size_t i = 0; i < a.size(); ++i) squares += std::pow((a[i] - b[i]) / data.noise.at(channel), 2);
+  }
+  return squares;
+}
+
 }  // namespace
 
 double refinedSpeed(const TestData& test, int teeth, double share) {
@@ -217,6 +236,41 @@ std::vector<std::string> estimatePhases(Dataset& data) {
   return notes;
 }
 
+std::vector<TurnFreedom> turnFreedoms(const TestData& test) {
+  // Programs and machines let the force come on at once or over some part of a sample.
+  constexpr double ENTRY_STD = 0.1, ENTRY_STEP = 0.02;  // [samples]
+  constexpr double ANGLE_STD = 1.0, ANGLE_STEP = 1e-4;  // [rad]
+  std::vector<TurnFreedom> free;
+  if (test.phase_estimated) {
+    free.push_back({&Turn::middle, ANGLE_STD, ANGLE_STEP});
+    free.push_back({&Turn::end, ANGLE_STD, ANGLE_STEP});
+  }
+  if (test.test.kind == TestKind::cut && test.test.engage_time && !test.test.running_before)
+    free.push_back({&Turn::entry, ENTRY_STD, ENTRY_STEP});
+  return free;
+}
+
+Turn turnBetween(const TestData& before, const TestData& now) {
+  const double end = (now.test.spindle_speed - before.test.spindle_speed) * halfSpan(now);
+  return {std::remainder(firstAngle(now) - firstAngle(before) + end, TWO_PI), end,
+          now.early_entry - before.early_entry};
+}
+
+double turnedPhase(double phase, const Turn& by) {
+  return phase + by.middle - by.end;
+}
+
+double turnedSpeed(const TestData& test, double speed, const Turn& by) {
+  return speed + by.end / halfSpan(test);
+}
+
+void turnRecord(TestData& t, const Turn& by) {
+  t.early_entry += by.entry;
+  if (by.middle == 0.0 && by.end == 0.0) return;
+  t.test.spindle_speed = turnedSpeed(t, t.test.spindle_speed, by);
+  setAngle(t, turnedPhase(firstAngle(t), by));
+}
+
 double turnPhases(Dataset& data, const MachineModel& model) {
   constexpr double LEAST_GAIN = 25.0;   // of squares over noise: less tells no phase
   constexpr double LEAST_SHOWN = 0.05;  // squares of the lines beside those of the tooth passing
@@ -227,6 +281,7 @@ double turnPhases(Dataset& data, const MachineModel& model) {
     sim::SimulationOptions options;
     options.noise = false;
     options.substeps = 2;
+    options.early_entry = t.early_entry;
     const Record simulated = sim::simulateTest(model, t.test, t.record, options);
     const std::size_t from = beginOf(t), end = t.record.size();
     const auto linesBetween = [&](std::size_t first, std::size_t last) {
@@ -260,8 +315,14 @@ double turnPhases(Dataset& data, const MachineModel& model) {
     const double rate = (late - early) / (0.5 * span);  // [rad/s]
     const double at_start = turn - rate * (0.5 * span + static_cast<double>(from) / t.test.sample_rate);
     const double phase = t.record.column("spindle_angle").front() + at_start;
+    const TestData before = t;
     t.test.spindle_speed += rate;
     setAngle(t, phase);
+    const Record turned = sim::simulateTest(model, t.test, t.record, options);
+    if (!(squaresLeft(data, t, turned) < squaresLeft(data, t, simulated))) {
+      t = before;
+      continue;
+    }
     largest =
         std::max({largest, std::abs(std::remainder(early, TWO_PI)), std::abs(std::remainder(late, TWO_PI))});
   }

@@ -12,6 +12,7 @@ namespace {
 // Sums over the cuts of one channel.
 struct Sums {
   double squares = 0.0, before = 0.0, after = 0.0;     // about the mean; what the models leave
+  double heldout_squares = 0.0, heldout_after = 0.0;   // of these, in held-out tests
   double periodic_squares = 0.0, floor_squares = 0.0;  // of the steady parts
   double steady = 0.0;                                 // [samples] of them
   double noise = 0.0;                                  // [unit of the channel]
@@ -59,14 +60,19 @@ void add(const TwinRunner& runner, const std::vector<double>& before, const std:
 void addChannelShares(const Workbench& bench, const Remains& before, const Remains& after,
                       Explanation* explanation) {
   std::map<std::string, Sums> sums;
-  add(bench.fitted(), before.fit, after.fit, &sums);
   add(bench.heldout(), before.heldout, after.heldout, &sums);
+  for (auto& [channel, s] : sums) {
+    s.heldout_squares = s.squares;
+    s.heldout_after = s.after;
+  }
+  add(bench.fitted(), before.fit, after.fit, &sums);
   for (const auto& [channel, s] : sums) {
     if (s.squares <= 0.0) continue;
     ChannelShare share;
     share.channel = channel;
     share.explained_before = 1.0 - s.before / s.squares;
     share.explained_after = 1.0 - s.after / s.squares;
+    if (s.heldout_squares > 0.0) share.explained_heldout = 1.0 - s.heldout_after / s.heldout_squares;
     if (s.steady > 0.0) {
       const double floor = std::sqrt(s.floor_squares / s.steady);
       share.repeats = 1.0 - s.floor_squares / s.periodic_squares;

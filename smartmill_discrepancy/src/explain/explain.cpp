@@ -8,7 +8,9 @@
 #include "smartmill_discrepancy/data/labels.h"
 #include "smartmill_discrepancy/explain/challenge.h"
 #include "smartmill_discrepancy/explain/judge.h"
+#include "smartmill_discrepancy/explain/nameless.h"
 #include "smartmill_discrepancy/explain/outcome.h"
+#include "smartmill_discrepancy/explain/sentence.h"
 #include "smartmill_discrepancy/results/formatted.h"
 #include "smartmill_sim/twin/twin.h"
 
@@ -55,6 +57,29 @@ void addChatter(const Dataset& data, Explanation* result) {
   }
 }
 
+// Names that a cause without a name has made needless.
+void tellFallen(const FitState& named, const FitState& now, std::vector<Resemblance>* resembles) {
+  for (const Member& m : named.members) {
+    if (std::none_of(now.members.begin(), now.members.end(),
+                     [&](const Member& other) { return other.hypothesis == m.hypothesis; }))
+      resembles->push_back({m.hypothesis->effect, m.hypothesis->variant,
+                            "nearest shape in the catalogue, but one without a name explains more"});
+  }
+}
+
+// What makes the model worse than the nominal one explains nothing.
+void withdraw(const SearchResult& found, Explanation* result) {
+  for (std::size_t m = 0; m < result->effects.size(); ++m) {
+    const Hypothesis& hypothesis = *found.best.state.members[m].hypothesis;
+    result->resembles.push_back(
+        {hypothesis.effect, hypothesis.variant,
+         "nearest shape in the catalogue, but the model with it is worse than the nominal one"});
+  }
+  result->effects.clear();
+  result->not_separable.clear();
+  result->suggested_test.reset();
+}
+
 }  // namespace
 
 Explanation explain(const Dataset& data, const ExplainOptions& options, const std::string& folder) {
@@ -76,17 +101,32 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
   if (!labels.doubtful.empty()) searched.most_effects = std::min<std::size_t>(searched.most_effects, 2);
   const std::vector<Hypothesis> hypotheses = catalogueHypotheses(data, &result.notes);
   SearchResult found = search(bench, hypotheses, searched);
-  for (const Rung& r : found.ladder) result.ladder.push_back(r.tried);
 
   // What the calibration of the nominal values takes away is no disagreement of their kind.
   StructureOptions structure = options.structure;
   structure.squares_of_gap = std::max(found.null.chi2 - bench.samples(), 1.0);
   result.where = findStructure(bench.fitted(), found.null.residual, structure);
+  challenge(bench, searched, &found, &result.resembles);
   result.unexplained = findStructure(bench.fitted(), found.best.residual, structure);
-  challenge(bench, options, structure, &found, &result.unexplained);
+  Nameless nameless(bench, options, structure);
+  const FitState named = found.best.state;
+  const std::optional<FitState> named_only = nameless.extend(&found, &result.unexplained);
+  tellFallen(named, found.best.state, &result.resembles);
   result.interrupted = bench.cancelled();
+  bench.guide(false);
+  bench.turnTo(found.best.state);
 
-  const MachineModel improved = nameEffects(bench, searched, found, &result);
+  for (const Rung& r : found.ladder) result.ladder.push_back(r.tried);
+  MachineModel improved = nameEffects(bench, searched, found, &result);
+  const GapPair after = remainsOf(bench, improved).gap;
+  if (after.fit <= before.gap.fit && after.heldout <= before.gap.heldout) {
+    result.sentence = sentenceOf(result);
+    if (named_only) result.named_only = remainsOf(bench, bench.exact().model(*named_only)).gap;
+  } else {
+    improved = data.nominal;
+    withdraw(found, &result);
+    result.unexplained = findStructure(bench.fitted(), found.null.residual, structure);
+  }
   writeOutcome(bench, before, improved, folder, &result);
   addChatter(bench.data(), &result);
   result.verdict = verdictOf(result);

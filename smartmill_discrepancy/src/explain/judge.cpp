@@ -6,8 +6,8 @@
 
 #include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_core/model/effect_catalogue.h"
-#include "smartmill_discrepancy/explain/evidence_of_members.h"
 #include "smartmill_discrepancy/search/separating_test.h"
+#include "smartmill_discrepancy/search/standing.h"
 
 namespace smartmill::discrepancy {
 namespace {
@@ -79,7 +79,7 @@ void addAlternatives(const Workbench& bench, const SearchOptions& options, const
   const FitState& best = found.best.state;
   for (const Rival& rival : found.rivals) {
     if (rival.member != member) continue;
-    effect->confidence = std::min(effect->confidence, confidenceBetween(exact, best, rival.state));
+    effect->confidence = std::min(effect->confidence, standingOf(bench, best, rival.state).confidence());
     effect->alternatives.emplace_back(rival.effect, rival.delta_bic);
     // What would not be enough to name an effect is not enough to tell it from another.
     const double alike = std::min(options.least_gain, 0.5 * effect->delta_bic);
@@ -119,9 +119,8 @@ MachineModel nameEffects(const Workbench& bench, const SearchOptions& options, c
     first += own;
     writeStdDevs(entry, effect.parameters);
     effect.delta_bic = found.contribution[m];
-    effect.evenness = traceOf(bench.exact(), best, m).evenness;
-    effect.heldout_gap_reduction = heldoutReduction(bench, best.state, m);
-    effect.confidence = confidenceBetween(bench.exact(), best.state, without(best.state, m));
+    effect.heldout_gap_reduction = heldoutReduction(bench, best.state, found.lacking[m]);
+    effect.confidence = standingOf(bench, best.state, found.lacking[m]).confidence();
     addAlternatives(bench, options, found, m, &effect, result);
     result->effects.push_back(std::move(effect));
   }
@@ -129,9 +128,13 @@ MachineModel nameEffects(const Workbench& bench, const SearchOptions& options, c
 }
 
 Verdict verdictOf(const Explanation& result) {
-  if (result.effects.empty())
-    return result.unexplained.empty() ? Verdict::no_disagreement : Verdict::unknown_effect;
-  return result.unexplained.empty() ? Verdict::explained : Verdict::partly_explained;
+  const auto empirical = static_cast<std::size_t>(
+      std::count_if(result.effects.begin(), result.effects.end(),
+                    [](const FoundEffect& f) { return findEffect(f.name)->empirical(); }));
+  const bool all_known = result.unexplained.empty() && empirical == 0;
+  if (result.effects.size() == empirical)
+    return all_known ? Verdict::no_disagreement : Verdict::unknown_effect;
+  return all_known ? Verdict::explained : Verdict::partly_explained;
 }
 
 }  // namespace smartmill::discrepancy

@@ -34,11 +34,33 @@ CampaignCost::CampaignCost(const Fitter& fitter, const FitState& start, const No
   for (const Member& m : start.members)
     coordinates_.insert(coordinates_.end(), m.hypothesis->coordinates.begin(),
                         m.hypothesis->coordinates.end());
+  const bool nominal_frozen = frozen_ && !frozen_->at.empty();
+  if (nominal_frozen && !options.nominal_free)
+    throw Error("fit: tangents of nominal values that are not free");
+  if (frozen_) addTurns();
+  const std::size_t own_begin = nominal_frozen ? nominal_ : 0;
+  for (std::size_t c = 0; c < coordinates_.size(); ++c)
+    (c < own_begin || c >= turnsBegin() ? frozen_places_ : own_places_).push_back(static_cast<Index>(c));
+}
+
+// No further from where the tangents were taken than they are worth something.
+void CampaignCost::addTurns() {
+  constexpr double REACH = 0.05;  // [rad]
+  turns_ = frozen_->turns.size();
+  start_.turns.resize(turns_, 0.0);
+  for (std::size_t k = 0; k < turns_; ++k) {
+    const TurnFreedom& free = fitter_.turns()[k].freedom;
+    const bool entry = free.value == &Turn::entry;
+    const double at = frozen_->turns[k], reach = entry ? 1.0 : REACH;
+    start_.turns[k] = std::clamp(start_.turns[k], at - reach, at + reach);
+    coordinates_.push_back({"turn", entry ? 0.0 : at, at - reach, at + reach, 0.0, free.prior_std});
+  }
 }
 
 std::vector<fit::Parameter> CampaignCost::parameters() const {
   Values start(start_.nominal.begin(), start_.nominal.begin() + static_cast<std::ptrdiff_t>(nominal_));
   for (const Member& m : start_.members) start.insert(start.end(), m.values.begin(), m.values.end());
+  if (turns_ > 0) start.insert(start.end(), start_.turns.begin(), start_.turns.end());
   std::vector<fit::Parameter> parameters;
   for (std::size_t c = 0; c < start.size(); ++c)
     parameters.push_back({start[c], coordinates_[c].low, coordinates_[c].high, 1.0});
@@ -53,12 +75,13 @@ FitState CampaignCost::stateAt(const VectorXd& at) const {
     std::copy(next, next + m.values.size(), m.values.begin());
     next += m.values.size();
   }
+  std::copy(next, next + turns_, state.turns.begin());
   return state;
 }
 
 MachineModel CampaignCost::modelAt(const VectorXd& at) const {
   FitState state = stateAt(at);
-  if (frozen_) state.nominal = frozen_->at;
+  if (frozen_ && !frozen_->at.empty()) state.nominal = frozen_->at;
   return fitter_.model(state);
 }
 
@@ -67,75 +90,92 @@ double CampaignCost::precision(std::size_t coordinate) const {
   return prior_weight_ / (std_dev * std_dev);
 }
 
-// @return false where the twin refuses
+// @return false where the twin refuses or gives no numbers
 bool CampaignCost::simulate(const VectorXd& at) const {
   if (same(simulated_at_, at)) return true;
+  const TwinRunner& runner = fitter_.runner();
   try {
-    simulated_ = fitter_.runner().simulate(modelAt(at));
+    simulated_ = std::move(runner.simulateBlocks({modelAt(at)}).front());
   } catch (const Error&) {
     return false;  // a point that the twin refuses is no better point
   }
+  apart_ = asVector(runner.joined(simulated_)) - asVector(runner.measured());
+  apart_squares_ = apart_.squaredNorm();
+  if (!std::isfinite(apart_squares_)) {
+    simulated_at_.resize(0);
+    return false;
+  }
+  if (!frozen_places_.empty()) frozen_along_ = frozen_->columns.along(apart_);
   simulated_at_ = at;
   return true;
 }
 
 // Columns along what is not frozen. simulate() stands at the point.
-bool CampaignCost::tangentsAt(const VectorXd& at, MatrixXd* own) const {
-  const Index first = frozen_ ? static_cast<Index>(nominal_) : 0;
+bool CampaignCost::tangentsAt(const VectorXd& at, BlockColumns* own) const {
   std::vector<MachineModel> models;
   Values step;
-  for (Index c = first; c < at.size(); ++c) {
+  for (const Index c : own_places_) {
     const Coordinate& k = coordinates_[static_cast<std::size_t>(c)];
     step.push_back(TANGENT * (at[c] + k.step > k.high ? -k.step : k.step));
     VectorXd moved = at;
     moved[c] += step.back();
     models.push_back(modelAt(moved));
   }
-  std::vector<Values> simulated;
   try {
-    simulated = fitter_.runner().simulate(models);
+    *own = BlockColumns(fitter_.runner(), simulated_, fitter_.runner().simulateBlocks(models), step);
   } catch (const Error&) {
     return false;
   }
-  own->resize(static_cast<Index>(simulated_.size()), static_cast<Index>(step.size()));
-  for (std::size_t k = 0; k < step.size(); ++k)
-    own->col(static_cast<Index>(k)) = (asVector(simulated[k]) - asVector(simulated_)) / step[k];
   return own->allFinite();
 }
 
-void CampaignCost::normalEquations(const MatrixXd& own, Linear* linear) const {
-  const auto all = static_cast<Index>(coordinates_.size());
-  const Index moving = own.cols(), fixed = all - moving;
-  linear->information.setZero(all, all);
-  linear->gradient.resize(all);
-  linear->gradient.tail(moving).noalias() = own.transpose() * linear->residual;
-  linear->information.bottomRightCorner(moving, moving).noalias() = own.transpose() * own;
-  if (fixed == 0) return;
-  if (frozen_information_.size() == 0)
-    frozen_information_.noalias() = frozen_->columns.transpose() * frozen_->columns;
-  linear->information.topLeftCorner(fixed, fixed) = frozen_information_;
-  linear->information.topRightCorner(fixed, moving).noalias() = frozen_->columns.transpose() * own;
-  linear->information.bottomLeftCorner(moving, fixed) =
-      linear->information.topRightCorner(fixed, moving).transpose();
-  linear->gradient.head(fixed).noalias() = frozen_->columns.transpose() * linear->residual;
+// Of what is frozen from where its tangents were taken.
+VectorXd CampaignCost::shiftAt(const VectorXd& at) const {
+  VectorXd shift(static_cast<Index>(frozen_places_.size()));
+  const std::size_t turns_begin = frozen_places_.size() - turns_;
+  for (std::size_t k = 0; k < frozen_places_.size(); ++k) {
+    const double from = k < turns_begin ? frozen_->at[k] : frozen_->turns[k - turns_begin];
+    shift[static_cast<Index>(k)] = at[frozen_places_[k]] - from;
+  }
+  return shift;
 }
 
-bool CampaignCost::residualAt(const VectorXd& at, VectorXd* residual) const {
-  if (!simulate(at)) return false;
-  *residual = asVector(simulated_) - asVector(fitter_.runner().measured());
-  if (frozen_ && nominal_ > 0) {
-    VectorXd shift = at.head(static_cast<Index>(nominal_)) - asVector(frozen_->at);
-    residual->noalias() += frozen_->columns * shift;
-  }
-  return residual->allFinite();
+// Squares of apart_ + frozen tangents * shift, without going over the samples again.
+double CampaignCost::squaresAt(const VectorXd& at) const {
+  if (frozen_places_.empty()) return apart_squares_;
+  const VectorXd shift = shiftAt(at);
+  return apart_squares_ + shift.dot(2.0 * frozen_along_ + frozen_->information * shift);
+}
+
+void CampaignCost::normalEquations(const VectorXd& at, const BlockColumns& own, Linear* linear) const {
+  const auto all = static_cast<Index>(coordinates_.size());
+  linear->squares = squaresAt(at);
+  linear->information.setZero(all, all);
+  linear->gradient.resize(all);
+  linear->gradient(own_places_) = own.along(apart_);
+  linear->information(own_places_, own_places_) = own.gram();
+  if (frozen_places_.empty()) return;
+  const MatrixXd cross = frozen_->columns.cross(own);
+  const VectorXd shift = shiftAt(at);
+  linear->information(frozen_places_, frozen_places_) = frozen_->information;
+  linear->information(frozen_places_, own_places_) = cross;
+  linear->information(own_places_, frozen_places_) = cross.transpose();
+  linear->gradient(frozen_places_) = frozen_along_ + frozen_->information * shift;
+  linear->gradient(own_places_) += cross.transpose() * shift;
+}
+
+VectorXd CampaignCost::residual(const VectorXd& at) const {
+  VectorXd residual = apart_;
+  if (!frozen_places_.empty()) frozen_->columns.addTo(shiftAt(at), &residual);
+  return residual;
 }
 
 const CampaignCost::Linear* CampaignCost::linearise(const VectorXd& at) const {
   if (same(linearised_at_, at)) return &linear_;
   linearised_at_.resize(0);
-  MatrixXd own;
-  if (!residualAt(at, &linear_.residual) || !tangentsAt(at, &own)) return nullptr;
-  normalEquations(own, &linear_);
+  BlockColumns own;
+  if (!simulate(at) || !tangentsAt(at, &own)) return nullptr;
+  normalEquations(at, own, &linear_);
   linearised_at_ = at;
   return &linear_;
 }
@@ -150,9 +190,8 @@ bool CampaignCost::evaluate(const VectorXd& at, VectorXd* residual, MatrixXd* ja
     r[n + 1 + c] = prior_root * (at[c] - k.null) / k.prior_std;
   }
   if (!jacobian) {
-    VectorXd all;
-    if (!residualAt(at, &all)) return false;
-    r[n] = all.norm();
+    if (!simulate(at)) return false;
+    r[n] = std::sqrt(std::max(squaresAt(at), 0.0));
     return true;
   }
   const Linear* at_point = linearise(at);
@@ -162,7 +201,7 @@ bool CampaignCost::evaluate(const VectorXd& at, VectorXd* residual, MatrixXd* ja
   MatrixXd& j = *jacobian;
   j.topRows(n) = root.root;
   r.head(n) = root.along;
-  r[n] = std::sqrt(std::max(at_point->residual.squaredNorm() - r.head(n).squaredNorm(), 0.0));
+  r[n] = std::sqrt(std::max(at_point->squares - r.head(n).squaredNorm(), 0.0));
   for (Index c = 0; c < n; ++c)
     j(n + 1 + c, c) = prior_root / coordinates_[static_cast<std::size_t>(c)].prior_std;
   return true;

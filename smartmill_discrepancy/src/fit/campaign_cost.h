@@ -30,36 +30,47 @@ class CampaignCost : public fit::Residuals {
   bool evaluate(const Eigen::VectorXd& at, Eigen::VectorXd* residual,
                 Eigen::MatrixXd* jacobian) const override;
 
-  /// (simulated - measured) / noise and, where asked, the normal equations without priors.
+  /// Of (simulated - measured) / noise: the normal equations without priors.
   struct Linear {
-    Eigen::VectorXd residual;
+    double squares = 0.0;         ///< of the residual
     Eigen::MatrixXd information;  ///< tangents' * tangents
     Eigen::VectorXd gradient;     ///< tangents' * residual
   };
   /// @return nullptr at a point that the twin refuses or where it gives no numbers; valid until the next call
   const Linear* linearise(const Eigen::VectorXd& at) const;
 
+  /// (simulated - measured) / noise where linearise() stands.
+  Eigen::VectorXd residual(const Eigen::VectorXd& at) const;
+
+  /// From which coordinate on they are turns of records: what a prior holds of them only keeps steps short.
+  std::size_t turnsBegin() const { return coordinates_.size() - turns_; }
+
   /// Of a coordinate's prior.
   double precision(std::size_t coordinate) const;
 
  private:
+  void addTurns();
   MachineModel modelAt(const Eigen::VectorXd& at) const;
   bool simulate(const Eigen::VectorXd& at) const;
-  bool tangentsAt(const Eigen::VectorXd& at, Eigen::MatrixXd* own) const;
-  bool residualAt(const Eigen::VectorXd& at, Eigen::VectorXd* residual) const;
-  void normalEquations(const Eigen::MatrixXd& own, Linear* linear) const;
+  bool tangentsAt(const Eigen::VectorXd& at, BlockColumns* own) const;
+  Eigen::VectorXd shiftAt(const Eigen::VectorXd& at) const;
+  double squaresAt(const Eigen::VectorXd& at) const;
+  void normalEquations(const Eigen::VectorXd& at, const BlockColumns& own, Linear* linear) const;
 
   const Fitter& fitter_;
   FitState start_;
   const NominalTangents* frozen_;
   double prior_weight_;
-  std::size_t nominal_ = 0;
-  std::vector<Coordinate> coordinates_;
+  std::size_t nominal_ = 0, turns_ = 0;
+  std::vector<Coordinate> coordinates_;                   // nominal ones, members', turns
+  std::vector<Eigen::Index> frozen_places_, own_places_;  // of the coordinates
   // The solver comes back to the points where it is.
   mutable Eigen::VectorXd simulated_at_, linearised_at_;
-  mutable std::vector<double> simulated_;
+  mutable SimulatedBlocks simulated_;
+  mutable Eigen::VectorXd apart_;  // (simulated - measured) / noise, of frozen nominal values where they are
+  mutable double apart_squares_ = 0.0;
+  mutable Eigen::VectorXd frozen_along_;  // frozen tangents' * apart
   mutable Linear linear_;
-  mutable Eigen::MatrixXd frozen_information_;
 };
 
 }  // namespace smartmill::discrepancy

@@ -29,6 +29,7 @@ std::optional<Eigen::VectorXd> solve(const CampaignCost& cost, const FitOptions&
   solver.iterations = options.iterations;
   solver.function_tolerance = options.tolerance;
   solver.parameter_tolerance = 1e-7;
+  solver.dear_derivatives = true;
   solver.finish_at_bounds = false;  // simulations are dear, and the next round comes back
   solver.progress = [&](const fit::Progress&) { return !cancelled || !cancelled(); };
   std::vector<fit::Parameter> parameters = cost.parameters();
@@ -57,13 +58,15 @@ bool describe(const CampaignCost& cost, const Eigen::VectorXd& at, double sample
   const CampaignCost::Linear* point = cost.linearise(at);
   if (!point) return false;
   fit.state = cost.stateAt(at);
-  fit.chi2 = point->residual.squaredNorm();
-  fit.residual.resize(static_cast<std::size_t>(point->residual.size()));
-  Eigen::Map<Eigen::VectorXd>(fit.residual.data(), point->residual.size()) = -point->residual;
+  const Eigen::VectorXd residual = cost.residual(at);
+  fit.chi2 = residual.squaredNorm();
+  fit.residual.resize(static_cast<std::size_t>(residual.size()));
+  Eigen::Map<Eigen::VectorXd>(fit.residual.data(), residual.size()) = -residual;
   MatrixXd information = point->information;
   for (Index c = 0; c < at.size(); ++c) {
     const auto k = static_cast<std::size_t>(c);
-    fit.penalty += cost.precision(k) * std::pow(at[c] - cost.coordinates()[k].null, 2);
+    if (k < cost.turnsBegin())
+      fit.penalty += cost.precision(k) * std::pow(at[c] - cost.coordinates()[k].null, 2);
     information(c, c) += cost.precision(k);
   }
   fit.bic = fit.chi2 + fit.penalty;
@@ -83,6 +86,15 @@ FitState without(const FitState& state, std::size_t member) {
 
 Fitter::Fitter(const TwinRunner& runner, const NominalFreedom& freedom, std::function<bool()> cancelled)
     : runner_(runner), freedom_(freedom), cancelled_(std::move(cancelled)) {
+  for (std::size_t k = 0; k < runner.tests().size(); ++k) {
+    for (const TurnFreedom& free : turnFreedoms(runner.data().tests[runner.tests()[k]]))
+      turns_.push_back({k, free});
+  }
+}
+
+NominalTangents NominalTangents::ofTurns() const {
+  const auto count = static_cast<Index>(turns.size());
+  return {{}, turns, columns.right(count), information.bottomRightCorner(count, count)};
 }
 
 MachineModel Fitter::model(const FitState& state) const {
@@ -94,20 +106,26 @@ MachineModel Fitter::model(const FitState& state) const {
 NominalTangents Fitter::nominalTangents(const FitState& state) const {
   const std::vector<Coordinate>& coordinates = freedom_.coordinates();
   std::vector<MachineModel> models{model(state)};
+  Values steps;
   for (std::size_t c = 0; c < coordinates.size(); ++c) {
     FitState moved = state;
-    moved.nominal[c] += TANGENT * coordinates[c].step;
+    steps.push_back(TANGENT * coordinates[c].step);
+    moved.nominal[c] += steps.back();
     models.push_back(model(moved));
   }
-  const std::vector<Values> simulated = runner_.simulate(models);
-  const auto column = [&](std::size_t k) {
-    return Eigen::Map<const Eigen::VectorXd>(simulated[k].data(), static_cast<Index>(runner_.size()));
-  };
-  NominalTangents tangents{
-      state.nominal, MatrixXd(static_cast<Index>(runner_.size()), static_cast<Index>(coordinates.size()))};
-  for (std::size_t c = 0; c < coordinates.size(); ++c)
-    tangents.columns.col(static_cast<Index>(c)) =
-        (column(c + 1) - column(0)) / (TANGENT * coordinates[c].step);
+  std::vector<SimulatedBlocks> simulated = runner_.simulateBlocks(models);
+  const SimulatedBlocks base = std::move(simulated.front());
+  simulated.erase(simulated.begin());
+  simulated.resize(coordinates.size() + turns_.size());
+  for (const TurnOf& t : turns_) steps.push_back(t.freedom.step);
+  runParallel(turns_.size(), runner_.threads(), [&](std::size_t k) {
+    Turn by;
+    by.*turns_[k].freedom.value = turns_[k].freedom.step;
+    simulated[coordinates.size() + k] = runner_.turned(models.front(), base, turns_[k].chosen, by);
+  });
+  NominalTangents tangents{state.nominal, state.turns, BlockColumns(runner_, base, simulated, steps), {}};
+  tangents.turns.resize(turns_.size(), 0.0);
+  tangents.information = tangents.columns.gram();
   return tangents;
 }
 

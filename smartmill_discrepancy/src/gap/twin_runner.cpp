@@ -16,48 +16,10 @@ namespace {
 
 constexpr std::size_t KEPT_RESULTS = 4;  // of each test
 
-void append(std::vector<double>& key, const ModalModel& modes) {
-  key.push_back(static_cast<double>(modes.modes.size()));
-  for (const Mode& m : modes.modes) key.insert(key.end(), {m.frequency, m.damping_ratio, m.gain});
-  key.push_back(modes.direct);
-}
-
-// Every value that the record of a test of this kind depends on.
-std::vector<double> valuesFor(const MachineModel& model, TestKind kind) {
-  std::vector<double> key;
-  if (kind == TestKind::cut) {
-    if (const auto& t = model.tool) {
-      key.insert(key.end(), {static_cast<double>(t->teeth), t->diameter, t->helix});
-      key.insert(key.end(), t->pitch.begin(), t->pitch.end());
-    }
-    if (const auto& c = model.cutting)
-      key.insert(key.end(), {c->ktc, c->krc, c->kac, c->kte, c->kre, c->kae});
-  }
-  append(key, model.tool_tip.x);
-  append(key, model.tool_tip.y);
-  for (const ModalModel& a : model.force_sensor.axis) append(key, a);
-  if (const auto& s = model.spindle; s && kind != TestKind::tap) {
-    key.insert(key.end(), {s->viscous, s->coulomb, s->load_meter_gain, s->load_meter_bandwidth,
-                           s->load_meter_resolution, s->friction_zero_below});
-  }
-  for (const EffectEntry& effect : model.effects) {
-    const EffectKind* known = findEffect(effect.name);
-    if (known && !sim::touches(known->stage, kind)) continue;
-    key.push_back(static_cast<double>(std::hash<std::string>()(effect.name)));
-    for (const auto& [name, value] : effect.numbers) {
-      key.push_back(static_cast<double>(std::hash<std::string>()(name)));
-      key.push_back(value);
-    }
-    for (const auto& [name, word] : effect.words)
-      key.push_back(static_cast<double>(std::hash<std::string>()(name + "=" + word)));
-    for (const auto& [name, list] : effect.lists) {
-      key.push_back(static_cast<double>(std::hash<std::string>()(name)));
-      key.insert(key.end(), list.begin(), list.end());
-    }
-    append(key, effect.flexibility.x);
-    append(key, effect.flexibility.y);
-  }
-  return key;
+// Traces of a test that are held: that of a state must outlast those of the tangents of its cutting
+// coefficients. Fine steps are for few models.
+std::size_t tracesFor(int substeps) {
+  return substeps > 2 ? 2 : 8;
 }
 
 }  // namespace
@@ -88,6 +50,7 @@ TwinRunner::TwinRunner(const Dataset& data, std::vector<std::size_t> tests, int 
   for (const std::size_t t : tests_) {
     const TestData& test = data_.tests[t];
     Kept& kept = kept_.emplace_back();
+    kept.traces = std::make_unique<sim::CutTraces>(tracesFor(substeps));
     kept.record.file = test.record.file;
     kept.record.time = test.record.time;
     for (const std::string& name : test.record.names) {
@@ -108,9 +71,28 @@ TwinRunner::TwinRunner(const Dataset& data, std::vector<std::size_t> tests, int 
 void TwinRunner::readPhases() {
   for (std::size_t k = 0; k < tests_.size(); ++k) {
     const TestData& test = data_.tests[tests_[k]];
-    const std::lock_guard<std::mutex> lock(kept_[k].mutex);
-    kept_[k].phase = sim::recordedPhase(test.test, test.record);
-    kept_[k].results.clear();
+    Kept& kept = kept_[k];
+    const std::lock_guard<std::mutex> lock(kept.mutex);
+    const double phase = sim::recordedPhase(test.test, test.record);
+    const bool same = phase == kept.phase && test.early_entry == kept.early_entry &&
+                      test.test.spindle_speed == kept.test.spindle_speed;
+    kept.phase = phase;
+    kept.early_entry = test.early_entry;
+    kept.test = test.test;
+    if (same) continue;
+    kept.results.clear();
+    kept.traces->clear();
+  }
+}
+
+void TwinRunner::setGuided(bool guided) {
+  if (guided == guided_) return;
+  guided_ = guided;
+  correction_.clear();
+  for (Kept& kept : kept_) {
+    const std::lock_guard<std::mutex> lock(kept.mutex);
+    kept.results.clear();
+    kept.traces->clear();
   }
 }
 
@@ -119,13 +101,26 @@ void TwinRunner::setSubsteps(int substeps) {
   for (Kept& kept : kept_) {
     const std::lock_guard<std::mutex> lock(kept.mutex);
     kept.results.clear();
+    kept.traces = std::make_unique<sim::CutTraces>(tracesFor(substeps));
   }
 }
 
-std::vector<double> TwinRunner::simulateOne(const MachineModel& model, std::size_t chosen) const {
-  const TestData& test = data_.tests[tests_[chosen]];
+SimulatedBlocks TwinRunner::blocksOf(const MachineModel& model, std::size_t chosen, const CampaignTest& test,
+                                     const sim::SimulationOptions& options) const {
+  const Record record = sim::simulateTest(model, test, kept_[chosen].record, options);
+  ++simulations_;
+  SimulatedBlocks result;
+  for (std::size_t b = first_block_[chosen]; b < first_block_[chosen + 1]; ++b) {
+    std::vector<double> values = record.column(blocks_[b].channel);
+    for (double& v : values) v /= blocks_[b].noise;
+    result.push_back(std::make_shared<const std::vector<double>>(std::move(values)));
+  }
+  return result;
+}
+
+SimulatedBlocks TwinRunner::simulateOne(const MachineModel& model, std::size_t chosen) const {
   Kept& kept = kept_[chosen];
-  std::vector<double> key = valuesFor(model, test.test.kind);
+  std::vector<double> key = sim::valuesOfRecord(model, kept.test.kind);
   {
     const std::lock_guard<std::mutex> lock(kept.mutex);
     for (const auto& [values, result] : kept.results) {
@@ -135,30 +130,55 @@ std::vector<double> TwinRunner::simulateOne(const MachineModel& model, std::size
   sim::SimulationOptions options;
   options.noise = false;
   options.substeps = substeps_;
+  options.guided = guided_;
   options.phase = kept.phase;
-  const Record record = sim::simulateTest(model, test.test, kept.record, options);
-  ++simulations_;
-  std::vector<double> result;
-  result.reserve(test.channels.size() * record.size());
-  for (std::size_t b = first_block_[chosen]; b < first_block_[chosen + 1]; ++b) {
-    for (const double v : record.column(blocks_[b].channel)) result.push_back(v / blocks_[b].noise);
-  }
+  options.early_entry = kept.early_entry;
+  options.traces = kept.traces.get();
+  SimulatedBlocks result = blocksOf(model, chosen, kept.test, options);
   const std::lock_guard<std::mutex> lock(kept.mutex);
   kept.results.emplace_front(std::move(key), result);
   if (kept.results.size() > KEPT_RESULTS) kept.results.pop_back();
   return result;
 }
 
-std::vector<std::vector<double>> TwinRunner::simulate(const std::vector<MachineModel>& models) const {
-  std::vector<std::vector<double>> results(models.size(), std::vector<double>(size_));
+SimulatedBlocks TwinRunner::turned(const MachineModel& model, const SimulatedBlocks& base, std::size_t chosen,
+                                   const Turn& by) const {
+  const Kept& kept = kept_[chosen];
+  CampaignTest test = kept.test;
+  test.spindle_speed = turnedSpeed(data_.tests[tests_[chosen]], test.spindle_speed, by);
+  sim::SimulationOptions options;
+  options.noise = false;
+  options.substeps = substeps_;
+  options.guided = guided_;
+  options.phase = turnedPhase(kept.phase, by);
+  options.early_entry = kept.early_entry + by.entry;
+  SimulatedBlocks of_test = blocksOf(model, chosen, test, options), all = base;
+  std::move(of_test.begin(), of_test.end(), all.begin() + static_cast<std::ptrdiff_t>(first_block_[chosen]));
+  return all;
+}
+
+std::vector<SimulatedBlocks> TwinRunner::simulateBlocks(const std::vector<MachineModel>& models) const {
+  std::vector<SimulatedBlocks> results(models.size(), SimulatedBlocks(blocks_.size()));
   runParallel(models.size() * tests_.size(), threads_, [&](std::size_t job) {
-    const std::size_t m = job / tests_.size(), k = job % tests_.size();
-    const std::vector<double> values = simulateOne(models[m], k);
-    const std::size_t from = blocks_[first_block_[k]].offset;
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      results[m][from + i] = values[i] + (correction_.empty() ? 0.0 : correction_[from + i]);
-    }
+    const std::size_t k = job / models.size(), m = job % models.size();
+    SimulatedBlocks of_test = simulateOne(models[m], k);
+    std::move(of_test.begin(), of_test.end(),
+              results[m].begin() + static_cast<std::ptrdiff_t>(first_block_[k]));
   });
+  return results;
+}
+
+std::vector<double> TwinRunner::joined(const SimulatedBlocks& blocks) const {
+  std::vector<double> all;
+  all.reserve(size_);
+  for (const auto& block : blocks) all.insert(all.end(), block->begin(), block->end());
+  for (std::size_t i = 0; i < correction_.size(); ++i) all[i] += correction_[i];
+  return all;
+}
+
+std::vector<std::vector<double>> TwinRunner::simulate(const std::vector<MachineModel>& models) const {
+  std::vector<std::vector<double>> results;
+  for (const SimulatedBlocks& blocks : simulateBlocks(models)) results.push_back(joined(blocks));
   return results;
 }
 

@@ -11,13 +11,17 @@ namespace {
 EffectScope scopeOf(const Dataset& data) {
   EffectScope scope{data.nominal, {}};
   scope.start_times = scope.cut_times = true;
-  double first_cut = 0.0;
+  double first_cut = 0.0, chip = 0.0, depth = 0.0;
   for (const TestData& t : data.tests) {
     const bool cut = t.test.kind == TestKind::cut;
     scope.channels.insert(t.channels.begin(), t.channels.end());
     scope.cuts = scope.cuts || cut;
     scope.start_times = scope.start_times && t.test.start_time;
     scope.cut_times = scope.cut_times && (!cut || t.test.cut_time_before);
+    if (t.test.engagement) {
+      chip = std::max(chip, t.test.engagement->feed_per_tooth);
+      depth = std::max(depth, t.test.engagement->axial_depth);
+    }
     const double start = cut ? t.test.start_time.value_or(0.0) : 0.0;
     if (start > 0.0 && (first_cut == 0.0 || start < first_cut)) first_cut = start;
     for (const char* name : {"fx", "fy", "fz"}) {
@@ -27,6 +31,8 @@ EffectScope scopeOf(const Dataset& data) {
     }
   }
   if (first_cut > 0.0) scope.first_cut = first_cut;
+  if (chip > 0.0) scope.largest_chip = chip;
+  if (depth > 0.0) scope.largest_depth = depth;
   return scope;
 }
 
@@ -42,6 +48,16 @@ std::vector<Hypothesis> catalogueHypotheses(const Dataset& data, std::vector<std
     } else if (!lacking->empty() && notes) {
       notes->push_back(kind.name + " is not tried: " + *lacking);
     }
+  }
+  return all;
+}
+
+std::vector<Hypothesis> empiricalHypotheses(const Dataset& data) {
+  const EffectScope scope = scopeOf(data);
+  std::vector<Hypothesis> all;
+  for (const EffectKind& kind : empiricalCatalogue()) {
+    if (lackingFor(kind, scope)) continue;
+    for (Hypothesis& form : formsOf(kind, scope)) all.push_back(std::move(form));
   }
   return all;
 }

@@ -90,6 +90,7 @@ void head(std::ostream& out, const std::string& campaign) {
 
 void verdict(std::ostream& out, const Explanation& e) {
   out << "<p class=\"verdict\"><b>" << nameOf(e.verdict) << "</b>. " << sentenceOf(e.verdict) << "</p>\n";
+  if (!e.sentence.empty()) out << "<p><b>" << escaped(e.sentence) << "</b></p>\n";
   if (e.interrupted) out << "<p>The search was interrupted: this is what was found until then.</p>\n";
   out << "<table><tr><th>gap<th>before<th>after</tr><tr><td>fit tests<td>" << number(e.before.fit) << "<td>"
       << number(e.after.fit) << "</tr><tr><td>held-out tests<td>" << number(e.before.heldout) << "<td>"
@@ -113,6 +114,11 @@ void effects(std::ostream& out, const Explanation& e) {
       out << "</tr>\n";
     }
     out << "</table>\n";
+  }
+  for (const Resemblance& r : e.resembles) {
+    out << "<p>Not named: <b>" << r.name << "</b>"
+        << (r.variant.empty() ? "" : " (" + escaped(r.variant) + ")") << ", " << escaped(r.reason)
+        << ".</p>\n";
   }
   for (const auto& group : e.not_separable)
     out << "<p>Not to be told apart on this campaign: " << joined(group) << ".</p>\n";

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/model/effect_catalogue.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::discrepancy {
@@ -65,15 +66,9 @@ Json cutOf(const CampaignTest& test) {
   return cut;
 }
 
-}  // namespace
-
-void writeReport(const Explanation& e, const std::string& folder) {
-  Json report;
-  report["format"] = "smartmill-report/1";
-  report["verdict"] = nameOf(e.verdict);
-  report["where"] = findingsOf(e.where);
-  report["effects"] = Json::array();
-  for (const FoundEffect& effect : e.effects) {
+Json effectsOf(const std::vector<FoundEffect>& effects) {
+  Json list = Json::array();
+  for (const FoundEffect& effect : effects) {
     Json parameters = Json::object();
     for (const FoundParameter& p : effect.parameters)
       parameters[p.key] = {{"value", rounded(p.value)}, {"std", rounded(p.std_dev)}};
@@ -81,19 +76,40 @@ void writeReport(const Explanation& e, const std::string& folder) {
     Json alternatives = Json::array();
     for (const auto& [name, delta] : effect.alternatives)
       alternatives.push_back({{"name", name}, {"delta_bic", rounded(delta)}});
-    report["effects"].push_back({{"name", effect.name},
-                                 {"parameters", parameters},
-                                 {"delta_bic", rounded(effect.delta_bic)},
-                                 {"heldout_gap_reduction", rounded(effect.heldout_gap_reduction)},
-                                 {"confidence", rounded(effect.confidence)},
-                                 {"alternatives", alternatives}});
+    Json entry = {{"name", effect.name}};
+    if (const EffectKind* kind = findEffect(effect.name); kind && kind->empirical())
+      entry = {{"name", EMPIRICAL}, {"stage", kind->form_stage}, {"form", kind->form}};
+    entry.update({{"parameters", parameters},
+                  {"delta_bic", rounded(effect.delta_bic)},
+                  {"heldout_gap_reduction", rounded(effect.heldout_gap_reduction)},
+                  {"confidence", rounded(effect.confidence)},
+                  {"alternatives", alternatives}});
+    list.push_back(entry);
   }
+  return list;
+}
+
+}  // namespace
+
+void writeReport(const Explanation& e, const std::string& folder) {
+  Json report;
+  report["format"] = "smartmill-report/1";
+  report["verdict"] = nameOf(e.verdict);
+  report["where"] = findingsOf(e.where);
+  report["effects"] = effectsOf(e.effects);
+  report["resembles"] = Json::array();
+  for (const Resemblance& r : e.resembles)
+    report["resembles"].push_back({{"name", r.name}, {"variant", r.variant}, {"reason", r.reason}});
   report["not_separable"] = e.not_separable;
   report["suggested_test"] = e.suggested_test ? Json(*e.suggested_test) : Json(nullptr);
   if (e.suggested_cut) report["suggested_cut"] = cutOf(*e.suggested_cut);
   report["unexplained"] = findingsOf(e.unexplained);
   report["gap"] = {{"before", {{"fit", rounded(e.before.fit)}, {"heldout", rounded(e.before.heldout)}}},
                    {"after", {{"fit", rounded(e.after.fit)}, {"heldout", rounded(e.after.heldout)}}}};
+  if (e.named_only)
+    report["gap"]["without_empirical"] = {{"fit", rounded(e.named_only->fit)},
+                                          {"heldout", rounded(e.named_only->heldout)}};
+  if (!e.sentence.empty()) report["sentence"] = e.sentence;
   report["gaps"] = Json::array();
   for (const BlockGap& g : e.gaps) {
     report["gaps"].push_back(
@@ -105,6 +121,10 @@ void writeReport(const Explanation& e, const std::string& folder) {
          {"interval", {rounded(g.after - 1.96 * g.std_dev), rounded(g.after + 1.96 * g.std_dev)}}});
   }
   report["channels"] = sharesOf(e.channels);
+  for (const ChannelShare& c : e.channels) {
+    if (c.explained_heldout) report["explained_share"][c.channel] = rounded(*c.explained_heldout);
+    if (c.repeats) report["repeatability_floor"][c.channel] = rounded(c.floor);
+  }
   report["candidates"] = Json::array();
   for (const TriedEffect& t : e.ladder) {
     report["candidates"].push_back({{"round", t.round + 1},

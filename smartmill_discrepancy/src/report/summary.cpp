@@ -5,6 +5,7 @@
 namespace smartmill::discrepancy {
 std::string summaryOf(const Explanation& e) {
   std::string lines = std::string("verdict: ") + nameOf(e.verdict) + "\n";
+  if (!e.sentence.empty()) lines += e.sentence + "\n";
   for (const FoundEffect& effect : e.effects) {
     lines += effect.name + ":";
     for (const auto& [key, word] : effect.words) lines += " " + key + " " + word;
@@ -12,6 +13,9 @@ std::string summaryOf(const Explanation& e) {
       lines += " " + p.key + formatted(" %.5g +- %.2g", p.value, p.std_dev);
     lines += "\n";
   }
+  for (const Resemblance& r : e.resembles)
+    lines +=
+        "not named: " + r.name + (r.variant.empty() ? "" : " (" + r.variant + ")") + ", " + r.reason + "\n";
   for (const Finding& f : e.unexplained) {
     lines += "unexplained: " + f.channel + ", " + f.domain;
     for (const auto& [key, value] : f.location) lines += " " + key + formatted(" %.5g", value);

@@ -28,6 +28,7 @@ double moved(const FitState& from, const FitState& to, const Eigen::MatrixXd& co
   };
   compare(from.nominal, to.nominal);
   for (std::size_t m = 0; m < from.members.size(); ++m) compare(from.members[m].values, to.members[m].values);
+  if (from.turns.size() == to.turns.size()) compare(from.turns, to.turns);
   return largest;
 }
 
@@ -96,15 +97,18 @@ std::vector<const Rung*> rivalsOf(const FitState& state, std::size_t member,
 bool refine(Workbench& bench, const FitState& state, const SearchOptions& options, SearchResult* result) {
   const Settled settled = settle(bench, state, &result->best);
   if (!settled.converged) return false;
+  bench.turnTo(result->best.state);
   const FitOptions compared = weighted(COMPARED, settled.weight);
   const FitState& at = result->best.state;
   result->contribution.clear();
   result->needed.clear();
+  result->lacking.clear();
   result->rivals.clear();
   for (std::size_t m = 0; m < at.members.size(); ++m) {
     const FitState less = without(at, m);
     const Fit rest = bench.quick().fit(less, &settled.tangents, compared);
     result->contribution.push_back(rest.bic - result->best.bic);
+    result->lacking.push_back(rest.state);
     result->needed.push_back(tells(bench.quick().runner(), rest, result->best, options));
     for (const Rung* rival : rivalsOf(at, m, result->ladder)) {
       FitState with = less;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 
 #include "smartmill_core/math/linear_algebra.h"
@@ -13,43 +14,55 @@ namespace {
 
 using Eigen::Index;
 
-// Orthogonal projection off the nominal tangents (with their priors) and off the tangents of the members.
+// Orthogonal projection off the nominal tangents (with their priors), off where the records lie, and off the
+// tangents of the members.
 class Projection {
  public:
   Projection(const Fitter& fitter, const Fit& now, const NominalTangents& tangents)
-      : freedom_(fitter.freedom().coordinates()), nominal_(now.state.nominal), basis_(tangents.columns) {
+      : freedom_(fitter.freedom().coordinates()),
+        nominal_(now.state.nominal),
+        tangents_(tangents),
+        held_(freedom_.size(), false),
+        residual_(Eigen::Map<const Eigen::VectorXd>(now.residual.data(),
+                                                    static_cast<Index>(fitter.runner().size()))) {
     addMembers(fitter, now.state);
-    const auto samples = static_cast<Index>(fitter.runner().size());
-    residual_ = Eigen::Map<const Eigen::VectorXd>(now.residual.data(), samples);
-    information_ = basis_.transpose() * basis_;
+    information_.resize(prior_.size(), prior_.size());
+    information_.leftCols(tangents.columns.cols()) =
+        stacked(tangents.information, members_.cross(tangents.columns));
+    information_.rightCols(members_.cols()) = stacked(tangents.columns.cross(members_), members_.gram());
     information_.diagonal() += prior_;
-    Eigen::VectorXd right = basis_.transpose() * residual_;
+    Eigen::VectorXd right = stacked(tangents.columns.along(residual_), members_.along(residual_));
     for (std::size_t c = 0; c < freedom_.size(); ++c)
       right[static_cast<Index>(c)] -= nominal_[c] * prior_[static_cast<Index>(c)];
+    for (std::size_t k = 0; k < tangents.turns.size(); ++k) {
+      const auto at = static_cast<Index>(freedom_.size() + k);
+      if (fitter.turns()[k].freedom.value == &Turn::entry && !now.state.turns.empty())
+        right[at] -= now.state.turns[k] * prior_[at];
+    }
     solveWithinBounds(right);
   }
 
-  const std::vector<double>& base() const { return base_; }
+  const SimulatedBlocks& base() const { return base_; }
 
   // Chi2 that these columns take away, with the amplitudes that do it.
-  double gain(const Eigen::MatrixXd& columns, Eigen::VectorXd* amplitudes) const {
-    const Eigen::MatrixXd cross = basis_.transpose() * columns;
+  double gain(const BlockColumns& columns, Eigen::VectorXd* amplitudes) const {
+    const Eigen::MatrixXd cross = crossWith(columns);
     const Eigen::MatrixXd solved = linear::solveSymmetric(information_, cross);
-    Eigen::MatrixXd own = columns.transpose() * columns - cross.transpose() * solved;
-    const Eigen::VectorXd raw = columns.colwise().squaredNorm();
+    Eigen::MatrixXd own = columns.gram() - cross.transpose() * solved;
+    const Eigen::VectorXd raw = columns.squares();
     for (Index k = 0; k < own.rows(); ++k) own(k, k) += 1e-9 * raw[k] + 1e-30;
-    const Eigen::VectorXd score = columns.transpose() * residual_ - cross.transpose() * solved_residual_;
+    const Eigen::VectorXd score = columns.along(residual_) - cross.transpose() * solved_residual_;
     *amplitudes = linear::solveSymmetric(own, score);
     return score.dot(*amplitudes);
   }
 
   // The same of each column by itself; 0 where it has no trace, no number, or a sign that cannot be.
-  Eigen::VectorXd gains(const Eigen::MatrixXd& columns, bool positive) const {
-    const Eigen::MatrixXd cross = basis_.transpose() * columns;
+  Eigen::VectorXd gains(const BlockColumns& columns, bool positive) const {
+    const Eigen::MatrixXd cross = crossWith(columns);
     const Eigen::MatrixXd solved = linear::solveSymmetric(information_, cross);
-    const Eigen::VectorXd raw = columns.colwise().squaredNorm();
+    const Eigen::VectorXd raw = columns.squares();
     const Eigen::VectorXd own = raw - (cross.cwiseProduct(solved)).colwise().sum().transpose();
-    const Eigen::VectorXd score = columns.transpose() * residual_ - cross.transpose() * solved_residual_;
+    const Eigen::VectorXd score = columns.along(residual_) - cross.transpose() * solved_residual_;
     Eigen::VectorXd result = Eigen::VectorXd::Zero(columns.cols());
     for (Index k = 0; k < columns.cols(); ++k) {
       if (!std::isfinite(own[k]) || !std::isfinite(score[k]) || raw[k] == 0.0) continue;
@@ -59,6 +72,20 @@ class Projection {
   }
 
  private:
+  static Eigen::MatrixXd stacked(const Eigen::MatrixXd& upper, const Eigen::MatrixXd& lower) {
+    Eigen::MatrixXd all(upper.rows() + lower.rows(), upper.cols());
+    all << upper, lower;
+    return all;
+  }
+
+  Eigen::MatrixXd crossWith(const BlockColumns& columns) const {
+    Eigen::MatrixXd cross = stacked(tangents_.columns.cross(columns), members_.cross(columns));
+    for (std::size_t c = 0; c < held_.size(); ++c) {
+      if (held_[c]) cross.row(static_cast<Index>(c)).setZero();
+    }
+    return cross;
+  }
+
   // Tangents of the members' values beside the nominal ones.
   void addMembers(const Fitter& fitter, const FitState& state) {
     std::vector<MachineModel> models{fitter.model(state)};
@@ -75,29 +102,25 @@ class Projection {
         models.push_back(fitter.model(moved));
       }
     }
-    auto simulated = fitter.runner().simulate(models);
+    auto simulated = fitter.runner().simulateBlocks(models);
     base_ = std::move(simulated.front());
-    const auto nominal = static_cast<Index>(freedom_.size());
-    basis_.conservativeResize(Eigen::NoChange, nominal + static_cast<Index>(steps.size()));
-    prior_ = Eigen::VectorXd::Zero(basis_.cols());
+    simulated.erase(simulated.begin());
+    members_ = BlockColumns(fitter.runner(), base_, simulated, steps);
+    const Index beside = tangents_.columns.cols();
+    prior_.resize(beside + members_.cols());
+    for (std::size_t k = 0; k < tangents_.turns.size(); ++k)
+      prior_[static_cast<Index>(freedom_.size() + k)] = std::pow(fitter.turns()[k].freedom.prior_std, -2.0);
     for (std::size_t c = 0; c < freedom_.size(); ++c)
       prior_[static_cast<Index>(c)] = 1.0 / (freedom_[c].prior_std * freedom_[c].prior_std);
-    for (std::size_t k = 0; k < steps.size(); ++k) {
-      const Index column = nominal + static_cast<Index>(k);
-      for (std::size_t i = 0; i < base_.size(); ++i)
-        basis_(static_cast<Index>(i), column) = (simulated[k + 1][i] - base_[i]) / steps[k];
-      prior_[column] = 1e-12 + 1e-9 * basis_.col(column).squaredNorm();
-    }
+    prior_.tail(members_.cols()) = 1e-12 + 1e-9 * members_.squares().array();
   }
 
   // One that stands at its bound moves no further, nor does one that the rest would push over it.
   void solveWithinBounds(Eigen::VectorXd& right) {
     constexpr double AT_BOUND = 0.01;  // standard deviations
-    std::vector<bool> held(freedom_.size(), false);
     const auto hold = [&](std::size_t coordinate) {
       const auto c = static_cast<Index>(coordinate);
-      held[coordinate] = true;
-      basis_.col(c).setZero();
+      held_[coordinate] = true;
       information_.row(c).setZero();
       information_.col(c).setZero();
       information_(c, c) = prior_[c];
@@ -114,7 +137,7 @@ class Projection {
       for (std::size_t c = 0; c < freedom_.size(); ++c) {
         const double at = nominal_[c] + solved_residual_[static_cast<Index>(c)];
         const double beyond = std::max(freedom_[c].low - at, at - freedom_[c].high) / freedom_[c].prior_std;
-        if (held[c] || beyond <= worst) continue;
+        if (held_[c] || beyond <= worst) continue;
         worst = beyond;
         which = c;
       }
@@ -125,28 +148,25 @@ class Projection {
 
   const std::vector<Coordinate>& freedom_;
   const std::vector<double>& nominal_;
-  std::vector<double> base_;
-  Eigen::MatrixXd basis_;
+  const NominalTangents& tangents_;
+  SimulatedBlocks base_;
+  BlockColumns members_;
+  std::vector<bool> held_;  // nominal values that do not move
   Eigen::VectorXd prior_, residual_, solved_residual_;
   Eigen::MatrixXd information_;
 };
 
 // The two best frequencies of a mode, one octave-third or more apart, from columns to first order.
-std::vector<double> bestFrequencies(const Projection& projection, const std::vector<double>& frequencies,
-                                    const std::function<std::vector<double>(double)>& column, bool positive,
-                                    int threads) {
+std::vector<double> bestFrequencies(const Projection& projection, const TwinRunner& runner,
+                                    const std::vector<double>& frequencies,
+                                    const std::function<std::vector<double>(double)>& column, bool positive) {
   constexpr std::size_t BATCH = 8;  // one pass over the tangents serves so many
   std::vector<double> gains(frequencies.size(), 0.0);
-  runParallel((frequencies.size() + BATCH - 1) / BATCH, threads, [&](std::size_t batch) {
+  runParallel((frequencies.size() + BATCH - 1) / BATCH, runner.threads(), [&](std::size_t batch) {
     const std::size_t first = batch * BATCH, count = std::min(BATCH, frequencies.size() - first);
-    Eigen::MatrixXd columns;
-    for (std::size_t k = 0; k < count; ++k) {
-      const std::vector<double> values = column(frequencies[first + k]);
-      const auto size = static_cast<Index>(values.size());
-      columns.resize(size, k == 0 ? static_cast<Index>(count) : columns.cols());
-      columns.col(static_cast<Index>(k)) = Eigen::Map<const Eigen::VectorXd>(values.data(), size);
-    }
-    const Eigen::VectorXd each = projection.gains(columns, positive);
+    std::vector<std::vector<double>> columns;
+    for (std::size_t k = 0; k < count; ++k) columns.push_back(column(frequencies[first + k]));
+    const Eigen::VectorXd each = projection.gains(BlockColumns(runner, columns), positive);
     for (std::size_t k = 0; k < count; ++k) gains[first + k] = each[static_cast<Index>(k)];
   });
   std::vector<double> best;
@@ -191,8 +211,8 @@ class Seeker {
     for (const TestData& t : runner_.data().tests) rate = std::max(rate, t.test.sample_rate);
     Probes found;
     for (const double f : bestFrequencies(
-             projection_, ModeProbes::grid(60.0, 0.42 * rate, 1.06),
-             [&](double at) { return probes_.sensorMode(axis, at, DAMPING); }, false, runner_.threads())) {
+             projection_, runner_, ModeProbes::grid(60.0, 0.42 * rate, 1.06),
+             [&](double at) { return probes_.sensorMode(axis, at, DAMPING); }, false)) {
       const double d = std::log(DAMPING);
       found.push_back({{std::log(f), d, 0.0}, {{std::log(f), d, 0.01}}, false});
     }
@@ -205,9 +225,8 @@ class Seeker {
     for (const char a : axes) {
       if (tip_.count(a) == 0) {
         tip_[a] = bestFrequencies(
-            projection_, ModeProbes::grid(200.0, 6000.0, 1.08),
-            [&](double at) { return probes_.tipMode(a == 'x' ? 0 : 1, at, DAMPING); }, true,
-            runner_.threads());
+            projection_, runner_, ModeProbes::grid(200.0, 6000.0, 1.08),
+            [&](double at) { return probes_.tipMode(a == 'x' ? 0 : 1, at, DAMPING); }, true);
       }
       const double f = tip_[a].empty() ? 1200.0 : tip_[a].front();
       for (const double v : {std::log(f), std::log(DAMPING), 0.0}) probe.null.push_back(v);
@@ -249,21 +268,16 @@ bool isMember(const FitState& state, const std::string& effect, const std::strin
 }
 
 // What the points of a probe add to the records.
-Eigen::MatrixXd columnsOf(const Fitter& fitter, const FitState& state, const Hypothesis& h,
-                          const Hypothesis::Probe& probe, const std::vector<double>& base) {
+BlockColumns columnsOf(const Fitter& fitter, const FitState& state, const Hypothesis& h,
+                       const Hypothesis::Probe& probe, const SimulatedBlocks& base) {
   std::vector<MachineModel> models;
   for (const std::vector<double>& point : probe.points) {
     FitState with = state;
     with.members.push_back({&h, point});
     models.push_back(fitter.model(with));
   }
-  const auto simulated = fitter.runner().simulate(models);
-  Eigen::MatrixXd columns(static_cast<Index>(base.size()), static_cast<Index>(models.size()));
-  for (std::size_t k = 0; k < models.size(); ++k) {
-    for (std::size_t i = 0; i < base.size(); ++i)
-      columns(static_cast<Index>(i), static_cast<Index>(k)) = simulated[k][i] - base[i];
-  }
-  return columns;
+  return {fitter.runner(), base, fitter.runner().simulateBlocks(models),
+          std::vector<double>(models.size(), 1.0)};
 }
 
 // Where a fit begins that has these amplitudes along a probe's points.
@@ -294,8 +308,8 @@ std::vector<Promise> screen(const Fitter& fitter, const Fit& now, const NominalT
     Promise best;
     best.hypothesis = &h;
     for (const Hypothesis::Probe& probe : seeker.probesOf(h)) {
-      const Eigen::MatrixXd columns = columnsOf(fitter, now.state, h, probe, projection.base());
-      if (!columns.allFinite() || columns.squaredNorm() == 0.0) continue;
+      const BlockColumns columns = columnsOf(fitter, now.state, h, probe, projection.base());
+      if (!columns.allFinite() || columns.squares().sum() == 0.0) continue;
       Eigen::VectorXd amplitudes;
       const double gain = projection.gain(columns, &amplitudes);
       if (gain <= best.gain) continue;
@@ -310,6 +324,31 @@ std::vector<Promise> screen(const Fitter& fitter, const Fit& now, const NominalT
   std::stable_sort(promises.begin(), promises.end(),
                    [](const Promise& a, const Promise& b) { return a.gain > b.gain; });
   return promises;
+}
+
+std::vector<double> bestStart(const Fitter& fitter, const Fit& now, const Promise& promise) {
+  if (promise.null.empty()) return promise.start;
+  std::vector<std::vector<double>> starts;
+  std::vector<MachineModel> models;
+  for (const double share : {1.0, 0.5, 0.2, 0.05}) {
+    std::vector<double> start = promise.null;
+    for (std::size_t c = 0; c < start.size(); ++c) start[c] += share * (promise.start[c] - promise.null[c]);
+    FitState with = now.state;
+    with.members.push_back({promise.hypothesis, start});
+    starts.push_back(std::move(start));
+    models.push_back(fitter.model(with));
+  }
+  const auto simulated = fitter.runner().simulate(models);
+  std::size_t best = 0;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t k = 0; k < simulated.size(); ++k) {
+    const double squares = squaresLeft(fitter.runner(), simulated[k]);
+    if (squares < least) {
+      least = squares;
+      best = k;
+    }
+  }
+  return starts[best];
 }
 
 }  // namespace smartmill::discrepancy

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <optional>
 #include <utility>
@@ -14,6 +13,7 @@
 #include "smartmill_discrepancy/search/evidence.h"
 #include "smartmill_discrepancy/search/refinement.h"
 #include "smartmill_discrepancy/search/screening.h"
+#include "smartmill_discrepancy/search/standing.h"
 
 namespace smartmill::discrepancy {
 namespace {
@@ -51,7 +51,7 @@ std::optional<Member> formOf(const std::string& effect, const Pieces& pieces,
 std::optional<FitState> joined(const FitState& state, const std::string& effect,
                                const std::vector<Hypothesis>& hypotheses) {
   Pieces pieces;
-  FitState merged{state.nominal, {}};
+  FitState merged{state.nominal, {}, state.turns};
   std::size_t members = 0;
   for (const Member& m : state.members) {
     if (m.hypothesis->effect != effect) {
@@ -75,32 +75,6 @@ std::optional<FitState> withPiecesJoined(const FitState& state, const std::vecto
     if (const auto one = joined(state, m.hypothesis->effect, hypotheses)) return one;
   }
   return {};
-}
-
-// The promise is linear: of shorter ways from the null point to its start the one that fits best.
-std::vector<double> startOf(const Fitter& fitter, const Fit& now, const Promise& promise) {
-  if (promise.null.empty()) return promise.start;
-  std::vector<std::vector<double>> starts;
-  std::vector<MachineModel> models;
-  for (const double share : {1.0, 0.5, 0.2, 0.05}) {
-    std::vector<double> start = promise.null;
-    for (std::size_t c = 0; c < start.size(); ++c) start[c] += share * (promise.start[c] - promise.null[c]);
-    FitState with = now.state;
-    with.members.push_back({promise.hypothesis, start});
-    starts.push_back(std::move(start));
-    models.push_back(fitter.model(with));
-  }
-  const auto simulated = fitter.runner().simulate(models);
-  std::size_t best = 0;
-  double least = std::numeric_limits<double>::infinity();
-  for (std::size_t k = 0; k < simulated.size(); ++k) {
-    const double squares = squaresLeft(fitter.runner(), simulated[k]);
-    if (squares < least) {
-      least = squares;
-      best = k;
-    }
-  }
-  return starts[best];
 }
 
 class Search {
@@ -129,9 +103,12 @@ class Search {
   bool isBetter(const Round& round) const;
   void settle(Fit best);
   void dropNeedless();
-  void stepBack(const Fit& before, const Hypothesis* newest);
+  bool helpsElsewhere(const Fit& before, const Hypothesis& newest);
+  void stepBack(const Fit& before);
+  void refuse(const Fit& before, const Hypothesis* newest);
+  void letGo();
   void finish();
-  void takeBetterRivals();
+  bool takeBetterRivals();
 
   NominalTangents linearise(const FitState& where);
   Fit refit(const Fit& from, const FitOptions& options) const;
@@ -151,6 +128,7 @@ class Search {
   double exact_now_ = 0.0;  // squares that the exact twin leaves
   std::vector<const Hypothesis*> refused_;
   std::size_t repeated_ = 0;  // rounds that did not count
+  std::size_t in_vain_ = 0;   // of them one after the other
   SearchResult result_;
 };
 
@@ -187,14 +165,18 @@ Fit Search::withPhasesTurned(Fit fit) {
 
 void Search::fitNominal() {
   now_.state.nominal.assign(bench_.freedom().coordinates().size(), 0.0);
-  // Nominal values that are off far: tangents are taken anew where the fit went.
-  for (int pass = 0; pass < 3; ++pass) {
+  // Nominal values that are off far: tangents are taken anew where the fit went. Where records lie is told
+  // from what the nominal values do to their last noise.
+  const int passes = bench_.phasesEstimated() ? 8 : 3;
+  const double share =
+      bench_.phasesEstimated() ? 1e-6 : 1e-3;  // of the cost, by which the last pass may gain
+  for (int pass = 0; pass < passes; ++pass) {
     tangents_ = linearise(now_.state);
     Fit fit = quick_.fit(now_.state, &tangents_, {8, 1e-5, true});
     if (!fit.converged && pass == 0)
       throw Error(bench_.data().campaign.folder + ": the twin gives no numbers for the nominal model");
     if (!fit.converged) break;
-    const bool settled = pass > 0 && std::abs(now_.bic - fit.bic) < std::max(1.0, 1e-3 * fit.bic);
+    const bool settled = pass > 0 && std::abs(now_.bic - fit.bic) < std::max(1.0, share * fit.bic);
     now_ = std::move(fit);
     if (settled || bench_.cancelled()) break;
   }
@@ -219,10 +201,11 @@ bool Search::worthFitting(const Round& round, const Promise& promise, double lar
 
 void Search::fitPromise(const Promise& promise, Round& round) {
   FitState with = now_.state;
-  with.members.push_back({promise.hypothesis, startOf(quick_, now_, promise)});
+  with.members.push_back({promise.hypothesis, bestStart(quick_, now_, promise)});
   const auto begin = std::chrono::steady_clock::now();
   const std::size_t simulations = quick_.runner().simulations();
-  const Fit tried = quick_.fit(with, round.strained ? nullptr : &tangents_, {6, 1e-3, true});
+  const NominalTangents turns = tangents_.ofTurns();
+  const Fit tried = quick_.fit(with, round.strained ? &turns : &tangents_, {6, 1e-3, true});
   const Member& newest = tried.state.members.back();
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   round.rungs.push_back({{round.number, promise.hypothesis->effect, promise.hypothesis->variant, promise.gain,
@@ -291,14 +274,19 @@ void Search::dropNeedless() {
   }
 }
 
-// Back to before a round that the exact twin does not bear out, with smaller steps or without its effect.
-void Search::stepBack(const Fit& before, const Hypothesis* newest) {
+// What does not shrink the gap of tests that it was not fitted to takes the shape of something else.
+bool Search::helpsElsewhere(const Fit& before, const Hypothesis& newest) {
+  bench_.turnTo(now_.state);
+  const AskedShare asked = standingOf(bench_, now_.state, before.state).heldout;
+  if (!std::isfinite(asked.std_dev) || asked.share > 0.5) return true;
+  options_.say(
+      formatted("held-out tests ask for %.2g +- %.2g of it, not taken: ", asked.share, asked.std_dev) +
+      newest.title());
+  return false;
+}
+
+void Search::stepBack(const Fit& before) {
   ++repeated_;
-  if (bench_.refineQuick()) {
-    options_.say("  again with smaller steps");
-  } else {
-    refused_.push_back(newest);
-  }
   now_ = before;
   bench_.turnPhases(now_.state);
   tangents_ = linearise(now_.state);
@@ -306,8 +294,15 @@ void Search::stepBack(const Fit& before, const Hypothesis* newest) {
   exact_now_ = bench_.exactSquares(now_.state);
 }
 
+void Search::refuse(const Fit& before, const Hypothesis* newest) {
+  ++in_vain_;
+  refused_.push_back(newest);
+  stepBack(before);
+}
+
 // @return false: nothing more is to be added
 bool Search::addEffect(std::size_t number) {
+  constexpr std::size_t MOST_IN_VAIN = 3;
   Round round = fitPromises(number);
   const bool better = isBetter(round) && !bench_.cancelled();
   const Hypothesis* const newest = better ? round.best.state.members.back().hypothesis : nullptr;
@@ -320,9 +315,20 @@ bool Search::addEffect(std::size_t number) {
   const double exact_squares = bench_.exactSquares(now_.state);
   if (!(exact_squares < exact_now_)) {
     options_.say(gapText(exact_squares) + " when simulated exactly, not taken: " + newest->title());
-    stepBack(before, newest);
+    if (bench_.refineQuick()) {
+      options_.say("  again with smaller steps");
+      stepBack(before);
+    } else {
+      refuse(before, newest);
+    }
     return true;
   }
+  if (!helpsElsewhere(before, *newest)) {
+    result_.refused.push_back(newest);
+    refuse(before, newest);
+    return in_vain_ < MOST_IN_VAIN;
+  }
+  in_vain_ = 0;
   for (std::size_t k = first; k < result_.ladder.size(); ++k)
     result_.ladder[k].tried.taken = result_.ladder[k].hypothesis == newest;
   exact_now_ = exact_squares;
@@ -341,18 +347,20 @@ void Search::finish() {
     options_.say("  not needed any more: " + result_.best.state.members[m].hypothesis->title());
     refined = refine(bench_, without(result_.best.state, m), options_, &result_);
   }
-  if (refined) takeBetterRivals();
+  if (refined) refined = takeBetterRivals();
+  if (!refined) result_.forgetMembers();
   for (const Member& m : result_.best.state.members) options_.say("found " + describe(m));
 }
 
 // A round compares fits that have not settled; which of two that explain as much is better shows only now.
-void Search::takeBetterRivals() {
+// @return false: the twin gives no numbers there
+bool Search::takeBetterRivals() {
   constexpr int SWAPS = 3;
   for (int swap = 0; swap < SWAPS; ++swap) {
     const auto ahead = [&](const Rival& r) { return r.delta_bic - result_.contribution[r.member]; };
     const auto best = std::max_element(result_.rivals.begin(), result_.rivals.end(),
                                        [&](const Rival& a, const Rival& b) { return ahead(a) < ahead(b); });
-    if (best == result_.rivals.end() || ahead(*best) <= 0.0) return;
+    if (best == result_.rivals.end() || ahead(*best) <= 0.0) return true;
     const Hypothesis& old = *result_.best.state.members[best->member].hypothesis;
     const Hypothesis& better = *best->state.members.back().hypothesis;
     options_.say("  better in the place of " + old.title() + ": " + better.title());
@@ -361,15 +369,27 @@ void Search::takeBetterRivals() {
       if (r.tried.effect == better.effect && r.tried.variant == better.variant) r.tried.taken = true;
     }
     const FitState state = best->state;
-    if (!refine(bench_, state, options_, &result_)) return;
+    if (!refine(bench_, state, options_, &result_)) return false;
   }
+  return true;
+}
+
+// The free simulation judges, where it can follow the records at all.
+void Search::letGo() {
+  constexpr double FOLLOWS = 2.0;  // times the squares of the guided one
+  const double guided = bench_.exactSquares(now_.state), free = bench_.freeSquares(now_.state);
+  options_.say("guided by the tool's displacement " + gapText(guided) + ", simulated freely " +
+               gapText(free));
+  if (free < FOLLOWS * guided) bench_.guide(false);
 }
 
 SearchResult Search::run() {
+  bench_.guide(bench_.canGuide());
   fitNominal();
   for (std::size_t round = 0; round < options_.most_effects + repeated_ && !bench_.cancelled(); ++round) {
     if (!addEffect(round)) break;
   }
+  if (bench_.guided()) letGo();
   finish();
   return std::move(result_);
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_discrepancy/data/phase.h"
 
 namespace smartmill::discrepancy {
@@ -15,6 +16,52 @@ std::vector<std::size_t> testsOf(const Dataset& data, bool heldout) {
   return tests;
 }
 
+bool guides(const TestData& test, const MachineModel& nominal) {
+  const bool modes = !nominal.tool_tip.x.modes.empty() || !nominal.tool_tip.y.modes.empty();
+  return modes && test.test.kind == TestKind::cut && !test.heldout && !test.test.running_before &&
+         test.record.has("tool_x") && test.record.has("tool_y");
+}
+
+// One step of Gauss and Newton of where each record lies. @return the largest turn [rad]
+double turnOnce(const TwinRunner& runner, const MachineModel& model, Dataset* data) {
+  constexpr double MOST = 0.3;  // [rad]
+  const SimulatedBlocks base = runner.simulateBlocks({model}).front();
+  const std::vector<double> simulated = runner.joined(base);
+  const auto size = static_cast<Eigen::Index>(simulated.size());
+  const Eigen::VectorXd apart = Eigen::Map<const Eigen::VectorXd>(runner.measured().data(), size) -
+                                Eigen::Map<const Eigen::VectorXd>(simulated.data(), size);
+  double largest = 0.0;
+  for (std::size_t k = 0; k < runner.tests().size(); ++k) {
+    TestData& test = data->tests[runner.tests()[k]];
+    const std::vector<TurnFreedom> free = turnFreedoms(test);
+    if (free.empty()) continue;
+    std::vector<SimulatedBlocks> moved;
+    std::vector<double> steps;
+    Eigen::VectorXd precision(static_cast<Eigen::Index>(free.size())), pull = precision;
+    for (const TurnFreedom& f : free) {
+      const auto at = static_cast<Eigen::Index>(moved.size());
+      precision[at] = 1.0 / (f.prior_std * f.prior_std);
+      pull[at] = f.value == &Turn::entry ? -precision[at] * test.early_entry : 0.0;
+      Turn step;
+      step.*f.value = f.step;
+      moved.push_back(runner.turned(model, base, k, step));
+      steps.push_back(f.step);
+    }
+    const BlockColumns columns(runner, base, moved, steps);
+    Eigen::MatrixXd information = columns.gram();
+    information.diagonal() += precision;
+    const Eigen::VectorXd right = columns.along(apart) + pull;
+    const Eigen::VectorXd found = linear::solveSymmetric(information, right);
+    Turn by;
+    for (std::size_t f = 0; f < free.size(); ++f) by.*free[f].value = found[static_cast<Eigen::Index>(f)];
+    const double turn = std::max(std::abs(by.middle), std::abs(by.end));
+    if (!found.allFinite() || turn > MOST) continue;
+    turnRecord(test, by);
+    largest = std::max(largest, turn);
+  }
+  return largest;
+}
+
 }  // namespace
 
 Workbench::Workbench(const Dataset& data, const WorkbenchOptions& options)
@@ -23,23 +70,63 @@ Workbench::Workbench(const Dataset& data, const WorkbenchOptions& options)
       phases_estimated_(std::any_of(data.tests.begin(), data.tests.end(),
                                     [](const TestData& t) { return t.phase_estimated; })),
       cancelled_(options.cancelled),
+      can_guide_(std::any_of(data.tests.begin(), data.tests.end(),
+                             [&](const TestData& t) { return guides(t, data.nominal); })),
       quick_runner_(data_, testsOf(data_, false), options.threads, options.screening_substeps),
       exact_runner_(data_, testsOf(data_, false), options.threads, options.final_substeps),
+      guided_runner_(data_, testsOf(data_, false), options.threads, options.final_substeps),
       heldout_runner_(data_, testsOf(data_, true), options.threads, options.final_substeps),
       quick_(quick_runner_, freedom_, options.cancelled),
       exact_(exact_runner_, freedom_, options.cancelled) {
+  guided_runner_.setGuided(true);
+  for (const std::size_t t : exact_runner_.tests()) loaded_.push_back(data_.tests[t]);
+}
+
+// The records and the exact twin; the quick one stays where its tangents were taken.
+void Workbench::turnFitted(const FitState& state) {
+  const std::vector<std::size_t>& tests = exact_runner_.tests();
+  for (std::size_t k = 0; k < tests.size(); ++k) {
+    TestData& t = data_.tests[tests[k]];
+    t.test.spindle_speed = loaded_[k].test.spindle_speed;
+    t.early_entry = loaded_[k].early_entry;
+    if (t.phase_estimated) t.record.add("spindle_angle") = loaded_[k].record.column("spindle_angle");
+  }
+  std::vector<Turn> by(tests.size());
+  for (std::size_t k = 0; k < state.turns.size(); ++k)
+    by[quick_.turns()[k].chosen].*quick_.turns()[k].freedom.value = state.turns[k];
+  for (std::size_t k = 0; k < tests.size(); ++k) turnRecord(data_.tests[tests[k]], by[k]);
+  exact_runner_.readPhases();
+  guided_runner_.readPhases();
 }
 
 NominalTangents Workbench::linearise(const FitState& state, double* exact_squares) {
   const MachineModel model = quick_.model(state);
-  const std::vector<double> simulated = exact_runner_.simulate(model);
-  if (exact_squares) *exact_squares = squaresLeft(exact_runner_, simulated);
+  turnFitted(state);
+  quick_runner_.readPhases();
+  const std::vector<double> simulated = fitted().simulate(model);
+  if (exact_squares) *exact_squares = squaresLeft(fitted(), simulated);
   quick_runner_.correctTo(model, simulated);
   return quick_.nominalTangents(state);
 }
 
-double Workbench::exactSquares(const FitState& state) const {
+double Workbench::exactSquares(const FitState& state) {
+  turnFitted(state);
+  return exactSquaresHere(state);
+}
+
+double Workbench::freeSquares(const FitState& state) {
+  turnFitted(state);
   return squaresLeft(exact_runner_, exact_runner_.simulate(quick_.model(state)));
+}
+
+void Workbench::guide(bool guided) {
+  guided_ = guided && can_guide_;
+  quick_runner_.setGuided(guided_);
+  heldout_runner_.setGuided(guided_);
+}
+
+double Workbench::exactSquaresHere(const FitState& state) const {
+  return squaresLeft(fitted(), fitted().simulate(quick_.model(state)));
 }
 
 bool Workbench::refineQuick() {
@@ -49,11 +136,29 @@ bool Workbench::refineQuick() {
   return true;
 }
 
-double Workbench::turnPhases(const FitState& state) {
+double Workbench::turnPhases(FitState& state) {
   if (!phases_estimated_) return 0.0;
+  turnFitted(state);
   const double turn = discrepancy::turnPhases(data_, quick_.model(state));
-  for (TwinRunner* runner : {&quick_runner_, &exact_runner_, &heldout_runner_}) runner->readPhases();
+  heldout_runner_.readPhases();
+  if (turn == 0.0) return turn;
+  state.turns.clear();
+  for (const Fitter::TurnOf& t : quick_.turns()) {
+    const TestData& now = data_.tests[exact_runner_.tests()[t.chosen]];
+    state.turns.push_back(turnBetween(loaded_[t.chosen], now).*t.freedom.value);
+  }
   return turn;
+}
+
+void Workbench::turnTo(const FitState& state) {
+  constexpr int PASSES = 3;
+  turnFitted(state);
+  for (int pass = 0; pass < PASSES; ++pass) {
+    const MachineModel model = quick_.model(state);
+    const double turn = turnOnce(heldout_runner_, model, &data_);
+    heldout_runner_.readPhases();
+    if (turn < PHASE_SETTLED) return;
+  }
 }
 
 }  // namespace smartmill::discrepancy

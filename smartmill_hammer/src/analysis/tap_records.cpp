@@ -1,15 +1,19 @@
 #include "smartmill_hammer/analysis/tap_records.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <complex>
+#include <cstdlib>
 #include <fstream>
 #include <sstream>
+#include <utility>
 
 #include "smartmill_core/campaign/record.h"
 #include "smartmill_core/error.h"
-#include "smartmill_core/io/gnuplot.h"
-#include "smartmill_core/signal/streams.h"
+#include "smartmill_core/io/csv.h"
+#include "smartmill_core/io/text_file.h"
+#include "smartmill_core/io/uff.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill {
@@ -20,17 +24,28 @@ namespace {
 constexpr double LARGEST_TIME_STEP = 2e-3;  // [s]
 /// Force that counts as the beginning of the hit, of the peak.
 constexpr double ONSET_SHARE = 0.02;
-/// Half width of the smoothing before peaks are sought, of the frequency.
-constexpr double PEAK_SMOOTHING = 0.0015;
-/// Share of a peak's height down to which its mode is fitted.
-constexpr double HALF_POWER = 0.7071;
-/// A rise above the lowest line so far by this factor is the next peak's flank.
-constexpr double VALLEY_RISE = 1.02;
 
 struct ThreeColumns {
   std::vector<double> a, b, c;
 };
 
+/// Numbers of a line between blanks or commas, up to the first word.
+std::vector<double> numbersOf(std::string line) {
+  std::replace(line.begin(), line.end(), ',', ' ');
+  std::istringstream cells(line);
+  std::vector<double> numbers;
+  for (std::string cell; cells >> cell;) {
+    char* end = nullptr;
+    numbers.push_back(std::strtod(cell.c_str(), &end));
+    if (*end) {
+      numbers.pop_back();
+      break;
+    }
+  }
+  return numbers;
+}
+
+/// Three numbers a line; the first line may be a head, or carry words behind its numbers (CutPro).
 ThreeColumns readThreeColumns(const std::string& file) {
   std::ifstream stream(file);
   if (!stream) throw Error(file + ": cannot be read");
@@ -38,18 +53,14 @@ ThreeColumns readThreeColumns(const std::string& file) {
   std::string line;
   for (int number = 1; std::getline(stream, line); ++number) {
     if (line.find_first_not_of(" \t\r") == std::string::npos) continue;
-    std::istringstream cells(line);
-    double a = 0.0, b = 0.0, c = 0.0;
-    std::string more;
-    if (!(cells >> a >> b >> c) || (cells >> more)) {
-      throw Error(file + ": line " + std::to_string(number) + ": three numbers are due");
-    }
-    if (!std::isfinite(a) || !std::isfinite(b) || !std::isfinite(c)) {
+    const std::vector<double> values = numbersOf(line);
+    if (number == 1 && values.empty()) continue;
+    if (values.size() < 3) throw Error(file + ": line " + std::to_string(number) + ": three numbers are due");
+    if (!std::isfinite(values[0]) || !std::isfinite(values[1]) || !std::isfinite(values[2]))
       throw Error(file + ": line " + std::to_string(number) + ": not a finite number");
-    }
-    columns.a.push_back(a);
-    columns.b.push_back(b);
-    columns.c.push_back(c);
+    columns.a.push_back(values[0]);
+    columns.b.push_back(values[1]);
+    columns.c.push_back(values[2]);
   }
   if (columns.a.size() < 4) throw Error(file + ": holds fewer than four lines of three numbers");
   return columns;
@@ -80,44 +91,244 @@ std::size_t onset(const std::vector<double>& force) {
   return static_cast<std::size_t>(i);
 }
 
+/// By ResponseKind.
+constexpr const char* NAME[] = {"acceleration", "velocity", "displacement", "force"};
+constexpr const char* UNIT[] = {"m/s2/N", "m/s/N", "m/N", "1"};
+
+std::size_t index(ResponseKind kind) {
+  return static_cast<std::size_t>(kind);
+}
+
+FrequencyResponse receptanceOf(const FrequencyResponse& measured, ResponseKind kind) {
+  if (kind == ResponseKind::acceleration) return receptanceFromAccelerance(measured);
+  FrequencyResponse receptance = measured;
+  if (kind != ResponseKind::velocity) return receptance;
+  receptance.unit = "m/N";
+  for (std::size_t i = 0; i < receptance.size(); ++i) {
+    const double w = units::TWO_PI * receptance.frequency[i];
+    receptance.value[i] /= std::complex<double>(0.0, w);
+    if (!receptance.std_dev.empty()) receptance.std_dev[i] /= w;
+  }
+  return receptance;
+}
+
+double swing(const std::vector<double>& values) {
+  const auto ends = std::minmax_element(values.begin(), values.end());
+  return *ends.second - *ends.first;
+}
+
+/// The response among a record's columns: a motion before a force, and of the sensor's forces the one that
+/// answers most.
+std::string responseOf(const Record& record) {
+  for (const char* name : {"displacement", "acceleration", "tool_x", "tool_y"}) {
+    if (record.has(name)) return name;
+  }
+  std::string found;
+  for (const char* name : {"fx", "fy", "fz"}) {
+    if (record.has(name) && (found.empty() || swing(record.column(name)) > swing(record.column(found))))
+      found = name;
+  }
+  if (found.empty())
+    throw Error(record.file + ": column acceleration or displacement is missing, and no force fx, fy or fz");
+  return found;
+}
+
+TapRecord tapOf(const Record& record, const ChannelNames& channels) {
+  const std::string response = channels.response.empty() ? responseOf(record) : channels.response;
+  TapRecord tap;
+  tap.file = record.file;
+  tap.hit.force = record.column(channels.force.empty() ? "hammer" : channels.force);
+  tap.hit.response = record.column(response);
+  tap.kind = response == "acceleration"    ? ResponseKind::acceleration
+             : response.rfind("f", 0) == 0 ? ResponseKind::force
+                                           : ResponseKind::displacement;
+  tap.hit.sample_rate = sampleRate(record.time, record.file);
+  tap.hit.pre_trigger = onset(tap.hit.force);
+  return tap;
+}
+
+/// Channels by name where they are given, otherwise: the hammer's is named so, the response is the first
+/// other of a known unit.
+TapRecord readTapDynoware(const std::string& file, const ChannelNames& channels) {
+  std::ifstream stream(file);
+  std::string line;
+  while (std::getline(stream, line) && (line.rfind("Time", 0) != 0 || line.size() < 5 || line[4] == ':')) {
+  }
+  if (line.size() < 5) throw Error(file + ": the row of channel names (Time, ...) is missing");
+  const char separator = line[4];
+  std::string units_line;
+  std::getline(stream, units_line);
+  const auto cellsOf = [separator](std::string text) {
+    if (!text.empty() && text.back() == '\r') text.pop_back();
+    std::vector<std::string> cells;
+    std::istringstream from(text);
+    for (std::string cell; std::getline(from, cell, separator);) cells.push_back(cell);
+    return cells;
+  };
+  const std::vector<std::string> names = cellsOf(line), unit = cellsOf(units_line);
+  std::string force = channels.force, response = channels.response, kind;
+  for (std::size_t i = 1; i < names.size() && i < unit.size(); ++i) {
+    std::string low = names[i];
+    for (char& c : low) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    if (force.empty() && low.find("hammer") != std::string::npos) force = names[i];
+    if (names[i] == force || (!response.empty() && names[i] != response)) continue;
+    if (!kind.empty()) continue;
+    kind = unit[i] == "m/s2" ? "acceleration" : unit[i] == "m" ? "displacement" : unit[i] == "N" ? "fx" : "";
+    if (!kind.empty()) response = names[i];
+  }
+  if (force.empty()) throw Error(file + ": no channel is named hammer; name it with --force-channel");
+  if (kind.empty()) throw Error(file + ": no response in m/s2, m or N; name it with --response-channel");
+  return tapOf(readDynoware(file, {{"hammer", force}, {kind, response}}), {"", kind});
+}
+
+/// Of a function's values; where the file does not say, by their unit.
+ResponseKind kindOf(const UffFunction& f, const std::string& file) {
+  switch (f.numerator) {
+    case uff::ACCELERATION:
+      return ResponseKind::acceleration;
+    case uff::VELOCITY:
+      return ResponseKind::velocity;
+    case uff::DISPLACEMENT:
+      return ResponseKind::displacement;
+    case uff::REACTION_FORCE:
+    case uff::EXCITATION_FORCE:
+      return ResponseKind::force;
+    case 0:
+    case 1:
+      break;
+    default:
+      throw Error(file + ": " + f.name + ": kind of data " + std::to_string(f.numerator) + " is no response");
+  }
+  const std::string& u = f.unit;
+  if (u == "g" || u == "G" || u == "g/N" || (u.rfind("m/s", 0) == 0 && u.find('2') != std::string::npos))
+    return ResponseKind::acceleration;
+  if (u.rfind("m/s", 0) == 0) return ResponseKind::velocity;
+  return u.rfind("N", 0) == 0 || u.rfind("kN", 0) == 0 ? ResponseKind::force : ResponseKind::displacement;
+}
+
+/// SI value of one in the file; units that are none of these are taken for SI.
+double siOf(const std::string& unit) {
+  if (unit == "g" || unit == "G" || unit == "g/N") return 9.80665;
+  if (unit.rfind("mm", 0) == 0) return units::MM;
+  if (unit.rfind("um", 0) == 0) return units::UM;
+  return unit.rfind("kN", 0) == 0 ? 1e3 : 1.0;
+}
+
+std::vector<double> realParts(const UffFunction& f) {
+  std::vector<double> values;
+  for (const std::complex<double>& v : f.value) values.push_back(v.real() * siOf(f.unit));
+  return values;
+}
+
+NamedFrf frfOf(const UffFunction& f, const std::string& name, const std::string& file) {
+  const ResponseKind kind = kindOf(f, file);
+  NamedFrf result{name, {}};
+  result.frf.unit = UNIT[index(kind)];
+  for (std::size_t i = 0; i < f.value.size(); ++i) {
+    if (!(f.abscissa[i] > 0.0)) continue;
+    result.frf.frequency.push_back(f.abscissa[i]);
+    result.frf.value.push_back(f.value[i] * siOf(f.unit));
+  }
+  result.frf = receptanceOf(result.frf, kind);
+  return result;
+}
+
+void addCoherence(const UffFunction& f, FrequencyResponse& frf) {
+  std::vector<double> coherence;
+  for (std::size_t i = 0; i < f.value.size(); ++i) {
+    if (f.abscissa[i] > 0.0) coherence.push_back(f.value[i].real());
+  }
+  if (coherence.size() == frf.size()) frf.coherence = std::move(coherence);
+}
+
+/// Forces and responses over time become hits: as many of both are pairs in their order, otherwise a response
+/// belongs to the last force before it.
+std::vector<TapRecord> hitsOf(const std::vector<const UffFunction*>& functions, const std::string& file) {
+  const bool named = std::any_of(functions.begin(), functions.end(),
+                                 [](const UffFunction* f) { return f->numerator == uff::EXCITATION_FORCE; });
+  const auto isHammer = [&](const UffFunction& f) {
+    return named ? f.numerator == uff::EXCITATION_FORCE : kindOf(f, file) == ResponseKind::force;
+  };
+  std::vector<const UffFunction*> forces, responses, before;
+  for (const UffFunction* f : functions) {
+    if (isHammer(*f)) {
+      forces.push_back(f);
+      continue;
+    }
+    responses.push_back(f);
+    before.push_back(forces.empty() ? nullptr : forces.back());
+  }
+  std::vector<TapRecord> taps;
+  for (std::size_t r = 0; r < responses.size() && !forces.empty(); ++r) {
+    const UffFunction& force = responses.size() == forces.size() ? *forces[r]
+                               : before[r]                       ? *before[r]
+                                                                 : *forces.front();
+    TapRecord tap;
+    tap.file = responses.size() > 1 ? file + ":" + std::to_string(r + 1) : file;
+    tap.kind = kindOf(*responses[r], file);
+    tap.hit.force = realParts(force);
+    tap.hit.response = realParts(*responses[r]);
+    tap.hit.sample_rate = sampleRate(force.abscissa, file);
+    tap.hit.pre_trigger = onset(tap.hit.force);
+    taps.push_back(std::move(tap));
+  }
+  return taps;
+}
+
+TapFile readTapUff(const std::string& file) {
+  TapFile result;
+  const std::vector<UffFunction> functions = readUff(file);
+  std::vector<const UffFunction*> over_time;
+  int number = 0;
+  for (const UffFunction& f : functions) {
+    const std::string name = file + (functions.size() > 1 ? ":" + std::to_string(++number) : "");
+    if (f.type == uff::FREQUENCY_RESPONSE) result.frfs.push_back(frfOf(f, name, file));
+    if (f.type == uff::COHERENCE && !result.frfs.empty()) addCoherence(f, result.frfs.back().frf);
+    if (f.type == uff::TIME_RESPONSE) over_time.push_back(&f);
+  }
+  result.taps = hitsOf(over_time, file);
+  if (result.taps.empty() && result.frfs.empty())
+    throw Error(file + ": holds neither FRFs nor a force and its response over time");
+  return result;
+}
+
+/// What frf.csv says beside the three columns.
+void readDeviations(const std::string& file, FrequencyResponse& frf) {
+  const NumberTable table = readNumberTable(file);
+  for (const auto& [name, values] :
+       {std::pair("coherence", &frf.coherence), std::pair("std", &frf.std_dev)}) {
+    if (!table.has(name)) continue;
+    const std::vector<double>& column = table.column(name);
+    const std::size_t unused = column.size() - frf.size();  // the line at zero
+    values->assign(column.begin() + static_cast<std::ptrdiff_t>(unused), column.end());
+  }
+}
+
 }  // namespace
 
 TapFormat detectFormat(const std::string& file) {
   std::ifstream stream(file, std::ios::binary);
   if (!stream) throw Error(file + ": cannot be read");
   std::string first;
-  char head[13] = {};
-  stream.read(head, 12);
-  if (std::string(head, 8) == "#ROSBAG ") return TapFormat::bag;
-  stream.clear();
-  stream.seekg(0);
   std::getline(stream, first);
+  if (first.rfind("#ROSBAG ", 0) == 0) return TapFormat::bag;
+  if (first.rfind("DynoWare", 0) == 0) return TapFormat::dynoware;
+  if (isUff(file)) return TapFormat::uff;
   if (first.find('[') != std::string::npos && first.find("time") != std::string::npos) return TapFormat::csv;
+  if (first.rfind("frequency", 0) == 0) return TapFormat::frf;
   std::string second;
   std::getline(stream, second);
-  double a0 = 0.0, a1 = 0.0, b = 0.0, c = 0.0;
-  std::istringstream one(first), two(second);
-  if ((one >> a0 >> b >> c) && (two >> a1 >> b >> c) && a1 > a0) {
-    return a1 - a0 < LARGEST_TIME_STEP ? TapFormat::text : TapFormat::frf;
-  }
-  throw Error(
-      file + ": neither a bag, nor CSV with time[s],hammer[N],acceleration[m/s2] (or displacement[m]), nor " +
-      "three columns of numbers");
+  const std::vector<double> one = numbersOf(first), two = numbersOf(second);
+  if (one.size() >= 3 && two.size() >= 3 && two[0] > one[0])
+    return two[0] - one[0] < LARGEST_TIME_STEP ? TapFormat::text : TapFormat::frf;
+  throw Error(file +
+              ": neither a bag, a DynoWare export, a universal file, nor CSV with "
+              "time[s],hammer[N],acceleration[m/s2] "
+              "(or displacement[m], or a force), nor three columns of numbers");
 }
 
-TapRecord readTapCsv(const std::string& file) {
-  const Record record = readCsv(file);
-  TapRecord tap;
-  tap.file = file;
-  tap.hit.force = record.column("hammer");
-  tap.acceleration = !record.has("displacement");
-  if (tap.acceleration && !record.has("acceleration")) {
-    throw Error(file + ": column acceleration or displacement is missing");
-  }
-  tap.hit.response = record.column(tap.acceleration ? "acceleration" : "displacement");
-  tap.hit.sample_rate = sampleRate(record.time, file);
-  tap.hit.pre_trigger = onset(tap.hit.force);
-  return tap;
+TapRecord readTapCsv(const std::string& file, const ChannelNames& channels) {
+  return tapOf(readCsv(file), channels);
 }
 
 TapRecord readTapText(const std::string& file) {
@@ -127,10 +338,27 @@ TapRecord readTapText(const std::string& file) {
   tap.file = file;
   tap.hit.force = columns.b;
   tap.hit.response = columns.c;
-  tap.acceleration = true;
+  tap.kind = ResponseKind::acceleration;
   tap.hit.sample_rate = sampleRate(columns.a, file);
   tap.hit.pre_trigger = onset(tap.hit.force);
   return tap;
+}
+
+TapFile readTapFile(const std::string& file, TapFormat format, const ChannelNames& channels) {
+  switch (format) {
+    case TapFormat::csv:
+      return {{readTapCsv(file, channels)}, {}};
+    case TapFormat::text:
+      return {{readTapText(file)}, {}};
+    case TapFormat::dynoware:
+      return {{readTapDynoware(file, channels)}, {}};
+    case TapFormat::uff:
+      return readTapUff(file);
+    case TapFormat::frf:
+      return {{}, {{file, readFrfText(file)}}};
+    default:
+      throw Error(file + ": no hammer record");
+  }
 }
 
 FrequencyResponse readFrfText(const std::string& file) {
@@ -145,167 +373,42 @@ FrequencyResponse readFrfText(const std::string& file) {
     frf.frequency.push_back(columns.a[i]);
     frf.value.emplace_back(columns.b[i], columns.c[i]);
   }
+  if (readText(file).rfind("frequency_hz", 0) == 0) readDeviations(file, frf);
   return frf;
 }
 
-TapFrf averageTaps(const std::vector<TapRecord>& taps, const HitLimits& limits, double exponential_time) {
+TapFrf averageTaps(const std::vector<TapRecord>& taps, const TapFrfOptions& options) {
+  if (taps.empty()) throw Error("no hit was given");
   TapFrf result;
-  ImpactOptions options;
-  options.exponential_time = exponential_time;
-  const bool acceleration = !taps.empty() && taps.front().acceleration;
-  if (acceleration) options.unit = "m/s2/N";
-  ImpactAnalysis analysis(options);
+  std::vector<Hit> hits;
+  std::vector<bool> usable;
   for (const TapRecord& tap : taps) {
-    if (tap.acceleration != acceleration) {
-      throw Error(tap.file + ": " + (acceleration ? "displacement" : "acceleration") + ", but " +
-                  taps.front().file + " holds " + (acceleration ? "acceleration" : "displacement"));
+    if (tap.kind != taps.front().kind) {
+      throw Error(tap.file + ": " + NAME[index(tap.kind)] + ", but " + taps.front().file + " holds " +
+                  NAME[index(taps.front().kind)]);
     }
-    const HitFault fault = hitFault(tap.hit, limits);
-    if (!fault.text.empty()) {
-      result.notes.push_back(tap.file + ": left out: " + fault.text);
-      continue;
-    }
+    result.hits.push_back({tap.file, hitReason(tap.hit, options.judge)});
+    hits.push_back(tap.hit);
+    usable.push_back(result.hits.back().accepted());
+  }
+  const std::vector<std::string> beside = reasonsBeside(hits, usable);
+  ImpactOptions impact;
+  impact.exponential_time = options.exponential_time;
+  impact.unit = UNIT[index(taps.front().kind)];
+  ImpactAnalysis analysis(impact);
+  for (std::size_t i = 0; i < taps.size(); ++i) {
+    if (usable[i]) result.hits[i].reason = beside[i];
+    if (!result.hits[i].accepted()) continue;
     try {
-      analysis.add(tap.hit);
+      analysis.add(hits[i]);
     } catch (const Error& error) {
-      throw Error(tap.file + ": " + error.what());
+      throw Error(taps[i].file + ": " + error.what());
     }
   }
-  if (analysis.hits() == 0) {
-    throw Error(result.notes.empty() ? std::string("no hit was given")
-                                     : "no hit is left; " + result.notes.back());
-  }
-  result.measured = analysis.frf();
-  const auto lines = result.measured.band(1e-9, INFINITY);
-  result.measured = lines;
-  result.receptance = acceleration ? receptanceFromAccelerance(lines) : lines;
+  if (analysis.hits() == 0) return result;
+  result.measured = analysis.frf(options.average).band(1e-9, INFINITY);
+  result.receptance = receptanceOf(result.measured, taps.front().kind);
   return result;
-}
-
-std::vector<ModeReading> peakModes(const FrequencyResponse& receptance, double low, double high, double share,
-                                   std::size_t most) {
-  const FrequencyResponse band = receptance.band(low, high);
-  const std::size_t n = band.size();
-  if (n < 8) throw Error("peaks: fewer than eight lines in the band");
-  const double step = (band.frequency.back() - band.frequency.front()) / static_cast<double>(n - 1);
-  // Averaged over some lines, so that a noisy line of a single hit is no peak; 0.15 % is less than a mode is
-  // wide.
-  FrequencyResponse smooth;
-  smooth.frequency = band.frequency;
-  for (std::size_t i = 0; i < n; ++i) {
-    const auto half = static_cast<std::size_t>(PEAK_SMOOTHING * band.frequency[i] / step);
-    const std::size_t first = i > half ? i - half : 0, last = std::min(n - 1, i + half);
-    double sum = 0.0;
-    for (std::size_t j = first; j <= last; ++j) sum += band.value[j].imag();
-    smooth.value.emplace_back(sum / static_cast<double>(last - first + 1));
-  }
-  std::vector<double> peaks = findPeaks(smooth, low, high, share);  // strongest first
-  if (peaks.size() > most) peaks.resize(most);
-  std::sort(peaks.begin(), peaks.end());
-  std::vector<ModeReading> rows;
-  for (const double peak : peaks) {
-    const auto at = static_cast<std::size_t>(
-        std::lower_bound(band.frequency.begin(), band.frequency.end(), peak) - band.frequency.begin());
-    const double height = std::abs(smooth.value[at].real());
-    std::size_t first = at, last = at;
-    // Down to the half-power height, but not over a valley into the next peak.
-    const auto magnitude = [&](std::size_t i) { return std::abs(smooth.value[i].real()); };
-    for (double valley = height; first > 0 && magnitude(first - 1) >= HALF_POWER * height &&
-                                 magnitude(first - 1) <= VALLEY_RISE * valley;) {
-      valley = std::min(valley, magnitude(--first));
-    }
-    for (double valley = height; last + 1 < n && magnitude(last + 1) >= HALF_POWER * height &&
-                                 magnitude(last + 1) <= VALLEY_RISE * valley;) {
-      valley = std::min(valley, magnitude(++last));
-    }
-    // A lightly damped mode is a few lines wide.
-    while (last - first < 6 && (first > 0 || last + 1 < n)) {
-      if (first > 0) --first;
-      if (last + 1 < n) ++last;
-    }
-    ModalFitOptions options;
-    options.low = band.frequency[first] - 0.1 * step;
-    options.high = band.frequency[last] + 0.1 * step;
-    options.modes = 1;
-    try {
-      const Mode mode = fitModes(band, options).model.modes.at(0);
-      // A fit that leaves its peak tells of another mode.
-      if (mode.frequency < options.low || mode.frequency > options.high) continue;
-      rows.push_back({mode, receptance.at(mode.frequency)});
-    } catch (const Error&) {
-      continue;  // no mode's shape
-    }
-  }
-  return rows;
-}
-
-bool looksDirect(const FrequencyResponse& receptance, double low, double high) {
-  double wrong = 0.0, all = 0.0;
-  for (const std::complex<double>& h : receptance.band(low, high).value) {
-    all += h.imag() * h.imag();
-    if (h.imag() > 0.0) wrong += h.imag() * h.imag();
-  }
-  return wrong < 0.02 * all;
-}
-
-std::vector<ModeReading> readModes(const ModalModel& model, const FrequencyResponse& receptance) {
-  std::vector<ModeReading> rows;
-  for (const Mode& mode : model.modes) rows.push_back({mode, receptance.at(mode.frequency)});
-  return rows;
-}
-
-void writeFrfCsv(const FrequencyResponse& frf, const ModalModel& fit, const std::string& file) {
-  std::ofstream out(file);
-  const std::string& u = frf.unit;
-  out << "frequency[Hz],real[" << u << "],imag[" << u << "],coherence[1],std_dev[" << u << "],fit_real[" << u
-      << "],fit_imag[" << u << "]\n";
-  out.precision(10);
-  for (std::size_t k = 0; k < frf.size(); ++k) {
-    const std::complex<double> f = fit.response(frf.frequency[k]);
-    out << frf.frequency[k] << ',' << frf.value[k].real() << ',' << frf.value[k].imag() << ','
-        << (frf.coherence.empty() ? NOT_A_NUMBER : frf.coherence[k]) << ','
-        << (frf.std_dev.empty() ? NOT_A_NUMBER : frf.std_dev[k]) << ',' << f.real() << ',' << f.imag()
-        << '\n';
-  }
-  if (!out.flush()) throw Error(file + ": cannot be written");
-}
-
-void writeModesCsv(const ModalModel& model, const std::string& file) {
-  std::ofstream out(file);
-  out << "frequency[Hz],frequency_std[Hz],damping_ratio[1],damping_ratio_std[1],stiffness[N/"
-         "um],stiffness_std[N/um]\n";
-  out.precision(10);
-  for (const Mode& m : model.modes) {
-    const double stiffness = 1.0 / m.gain / units::N_PER_UM;
-    out << m.frequency << ',' << m.frequency_std << ',' << m.damping_ratio << ',' << m.damping_ratio_std
-        << ',' << stiffness << ',' << std::abs(stiffness * m.gain_std / m.gain) << '\n';
-  }
-  if (!out.flush()) throw Error(file + ": cannot be written");
-}
-
-void plotFrf(const std::string& csv_file, const std::string& png_file, const std::string& title, double low,
-             double high, bool coherence) {
-  const int panels = coherence ? 3 : 2;
-  const std::string csv = Gnuplot::quoted(csv_file);
-  Gnuplot plot(png_file, 1100, 330 * panels);
-  plot << "set datafile separator ','\nset datafile missing 'nan'\nset key autotitle columnhead\n"
-       << "set multiplot layout " << panels << ",1 title " << Gnuplot::quoted(title) << "\nset xrange ["
-       << low << ":" << high << "]\nset grid\nset lmargin 11\n";
-  const auto part = [&](const char* name, int measured, int fitted) {
-    plot << "set ylabel 'receptance " << name << " [um/N]'\nplot " << csv << " using 1:($" << measured
-         << "*1e6) with lines lw 2 title 'measured', '' using 1:($" << fitted
-         << "*1e6) with lines lw 1.5 title 'fitted modes'\n";
-  };
-  part("Re", 2, 6);
-  if (!coherence) plot << "set xlabel 'frequency [Hz]'\n";
-  part("Im", 3, 7);
-  if (coherence) {
-    plot << "set xlabel 'frequency [Hz]'\nset ylabel 'coherence [1]'\nset yrange [0:1.05]\nset key bottom "
-            "right\n"
-         << "plot " << csv << " using 1:4 with lines lw 1.5 title 'coherence'\n";
-  }
-  plot << "unset multiplot\n";
-  plot.draw();
 }
 
 }  // namespace hammer

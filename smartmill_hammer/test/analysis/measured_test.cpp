@@ -1,10 +1,14 @@
+#include <algorithm>
 #include <cmath>
+#include <complex>
 #include <fstream>
 #include <functional>
 
 #include <gtest/gtest.h>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/io/uff.h"
+#include "smartmill_core/modal/modal_estimate.h"
 #include "smartmill_core/testing/shared_data.h"
 #include "smartmill_hammer/analysis/tap_records.h"
 
@@ -12,55 +16,159 @@ namespace smartmill {
 namespace hammer {
 namespace {
 
-// Published: modes at 1074, 1961, 2617 Hz; Im of the averaged receptance there -.6433, -.2138, -.2180 um/N.
-void expectPublished(const std::vector<ModeReading>& rows) {
-  const double due[][2] = {{1074.0, -0.6433e-6}, {1961.0, -0.2138e-6}, {2617.0, -0.2180e-6}};
-  for (const auto& d : due) {
-    const ModeReading* nearest = nullptr;
-    for (const ModeReading& row : rows) {
-      if (!nearest || std::abs(row.mode.frequency - d[0]) < std::abs(nearest->mode.frequency - d[0]))
-        nearest = &row;
+// The one mode nearest to a published frequency [Hz].
+const EstimatedMode& nearest(const ModalEstimate& estimate, double due) {
+  return *std::min_element(estimate.modes.begin(), estimate.modes.end(), [due](const auto& a, const auto& b) {
+    return std::abs(a.frequency - due) < std::abs(b.frequency - due);
+  });
+}
+
+void expectFinite(const ModalEstimate& estimate) {
+  for (const auto* modes : {&estimate.modes, &estimate.doubts}) {
+    for (const EstimatedMode& m : *modes) {
+      EXPECT_TRUE(std::isfinite(m.frequency_std) && m.frequency_std > 0.0);
+      EXPECT_TRUE(std::isfinite(m.damping_ratio_std) && m.damping_ratio_std > 0.0);
+      for (const double std : m.gain_std) EXPECT_TRUE(std::isfinite(std) && std > 0.0);
     }
-    ASSERT_NE(nearest, nullptr);
-    EXPECT_NEAR(nearest->mode.frequency, d[0], 0.01 * d[0]);
-    EXPECT_NEAR(nearest->receptance.imag(), d[1], 0.05 * std::abs(d[1])) << d[0];
-    EXPECT_GT(nearest->mode.gain, 0.0);
   }
 }
 
+// Published: modes at 1074, 1961, 2617 Hz; what stands about 1265 and 2713 Hz is smaller.
 TEST(MeasuredToolTip, ShowsThePublishedModes) {
   SMARTMILL_SHARED_DATA(file, "measured/tool_tip_tap/EMA_Point_1_Channel_1_CH1.txt");
   ASSERT_EQ(detectFormat(file), TapFormat::frf);
-  const FrequencyResponse frf = readFrfText(file);
-  EXPECT_TRUE(looksDirect(frf, 500.0, 3500.0));
-  expectPublished(peakModes(frf, 500.0, 3500.0, 0.02, 20));
+  for (const bool whole : {false, true}) {
+    ModalEstimateOptions options;
+    if (!whole) options.low = 500.0, options.high = 3500.0;
+    const ModalEstimate estimate = estimateModes({readFrfText(file)}, options);
+    ASSERT_GE(estimate.modes.size(), 3u);
+    EXPECT_LE(estimate.modes.size(), 10u);
+    for (const double due : {1074.0, 1961.0, 2617.0}) {
+      const EstimatedMode& found = nearest(estimate, due);
+      EXPECT_NEAR(found.frequency, due, 0.01 * due);
+      EXPECT_GT(found.gain[0], 0.0);
+    }
+    // The shoulder beside the third mode is a mode of its own; that about 1265 Hz is not proven by one point.
+    EXPECT_NEAR(nearest(estimate, 2713.0).frequency, 2713.0, 0.01 * 2713.0);
+    expectFinite(estimate);
+  }
+}
+
+TEST(MeasuredToolTip, AllPointsShareThePublishedModes) {
+  SMARTMILL_SHARED_DATA(folder, "measured");
+  std::vector<FrequencyResponse> frfs = {readFrfText(folder + "/tool_tip_tap/EMA_Point_1_Channel_1_CH1.txt")};
+  for (int i = 2; i <= 5; ++i)
+    frfs.push_back(readFrfText(folder + "/tool_tip_points/point_" + std::to_string(i) + ".txt"));
+  ModalEstimateOptions options;
+  options.low = 500.0;
+  options.high = 3500.0;
+  const ModalEstimate estimate = estimateModes(frfs, options);
+  for (const double due : {1074.0, 1961.0, 2617.0})
+    EXPECT_NEAR(nearest(estimate, due).frequency, due, 0.01 * due);
+  // No cancelling companions: one mode within 4 % of the first.
+  EXPECT_EQ(std::count_if(estimate.modes.begin(), estimate.modes.end(),
+                          [](const EstimatedMode& m) { return std::abs(m.frequency - 1074.0) < 43.0; }),
+            1);
+  // The shapes' signs turn along the tool: all points alike in the first mode, not in the second.
+  const EstimatedMode &first = nearest(estimate, 1074.0), &second = nearest(estimate, 1961.0);
+  for (std::size_t o = 1; o < 5; ++o) EXPECT_GT(first.gain[o] * first.gain[0], 0.0);
+  EXPECT_LT(second.gain[4] * second.gain[0], 0.0);
+  expectFinite(estimate);
+}
+
+// Engineering Vibration Toolbox: one mode each between 156 and 312 Hz.
+TEST(MeasuredVibrationToolbox, OneModeEach) {
+  SMARTMILL_SHARED_DATA(folder, "measured/vt_cases");
+  const double due[] = {212.0925, 192.5938};
+  for (const int i : {0, 1}) {
+    ModalEstimateOptions options;
+    options.low = 156.0;
+    options.high = 312.0;
+    const ModalEstimate estimate =
+        estimateModes({readFrfText(folder + "/case" + std::to_string(i + 1) + ".txt")}, options);
+    ASSERT_EQ(estimate.modes.size(), 1u) << i;
+    EXPECT_NEAR(estimate.modes[0].frequency, due[i], 5e-4 * due[i]);
+    expectFinite(estimate);
+  }
 }
 
 // The single hit of the same point: within 5 % of the averaged receptance's Im at the published modes.
 TEST(MeasuredToolTip, SingleHitAgreesWithTheAverage) {
   SMARTMILL_SHARED_DATA(file, "measured/tool_tip_tap/ImpactTesting_Point1_Channel1_CH1.txt");
   ASSERT_EQ(detectFormat(file), TapFormat::text);
-  const TapFrf frf = averageTaps({readTapText(file)}, {20.0, 0.1, 0.0}, 0.0);
+  const TapFrf frf = averageTaps({readTapText(file)}, {});
   EXPECT_NEAR(frf.receptance.at(1074.0).imag(), -0.6433e-6, 0.05 * 0.6433e-6);
   EXPECT_NEAR(frf.receptance.at(1961.0).imag(), -0.2138e-6, 0.05 * 0.2138e-6);
   EXPECT_NEAR(frf.receptance.at(2617.0).imag(), -0.2180e-6, 0.05 * 0.2180e-6);
 }
 
-TEST(MeasuredFiveHits, ShowThePublishedPeaks) {
+// H1 of five hits: no hit refused, and poles at the peaks that the record's description lists.
+TEST(MeasuredFiveHits, GiveOnePoleSet) {
   SMARTMILL_SHARED_DATA(folder, "measured/five_hits");
   std::vector<TapRecord> taps;
   for (int i = 1; i <= 5; ++i) taps.push_back(readTapCsv(folder + "/hit_" + std::to_string(i) + ".csv"));
   EXPECT_EQ(detectFormat(taps[0].file), TapFormat::csv);
   EXPECT_DOUBLE_EQ(taps[0].hit.sample_rate, 25600.0);
-  const TapFrf frf = averageTaps(taps, {20.0, 0.1, 0.0}, 0.0);
+  const TapFrf frf = averageTaps(taps, {});
+  for (const TapVerdict& hit : frf.hits) EXPECT_TRUE(hit.accepted()) << hit.reason;
   EXPECT_EQ(frf.measured.averages, 5);
   EXPECT_EQ(frf.measured.unit, "m/s2/N");
-  const auto peaks = findPeaks(frf.measured, 500.0, 6500.0, 0.02);
-  for (const double due : {810.0, 900.0, 2640.0, 3669.0, 3690.0, 4093.0, 4128.0, 4164.0, 4392.0, 5969.0}) {
-    double nearest = 1e9;
-    for (const double p : peaks) nearest = std::abs(p - due) < std::abs(nearest - due) ? p : nearest;
-    EXPECT_NEAR(nearest, due, 3.0);
+  ModalEstimateOptions options;
+  options.low = 500.0;
+  options.high = 6500.0;
+  const ModalEstimate estimate = estimateModes({frf.receptance}, options);
+  for (const double due : {810.0, 900.0, 2640.0, 3669.0, 3690.0, 4093.0, 4128.0, 4164.0, 4392.0, 5969.0})
+    EXPECT_NEAR(nearest(estimate, due).frequency, due, 4.0);
+  expectFinite(estimate);
+}
+
+// A hit and an FRF through a universal file, response before force, and acceleration in g; a DynoWare export.
+TEST(TapRecords, ReadUniversalFilesAndDynoWare) {
+  const std::string file = testing::TempDir() + "smartmill_tap.uff";
+  UffFunction force, response, frf;
+  force.type = response.type = uff::TIME_RESPONSE;
+  force.numerator = uff::EXCITATION_FORCE;
+  force.unit = "N";
+  response.numerator = uff::ACCELERATION;
+  response.unit = "g";
+  std::string dynoware = "DynoWare,Version 2.5\nTime,Ax,Hammer\ns,m/s2,N\n";
+  for (int i = 0; i < 64; ++i) {
+    force.abscissa.push_back(1e-4 * i);
+    response.abscissa.push_back(1e-4 * i);
+    force.value.emplace_back(i == 10 ? 50.0 : 0.0);
+    response.value.emplace_back(0.5 * i);
+    dynoware += std::to_string(1e-4 * i) + "," + std::to_string(i) + "," + (i == 10 ? "50" : "0") + "\n";
   }
+  frf.type = uff::FREQUENCY_RESPONSE;
+  frf.numerator = uff::ACCELERATION;
+  frf.denominator = uff::EXCITATION_FORCE;
+  frf.unit = "m/s2";
+  for (int i = 0; i < 8; ++i) {
+    frf.abscissa.push_back(10.0 * i);
+    frf.value.emplace_back(2.0, -1.0);
+  }
+  writeUff({response, force}, file, true);
+  ASSERT_EQ(detectFormat(file), TapFormat::uff);
+  const TapFile hit = readTapFile(file, TapFormat::uff, {});
+  ASSERT_EQ(hit.taps.size(), 1u);
+  EXPECT_EQ(hit.taps[0].kind, ResponseKind::acceleration);
+  EXPECT_DOUBLE_EQ(hit.taps[0].hit.sample_rate, 10000.0);
+  EXPECT_DOUBLE_EQ(hit.taps[0].hit.force[10], 50.0);
+  EXPECT_NEAR(hit.taps[0].hit.response[2], 9.80665, 1e-12);
+  writeUff({frf}, file, false);
+  const TapFile lines = readTapFile(file, TapFormat::uff, {});
+  ASSERT_EQ(lines.frfs.size(), 1u);
+  EXPECT_EQ(lines.frfs[0].frf.unit, "m/N");
+  ASSERT_EQ(lines.frfs[0].frf.size(), 7u);  // none at rest
+  const double square = std::pow(2.0 * 3.14159265358979 * 10.0, 2);
+  EXPECT_NEAR(std::abs(lines.frfs[0].frf.value[0] + std::complex<double>(2.0, -1.0) / square), 0.0, 1e-15);
+  std::ofstream(file) << dynoware;
+  ASSERT_EQ(detectFormat(file), TapFormat::dynoware);
+  const TapFile channels = readTapFile(file, TapFormat::dynoware, {});
+  ASSERT_EQ(channels.taps.size(), 1u);
+  EXPECT_EQ(channels.taps[0].kind, ResponseKind::acceleration);
+  EXPECT_DOUBLE_EQ(channels.taps[0].hit.force[10], 50.0);
+  EXPECT_DOUBLE_EQ(channels.taps[0].hit.response[7], 7.0);
 }
 
 TEST(TapRecords, NameWhatIsWrong) {

@@ -16,6 +16,7 @@ class ChipCoefficients : public Effect {
     state.law.coefficients.krc += krc_;
     state.law.coefficients.kac += kac_;
   }
+  bool scalesForce() const override { return true; }
 
  private:
   double ktc_, krc_, kac_;  // [N/m2]

@@ -14,6 +14,7 @@ class CuttingSpeed : public Effect {
     const double v = now.speed * state.radius;
     if (v > 0.0) state.law.chip_factor *= std::pow(v / reference_, -exponent_);
   }
+  bool scalesForce() const override { return true; }
 
  private:
   double exponent_, reference_;  // [1], [m/s]

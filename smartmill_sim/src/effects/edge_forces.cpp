@@ -16,6 +16,7 @@ class EdgeForces : public Effect {
     state.law.coefficients.kre += kre_;
     state.law.coefficients.kae += kae_;
   }
+  bool scalesForce() const override { return true; }
 
  private:
   double kte_, kre_, kae_;  // [N/m]

@@ -2,6 +2,7 @@
 #include <limits>
 #include <map>
 #include <string>
+#include <utility>
 
 #include "effect_class.h"
 #include "smartmill_core/error.h"
@@ -15,12 +16,14 @@ std::map<std::string, EffectMaker>& classes() {
   return all;
 }
 
-// Place in the catalogue; behind it: unknown.
-std::size_t rankOf(const std::string& name) {
-  const std::vector<EffectKind>& all = effectCatalogue();
-  std::size_t rank = 0;
-  while (rank < all.size() && all[rank].name != name) ++rank;
-  return rank;
+// In the order of the stages, then of the catalogue; causes without a name first, for nothing is behind a
+// clipped signal. Unknown: last.
+std::pair<int, std::size_t> rankOf(const std::string& name) {
+  const EffectKind* kind = findEffect(name);
+  if (!kind) return {static_cast<int>(Stage::signal) + 1, 0};
+  const auto& all = kind->empirical() ? empiricalCatalogue() : effectCatalogue();
+  const auto place = static_cast<std::size_t>(kind - all.data());
+  return {static_cast<int>(kind->stage), kind->empirical() ? place : place + empiricalCatalogue().size()};
 }
 
 }  // namespace

@@ -11,6 +11,7 @@ class ToolWear : public Effect {
   void update(const Instant& now, TwinState& state) const override {
     state.law.edge_factor *= 1.0 + growth_ * now.edge_time;
   }
+  bool scalesForce() const override { return true; }
 
  private:
   double growth_;  // [1/s]

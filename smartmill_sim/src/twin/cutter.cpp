@@ -6,7 +6,7 @@ namespace smartmill::sim {
 
 Cutter::Cutter(const ToolGeometry& tool, const CuttingLaw& law, double time_step,
                const std::vector<double>& radius_offset, double corner_radius, Way way)
-    : corner_radius_(corner_radius), lag_(tool.lag()), law_(law) {
+    : way_(way), corner_radius_(corner_radius), lag_(tool.lag()), law_(law) {
   for (const EdgeSlice& slice : edgeSlices(tool, corner_radius)) {
     Part part;
     part.slice = part.actual = slice;
@@ -80,13 +80,19 @@ void Cutter::setLaw(const CuttingLaw& law) {
   }
 }
 
+CuttingForce Cutter::fromTables(Part& part, double angle) {
+  const EdgeSums sums = followed_ ? followed_->at(place_++) : part.rigid->sumsAt(angle);
+  if (kept_) kept_->push_back(sums);
+  return part.rigid->force(sums);
+}
+
 CuttingForce Cutter::step(const ToolMotion& now) {
   now_ = now;
   CuttingForce sum;
   for (Part& part : parts_) {
     if (part.arcs == 0) continue;
     const ToolMotion motion = motionOf(part, now);
-    const CuttingForce force = part.rigid ? part.rigid->at(motion.angle) : part.process->step(motion);
+    const CuttingForce force = part.rigid ? fromTables(part, motion.angle) : part.process->step(motion);
     sum.fx += force.fx;
     sum.fy += force.fy;
     sum.fz += force.fz;

@@ -24,7 +24,7 @@ CuttingMachine::CuttingMachine(const MachineModel& model, double time_step, Feed
       time_step_(time_step),
       sign_(model.force_sensor.measures_workpiece ? -1.0 : 1.0) {
   model_.effects.clear();
-  TwinSetup setup{std::move(model_), {}, {}};
+  TwinSetup setup{std::move(model_), {}, {}, {}};
   if (setup.model.tool) setup.radius_offset.assign(static_cast<std::size_t>(setup.model.tool->teeth), 0.0);
   effects_.setUp(setup);
   model_ = std::move(setup.model);
@@ -37,6 +37,7 @@ CuttingMachine::CuttingMachine(const MachineModel& model, double time_step, Feed
     const bool tables = feed == Feed::steady && !vibrates_;
     cutter_.emplace(*model_.tool, nominal_.law, time_step, setup.radius_offset, setup.corner_radius,
                     tables ? Cutter::Way::tables : Cutter::Way::history);
+    layers_ = EdgeLayers(setup, nominal_.law, time_step, tables);
   }
   state_ = nominal_;
   tip_.emplace_back(model_.tool_tip.x, rate, Hold::first_order);
@@ -70,6 +71,7 @@ ToolMotion CuttingMachine::fed(const ToolMotion& commanded) const {
 void CuttingMachine::engage(const std::vector<ContactArc>& arcs, const ToolMotion& now, double rise) {
   if (!cutter_) throw Error(model_.file + ": tool or cutting is missing (needed to simulate a cut)");
   if (!feed_start_) feed_start_ = now.centre;
+  if (arcs_.empty()) cut_time_ = 0.0;
   Input input;
   input.motion = now;
   update(input);
@@ -81,7 +83,9 @@ void CuttingMachine::engage(const std::vector<ContactArc>& arcs, const ToolMotio
   std::vector<ContactArc> actual = arcs;
   for (ContactArc& a : actual) a.depth = actualDepth(a.depth);
   depth_extra_ = state_.depth_extra;
+  if (replayed()) return;
   cutter_->engage(actual, fed(now));
+  layers_.engage(actual, fed(now));
 }
 
 double CuttingMachine::actualDepth(double commanded) const {
@@ -93,7 +97,9 @@ void CuttingMachine::setActualDepths() {
   std::vector<double> depths;
   for (const ContactArc& a : arcs_) depths.push_back(actualDepth(a.depth));
   depth_extra_ = state_.depth_extra;
-  if (cutter_) cutter_->setDepths(depths);
+  if (!cutter_ || replayed()) return;
+  cutter_->setDepths(depths);
+  layers_.setDepths(depths);
 }
 
 void CuttingMachine::setDepth(double depth, double passed_over) {
@@ -121,9 +127,11 @@ void CuttingMachine::update(const Input& input) {
   now_.speed = input.motion.speed;
   now_.start_time = clock_.start_time;
   now_.edge_time = clock_.edge_time;
+  now_.cut_time = cut_time_;
   state_ = nominal_;
   effects_.update(now_, state_);
   if (cutter_) cutter_->setLaw(state_.law);
+  layers_.setLaw(state_.law);
   if (drive_) drive_->setFriction(state_.friction_extra, state_.friction_factor);
   // The first time exactly, then only when it has moved.
   const double moved = std::abs(state_.sensor_frequency / sensor_frequency_ - 1.0);
@@ -146,7 +154,7 @@ CuttingMachine::Output CuttingMachine::step(const Input& input) {
 
 void CuttingMachine::step(const Input& input, Output& out) {
   takeOver(input);
-  out.force = cut(input.motion);
+  out.force = cut(input);
   out.applied = {{out.force.fx + input.sensor_force[0], out.force.fy + input.sensor_force[1],
                   out.force.fz + input.sensor_force[2]}};
   if (effects_.has(Stage::sensor_force)) effects_.addForce(now_, out.applied);
@@ -177,19 +185,45 @@ void CuttingMachine::takeOver(const Input& input) {
   now_.speed = input.motion.speed;
 }
 
-CuttingForce CuttingMachine::cut(const ToolMotion& commanded) {
+CuttingForce CuttingMachine::cut(const Input& input) {
+  if (replayed()) return followed_->steps.at(place_).force;
   if (!cutter_) return {};
-  ToolMotion motion = fed(commanded);
+  ToolMotion motion = fed(input.motion);
+  if (input.tip) {
+    motion.displacement = *input.tip;
+    return cutter_->step(motion);
+  }
   // The tip's place needs this step's force and the force needs the place: the force is first taken to go
   // on in a straight line, which errs by the square of the step.
   for (std::size_t axis = 0; axis < 2 && vibrates_; ++axis) {
     const std::array<double, 2>& f = tip_history_[axis];
     motion.displacement[axis] = tip_[axis].peek(2.0 * f[0] - f[1]);
   }
-  return cutter_->step(motion);
+  CuttingForce force = cutter_->step(motion);
+  layers_.add(motion, force);
+  return force;
 }
 
 void CuttingMachine::moveTip(const Input& input, Output& out) {
+  if (rigid()) return;
+  ChannelValues& channels = out.early;
+  double acceleration = 0.0;
+  if (followed_) {
+    const CutTrace::Step& step = followed_->steps.at(place_++);
+    channels[TOOL_X] = step.displacement[0];
+    channels[TOOL_Y] = step.displacement[1];
+    acceleration = step.acceleration;
+  } else {
+    settleTip(input, out);
+    if (probe_) acceleration = tip_[*probe_].acceleration();
+    if (kept_) kept_->steps.push_back({out.force, {{channels[TOOL_X], channels[TOOL_Y]}}, acceleration});
+  }
+  if (!probe_) return;
+  channels[DISPLACEMENT] = channels[TOOL_X + *probe_];
+  channels[ACCELERATION] = acceleration;
+}
+
+void CuttingMachine::settleTip(const Input& input, Output& out) {
   const std::array<double, 2> tip{{out.force.fx + input.tip_force[0], out.force.fy + input.tip_force[1]}};
   ChannelValues& channels = out.early;
   for (std::size_t axis = 0; axis < 2 && vibrates_; ++axis) {
@@ -198,13 +232,15 @@ void CuttingMachine::moveTip(const Input& input, Output& out) {
     // A jump does not go on.
     tip_history_[axis] = {{tip[axis], engaged_ ? tip[axis] : tip_history_[axis][0]}};
   }
-  if (probe_) {
-    channels[DISPLACEMENT] = channels[TOOL_X + *probe_];
-    channels[ACCELERATION] = tip_[*probe_].acceleration();
+  if (!cutter_) return;
+  std::array<double, 2> at{};
+  if (input.tip) {
+    at = *input.tip;
+  } else if (vibrates_) {
+    at = {{channels[TOOL_X], channels[TOOL_Y]}};
   }
-  if (cutter_)
-    cutter_->settle(vibrates_ ? std::array<double, 2>{{channels[TOOL_X], channels[TOOL_Y]}}
-                              : std::array<double, 2>{{0.0, 0.0}});
+  cutter_->settle(at);
+  layers_.settle(at);
 }
 
 void CuttingMachine::showForce(Output& out) {
@@ -228,6 +264,7 @@ void CuttingMachine::showLoad(double speed, Output& out) {
 void CuttingMachine::passTime(const ToolMotion& motion) {
   now_.record_time += time_step_;
   if (clock_.record || cutting()) clock_.edge_time += time_step_;
+  if (cutting()) cut_time_ += time_step_;
   if (!clock_.record) clock_.start_time += time_step_;
   if (state_.depth_slope != 0.0 && cutting()) {
     const std::array<double, 2>& v = motion.velocity;

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <functional>
 #include <random>
 #include <string>
 #include <utility>
@@ -17,6 +16,7 @@
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/signal/window.h"
 #include "smartmill_core/units.h"
+#include "smartmill_sim/twin/cut_traces.h"
 #include "smartmill_sim/twin/cutting_machine.h"
 
 namespace smartmill::sim {
@@ -99,7 +99,7 @@ CuttingMachine::Clock clockOf(const MachineModel& model, const CampaignTest& tes
 // squares of sine and cosine on every channel that a tone is in, about the means. Clipped samples do not
 // count.
 void findPhases(const Record& recorded, const std::array<std::vector<double>*, CHANNELS>& early, double rate,
-                const CuttingMachine& machine, const std::vector<Tone*>& tones) {
+                double speed, const CuttingMachine& machine, const std::vector<Tone*>& tones) {
   const ChannelValues limits = machine.limits();
   const auto n = static_cast<Eigen::Index>(2 * tones.size());
   std::vector<double> amplitude;
@@ -126,7 +126,7 @@ void findPhases(const Record& recorded, const std::array<std::vector<double>*, C
       values[c] = (*early[c])[i];
       machine.finish(t, values);
       for (Eigen::Index k = 0; k < n / 2; ++k) {
-        const double a = units::TWO_PI * tones[static_cast<std::size_t>(k)]->frequency * t;
+        const double a = tones[static_cast<std::size_t>(k)]->rate(speed) * t;
         row(2 * k) = amplitudeOf(k, c) * std::sin(a);
         row(2 * k + 1) = amplitudeOf(k, c) * std::cos(a);
       }
@@ -182,9 +182,9 @@ TapTarget targetOf(const Record& record, std::size_t axis) {
 // Runs the machine over the record, with substeps between the samples; recorded columns are kept.
 // input(i, share): what happens at a share 0..1 of the way from sample i to the next.
 // recorded: nullptr when there is none.
+template <class Input>
 void run(const MachineModel& model, const CampaignTest& test, const SimulationOptions& options,
-         CuttingMachine& machine, const std::function<CuttingMachine::Input(std::size_t, double)>& input,
-         const Record* recorded, Record& record) {
+         CuttingMachine& machine, const Input& input, const Record* recorded, Record& record) {
   machine.setClock(clockOf(model, test, record));
   if (record.has("load_meter")) {
     model.needSpindle("simulate load_meter");
@@ -217,7 +217,7 @@ void run(const MachineModel& model, const CampaignTest& test, const SimulationOp
   const std::vector<Tone*> tones = machine.tones();
   if (!tones.empty()) {
     if (recorded && !options.random_phases) {
-      findPhases(*recorded, out, test.sample_rate, machine, tones);
+      findPhases(*recorded, out, test.sample_rate, test.spindle_speed, machine, tones);
     } else {
       for (Tone* tone : tones)
         tone->phase = std::uniform_real_distribution<double>(0.0, units::TWO_PI)(random);
@@ -261,9 +261,15 @@ Record simulateTap(const MachineModel& model, const CampaignTest& test, const Re
 class SteadyTest {
  public:
   // @param phase of tooth 1 [rad] at the time `begin` [s] of the first sample
-  SteadyTest(const MachineModel& model, const CampaignTest& test, double phase, double begin, int substeps,
-             CuttingMachine& machine)
-      : test_(test), phase_(phase), begin_(begin), substeps_(substeps), machine_(machine) {
+  SteadyTest(const MachineModel& model, const CampaignTest& test, double phase, double begin,
+             const SimulationOptions& options, CuttingMachine& machine)
+      : test_(test),
+        phase_(phase),
+        begin_(begin),
+        substeps_(options.substeps),
+        // Half of what comes on linearly is there before the step ends.
+        rise_(engagementRise(machine.vibrates()) + 2.0 * options.early_entry),
+        machine_(machine) {
     if (!cut()) return;
     model.needCutting("simulate a cut");
     feed_ = test.engagement->feed_per_tooth * model.needTool("simulate a cut").teeth * test.spindle_speed /
@@ -313,14 +319,14 @@ class SteadyTest {
  private:
   bool cut() const { return test_.kind == TestKind::cut; }
   void engage(const ToolMotion& now, double depth) {
-    machine_.engage({{test_.engagement->entry, test_.engagement->exit, depth}}, now,
-                    engagementRise(machine_.vibrates()) * substeps_);
+    machine_.engage({{test_.engagement->entry, test_.engagement->exit, depth}}, now, rise_ * substeps_);
     engaged_ = true;
   }
 
   const CampaignTest& test_;
   double phase_, begin_;
   int substeps_;
+  double rise_;  // [samples]
   CuttingMachine& machine_;
   double feed_ = 0.0;  // [m/s]
   bool engaged_ = false;
@@ -336,25 +342,55 @@ void fillAngle(Record& record, double phase, double speed) {
   }
 }
 
-Record simulate(const MachineModel& model, const CampaignTest& test, const Record* recorded, Record record,
-                double phase, const SimulationOptions& options) {
-  if (options.substeps < 1) throw Error("simulation: substeps below 1");
-  CuttingMachine machine(model, 1.0 / (test.sample_rate * options.substeps), Feed::steady);
+bool isGuide(const CampaignTest& test, const Record* recorded, const CuttingMachine& machine) {
+  return test.kind == TestKind::cut && !test.running_before && machine.vibrates() && recorded &&
+         recorded->has(TIP[0]) && recorded->has(TIP[1]);
+}
+
+std::array<double, 2> tipAt(const Record& recorded, std::size_t i, double share) {
+  return {{interpolated(recorded.column(TIP[0]), i, share), interpolated(recorded.column(TIP[1]), i, share)}};
+}
+
+Record simulateOn(CuttingMachine& machine, const MachineModel& model, const CampaignTest& test,
+                  const Record* recorded, Record record, double phase, const SimulationOptions& options) {
   if (test.kind == TestKind::tap)
     return simulateTap(model, test, recorded, std::move(record), options, machine);
   fillAngle(record, phase, test.spindle_speed);
-  SteadyTest steady(model, test, phase, record.time.front(), options.substeps, machine);
+  SteadyTest steady(model, test, phase, record.time.front(), options, machine);
   if (test.running_before) {
     machine.setClock(clockOf(model, test, record));
     if (record.has("load_meter")) machine.resetLoadMeter(test.spindle_speed);
     steady.lead();
   }
   const double dt = 1.0 / test.sample_rate;
+  const bool guided = options.guided && isGuide(test, recorded, machine);
   run(
       model, test, options, machine,
-      [&](std::size_t i, double share) { return steady.next(record.time[i] + share * dt); }, recorded,
-      record);
+      [&](std::size_t i, double share) {
+        CuttingMachine::Input input = steady.next(record.time[i] + share * dt);
+        if (guided) input.tip = tipAt(*recorded, i, share);
+        return input;
+      },
+      recorded, record);
   return record;
+}
+
+Record simulate(const MachineModel& model, const CampaignTest& test, const Record* recorded, Record record,
+                double phase, const SimulationOptions& options) {
+  if (options.substeps < 1) throw Error("simulation: substeps below 1");
+  CuttingMachine machine(model, 1.0 / (test.sample_rate * options.substeps), Feed::steady);
+  const bool worth = options.traces && (test.kind == TestKind::cut || machine.vibrates());
+  if (!worth) return simulateOn(machine, model, test, recorded, std::move(record), phase, options);
+  std::vector<double> values = valuesOfTrace(model, test.kind);
+  if (const auto held = options.traces->find(values)) {
+    machine.follow(held.get());
+    return simulateOn(machine, model, test, recorded, std::move(record), phase, options);
+  }
+  const auto kept = std::make_shared<CutTrace>();
+  machine.keep(kept.get());
+  Record simulated = simulateOn(machine, model, test, recorded, std::move(record), phase, options);
+  options.traces->hold(std::move(values), kept);
+  return simulated;
 }
 
 }  // namespace

@@ -67,6 +67,7 @@ void run(const Options& o) {
     if (o.only_case >= 0 ? number != o.only_case : lines.count(number) > 0) return;
     const std::string folder = o.out + "/case_" + std::to_string(number);
     const auto progress = [&](const std::string& line) {
+      std::ofstream(folder + ".log", std::ios::app) << line << "\n";
       if (o.only_case >= 0) std::fprintf(stderr, "%s\n", line.c_str());
     };
     const json line = runBenchCase(cases[k], number, folder, progress);

@@ -24,8 +24,9 @@ struct TestData {
   std::vector<std::string> channels;  ///< that count and that the twin gives
   bool heldout = false;               ///< takes no part in any fit or choice
   bool phase_estimated = false;       ///< the record has no spindle angle
-  std::size_t quiet = 0;              ///< samples before any force acts
-  std::size_t first_cut = 0;          ///< first sample in cut; record.size() without cut
+  double early_entry = 0.0;   ///< [samples] by which the force of the cut comes on earlier than stated
+  std::size_t quiet = 0;      ///< samples before any force acts
+  std::size_t first_cut = 0;  ///< first sample in cut; record.size() without cut
 };
 
 /// A cut that was left aside because it chatters.

@@ -13,9 +13,6 @@ struct ExplainOptions {
   WorkbenchOptions bench;
   SearchOptions search;
   StructureOptions structure;
-  double least_heldout_reduction = 0.1;  ///< [1] of the held-out squares above the noise
-  /// An effect whose size differs more from test to test stands for another cause.
-  double least_evenness = 0.04;
 };
 
 /// The whole workflow: check the labels, search which effects are missing, see where the model differs,

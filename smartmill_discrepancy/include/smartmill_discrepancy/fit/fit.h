@@ -6,6 +6,7 @@
 
 #include <Eigen/Core>
 
+#include "smartmill_discrepancy/gap/block_columns.h"
 #include "smartmill_discrepancy/gap/twin_runner.h"
 #include "smartmill_discrepancy/hypotheses/hypothesis.h"
 #include "smartmill_discrepancy/hypotheses/nominal_freedom.h"
@@ -22,6 +23,9 @@ struct Member {
 struct FitState {
   std::vector<double> nominal;  ///< coordinates of NominalFreedom
   std::vector<Member> members;
+  /// What is free of where the records lie (turnFreedoms() of each, in the runner's order), beside where they
+  /// lay when they were loaded. Empty: there.
+  std::vector<double> turns;
 };
 
 /// The same without one of its members.
@@ -33,16 +37,22 @@ struct Fit {
   double penalty = 0.0;          ///< of the priors
   double bic = 0.0;              ///< chi2 + penalty + effect coordinates x ln(samples) + handicaps
   std::vector<double> residual;  ///< (measured - simulated) / noise at the state; empty unless converged
-  /// Covariance of nominal coordinates, then members' in their order: inverse of Fisher information with
-  /// priors.
+  /// Covariance of nominal coordinates, then members' in their order, then turns: inverse of Fisher
+  /// information with priors.
   Eigen::MatrixXd covariance;
   bool converged = false;  ///< false: the twin gives no numbers there; chi2 and bic are infinite
 };
 
-/// Tangents of the nominal coordinates about a state.
+/// Tangents of the nominal coordinates about a state, and of where the records lie: what phase, speed and
+/// entry can stand for is told from what they cannot in every fit.
 struct NominalTangents {
-  std::vector<double> at;   ///< nominal coordinates
-  Eigen::MatrixXd columns;  ///< samples x coordinates
+  std::vector<double> at;       ///< nominal coordinates
+  std::vector<double> turns;    ///< as in FitState
+  BlockColumns columns;         ///< one a nominal coordinate, then one a turn
+  Eigen::MatrixXd information;  ///< columns' * columns
+
+  /// Those of the turns alone: a fit with them simulates the nominal values.
+  NominalTangents ofTurns() const;
 };
 
 struct FitOptions {
@@ -62,9 +72,17 @@ class Fitter {
 
   MachineModel model(const FitState& state) const;
 
+  /// About a state at whose turns the runner stands.
   NominalTangents nominalTangents(const FitState& state) const;
+  /// A turn's freedom in one of the runner's tests.
+  struct TurnOf {
+    std::size_t chosen;
+    TurnFreedom freedom;
+  };
+  const std::vector<TurnOf>& turns() const { return turns_; }
 
-  /// @param frozen nominal values act linearly along these tangents; nullptr: they are simulated anew
+  /// @param frozen nominal values and turns act linearly along these tangents; without nominal ones, or
+  /// nullptr: they are simulated anew
   /// @return at a start where the twin gives no numbers: the start, not converged
   Fit fit(const FitState& start, const NominalTangents* frozen, const FitOptions& options) const;
 
@@ -75,6 +93,7 @@ class Fitter {
   const TwinRunner& runner_;
   const NominalFreedom& freedom_;
   std::function<bool()> cancelled_;
+  std::vector<TurnOf> turns_;
 };
 
 }  // namespace smartmill::discrepancy

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <deque>
 #include <functional>
+#include <memory>
 #include <mutex>
 #include <string>
 #include <vector>
@@ -11,6 +12,9 @@
 #include "smartmill_core/campaign/record.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_discrepancy/data/dataset.h"
+#include "smartmill_discrepancy/data/phase.h"
+#include "smartmill_sim/twin/cut_traces.h"
+#include "smartmill_sim/twin/twin.h"
 
 namespace smartmill::discrepancy {
 
@@ -22,6 +26,10 @@ struct Block {
   std::size_t size = 0;
   double noise = 0.0;  ///< [unit of the channel]
 };
+
+/// What a model says of each block, over its noise. Where nothing that a test knows of has changed, models
+/// share its blocks.
+using SimulatedBlocks = std::vector<std::shared_ptr<const std::vector<double>>>;
 
 /// Simulates tests of a campaign for many models at once. Vectors over the campaign hold all channels of the
 /// chosen tests one after the other, each over its noise.
@@ -45,8 +53,12 @@ class TwinRunner {
   /// is. Takes the error of few substeps out, which is nearly alike for models nearby.
   void correctTo(const MachineModel& reference, const std::vector<double>& exact);
 
-  /// The phases and speeds of the dataset's records are others now.
+  /// Phases, speeds and entries of the dataset's records are others now; until then those of the last call
+  /// stand.
   void readPhases();
+
+  /// Whether tools with modes are guided by the displacement that cuts' records show, see SimulationOptions.
+  void setGuided(bool guided);
 
   /// Steps of the twin a sample from here on.
   void setSubsteps(int substeps);
@@ -56,23 +68,37 @@ class TwinRunner {
   std::vector<std::vector<double>> simulate(const std::vector<MachineModel>& models) const;
   std::vector<double> simulate(const MachineModel& model) const;
 
+  /// The same in blocks, without what correctTo() adds to each model alike.
+  std::vector<SimulatedBlocks> simulateBlocks(const std::vector<MachineModel>& models) const;
+  /// What a model says when one of the chosen tests lies elsewhere, beside what it says of all of them.
+  SimulatedBlocks turned(const MachineModel& model, const SimulatedBlocks& base, std::size_t chosen,
+                         const Turn& by) const;
+  /// In one vector, with it.
+  std::vector<double> joined(const SimulatedBlocks& blocks) const;
+
   std::size_t simulations() const { return simulations_; }  ///< tests simulated so far
 
  private:
-  // Of one test: what the twin needs of its record, and its last results by the values they depend on. A tap
-  // says nothing of a cutting coefficient: what a fit moves leaves many tests as they were.
+  // Of one test: what the twin needs of its record, its last results by the values they depend on, and what
+  // the tool did in it. A tap says nothing of a cutting coefficient, a sensor's mode nothing of the cut: what
+  // a fit moves leaves much as it was.
   struct Kept {
     Record record;
-    double phase = 0.0;
+    CampaignTest test;
+    double phase = 0.0, early_entry = 0.0;
     std::mutex mutex;
-    std::deque<std::pair<std::vector<double>, std::vector<double>>> results;
+    std::deque<std::pair<std::vector<double>, SimulatedBlocks>> results;
+    std::unique_ptr<sim::CutTraces> traces;
   };
-  std::vector<double> simulateOne(const MachineModel& model, std::size_t chosen) const;
+  SimulatedBlocks simulateOne(const MachineModel& model, std::size_t chosen) const;
+  SimulatedBlocks blocksOf(const MachineModel& model, std::size_t chosen, const CampaignTest& test,
+                           const sim::SimulationOptions& options) const;
 
   const Dataset& data_;
   std::vector<std::size_t> tests_;
   mutable std::deque<Kept> kept_;
   int threads_, substeps_;
+  bool guided_ = false;
   std::vector<Block> blocks_;
   std::vector<std::size_t> first_block_;  // of each chosen test; one more at the end
   std::size_t size_ = 0;

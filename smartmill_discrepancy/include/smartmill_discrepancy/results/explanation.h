@@ -32,12 +32,14 @@ struct FoundEffect {
   double delta_bic = 0.0;  ///< BIC that is lost without it
   /// [1] share of the held-out squares above the noise that it takes away
   double heldout_gap_reduction = 0.0;
-  /// [1] variance over the tests of the size in which each test shows it; 0 where all agree
-  double evenness = 0.0;
-  /// [1] that the tests as a body prefer this effect to its best rival (or to none), were they drawn anew:
-  /// Vuong's comparison of two models over tests.
-  double confidence = 0.0;
+  double confidence = 0.0;  ///< [1] that it shrinks the gap of tests it was not fitted to, against none and
+                            ///< against its rivals (Standing)
   std::vector<std::pair<std::string, double>> alternatives;  ///< other effects in its place: name, delta_bic
+};
+
+/// An effect of the catalogue that comes nearest to what is left and does not hold.
+struct Resemblance {
+  std::string name, variant, reason;
 };
 
 /// Gap of one channel of one test before and after.
@@ -53,10 +55,11 @@ struct BlockGap {
 struct ChannelShare {
   std::string channel;
   double explained_before = 0.0,
-         explained_after = 0.0;   ///< [1] of the variance; below 0: worse than the mean
-  std::optional<double> repeats;  ///< [1] of the variance; unknown in short cuts
-  double floor = 0.0;             ///< [unit of the channel] RMS of what does not come again
-  double floor_gap = 0.0;         ///< [1] the same over the noise: the gap of the best model of steady cuts
+         explained_after = 0.0;             ///< [1] of the variance; below 0: worse than the mean
+  std::optional<double> explained_heldout;  ///< [1] after, of the held-out cuts alone
+  std::optional<double> repeats;            ///< [1] of the variance; unknown in short cuts
+  double floor = 0.0;                       ///< [unit of the channel] RMS of what does not come again
+  double floor_gap = 0.0;  ///< [1] the same over the noise: the gap of the best model of steady cuts
 };
 
 /// One channel of one test over the spindle angle: the mean of the record's revolutions in bins.
@@ -81,10 +84,13 @@ struct Explanation {
   Verdict verdict = Verdict::no_disagreement;
   std::vector<Finding> where, unexplained;
   std::vector<FoundEffect> effects;
+  std::vector<Resemblance> resembles;
   std::vector<std::vector<std::string>> not_separable;
   std::optional<std::string> suggested_test;
   std::optional<CampaignTest> suggested_cut;  ///< the same, for who makes it
   GapPair before, after;
+  std::optional<GapPair> named_only;  ///< gap without the effects that have no name, where there are any
+  std::string sentence;               ///< what a machinist should know; may be empty
   std::vector<BlockGap> gaps;
   std::vector<ChannelShare> channels;
   std::vector<TriedEffect> ladder;

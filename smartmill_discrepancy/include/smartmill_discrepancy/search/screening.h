@@ -24,4 +24,7 @@ struct Promise {
 std::vector<Promise> screen(const Fitter& fitter, const Fit& now, const NominalTangents& tangents,
                             const std::vector<Hypothesis>& tried);
 
+/// The promise is linear: of shorter ways from the null point to its start the one that fits best.
+std::vector<double> bestStart(const Fitter& fitter, const Fit& now, const Promise& promise);
+
 }  // namespace smartmill::discrepancy

@@ -47,7 +47,18 @@ struct SearchResult {
   std::vector<Rung> ladder;
   std::vector<double> contribution;  ///< of each member: BIC that is lost without it, others fitted again
   std::vector<bool> needed;          ///< whether that is enough to name it
+  std::vector<FitState> lacking;     ///< the model without each member, others fitted again
   std::vector<Rival> rivals;
+  std::vector<const Hypothesis*> refused;  ///< took the shape of something else: held-out tests deny them
+
+  /// Back to the nominal values alone.
+  void forgetMembers() {
+    best = null;
+    contribution.clear();
+    needed.clear();
+    lacking.clear();
+    rivals.clear();
+  }
 };
 
 /// Forward addition of effects with re-fitting and pruning, on the fit tests. Cancelled, it ends with what it

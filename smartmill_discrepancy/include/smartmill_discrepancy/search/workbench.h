@@ -32,7 +32,8 @@ class Workbench {
   const NominalFreedom& freedom() const { return freedom_; }
   const Fitter& quick() const { return quick_; }
   const Fitter& exact() const { return exact_; }
-  const TwinRunner& fitted() const { return exact_runner_; }     ///< exact twin of the fit tests
+  /// Exact twin of the fit tests, guided where fits are.
+  const TwinRunner& fitted() const { return guided_ ? guided_runner_ : exact_runner_; }
   const TwinRunner& heldout() const { return heldout_runner_; }  ///< exact twin of the held-out tests
   bool cancelled() const { return cancelled_ && cancelled_(); }
 
@@ -43,23 +44,41 @@ class Workbench {
   /// @param exact_squares receives what the exact twin leaves there; may be nullptr
   NominalTangents linearise(const FitState& state, double* exact_squares = nullptr);
 
+  /// Whether some cut of a tool with modes shows its displacement: such tools are searched guided by it, so
+  /// that no candidate runs away, and judged freely.
+  bool canGuide() const { return can_guide_; }
+  bool guided() const { return guided_; }
+  void guide(bool guided);
+
   /// What the exact twin leaves of the fit tests at a state.
-  double exactSquares(const FitState& state) const;
+  double exactSquares(const FitState& state);
+  /// The same with the records where they lie now.
+  double exactSquaresHere(const FitState& state) const;
+  /// What the exact twin leaves that nothing guides.
+  double freeSquares(const FitState& state);
 
   /// Smaller steps for the quick twin. @return false: they are as small as the exact one's
   bool refineQuick();
 
   bool phasesEstimated() const { return phases_estimated_; }  ///< some records have no spindle angle
 
-  /// Turns the records without spindle angle to where a state fits best. @return by how much [rad]
-  double turnPhases(const FitState& state);
+  /// Turns the records without spindle angle, of the state and held out, to where the lines of the state's
+  /// forces say, where it then fits better: another tooth, another turn in air. @return by how much [rad]
+  double turnPhases(FitState& state);
+
+  /// The records lie where a state has them, those held out where it fits them best.
+  void turnTo(const FitState& state);
 
  private:
-  Dataset data_;  // its records without spindle angle are turned as the model becomes better
+  void turnFitted(const FitState& state);
+
+  Dataset data_;                  // its records without spindle angle are turned as the model becomes better
+  std::vector<TestData> loaded_;  // those to be fitted, as they were loaded
   NominalFreedom freedom_;
   bool phases_estimated_;
   std::function<bool()> cancelled_;
-  TwinRunner quick_runner_, exact_runner_, heldout_runner_;
+  bool can_guide_, guided_ = false;
+  TwinRunner quick_runner_, exact_runner_, guided_runner_, heldout_runner_;
   Fitter quick_, exact_;
 };
 

@@ -10,6 +10,7 @@
 #include "smartmill_core/cutting/cutting_law.h"
 #include "smartmill_core/model/effect_catalogue.h"
 #include "smartmill_core/model/machine_model.h"
+#include "smartmill_core/units.h"
 
 namespace smartmill::sim {
 
@@ -33,12 +34,22 @@ const char* channelName(std::size_t channel);
 /// @throws Error on an unknown name.
 std::size_t channelOf(const std::string& name);
 
+/// A lower part of the cutter's edges that acts besides them.
+struct EdgeLayer {
+  double weight = 1.0;  ///< [1] of its force
+  double height = 0.0;  ///< [m] where it ends: above the tip, or below the work's surface
+  bool from_surface = false;
+  bool chip_only = false;  ///< only what the chip coefficients give
+  int missing_tooth = -1;  ///< does not cut there, counts from 0; -1: all do
+};
+
 /// What the machine is before it starts; effects change it once.
 struct TwinSetup {
   MachineModel model;                  ///< without effects
   std::vector<double> radius_offset;   ///< [m] of each tooth
   std::array<double, CHANNELS> delay;  ///< [s] of each channel
   double corner_radius = 0.0;          ///< [m] of the tool
+  std::vector<EdgeLayer> layers;
 };
 
 /// Now.
@@ -48,6 +59,7 @@ struct Instant {
   double record_time = 0.0;  ///< [s] since the record began
   double start_time = 0.0;   ///< [s] of the record since the machine was cold
   double edge_time = 0.0;    ///< [s] that the edge has cut
+  double cut_time = 0.0;     ///< [s] since this cut began
 };
 
 /// What effects set anew while the machine runs, from its nominal state each time.
@@ -67,6 +79,10 @@ struct Tone {
   double frequency = 0.0;                    ///< [Hz]
   std::array<double, CHANNELS> amplitude{};  ///< in each channel
   double phase = 0.0;                        ///< [rad] at the start of the record
+  double order = 0.0;                        ///< [1] of the spindle, instead of the frequency; 0: none
+
+  /// [rad/s] @param speed [rad/s] of the spindle
+  double rate(double speed) const { return order > 0.0 ? order * speed : units::TWO_PI * frequency; }
 };
 
 /// One physical cause that a nominal model may lack: an entry of a model's `effects:`. A class overrides the
@@ -80,6 +96,8 @@ class Effect {
   virtual void setUp(TwinSetup&) const {}
   /// Motion, cutting law, speed-dependent sensor, friction.
   virtual void update(const Instant&, TwinState&) const {}
+  /// Whether update() sets nothing of the cut but coefficients and factors of the law.
+  virtual bool scalesForce() const { return false; }
   /// Adds to the force on the sensor [N].
   virtual void addForce(const Instant&, Axes3&) const {}
   /// Sensor output and signal: changes measured channels.

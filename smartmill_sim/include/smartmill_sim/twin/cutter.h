@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <optional>
 #include <vector>
 
@@ -30,6 +31,13 @@ class Cutter {
   void setDepths(const std::vector<double>& depths);
   void setLaw(const CuttingLaw& law);
 
+  Way way() const { return way_; }
+  /// Of tables: from here on the sums of each step are kept, or taken from what was kept over the same steps
+  /// by a cutter that differed in coefficients and factors of the law only. @param sums must outlive the
+  /// steps
+  void keep(std::vector<EdgeSums>* sums) { kept_ = sums; }
+  void follow(const std::vector<EdgeSums>* sums) { followed_ = sums; }
+
   /// Force on the tool with its tip displaced as in this motion.
   CuttingForce step(const ToolMotion& now);
   /// Ends the step with the tip there [m].
@@ -46,13 +54,18 @@ class Cutter {
   };
   void place(Part& part);
   ToolMotion motionOf(const Part& part, const ToolMotion& now) const;
+  CuttingForce fromTables(Part& part, double angle);
 
+  Way way_;
   double corner_radius_, lag_;
   CuttingLaw law_;
   std::vector<Part> parts_;
   std::vector<ContactArc> arcs_;
   ToolMotion now_;
-  bool fresh_ = false;  // the arcs are other ones than those of the last step
+  std::vector<EdgeSums>* kept_ = nullptr;
+  const std::vector<EdgeSums>* followed_ = nullptr;
+  std::size_t place_ = 0;  // in what is followed
+  bool fresh_ = false;     // the arcs are other ones than those of the last step
 };
 
 }  // namespace smartmill::sim

@@ -11,6 +11,7 @@
 #include "smartmill_sim/effects/delay_line.h"
 #include "smartmill_sim/effects/effect.h"
 #include "smartmill_sim/twin/cutter.h"
+#include "smartmill_sim/twin/edge_layers.h"
 #include "smartmill_sim/twin/spindle_drive.h"
 
 namespace smartmill::sim {
@@ -18,6 +19,17 @@ namespace smartmill::sim {
 /// How the tool is fed: steady promises that speed, feed and contact do not change while the tool cuts (a
 /// record of a campaign); without tool-tip modes tables over a revolution then give the forces.
 enum class Feed { any, steady };
+
+/// What cut and tool do in each step, which no sensor, drive or signal has a part in.
+struct CutTrace {
+  struct Step {
+    CuttingForce force;
+    std::array<double, 2> displacement;  ///< [m] of the tip
+    double acceleration;                 ///< [m/s2] where a probe stands
+  };
+  std::vector<EdgeSums> sums;  ///< of a tool without modes: coefficients and factors of the law act later
+  std::vector<Step> steps;     ///< of one with modes
+};
 
 /// Process, tool structure, force sensor, spindle drive and measuring chain of one machine with the effects
 /// that its model lists, in steps of constant length.
@@ -28,6 +40,8 @@ class CuttingMachine {
     ToolMotion motion;                              ///< displacement is not read: the structure gives it
     std::array<double, 2> tip_force{{0, 0}};        ///< [N] on the tool besides cutting (a hammer)
     std::array<double, 3> sensor_force{{0, 0, 0}};  ///< [N] on the sensor besides cutting
+    /// [m] where the tip is known to be, x and y: the chip is of that, whatever the structure would do.
+    std::optional<std::array<double, 2>> tip;
   };
   /// At the end of a step.
   struct Output {
@@ -75,6 +89,18 @@ class CuttingMachine {
   /// Displacement and acceleration sensors stand at the tip, in x (0) or y (1).
   void setProbe(std::size_t axis) { probe_ = axis; }
 
+  /// From here on what cut and tool do is kept; or is taken from what another machine kept over the same
+  /// steps, which differed behind the tool only (of a tool without modes: in coefficients and factors of the
+  /// law too). @param trace must outlive the steps
+  void keep(CutTrace* trace) {
+    kept_ = trace;
+    if (rigid()) cutter_->keep(&trace->sums);
+  }
+  void follow(const CutTrace* trace) {
+    followed_ = trace;
+    if (rigid()) cutter_->follow(&trace->sums);
+  }
+
   /// The load meter stands at the steady value of cutting air.
   void resetLoadMeter(double spindle_speed);
 
@@ -89,12 +115,16 @@ class CuttingMachine {
   void update(const Input& input);
   // A step, in this order.
   void takeOver(const Input& input);  // what effects set anew
-  CuttingForce cut(const ToolMotion& commanded);
+  CuttingForce cut(const Input& input);
   void moveTip(const Input& input, Output& out);
+  void settleTip(const Input& input, Output& out);
   void showForce(Output& out);
   void showLoad(double speed, Output& out);
   void passTime(const ToolMotion& motion);
 
+  bool rigid() const { return cutter_ && cutter_->way() == Cutter::Way::tables; }
+  // Cut and tool are taken from a trace, step by step.
+  bool replayed() const { return followed_ && !rigid(); }
   double actualDepth(double commanded) const;  // [m]
   void setActualDepths();
   ToolMotion fed(const ToolMotion& commanded) const;
@@ -107,11 +137,16 @@ class CuttingMachine {
   Clock clock_;
   int steps_to_update_ = 0;
   std::optional<Cutter> cutter_;
+  EdgeLayers layers_;
   bool vibrates_ = false;
+  CutTrace* kept_ = nullptr;
+  const CutTrace* followed_ = nullptr;
+  std::size_t place_ = 0;  // in what is followed
   std::optional<std::size_t> probe_;
   std::vector<ContactArc> arcs_;                     // as commanded
   double depth_extra_ = 0.0;                         // [m] that the depths hold now
   double feed_path_ = 0.0;                           // [m] since engagement
+  double cut_time_ = 0.0;                            // [s] since then
   std::optional<std::array<double, 2>> feed_start_;  // [m] where feed errors begin to count
   std::vector<ModalFilter> tip_;                     // x, y
   std::vector<ModalFilter> sensor_;                  // x, y, z

@@ -10,14 +10,26 @@
 
 namespace smartmill::sim {
 
+class CutTraces;
+
 struct SimulationOptions {
   bool noise = true;       ///< sensor noise and rounding of the load meter
   std::uint64_t seed = 1;  ///< of the noise and, without recorded angle, of the phase
   int substeps = 4;        ///< integration steps a sample, >= 1
   /// [rad] spindle angle at the first sample, instead of the recorded angle's.
   std::optional<double> phase;
+  /// [samples] The force of a cut comes on so much earlier, in the mean, than engage_time and
+  /// engagementRise() say.
+  double early_entry = 0.0;
+  /// Of a tool with modes, where a cut's record shows tool_x and tool_y: chips are those of the displacement
+  /// that was measured, the structure only shows what these forces do to it. Nothing can run away, a
+  /// chattering cut is followed, and what is left is an error of prediction.
+  bool guided = false;
   /// Tones (mains hum) with a phase of the seed, not with the one that the recorded signals show.
   bool random_phases = false;
+  /// What cut and tool did in this very test (record, phase, substeps) under other models: taken from there
+  /// where the model has the same values, and put there. nullptr: each simulation by itself.
+  CutTraces* traces = nullptr;
 };
 
 /// [1] The force of a cut comes on over this part of a sample before the engagement: a step of the programs

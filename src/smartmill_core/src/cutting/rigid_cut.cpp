@@ -15,7 +15,6 @@ using units::TWO_PI;
 
 constexpr std::size_t NODES = TURN_NODES;  // linear between them errs by 1e-6 of the integrand
 constexpr double NODE_ANGLE = TURN_NODE_ANGLE;
-constexpr int MOST_JOINS = 3;  // of tables with the factors of one moment
 constexpr std::size_t MOST_TEETH = 20;
 constexpr double LEAST_CHIP = 1e-15;  // [m] at the ends of a contact, which still rub
 
@@ -23,8 +22,14 @@ ContactArc arcOf(const Engagement& engagement) {
   return {engagement.entry, std::min(engagement.exit, TWO_PI), engagement.axial_depth};
 }
 
-CuttingForce forceOf(const double* sum, double radius) {
-  return {sum[0], sum[1], sum[2], sum[3] * radius};
+// sums += share (b - a)
+void addDifference(const EdgeSums& a, const EdgeSums& b, double share, EdgeSums& sums) {
+  sums.chip_sine += share * (b.chip_sine - a.chip_sine);
+  sums.chip_cosine += share * (b.chip_cosine - a.chip_cosine);
+  sums.chip += share * (b.chip - a.chip);
+  sums.edge_sine += share * (b.edge_sine - a.edge_sine);
+  sums.edge_cosine += share * (b.edge_cosine - a.edge_cosine);
+  sums.edge += share * (b.edge - a.edge);
 }
 
 }  // namespace
@@ -40,21 +45,19 @@ RigidCut::RigidCut(const ToolGeometry& tool, const CuttingLaw& law, const Engage
   engage({arcOf(engagement)}, {{engagement.feed_per_tooth * tool.teeth / TWO_PI, 0.0}});
 }
 
-// Chip and edge part of a chip, the factors of both left out: they act later.
-void RigidCut::add(double weight, double thickness, const SineCosine& at, Row& row) const {
-  const CuttingCoefficients& k = law_.coefficients;
+void RigidCut::add(double weight, double thickness, const SineCosine& at, EdgeSums& sums) const {
   const double chip = std::max(thickness, LEAST_CHIP);
-  const double h = effectiveChip(law_, chip), e = edgeShare(law_, chip);
-  EdgeForce of_chip, of_edge;
-  of_chip.add(weight, k.ktc * h, k.krc * h, k.kac * h, at.sine, at.cosine);
-  of_edge.add(weight, k.kte * e, k.kre * e, k.kae * e, at.sine, at.cosine);
-  const Row part{of_chip.fx, of_chip.fy, of_chip.fz, of_chip.ft,
-                 of_edge.fx, of_edge.fy, of_edge.fz, of_edge.ft};
-  for (std::size_t i = 0; i < row.size(); ++i) row[i] += part[i];
+  const double h = weight * effectiveChip(law_, chip), e = weight * edgeShare(law_, chip);
+  sums.chip_sine += h * at.sine;
+  sums.chip_cosine += h * at.cosine;
+  sums.chip += h;
+  sums.edge_sine += e * at.sine;
+  sums.edge_cosine += e * at.cosine;
+  sums.edge += e;
 }
 
-std::vector<RigidCut::Row> RigidCut::integrals(std::vector<ChipShape> shapes) const {
-  std::vector<Row> table(NODES + 1, Row{});
+std::vector<EdgeSums> RigidCut::integrals(std::vector<ChipShape> shapes) const {
+  std::vector<EdgeSums> table(NODES + 1);
   forEachContact(shapes.data(), shapes.size(), 0.0, TWO_PI, [&](const ChipShape& shape, const Stretch& over) {
     const auto first = static_cast<std::size_t>(over.low() / NODE_ANGLE);
     for (std::size_t n = first; n < NODES && static_cast<double>(n) * NODE_ANGLE < over.high(); ++n) {
@@ -66,9 +69,7 @@ std::vector<RigidCut::Row> RigidCut::integrals(std::vector<ChipShape> shapes) co
       });
     }
   });
-  for (std::size_t n = 1; n <= NODES; ++n) {
-    for (std::size_t k = 0; k < table[n].size(); ++k) table[n][k] += table[n - 1][k];
-  }
+  for (std::size_t n = 1; n <= NODES; ++n) addDifference({}, table[n - 1], 1.0, table[n]);
   return table;
 }
 
@@ -76,7 +77,6 @@ std::vector<RigidCut::Row> RigidCut::integrals(std::vector<ChipShape> shapes) co
 // chip.
 void RigidCut::shape() {
   tables_.clear();
-  joined_now_ = false;
   shapes_.assign(rule_.alike() ? 1 : static_cast<std::size_t>(rule_.teeth()), {});
   for (std::size_t j = 0; j < shapes_.size(); ++j) {
     for (int n = 1; n <= rule_.teeth(); ++n)
@@ -102,33 +102,10 @@ void RigidCut::setDepths(const std::vector<double>& depths) {
 }
 
 void RigidCut::setLaw(const CuttingLaw& law) {
-  const CuttingCoefficients &a = law.coefficients, &b = law_.coefficients;
-  const bool same = a.ktc == b.ktc && a.krc == b.krc && a.kac == b.kac && a.kte == b.kte && a.kre == b.kre &&
-                    a.kae == b.kae && law.edge_chip == law_.edge_chip &&
-                    law.size_exponent == law_.size_exponent && law.size_reference == law_.size_reference;
-  if (law.chip_factor != law_.chip_factor || law.edge_factor != law_.edge_factor) {
-    joined_now_ = false;
-    ++factor_changes_;
-  }
+  if (law.edge_chip != law_.edge_chip || law.size_exponent != law_.size_exponent ||
+      law.size_reference != law_.size_reference || law.course != law_.course)
+    tables_.clear();
   law_ = law;
-  if (same) return;
-  tables_.clear();
-  joined_now_ = false;
-}
-
-void RigidCut::join() {
-  joined_.resize(tables_.size());
-  for (std::size_t t = 0; t < tables_.size(); ++t) {
-    joined_[t].resize(tables_[t].size());
-    for (std::size_t n = 0; n < tables_[t].size(); ++n) joined_[t][n] = joined(tables_[t][n]);
-  }
-  joined_now_ = true;
-}
-
-RigidCut::Sum RigidCut::joined(const Row& row) const {
-  Sum sum;
-  for (std::size_t k = 0; k < 4; ++k) sum[k] = law_.chip_factor * row[k] + law_.edge_factor * row[k + 4];
-  return sum;
 }
 
 double RigidCut::chip(int tooth, double phi) const {
@@ -141,77 +118,73 @@ double RigidCut::chip(int tooth, double phi) const {
 namespace {
 
 /// The integral of a table over the immersion angles from..to, times a height.
-template <class Row>
-void addBetween(const std::vector<Row>& rows, double from, double to, double height, Row& sum) {
+void addBetween(const std::vector<EdgeSums>& rows, double from, double to, double height, EdgeSums& sums) {
   const double pa = from * (1.0 / NODE_ANGLE), pb = to * (1.0 / NODE_ANGLE);
   const auto ia = std::min(static_cast<std::size_t>(pa), NODES - 1);
   const auto ib = std::min(static_cast<std::size_t>(pb), NODES - 1);
-  const double sa = pa - static_cast<double>(ia), sb = pb - static_cast<double>(ib);
-  for (std::size_t k = 0; k < sum.size(); ++k) {
-    sum[k] += height * (rows[ib][k] + sb * (rows[ib + 1][k] - rows[ib][k]) - rows[ia][k] -
-                        sa * (rows[ia + 1][k] - rows[ia][k]));
-  }
+  addDifference(rows[ia], rows[ib], height, sums);
+  addDifference(rows[ib], rows[ib + 1], height * (pb - static_cast<double>(ib)), sums);
+  addDifference(rows[ia], rows[ia + 1], -height * (pa - static_cast<double>(ia)), sums);
 }
 
 }  // namespace
 
-void RigidCut::addStraight(const EdgePart& part, Row& sum) const {
+void RigidCut::addStraight(const EdgePart& part, EdgeSums& sums) const {
   const double thickness = chip(part.tooth, part.to);
-  if (thickness > 0.0) add(part.height, thickness, {std::sin(part.to), std::cos(part.to)}, sum);
+  if (thickness > 0.0) add(part.height, thickness, {std::sin(part.to), std::cos(part.to)}, sums);
 }
 
-CuttingForce RigidCut::at(double angle) {
-  // Factors that change all the time (wear) are not worth a table; a straight edge needs none.
-  const bool wanted = factor_changes_ <= MOST_JOINS && lag_ > 0.0 && !arcs_.empty();
+EdgeSums RigidCut::sumsAt(double angle) {
+  EdgeSums sums;
+  if (arcs_.empty()) return sums;
   if (lag_ > 0.0) tabulate();
-  if (!joined_now_ && wanted) join();
-  Sum sum{};
-  Row row{};
   forEachEdgePart(arcs_, lag_, rule_.toothAngle(), angle, [&](const EdgePart& part) {
     if (part.straight) {
-      addStraight(part, row);
-    } else if (joined_now_) {
-      addBetween(joined_[tableOf(part.tooth)], part.from, part.to, part.height, sum);
+      addStraight(part, sums);
     } else {
-      addBetween(tables_[tableOf(part.tooth)], part.from, part.to, part.height, row);
+      addBetween(tables_[tableOf(part.tooth)], part.from, part.to, part.height, sums);
     }
   });
-  const Sum rest = joined(row);
-  for (std::size_t k = 0; k < sum.size(); ++k) sum[k] += rest[k];
-  return forceOf(sum.data(), tool_.radius());
+  return sums;
+}
+
+std::array<CuttingForce, 2> RigidCut::parts(const EdgeSums& s) const {
+  const CuttingCoefficients& k = law_.coefficients;
+  return {forceOf(s.chip_sine, s.chip_cosine, s.chip, k.ktc, k.krc, k.kac),
+          forceOf(s.edge_sine, s.edge_cosine, s.edge, k.kte, k.kre, k.kae)};
 }
 
 void RigidCut::integrate(const std::vector<ChipShape>& shapes, double from, double to, double height,
-                         Row& sum) const {
+                         EdgeSums& sums) const {
   std::array<ChipShape, MOST_TEETH> own;
   std::copy(shapes.begin(), shapes.end(), own.begin());
   forEachContact(own.data(), shapes.size(), from, to, [&](const ChipShape& shape, const Stretch& over) {
     gauss(over, [&](double weight, double s, double c) {
-      add(height * weight, shape.at(s, c), {s, c}, sum);
+      add(height * weight, shape.at(s, c), {s, c}, sums);
     });
   });
 }
 
 std::array<CuttingForce, 2> RigidCut::partsAt(double angle) const {
-  Row row{};
+  EdgeSums sums;
   forEachEdgePart(arcs_, lag_, rule_.toothAngle(), angle, [&](const EdgePart& part) {
     if (part.straight) {
-      addStraight(part, row);
+      addStraight(part, sums);
     } else {
-      integrate(shapes_[tableOf(part.tooth)], part.from, part.to, part.height, row);
+      integrate(shapes_[tableOf(part.tooth)], part.from, part.to, part.height, sums);
     }
   });
-  return {forceOf(row.data(), tool_.radius()), forceOf(row.data() + 4, tool_.radius())};
+  return parts(sums);
 }
 
 std::array<CuttingForce, 2> RigidCut::meanParts() const {
-  Row row{};
+  EdgeSums sums;
   for (const ContactArc& arc : arcs_) {
     // One entry of shapes serves all teeth when they are alike.
     const double share = arc.depth / TWO_PI * (rule_.alike() ? rule_.teeth() : 1);
-    for (const std::vector<ChipShape>& shapes : shapes_) integrate(shapes, arc.entry, arc.exit, share, row);
+    for (const std::vector<ChipShape>& shapes : shapes_) integrate(shapes, arc.entry, arc.exit, share, sums);
   }
-  return {forceOf(row.data(), tool_.radius()), forceOf(row.data() + 4, tool_.radius())};
+  return parts(sums);
 }
 
 }  // namespace smartmill

@@ -59,6 +59,10 @@ ceres::Solver::Options solverOptions(const Options& options, Reporter* reporter)
   solver.parameter_tolerance = options.parameter_tolerance;
   solver.gradient_tolerance = options.gradient_tolerance;
   solver.initial_trust_region_radius = options.trust_radius;
+  if (options.dear_derivatives) {
+    solver.line_search_interpolation_type = ceres::QUADRATIC;
+    solver.max_num_line_search_step_size_iterations = 12;
+  }
   solver.logging_type = ceres::SILENT;
   solver.num_threads = 1;
   solver.update_state_every_iteration = false;

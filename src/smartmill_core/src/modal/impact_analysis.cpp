@@ -91,11 +91,17 @@ void ImpactAnalysis::add(const Hit& hit) {
   ++hits_;
 }
 
-FrequencyResponse ImpactAnalysis::frf() const {
+FrequencyResponse ImpactAnalysis::frf(FrfAverage average) const {
   if (!estimator_) throw Error("no hit was recorded");
-  FrequencyResponse h = estimator_->h1(options_.unit);
+  FrequencyResponse h =
+      average == FrfAverage::h2 ? estimator_->h2(options_.unit) : estimator_->h1(options_.unit);
+  for (std::size_t k = 0; average == FrfAverage::hv && k < h.size(); ++k) {
+    // |H2| = |H1| / C
+    if (h.coherence[k] > 0.0) h.value[k] /= std::sqrt(h.coherence[k]);
+  }
   const std::size_t lines = h.size();
-  // Eq. 4.39 (4.29 for one hit) with the noise seen before the hits.
+  // Eq. 4.39 for H1, 4.41 for H2 (with S_xx = S_ff |H1| |H2|), between them for Hv; with the noise seen
+  // before the hits. One hit: eq. 4.29.
   const double n = static_cast<double>(samples_), m = static_cast<double>(hits_);
   const double share = window_share_ / m, force_noise = force_noise_ / m,
                response_noise = response_noise_ / m;
@@ -106,7 +112,16 @@ FrequencyResponse ImpactAnalysis::frf() const {
     }
   }
   for (std::size_t k = 0; k < lines; ++k) {
-    const double floor = n / force_power_[k] * (response_noise + std::norm(h.value[k]) * share * force_noise);
+    const double c = h.coherence[k] > 0.0 ? h.coherence[k] : 1.0;
+    const double of_response = response_noise, of_force = std::norm(h.value[k]) * share * force_noise;
+    double floor = n / force_power_[k];
+    if (average == FrfAverage::h1) {
+      floor *= of_response + of_force / c;
+    } else if (average == FrfAverage::h2) {
+      floor *= (of_response / c + of_force) / c;
+    } else {
+      floor *= (of_response + of_force) / c;
+    }
     double variance = 0.0;
     const std::size_t first = k > SMOOTH_LINES ? k - SMOOTH_LINES : 0;
     const std::size_t last = std::min(lines - 1, k + SMOOTH_LINES);

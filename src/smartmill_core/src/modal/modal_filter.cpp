@@ -52,18 +52,6 @@ ModalFilter::ModalFilter(const ModalModel& model, double sample_rate, Hold hold)
   }
 }
 
-double ModalFilter::step(double input) {
-  double output = direct_ * input;
-  for (Section& s : sections_) {
-    const double x = s.a11 * s.x + s.a12 * s.v + s.b1 * last_input_ + s.c1 * input;
-    s.v = s.a21 * s.x + s.a22 * s.v + s.b2 * last_input_ + s.c2 * input;
-    s.x = x;
-    output += s.gain * x;
-  }
-  last_input_ = input;
-  return output;
-}
-
 double ModalFilter::jump(double before, double input) {
   const double output = step(before);
   last_input_ = input;

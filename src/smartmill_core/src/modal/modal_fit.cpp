@@ -10,17 +10,19 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/fit/least_squares.h"
 #include "smartmill_core/math/linear_algebra.h"
+#include "smartmill_core/modal/modal_estimate.h"
 
 namespace smartmill {
 namespace {
 
 using Complex = std::complex<double>;
 
-constexpr double MIN_DAMPING = 1e-4;
+constexpr double MIN_DAMPING = 1e-6;
 constexpr double MAX_DAMPING = 0.5;
-constexpr double START_DAMPING = 0.02;
-// A further mode must lower the BIC by more than this: strong evidence on the usual scale.
-constexpr double BIC_STEP = 10.0;
+// A gain below this share of the tallest line is none.
+constexpr double LEAST_GAIN = 1e-6;
+// A deviation that the lines do not tell is stated as this many times the value.
+constexpr double NOT_TOLD = 10.0;
 
 struct Solution {
   int modes = 0;
@@ -28,7 +30,7 @@ struct Solution {
   double cost = std::numeric_limits<double>::infinity();  // sum of squared weighted residuals
 };
 
-// Gains, direct and mass line that fit best for given frequencies and damping ratios.
+// Gains and direct share that fit best for given frequencies and damping ratios.
 void solveLinear(const ModalLines& problem, Solution& solution) {
   const int free = problem.parameters(solution.modes) - 2 * solution.modes;
   if (free == 0) return;
@@ -48,8 +50,7 @@ void solveLinear(const ModalLines& problem, Solution& solution) {
                                  std::exp(solution.parameters[3 * k + 1]));
       set(column++, problem.scale * (problem.unit_static_gain ? h - 1.0 : h));
     }
-    if (problem.direct) set(column++, problem.scale);
-    if (problem.mass) set(column, problem.scale * problem.massTerm(i));
+    if (problem.direct) set(column, problem.scale);
     const Complex due = problem.value[i] - (problem.unit_static_gain ? 1.0 : 0.0);
     b(row) = w * due.real();
     b(row + 1) = w * due.imag();
@@ -86,68 +87,6 @@ void solve(const ModalLines& problem, Solution& solution) {
   solution.cost = found.squares;
 }
 
-FrequencyResponse residual(const ModalLines& problem, const Solution& solution) {
-  FrequencyResponse left;
-  left.frequency = problem.frequency;
-  const ModalResiduals residuals(problem, solution.modes);
-  Eigen::VectorXd r(residuals.count());
-  residuals.evaluate(asVector(solution.parameters), &r, nullptr);
-  for (Eigen::Index i = 0; i < r.size(); i += 2) left.value.emplace_back(r[i], r[i + 1]);
-  return left;
-}
-
-// Smoothed over three lines, so that a single noisy line does not look like a mode.
-FrequencyResponse smoothed(const FrequencyResponse& frf) {
-  FrequencyResponse result = frf;
-  for (std::size_t i = 1; i + 1 < frf.size(); ++i) {
-    result.value[i] = (frf.value[i - 1] + frf.value[i] + frf.value[i + 1]) / 3.0;
-  }
-  return result;
-}
-
-Solution withOneMore(const ModalLines& problem, const Solution& from) {
-  constexpr std::size_t TRIALS = 3;
-  std::vector<double> peaks = findPeaks(smoothed(residual(problem, from)), problem.low, problem.high, 0.05);
-  if (peaks.empty()) throw Error("modal fit: no peak in the band");
-  if (peaks.size() > TRIALS) peaks.resize(TRIALS);
-  Solution best;
-  for (const double peak : peaks) {
-    for (const double damping : {START_DAMPING, 0.2 * START_DAMPING}) {
-      Solution trial;
-      trial.modes = from.modes + 1;
-      const auto modes_end = from.parameters.begin() + 3 * from.modes;
-      trial.parameters.assign(from.parameters.begin(), modes_end);
-      trial.parameters.insert(trial.parameters.end(), {std::log(peak), std::log(damping), 0.0});
-      trial.parameters.insert(trial.parameters.end(), modes_end, from.parameters.end());
-      solve(problem, trial);
-      if (trial.cost < best.cost) best = trial;
-    }
-  }
-  if (best.modes == 0)
-    throw Error("modal fit: the solver did not converge with " + std::to_string(from.modes + 1) + " modes");
-  return best;
-}
-
-double bic(const ModalLines& problem, const Solution& solution) {
-  const double n = 2.0 * problem.lines();
-  return n * std::log(solution.cost / n) + problem.parameters(solution.modes) * std::log(n);
-}
-
-// Standard deviations from the scatter of a few hits are noisy and lean towards the lines that happen to
-// agree; noise is smooth in frequency, so that the root mean square over neighbouring lines is the better
-// weight.
-std::vector<double> smoothedDeviation(const std::vector<double>& deviation) {
-  constexpr std::size_t SIDE = 5;
-  std::vector<double> result(deviation.size());
-  for (std::size_t i = 0; i < deviation.size(); ++i) {
-    const std::size_t first = i > SIDE ? i - SIDE : 0, last = std::min(i + SIDE, deviation.size() - 1);
-    double sum = 0.0;
-    for (std::size_t j = first; j <= last; ++j) sum += deviation[j] * deviation[j];
-    result[i] = std::sqrt(sum / static_cast<double>(last - first + 1));
-  }
-  return result;
-}
-
 ModalLines prepare(const FrequencyResponse& frf, const ModalFitOptions& options) {
   if (frf.value.size() != frf.size())
     throw Error("modal fit: the FRF has unequal numbers of lines and values");
@@ -157,8 +96,7 @@ ModalLines prepare(const FrequencyResponse& frf, const ModalFitOptions& options)
   problem.low = options.low;
   problem.high = options.high;
   problem.unit_static_gain = options.unit_static_gain;
-  problem.direct = options.fit_direct && !options.unit_static_gain;
-  problem.mass = options.fit_mass_line;
+  problem.direct = !options.unit_static_gain;
   problem.positive = options.positive_gains;
   double largest = 0.0;
   std::size_t known = 0;
@@ -189,6 +127,33 @@ ModalLines prepare(const FrequencyResponse& frf, const ModalFitOptions& options)
     weight = problem.weighted ? std::sqrt(2.0) / std::max(weight, 1e-9 * largest) : 1.0 / largest;
   }
   return problem;
+}
+
+Solution without(const Solution& from, int mode) {
+  Solution less = from;
+  --less.modes;
+  less.cost = std::numeric_limits<double>::infinity();
+  less.parameters.erase(less.parameters.begin() + 3 * mode, less.parameters.begin() + 3 * mode + 3);
+  return less;
+}
+
+// All modes at once, real and with what the options hold them to. Found ones that this leaves no share are
+// dropped, unless their number is given.
+Solution fitTogether(const ModalLines& problem, const std::vector<EstimatedMode>& found, bool fixed) {
+  Solution solution;
+  solution.modes = static_cast<int>(found.size());
+  for (const EstimatedMode& m : found)
+    solution.parameters.insert(solution.parameters.end(),
+                               {std::log(m.frequency), std::log(m.damping_ratio), 0.0});
+  solution.parameters.resize(static_cast<std::size_t>(problem.parameters(solution.modes)), 0.0);
+  solve(problem, solution);
+  for (int k = solution.modes - 1; problem.positive && !fixed && k >= 0 && solution.modes > 1; --k) {
+    if (solution.parameters[static_cast<std::size_t>(3 * k + 2)] > LEAST_GAIN) continue;
+    solution = without(solution, k);
+    solve(problem, solution);
+  }
+  if (!std::isfinite(solution.cost)) throw Error("modal fit: the solver did not converge");
+  return solution;
 }
 
 // The physical model of a solution with its covariance.
@@ -228,15 +193,20 @@ ModalFit describe(const ModalLines& problem, const Solution& solution) {
   double gains = 0.0;
   for (int k = 0; k < solution.modes; ++k) {
     Mode& mode = fit.model.modes[k];
-    mode.frequency_std = std::sqrt(fit.covariance(3 * k, 3 * k));
-    mode.damping_ratio_std = std::sqrt(fit.covariance(3 * k + 1, 3 * k + 1));
-    mode.gain_std = std::sqrt(fit.covariance(3 * k + 2, 3 * k + 2));
+    const auto deviation = [&](int i, double value) {
+      const double d = std::sqrt(fit.covariance(3 * k + i, 3 * k + i));
+      return std::isfinite(d) ? d : NOT_TOLD * std::abs(value);
+    };
+    mode.frequency_std = deviation(0, mode.frequency);
+    mode.damping_ratio_std = deviation(1, mode.damping_ratio);
+    mode.gain_std = deviation(2, mode.gain);
     gains += mode.gain;
   }
   fit.model.direct = problem.unit_static_gain ? 1.0 - gains
                      : problem.direct         ? problem.scale * solution.parameters[3 * solution.modes]
                                               : 0.0;
   fit.model.direct_std = std::sqrt(fit.covariance(outer - 1, outer - 1));
+  if (!std::isfinite(fit.model.direct_std)) fit.model.direct_std = NOT_TOLD * std::abs(fit.model.direct);
   double error = 0.0, norm = 0.0;
   for (std::size_t i = 0; i < problem.lines(); ++i) {
     error +=
@@ -249,57 +219,33 @@ ModalFit describe(const ModalLines& problem, const Solution& solution) {
 
 }  // namespace
 
-std::vector<double> findPeaks(const FrequencyResponse& frf, double low, double high, double share) {
-  std::vector<double> height;
-  std::vector<double> frequency;
-  for (std::size_t i = 0; i < frf.size(); ++i) {
-    if (frf.frequency[i] < low || frf.frequency[i] > high) continue;
-    frequency.push_back(frf.frequency[i]);
-    height.push_back(std::abs(frf.value[i]));
-  }
-  struct Peak {
-    std::size_t line;
-    double prominence;
-  };
-  std::vector<Peak> peaks;
-  for (std::size_t i = 1; i + 1 < height.size(); ++i) {
-    if (!(height[i] > height[i - 1] && height[i] >= height[i + 1])) continue;
-    double left = height[i], right = height[i];
-    for (std::size_t j = i; j-- > 0 && height[j] <= height[i];) left = std::min(left, height[j]);
-    for (std::size_t j = i + 1; j < height.size() && height[j] <= height[i]; ++j)
-      right = std::min(right, height[j]);
-    peaks.push_back({i, height[i] - std::max(left, right)});
-  }
-  std::sort(peaks.begin(), peaks.end(),
-            [](const Peak& a, const Peak& b) { return a.prominence > b.prominence; });
-  std::vector<double> result;
-  for (const Peak& peak : peaks) {
-    if (peak.prominence < share * peaks.front().prominence) break;
-    result.push_back(frequency[peak.line]);
-  }
-  return result;
-}
-
 ModalFit fitModes(const FrequencyResponse& frf, const ModalFitOptions& options) {
   const ModalLines problem = prepare(frf, options);
-  Solution solution;
-  solution.parameters.assign(problem.parameters(0), 0.0);
+  ModalEstimateOptions search;
+  search.low = options.low;
+  search.high = options.high;
+  search.real_modes = true;
+  ModalEstimate estimate = estimateModes({frf}, search);
+  std::vector<EstimatedMode> chosen = std::move(estimate.modes);
   const bool fixed = options.modes > 0;
-  const int most = fixed ? options.modes : options.max_modes;
-  while (solution.modes < most) {
-    Solution more;
-    try {
-      more = withOneMore(problem, solution);
-    } catch (const Error&) {
-      if (fixed || solution.modes == 0) throw;
-      break;
-    }
-    const bool better = solution.modes == 0 || bic(problem, more) < bic(problem, solution) - BIC_STEP;
-    if (!fixed && !better) break;
-    solution = std::move(more);
+  const auto most = static_cast<std::size_t>(fixed ? options.modes : options.max_modes);
+  if (fixed && chosen.size() < most)
+    chosen.insert(chosen.end(), estimate.doubts.begin(), estimate.doubts.end());
+  std::sort(chosen.begin(), chosen.end(),
+            [](const EstimatedMode& a, const EstimatedMode& b) { return a.evidence > b.evidence; });
+  if (chosen.empty()) throw Error("modal fit: no mode is proven in the band");
+  if (fixed && chosen.size() < most) {
+    throw Error("modal fit: " + std::to_string(most) + " modes are asked for, the band shows " +
+                std::to_string(chosen.size()));
   }
-
-  return describe(problem, solution);
+  if (chosen.size() > most) chosen.resize(most);
+  ModalFit fit = describe(problem, fitTogether(problem, chosen, fixed));
+  for (const EstimatedMode& m : estimate.doubts) {
+    if (!fixed)
+      fit.doubts.push_back(
+          {m.frequency, m.damping_ratio, m.gain[0], m.frequency_std, m.damping_ratio_std, m.gain_std[0]});
+  }
+  return fit;
 }
 
 }  // namespace smartmill

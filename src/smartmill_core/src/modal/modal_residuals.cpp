@@ -8,17 +8,20 @@ namespace smartmill {
 using Complex = std::complex<double>;
 using Eigen::Index;
 
-double ModalLines::massTerm(std::size_t i) const {
-  return -std::pow(reference() / frequency[i], 2);
-}
-
 double ModalLines::reference() const {
   return std::max(low, frequency.front());
 }
 
-Complex unitMode(double f, double f0, double zeta) {
-  const double r = f / f0;
-  return 1.0 / Complex(1.0 - r * r, 2.0 * zeta * r);
+std::vector<double> smoothedDeviation(const std::vector<double>& deviation) {
+  constexpr std::size_t NEAR = 5;
+  std::vector<double> result(deviation.size());
+  for (std::size_t i = 0; i < deviation.size(); ++i) {
+    const std::size_t first = i > NEAR ? i - NEAR : 0, last = std::min(i + NEAR, deviation.size() - 1);
+    double sum = 0.0;
+    for (std::size_t j = first; j <= last; ++j) sum += deviation[j] * deviation[j];
+    result[i] = std::sqrt(sum / static_cast<double>(last - first + 1));
+  }
+  return result;
 }
 
 bool ModalResiduals::evaluate(const Eigen::VectorXd& at, Eigen::VectorXd* residual,
@@ -43,14 +46,10 @@ bool ModalResiduals::evaluate(const Eigen::VectorXd& at, Eigen::VectorXd* residu
       set(3 * k + 1, -gain * h * h * Complex(0.0, 2.0 * zeta * r));
       set(3 * k + 2, s * shape);
     }
-    Index next = 3 * modes_;
+    const Index next = 3 * modes_;
     if (lines_.direct) {
       model += s * at[next];
-      set(next++, s);
-    }
-    if (lines_.mass) {
-      model += s * at[next] * lines_.massTerm(i);
-      set(next, s * lines_.massTerm(i));
+      set(next, s);
     }
     (*residual)[row] = w * (model.real() - lines_.value[i].real());
     (*residual)[row + 1] = w * (model.imag() - lines_.value[i].imag());

@@ -3,6 +3,7 @@
 #include <complex>
 #include <vector>
 
+#include "modal_window.h"
 #include "smartmill_core/fit/least_squares.h"
 
 namespace smartmill {
@@ -12,26 +13,24 @@ struct ModalLines {
   std::vector<double> frequency;            // [Hz]
   std::vector<std::complex<double>> value;  // [unit]
   std::vector<double> weight;               // [1/unit] of the real and of the imaginary part
-  double scale = 1.0;                       // [unit] of gains, direct and mass line inside the solver
+  double scale = 1.0;                       // [unit] of gains and direct share inside the solver
   bool weighted = false;
   bool unit_static_gain = false;
   bool direct = false;
-  bool mass = false;
   bool positive = false;
   double low = 0.0, high = 0.0;  // [Hz]
 
   std::size_t lines() const { return frequency.size(); }
-  int parameters(int modes) const { return 3 * modes + (direct ? 1 : 0) + (mass ? 1 : 0); }
-  // Mass line 1 / -(f / low)^2: of the size of one at the lower end of the band.
-  double massTerm(std::size_t i) const;
+  int parameters(int modes) const { return 3 * modes + (direct ? 1 : 0); }
   double reference() const;
 };
 
-/// w_n^2 / (w_n^2 - w^2 + 2 i zeta w_n w)
-std::complex<double> unitMode(double f, double f0, double zeta);
+/// Standard deviations from the scatter of a few hits are themselves scattered, and lean towards lines that
+/// happen to agree: the root mean square over neighbours is the better weight.
+std::vector<double> smoothedDeviation(const std::vector<double>& deviation);
 
 /// Weighted (fit - measured), real and imaginary part line by line, over log f0, log zeta, gain / scale of
-/// each mode, then direct / scale, then mass line / scale.
+/// each mode, then direct / scale.
 class ModalResiduals : public fit::Residuals {
  public:
   /// The lines must outlive this.

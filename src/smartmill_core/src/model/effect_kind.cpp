@@ -121,8 +121,17 @@ bool EffectKind::has(EffectNeed need) const {
 }
 
 const EffectKind* findEffect(const std::string& name) {
-  for (const EffectKind& kind : effectCatalogue()) {
-    if (kind.name == name) return &kind;
+  for (const std::vector<EffectKind>* kinds : {&effectCatalogue(), &empiricalCatalogue()}) {
+    for (const EffectKind& kind : *kinds) {
+      if (kind.name == name) return &kind;
+    }
+  }
+  return nullptr;
+}
+
+const EffectKind* findEmpirical(const std::string& stage, const std::string& form) {
+  for (const EffectKind& kind : empiricalCatalogue()) {
+    if (kind.form_stage == stage && kind.form == form) return &kind;
   }
   return nullptr;
 }
@@ -179,7 +188,9 @@ EffectEntry effectEntry(const std::string& name, const std::map<std::string, dou
   entry.lists = lists;
   for (const auto& [key, value] : numbers) check(known(key, EffectValue::number), value);
   for (const auto& [key, values] : lists) {
-    const EffectParameter& p = known(key, EffectValue::list);
+    const EffectParameter* p_of = findParameter(*kind, key);
+    const bool series = p_of && p_of->value == EffectValue::series;
+    const EffectParameter& p = known(key, series ? EffectValue::series : EffectValue::list);
     for (const double value : values) check(p, value);
   }
   for (const auto& [key, word] : words) {

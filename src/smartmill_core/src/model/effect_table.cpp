@@ -33,6 +33,8 @@ std::string keyText(const EffectParameter& p) {
     case EffectValue::list:
       return p.key + " (" + p.unit + ", one a tooth" + rangeText(p) +
              (p.sum ? ", sum " + shortNumber(*p.sum) + ")" : ")");
+    case EffectValue::series:
+      return p.key + " (" + p.unit + ", any number of them" + rangeText(p) + ")";
     case EffectValue::modes:
       return p.key + " (modes as in tool_tip; absent: none)";
     case EffectValue::word:

@@ -197,11 +197,24 @@ Workpiece readWorkpiece(const StrictYaml& map) {
   return w;
 }
 
+// The effect that an entry names; one without a name is told by stage and form.
+const EffectKind& kindOf(const StrictYaml& map) {
+  const std::string name = map.word("name");
+  if (name == EMPIRICAL) {
+    const std::string stage = map.word("stage"), form = map.word("form");
+    const EffectKind* kind = findEmpirical(stage, form);
+    if (!kind) map.fail("form", "'" + form + "' is no form of an empirical effect of stage '" + stage + "'");
+    return *kind;
+  }
+  const EffectKind* kind = findEffect(name);
+  if (!kind || kind->empirical()) map.fail("name", "'" + name + "' is no effect of the catalogue");
+  return *kind;
+}
+
 EffectEntry readEffect(const StrictYaml& map, const MachineModel& model) {
+  const EffectKind* kind = &kindOf(map);
   EffectEntry effect;
-  effect.name = map.word("name");
-  const EffectKind* kind = findEffect(effect.name);
-  if (!kind) map.fail("name", "'" + effect.name + "' is no effect of the catalogue");
+  effect.name = kind->name;
   for (const EffectParameter& p : kind->parameters) {
     switch (p.value) {
       case EffectValue::number: {
@@ -218,11 +231,14 @@ EffectEntry readEffect(const StrictYaml& map, const MachineModel& model) {
       case EffectValue::word:
         effect.words[p.key] = map.oneOf(p.key, p.words);
         break;
-      case EffectValue::list: {
-        const std::size_t teeth = model.tool ? static_cast<std::size_t>(model.tool->teeth) : 0;
+      case EffectValue::list:
+      case EffectValue::series: {
+        const bool per_tooth = p.value == EffectValue::list && model.tool;
+        const std::size_t teeth = per_tooth ? static_cast<std::size_t>(model.tool->teeth) : 0;
         effect.lists[p.key] = readPerTooth(map, p.key, teeth, p.range, p.sum);
         if (!map.has(p.key + "_std")) break;
-        const std::vector<double> stds = map.numbers(p.key + "_std", teeth, NOT_NEGATIVE);
+        const std::vector<double> stds =
+            map.numbers(p.key + "_std", effect.lists[p.key].size(), NOT_NEGATIVE);
         for (std::size_t k = 0; k < stds.size(); ++k) effect.std_devs[itemOf(p.key, k)] = stds[k];
         break;
       }
@@ -294,9 +310,11 @@ void writeModes(std::ostream& out, const std::string& indent, const std::string&
 }
 
 void writeEffect(std::ostream& out, const EffectEntry& effect) {
-  out << "- name: " << yamlWord(effect.name) << "\n";
   const EffectKind* kind = findEffect(effect.name);
   if (!kind) throw Error("model: effects: '" + effect.name + "' is no effect of the catalogue");
+  out << "- name: " << (kind->empirical() ? EMPIRICAL : yamlWord(effect.name)) << "\n";
+  if (kind->empirical())
+    out << "  stage: " << yamlWord(kind->form_stage) << "\n  form: " << yamlWord(kind->form) << "\n";
   for (const EffectParameter& p : kind->parameters) {
     switch (p.value) {
       case EffectValue::number: {
@@ -311,7 +329,8 @@ void writeEffect(std::ostream& out, const EffectEntry& effect) {
         if (value != effect.words.end()) out << "  " << p.key << ": " << yamlWord(value->second) << "\n";
         break;
       }
-      case EffectValue::list: {
+      case EffectValue::list:
+      case EffectValue::series: {
         const auto values = effect.lists.find(p.key);
         if (values == effect.lists.end()) break;
         out << "  " << p.key << ": " << list(values->second, 1.0) << "\n";

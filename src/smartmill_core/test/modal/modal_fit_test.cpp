@@ -135,20 +135,12 @@ TEST(ModalFit, derivativesAgreeWithDifferences) {
   for (const bool unit_static_gain : {false, true}) {
     lines.unit_static_gain = unit_static_gain;
     lines.direct = !unit_static_gain;
-    lines.mass = true;
     Eigen::VectorXd at(lines.parameters(2));
     at.head(6) << std::log(900.0), std::log(0.04), 0.3, std::log(2000.0), std::log(0.01), -0.1;
     at.tail(at.size() - 6).setConstant(0.05);
     const fit::DerivativeGap gap = fit::checkDerivatives(ModalResiduals(lines, 2), at);
     EXPECT_LT(gap.relative, 1e-8) << gap.row << " " << gap.column << " " << gap.given << " " << gap.numeric;
   }
-}
-
-TEST(FindPeaks, strongestFirst) {
-  const std::vector<double> peaks = findPeaks(measured(sensor(), 0.0, 1), 0.0, 4000.0, 0.05);
-  ASSERT_EQ(peaks.size(), 2u);
-  EXPECT_NEAR(peaks[0], 930.0, 5.0);
-  EXPECT_NEAR(peaks[1], 1950.0, 5.0);
 }
 
 }  // namespace

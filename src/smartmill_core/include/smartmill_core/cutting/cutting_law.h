@@ -1,29 +1,46 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
+#include <vector>
 
 #include "smartmill_core/cutting/tool.h"
 
 namespace smartmill {
+
+/// A course of the effective chip that no law gives: straight between its nodes, from nothing at no chip, and
+/// straight on behind the last one.
+struct ChipCourse {
+  std::vector<double> chip;       ///< [m] > 0, rising; two or more
+  std::vector<double> effective;  ///< [m] of each, rising
+
+  double at(double h) const {
+    std::size_t k = 0;
+    while (k + 1 < chip.size() && h > chip[k]) ++k;
+    const double h0 = k ? chip[k - 1] : 0.0, e0 = k ? effective[k - 1] : 0.0;
+    return e0 + (h - h0) * (effective[k] - e0) / (chip[k] - h0);
+  }
+};
 
 /// How a chip turns into force. Per metre of edge and in the frame of the edge:
 ///
 ///     Ft = chip_factor ktc h' + edge_factor kte e + 0.3 d      Fr = chip_factor krc h' + edge_factor kre e +
 ///     d Fa = chip_factor kac h' + edge_factor kae e
 ///
-/// with h' = h (h / size_reference)^-size_exponent, e = 1 - exp(-h / edge_chip) and d = damping v_r / v_c,
-/// the velocity into the work over the cutting speed. Where h <= 0 there is no force at all (formats.md,
+/// with h' = course(h) (h / size_reference)^-size_exponent, e = 1 - exp(-h / edge_chip) and d = damping v_r /
+/// v_c, the velocity into the work over the cutting speed. Where h <= 0 there is no force at all (formats.md,
 /// effects.md).
 struct CuttingLaw {
   CuttingCoefficients coefficients;
-  double chip_factor = 1.0;      ///< [1] on ktc, krc, kac
-  double edge_factor = 1.0;      ///< [1] on kte, kre, kae
-  double edge_chip = 0.0;        ///< [m] over which the edge terms come; 0: there at once
-  double size_exponent = 0.0;    ///< [1]
-  double size_reference = 1e-4;  ///< [m]
-  double damping = 0.0;          ///< [N/m]
-  double damping_radial = 1.0;   ///< [1] share of d across the tool; below 1 where the edge leans (corner.h)
-  double damping_axial = 0.0;    ///< [1] share of d along it
+  double chip_factor = 1.0;            ///< [1] on ktc, krc, kac
+  double edge_factor = 1.0;            ///< [1] on kte, kre, kae
+  double edge_chip = 0.0;              ///< [m] over which the edge terms come; 0: there at once
+  double size_exponent = 0.0;          ///< [1]
+  double size_reference = 1e-4;        ///< [m]
+  const ChipCourse* course = nullptr;  ///< of another; none: h itself
+  double damping = 0.0;                ///< [N/m]
+  double damping_radial = 1.0;  ///< [1] share of d across the tool; below 1 where the edge leans (corner.h)
+  double damping_axial = 0.0;   ///< [1] share of d along it
 };
 
 /// [1] Tangential over radial force of process damping.
@@ -31,7 +48,8 @@ inline constexpr double TANGENTIAL_DAMPING = 0.3;
 
 /// [m] h' of a chip h > 0.
 inline double effectiveChip(const CuttingLaw& law, double chip) {
-  return law.size_exponent == 0.0 ? chip : chip * std::pow(chip / law.size_reference, -law.size_exponent);
+  const double h = law.course ? law.course->at(chip) : chip;
+  return law.size_exponent == 0.0 ? h : h * std::pow(chip / law.size_reference, -law.size_exponent);
 }
 
 /// [1] e of a chip h > 0.

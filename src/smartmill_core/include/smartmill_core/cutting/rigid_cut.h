@@ -13,6 +13,13 @@
 
 namespace smartmill {
 
+/// What of the edges is in contact, sums over them that no coefficient nor factor of the law enters: the
+/// force is linear in both. With h' and e of CuttingLaw at immersion angles phi:
+struct EdgeSums {
+  double chip_sine = 0.0, chip_cosine = 0.0, chip = 0.0;  ///< [m2] of h' sin(phi), h' cos(phi), h'
+  double edge_sine = 0.0, edge_cosine = 0.0, edge = 0.0;  ///< [m] of e sin(phi), e cos(phi), e
+};
+
 /// Milling with a tool that does not vibrate, at steady speed and feed, from tables over a revolution: each
 /// tooth's chips by ChipRule (runout, uneven pitch), their elementary forces integrated over the immersion
 /// angle once; the force of an edge is the difference of the integral between its ends in the arc
@@ -30,11 +37,21 @@ class RigidCut {
   const std::vector<ContactArc>& arcs() const { return arcs_; }
   void setDepths(const std::vector<double>& depths);
 
-  /// Chip and edge factors act at once; the rest of the law makes new tables.
+  /// Coefficients and factors act at once; how chips turn into h' and e makes new tables.
   void setLaw(const CuttingLaw& law);
 
   /// Force on the tool when tooth 1 stands at an angle [rad].
-  CuttingForce at(double angle);
+  CuttingForce at(double angle) { return force(sumsAt(angle)); }
+  /// The same in two steps.
+  EdgeSums sumsAt(double angle);
+  CuttingForce force(const EdgeSums& sums) const {
+    const CuttingCoefficients& k = law_.coefficients;
+    const double c = law_.chip_factor, e = law_.edge_factor;
+    const CuttingForce chip = forceOf(sums.chip_sine, sums.chip_cosine, sums.chip, k.ktc, k.krc, k.kac);
+    const CuttingForce edge = forceOf(sums.edge_sine, sums.edge_cosine, sums.edge, k.kte, k.kre, k.kae);
+    return {c * chip.fx + e * edge.fx, c * chip.fy + e * edge.fy, c * chip.fz + e * edge.fz,
+            c * chip.torque + e * edge.torque};
+  }
   /// Chip of a tooth at an immersion angle [m], <= 0: no contact.
   double chip(int tooth, double phi) const;
   /// What the chip coefficients and what the edge coefficients give alone, the factors of the law left out.
@@ -44,16 +61,20 @@ class RigidCut {
   std::array<CuttingForce, 2> meanParts() const;
 
  private:
-  using Row = std::array<double, 8>;  // fx fy fz ft of the chip, the same of the edge
-  using Sum = std::array<double, 4>;  // fx fy fz ft
   void shape();
   void tabulate();
-  std::vector<Row> integrals(std::vector<ChipShape> shapes) const;
-  void add(double weight, double thickness, const SineCosine& at, Row& row) const;
-  void join();
-  Sum joined(const Row& row) const;
-  void addStraight(const EdgePart& part, Row& sum) const;
-  void integrate(const std::vector<ChipShape>& shapes, double from, double to, double height, Row& sum) const;
+  std::vector<EdgeSums> integrals(std::vector<ChipShape> shapes) const;
+  void add(double weight, double thickness, const SineCosine& at, EdgeSums& sums) const;
+  void addStraight(const EdgePart& part, EdgeSums& sums) const;
+  void integrate(const std::vector<ChipShape>& shapes, double from, double to, double height,
+                 EdgeSums& sums) const;
+  // Sums times coefficients, see EdgeForce::add().
+  CuttingForce forceOf(double sine, double cosine, double plain, double tangential, double radial,
+                       double axial) const {
+    return {-tangential * cosine - radial * sine, tangential * sine - radial * cosine, axial * plain,
+            tangential * plain * tool_.radius()};
+  }
+  std::array<CuttingForce, 2> parts(const EdgeSums& sums) const;
   std::size_t tableOf(int tooth) const { return rule_.alike() ? 0 : static_cast<std::size_t>(tooth); }
 
   ToolGeometry tool_;
@@ -63,10 +84,8 @@ class RigidCut {
   std::vector<ContactArc> arcs_;
   std::array<double, 2> feed_{{0, 0}};          // [m/rad]
   std::vector<std::vector<ChipShape>> shapes_;  // what a tooth may meet; one entry when all teeth are alike
-  std::vector<std::vector<Row>> tables_;  // the same: integrals from 0 to each node [N/m rad], when needed
-  std::vector<std::vector<Sum>> joined_;  // with the factors of chip and edge, while these stand
-  bool joined_now_ = false;
-  int factor_changes_ = 0;
+  std::vector<std::vector<EdgeSums>> tables_;   // the same: integrals from 0 to each node, over the height of
+                                                // edge a radian, when needed
 };
 
 }  // namespace smartmill

@@ -65,6 +65,9 @@ struct Options {
   double trust_radius = 1e4;           ///< of the first step: the larger, the less it is damped
   /// QR of the Jacobian in place of normal equations: slower, sees twice the digits.
   bool orthogonal = false;
+  /// Derivatives cost much beside residuals: between bounds a step that does not hold what it promised is
+  /// shortened from residuals alone.
+  bool dear_derivatives = false;
   /// A second run without the unknowns that press against a bound, beside which Ceres ends early.
   bool finish_at_bounds = true;
   /// Called after every iteration. @return false to end with the best point so far

@@ -10,6 +10,10 @@
 
 namespace smartmill {
 
+/// Which average: H1 = S_fx / S_ff (Dunwoody eq. 4.26, noise of the force pulls it down), H2 = S_xx / S_fx*
+/// (eq. 4.27, noise of the response pulls it up), Hv between them: sqrt(|H1 H2|) with their phase.
+enum class FrfAverage { h1, h2, hv };
+
 /// How hits become an FRF.
 struct ImpactOptions {
   bool window_force = true;  ///< Dunwoody eq. 4.17..4.19
@@ -25,7 +29,8 @@ struct ImpactOptions {
 
 /// Windows, transforms and averages hits of one point (Dunwoody eq. 4.15..4.27). Baselines before the trigger
 /// are taken off. Standard deviations: with several hits from their scatter, smoothed over neighbouring lines
-/// and never below what the noise before the hits gives (eq. 4.39); with one hit from that noise (eq. 4.29).
+/// and never below what the noise before the hits gives (eq. 4.39, of H2 eq. 4.41); with one hit from that
+/// noise (eq. 4.29).
 class ImpactAnalysis {
  public:
   explicit ImpactAnalysis(const ImpactOptions& options);
@@ -34,8 +39,8 @@ class ImpactAnalysis {
   void add(const Hit& hit);
   int hits() const { return hits_; }
 
-  /// H1 of all hits so far. @throws Error without a hit.
-  FrequencyResponse frf() const;
+  /// Of all hits so far. @throws Error without a hit.
+  FrequencyResponse frf(FrfAverage average = FrfAverage::h1) const;
 
   /// Takes the exponential window's damping off fitted modes: zeta -= 1 / (time 2 pi f).
   void removeWindowDamping(ModalModel& model) const;

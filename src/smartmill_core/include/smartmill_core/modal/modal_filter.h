@@ -21,7 +21,17 @@ class ModalFilter {
   /// Output [unit x unit of input] at this sample. First order: the input runs linearly from the last
   /// sample's to this one's. Zero order: the output at this sample knows the inputs of the samples before
   /// (the direct share also this one's).
-  double step(double input);
+  double step(double input) {
+    double output = direct_ * input;
+    for (Section& s : sections_) {
+      const double x = s.a11 * s.x + s.a12 * s.v + s.b1 * last_input_ + s.c1 * input;
+      s.v = s.a21 * s.x + s.a22 * s.v + s.b2 * last_input_ + s.c2 * input;
+      s.x = x;
+      output += s.gain * x;
+    }
+    last_input_ = input;
+    return output;
+  }
 
   /// step() with an input that came linearly to before and jumps now: output with the new input.
   double jump(double before, double input);

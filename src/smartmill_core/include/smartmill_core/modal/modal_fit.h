@@ -12,31 +12,26 @@ namespace smartmill {
 struct ModalFitOptions {
   double low = 0.0;   ///< [Hz] band of the fit
   double high = 0.0;  ///< [Hz]
-  int modes = 0;      ///< 0: chosen by evidence (BIC), up to max_modes
+  int modes = 0;      ///< 0: as many as are proven, up to max_modes
   int max_modes = 8;
-  bool unit_static_gain =
-      false;               ///< force sensor: direct = 1 - sum of gains (Dunwoody eq. 5.6, with K_k / w_k^2)
-  bool fit_direct = true;  ///< without unit_static_gain: a real direct share stands for modes above the band
-  /// Below the lowest mode of a free structure (accelerometer taps) a mass line: adds lower / -(2 pi f)^2.
-  bool fit_mass_line = false;
+  bool unit_static_gain = false;  ///< force sensor: direct = 1 - sum of gains (Dunwoody eq. 5.6, with K_k /
+                                  ///< w_k^2); else a free direct share
   /// Hit and response at one point: no mode can have a negative gain, and none is fitted.
   bool positive_gains = false;
 };
 
 struct ModalFit {
-  ModalModel model;             ///< with standard deviations, lowest frequency first
+  ModalModel model;             ///< with standard deviations, finite, lowest frequency first
+  std::vector<Mode> doubts;     ///< seen, not proven; no part of the model
   Eigen::MatrixXd covariance;   ///< of (frequency, damping_ratio, gain) of each mode in turn, then direct
   double relative_error = 0.0;  ///< [1] norm of (fit - measured) over norm of measured in the band
   double reduced_chi2 = 0.0;    ///< [1] with the stated std_dev of the FRF; NaN without
 };
 
-/// Peaks of |H|, strongest first [Hz].
-/// A peak counts when its prominence exceeds share of the largest one.
-std::vector<double> findPeaks(const FrequencyResponse& frf, double low, double high, double share);
-
-/// Fits modes to an FRF with Ceres; lines are weighted by their standard deviation where it is known.
-/// Standard deviations come from the Jacobian, scaled up by sqrt(reduced_chi2) when that exceeds one.
-/// @throws Error when the band holds too few lines, no peak is found, or the solver does not converge.
+/// Real modes of an FRF: those that estimateModes() proves, then fitted all at once over the band with what
+/// the options hold them to; lines are weighted by their standard deviation where it is known. Standard
+/// deviations come from the Jacobian, scaled up by sqrt(reduced_chi2) when that exceeds one.
+/// @throws Error when the band holds too few lines, no mode is proven, or the solver does not converge.
 ModalFit fitModes(const FrequencyResponse& frf, const ModalFitOptions& options);
 
 }  // namespace smartmill

@@ -38,8 +38,9 @@ bool isBehindSensor(EffectStage stage);
 enum class EffectValue {
   number,
   word,
-  list,  ///< of numbers, one a tooth
-  modes  ///< of the tool tip, as in the section tool_tip
+  list,    ///< of numbers, one a tooth
+  series,  ///< of numbers, as many as the file has
+  modes    ///< of the tool tip, as in the section tool_tip
 };
 
 /// What a campaign must hold for an effect to be looked for in it.
@@ -98,6 +99,7 @@ struct EffectScope {
   bool start_times = false, cut_times = false;  ///< stated wherever they count
   double largest_force = 0.0;                   ///< [N] of the records
   double first_cut = 400.0;  ///< [s] > 0, least start time of a cut that does not start at 0
+  double largest_chip = 100e-6, largest_depth = 2e-3;  ///< [m] of the cuts
 };
 
 /// One cause that a nominal model may lack. Everything that speaks of it reads this declaration: the strict
@@ -120,7 +122,11 @@ struct EffectKind {
   /// [BIC] that the effect must explain beyond what another one does: of two that no record tells apart the
   /// commoner one is named.
   double handicap = 0.0;
+  /// Of an effect built from what the catalogue leaves: files and reports call it `empirical` and tell it by
+  /// stage and form. Empty: it has a name.
+  std::string form_stage = {}, form = {};
 
+  bool empirical() const { return !form.empty(); }
   bool has(EffectNeed need) const;
 };
 
@@ -131,7 +137,17 @@ const std::vector<std::string>& measuredChannels();
 /// act.
 const std::vector<EffectKind>& effectCatalogue();
 
-/// nullptr when there is no such effect.
+/// Causes without a name: forms in which an effect may be built from what the catalogue leaves. None of them
+/// stands in the catalogue; their own names ("empirical:" and the form) are used inside only.
+const std::vector<EffectKind>& empiricalCatalogue();
+
+/// What files and reports call every one of them.
+constexpr const char* EMPIRICAL = "empirical";
+
+/// nullptr when there is none of this stage and form.
+const EffectKind* findEmpirical(const std::string& stage, const std::string& form);
+
+/// nullptr when there is no such effect, with or without a name.
 const EffectKind* findEffect(const std::string& name);
 
 /// nullptr when the effect has no such key.

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+#include "smartmill_discrepancy/search/workbench.h"
+
+namespace smartmill::discrepancy {
+
+/// How much of the way from one model to a better one a group of tests asks for. In test t the models differ
+/// by d, the better one leaves r; both over the noise. The test itself asks for the share
+/// a = 1 + d.r / d.d, and since
+///
+///     |r + d|^2 - |r|^2 = |d|^2 (2 a - 1)
+///
+/// the better model shrinks the gap of that test when a > 1/2; where a > 3/2 the test would be nearer still
+/// with twice of it, and it is the size that the tests do not agree about. What it leaves is noise and
+/// whatever it lacks besides; where the phases of that have nothing to do with those of d, d.r has the
+/// variance sum_k |D_k|^2 |R_k|^2 over the frequencies: little where what is left lies elsewhere, much where
+/// it lies just where d acts.
+struct AskedShare {
+  double share = 0.5;    ///< [1] mean of the a, by their variances
+  double std_dev = 0.0;  ///< [1] of it; where the tests differ by more than their variances say, as they do
+
+  /// Standard deviations by which the tests ask for more than half and less than one and a half.
+  double beyond() const { return (0.5 - std::abs(share - 1.0)) / std_dev; }
+};
+
+/// What one test says of two models: sums over its channels.
+struct AskedTest {
+  double squares = 0.0;   ///< d.d
+  double product = 0.0;   ///< d.r
+  double variance = 0.0;  ///< of the product
+
+  /// One channel, values over the noise. @param between d @param left r
+  void add(const double* between, const double* left, std::size_t size);
+};
+
+/// Of tests that tell the models apart; of none the deviation is infinite.
+AskedShare sharedBy(const std::vector<AskedTest>& tests);
+
+/// How one model stands against another in tests that it was not fitted to, and in those that it was.
+struct Standing {
+  AskedShare heldout;  ///< unknown (infinite deviation) where no held-out test tells the two apart
+  AskedShare fitted;   ///< the stated uncertainty of the nominal values is one test more of these
+
+  /// The group that is less sure of it.
+  const AskedShare& weaker() const;
+  /// Probability that the weaker group asks for more than half and less than one and a half.
+  double confidence() const;
+  /// Whether both groups do, by two standard deviations each.
+  bool holds() const;
+};
+
+/// @param better, other states of the same campaign, both simulated exactly
+Standing standingOf(const Workbench& bench, const FitState& better, const FitState& other);
+
+/// [1] Share of the held-out squares above the noise that one model takes away from another's.
+double heldoutReduction(const Workbench& bench, const FitState& better, const FitState& other);
+
+}  // namespace smartmill::discrepancy

@@ -1,0 +1,301 @@
+#include "smartmill_discrepancy/explain/nameless.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "smartmill_core/model/effect_catalogue.h"
+#include "smartmill_core/units.h"
+#include "smartmill_discrepancy/results/formatted.h"
+#include "smartmill_discrepancy/search/evidence.h"
+#include "smartmill_discrepancy/search/refinement.h"
+#include "smartmill_discrepancy/search/screening.h"
+
+namespace smartmill::discrepancy {
+namespace {
+
+constexpr FitOptions CLOSELY{8, 1e-4, true};
+
+// A line of the residual as a hypothesis, its place where the residual has it.
+void addLine(const std::vector<Hypothesis>& forms, const char* form, const Finding& f, double place,
+             std::vector<Hypothesis>* lines) {
+  const bool by_order = f.domain == "order";
+  for (const Hypothesis& h : forms) {
+    if (h.effect != std::string(EMPIRICAL) + ":" + form || h.variant.rfind(f.channel, 0) != 0) continue;
+    Hypothesis line = h;
+    line.named(h.variant + formatted(by_order ? ", order %.4g" : ", %.4g Hz", place));
+    const double size = std::max(f.amplitude, h.coordinates.back().step);
+    if (by_order) {
+      line.number("order", place).probe({0.0}, {{size}});
+    } else {
+      line.probe({place, 0.0}, {{place, size}});
+    }
+    lines->push_back(std::move(line));
+  }
+}
+
+double longestRecord(const Dataset& data) {
+  double longest = 0.0;
+  for (const TestData& t : data.tests) {
+    if (t.record.size() > 1) longest = std::max(longest, t.record.time.back() - t.record.time.front());
+  }
+  return longest;
+}
+
+// Whether a line can be told from a slow wander, which any sine of its own phase in each record follows, and
+// from a tone that a state has on that channel: together they would give each record an amplitude of its own.
+bool isTone(const Dataset& data, const FitState& state, const Finding& f) {
+  constexpr double LEAST_CYCLES = 4.0, RESOLVED = 2.0;
+  const double frequency = f.location.at("frequency_hz"), longest = longestRecord(data);
+  return frequency * longest > LEAST_CYCLES &&
+         std::none_of(state.members.begin(), state.members.end(), [&](const Member& m) {
+           const EffectEntry e = m.hypothesis->entry(m.values);
+           return e.name == std::string(EMPIRICAL) + ":tone" && e.words.at("channel") == f.channel &&
+                  std::abs(e.numbers.at("frequency_hz") - frequency) * longest < RESOLVED;
+         });
+}
+
+// What may act without a name, lines at the places where the residual shows some.
+std::vector<Hypothesis> formsFor(const Dataset& data, const FitState& state,
+                                 const std::vector<Finding>& unexplained) {
+  constexpr std::size_t MOST_LINES = 12;
+  const std::vector<Hypothesis> all = empiricalHypotheses(data);
+  std::vector<Hypothesis> lines;
+  for (const Finding& f : unexplained) {
+    if (lines.size() >= MOST_LINES) break;
+    if (f.domain == "frequency" && isTone(data, state, f))
+      addLine(all, "tone", f, f.location.at("frequency_hz"), &lines);
+    if (f.domain == "order") addLine(all, "order", f, f.location.at("order"), &lines);
+  }
+  std::vector<Hypothesis> forms;
+  std::copy_if(all.begin(), all.end(), std::back_inserter(forms),
+               [](const Hypothesis& h) { return !h.probes.empty(); });
+  forms.insert(forms.end(), lines.begin(), lines.end());
+  return forms;
+}
+
+// What one test says of a change of the model, in squares over noise.
+struct Said {
+  double gain = 0.0;      // by which the residual's squares fall
+  double change = 0.0;    // squares of the change itself: the gain, were it all true
+  double left = 0.0;      // the residual's squares above the noise without the change
+  double variance = 0.0;  // of the gain, by its scatter from revolution to revolution
+};
+
+// Gains of equal pieces, as long as a turn of the spindle. Mean times count has this variance.
+double varianceOf(const std::vector<double>& pieces) {
+  if (pieces.size() < 2) return 0.0;
+  double sum = 0.0, squares = 0.0;
+  for (const double p : pieces) {
+    sum += p;
+    squares += p * p;
+  }
+  const auto n = static_cast<double>(pieces.size());
+  return std::max(squares - sum * sum / n, 0.0) * n / (n - 1.0);
+}
+
+std::vector<Said> saidBy(const TwinRunner& runner, const MachineModel& before, const MachineModel& after) {
+  constexpr std::size_t LEAST_PIECE = 64;
+  const auto simulated = runner.simulate({before, after});
+  std::map<std::size_t, Said> tests;
+  std::map<std::size_t, std::vector<double>> pieces;
+  for (const Block& b : runner.blocks()) {
+    const CampaignTest& test = runner.data().tests[b.test].test;
+    std::size_t turn = LEAST_PIECE;
+    if (test.spindle_speed > 0.0)
+      turn = std::max(turn, static_cast<std::size_t>(units::TWO_PI / test.spindle_speed * test.sample_rate));
+    Said& said = tests[b.test];
+    std::vector<double>& of_test = pieces[b.test];
+    of_test.resize(std::max(of_test.size(), b.size / turn + 1), 0.0);
+    for (std::size_t i = 0; i < b.size; ++i) {
+      const std::size_t k = b.offset + i;
+      const double r = runner.measured()[k] - simulated[0][k], s = runner.measured()[k] - simulated[1][k];
+      of_test[i / turn] += r * r - s * s;
+      said.gain += r * r - s * s;
+      said.change += (r - s) * (r - s);
+      said.left += r * r - 1.0;
+    }
+  }
+  std::vector<Said> all;
+  for (auto& [test, said] : tests) {
+    said.variance = varianceOf(pieces[test]);
+    all.push_back(said);
+  }
+  return all;
+}
+
+Said sumOf(const std::vector<Said>& tests) {
+  Said sum;
+  for (const Said& t : tests) {
+    sum.gain += t.gain;
+    sum.change += t.change;
+    sum.left += t.left;
+    sum.variance += t.variance;
+  }
+  return sum;
+}
+
+// The largest gain that a test loses beyond chance.
+double contradiction(const std::vector<Said>& tests, double deviations) {
+  double worst = 0.0;
+  for (const Said& t : tests) {
+    if (-t.gain > deviations * std::sqrt(t.variance)) worst = std::max(worst, -t.gain);
+  }
+  return worst;
+}
+
+}  // namespace
+
+// A cause that is real shows the same in every test: it takes from tests that it never saw what it takes from
+// those it was fitted to.
+bool Nameless::repeats(const FitState& before, const Fit& with) const {
+  const Fitter& exact = bench_.exact();
+  const MachineModel less = exact.model(before), more = exact.model(with.state);
+  const std::vector<Said> fitted = saidBy(bench_.fitted(), less, more);
+  const std::vector<Said> heldout = saidBy(bench_.heldout(), less, more);
+  const Said fit = sumOf(fitted), held = sumOf(heldout);
+  const double against = std::max(contradiction(fitted, rule_.least_deviations) / std::max(fit.gain, 1.0),
+                                  contradiction(heldout, rule_.least_deviations) / std::max(held.gain, 1.0));
+  const bool holds =
+      fit.gain > rule_.least_share * fit.left &&
+      held.gain / held.left > rule_.least_repeated * fit.gain / fit.left &&
+      held.gain > rule_.least_repeated * held.change && rule_.least_repeated * held.gain < held.change &&
+      held.gain > rule_.least_deviations * std::sqrt(held.variance) && against < rule_.most_contradicted;
+  options_.search.say(formatted(
+      "  without a name: %s takes %.3f of what is left, held out %.3f (%.2f of what it changes there, %.1f "
+      "deviations), contradicted %.2f: %s",
+      with.state.members.back().hypothesis->title().c_str(), fit.gain / std::max(fit.left, 1.0),
+      held.gain / std::max(held.left, 1.0), held.gain / std::max(held.change, 1.0),
+      held.gain / std::sqrt(std::max(held.variance, 1.0)), against, holds ? "repeats" : "does not repeat"));
+  return holds;
+}
+
+// An effect with a name may have stood for the one without.
+Fit Nameless::withoutNeedless(Fit fit, const NominalTangents& tangents) const {
+  for (std::size_t m = 0; m + 1 < fit.state.members.size();) {
+    Fit less = bench_.quick().fit(without(fit.state, m), &tangents, {6, 1e-3, true});
+    if (tells(bench_.quick().runner(), less, fit, options_.search)) {
+      ++m;
+      continue;
+    }
+    options_.search.say("  not needed any more: " + fit.state.members[m].hypothesis->title());
+    fit = std::move(less);
+  }
+  return fit;
+}
+
+// Fits the forms that promise most beside what a fit holds already.
+// @param least gain of BIC against that fit @param most fits
+std::vector<Fit> Nameless::fitsBeside(const Fit& now, const NominalTangents& tangents, double least,
+                                      std::size_t most, SearchResult* found) const {
+  constexpr double PROMISED = 0.25;  // of the gain: tangents say little of what is far away
+  const std::size_t round = found->ladder.empty() ? 0 : found->ladder.back().tried.round + 1;
+  const Fitter& quick = bench_.quick();
+  std::vector<Fit> fits;
+  std::size_t fitted = 0;
+  for (const Promise& p : screen(quick, now, tangents, forms_.back())) {
+    if (p.gain < PROMISED * least || ++fitted > most || bench_.cancelled()) break;
+    FitState with = now.state;
+    with.members.push_back({p.hypothesis, bestStart(quick, now, p)});
+    const auto begin = std::chrono::steady_clock::now();
+    const std::size_t simulations = quick.runner().simulations();
+    Fit fit = quick.fit(with, &tangents, CLOSELY);
+    const double gain = now.bic - fit.bic;
+    options_.search.say(formatted("  without a name, promise %.4g, gain %.4g: %s", p.gain, gain,
+                                  p.hypothesis->title().c_str()));
+    found->ladder.push_back({{round, p.hypothesis->effect, p.hypothesis->variant, p.gain, gain, false,
+                              std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(),
+                              quick.runner().simulations() - simulations},
+                             p.hypothesis,
+                             fit.state.members.back().values});
+    if (fit.converged && gain > least) fits.push_back(std::move(fit));
+  }
+  return fits;
+}
+
+// One cause without a name may do all that several names stand for.
+std::vector<Fit> Nameless::fitsInstead(SearchResult* found) const {
+  const Fit now = fitted({found->best.state.nominal, {}, found->best.state.turns});
+  if (!now.converged) return {};
+  return fitsBeside(now, bench_.linearise(now.state), now.bic - found->best.bic, rule_.fitted_instead, found);
+}
+
+bool Nameless::take(const Fit& start, const FitState& before, SearchResult* found) const {
+  const NominalTangents here = bench_.linearise(start.state);
+  Fit fit = bench_.quick().fit(start.state, &here, CLOSELY);
+  if (!fit.converged || !repeats(before, fit)) return false;
+  fit = withoutNeedless(std::move(fit), here);
+  SearchResult more = *found;
+  for (Rung& r : more.ladder)
+    r.tried.taken = r.tried.taken || r.hypothesis == fit.state.members.back().hypothesis;
+  // Values settle; what repeated must still do, and nothing be lost that names had explained.
+  if (!refine(bench_, fit.state, options_.search, &more) || !repeats(before, more.best)) return false;
+  const auto heldout = [&](const Fit& at) {
+    return squaresLeft(bench_.heldout(), bench_.heldout().simulate(bench_.exact().model(at.state)));
+  };
+  if (more.best.bic > found->best.bic - options_.search.least_gain ||
+      heldout(more.best) > heldout(found->best))
+    return false;
+  *found = std::move(more);
+  return true;
+}
+
+bool Nameless::addOne(SearchResult* found, const std::vector<Finding>& unexplained) {
+  forms_.push_back(formsFor(bench_.data(), found->best.state, unexplained));
+  const FitState before = found->best.state;
+  const NominalTangents tangents = bench_.linearise(before);
+  const double least =
+      std::max(options_.search.least_gain, rule_.least_share * (found->best.chi2 - bench_.samples()));
+  const std::vector<Fit> beside = fitsBeside(found->best, tangents, least, rule_.fitted, found);
+  const bool named = std::any_of(before.members.begin(), before.members.end(), [](const Member& m) {
+    return !findEffect(m.hypothesis->effect)->empirical();
+  });
+  // One cause in the place of several names is the simpler answer.
+  if (named && forms_.size() == 1) {
+    const std::vector<Fit> instead = fitsInstead(found);
+    if (takeOne(instead, {before.nominal, {}, before.turns}, found)) return true;
+  }
+  return takeOne(beside, before, found);
+}
+
+bool Nameless::takeOne(std::vector<Fit> fits, const FitState& before, SearchResult* found) const {
+  std::sort(fits.begin(), fits.end(), [](const Fit& a, const Fit& b) { return a.bic < b.bic; });
+  for (std::size_t k = 0; k < std::min(fits.size(), rule_.examined) && !bench_.cancelled(); ++k) {
+    if (take(fits[k], before, found)) return true;
+  }
+  return false;
+}
+
+Fit Nameless::fitted(const FitState& state) const {
+  const NominalTangents first = bench_.linearise(state);
+  const Fit once = bench_.quick().fit(state, &first, CLOSELY);
+  if (!once.converged) return once;
+  const NominalTangents there = bench_.linearise(once.state);
+  return bench_.quick().fit(once.state, &there, CLOSELY);
+}
+
+std::optional<FitState> Nameless::extend(SearchResult* found, std::vector<Finding>* unexplained) {
+  FitState named = found->best.state;
+  std::vector<Finding> left = *unexplained;
+  std::size_t added = 0;
+  for (; added < rule_.most && !left.empty() && !bench_.cancelled(); ++added) {
+    if (!addOne(found, left)) break;
+    left = findStructure(bench_.fitted(), found->best.residual, structure_);
+  }
+  if (added == 0) return {};
+  // What is not known by name stays unexplained. Names that fell away explain nothing any more.
+  FitState kept = found->best.state;
+  kept.members.erase(
+      std::remove_if(kept.members.begin(), kept.members.end(),
+                     [](const Member& m) { return findEffect(m.hypothesis->effect)->empirical(); }),
+      kept.members.end());
+  if (kept.members.size() == named.members.size()) return named;
+  const Fit rest = fitted(kept);
+  if (!rest.converged) return named;
+  *unexplained = findStructure(bench_.fitted(), rest.residual, structure_);
+  return rest.state;
+}
+
+}  // namespace smartmill::discrepancy

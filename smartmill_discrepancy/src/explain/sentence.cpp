@@ -1,0 +1,153 @@
+#include "smartmill_discrepancy/explain/sentence.h"
+
+#include <cmath>
+#include <functional>
+#include <map>
+#include <vector>
+
+#include "smartmill_core/model/effect_catalogue.h"
+#include "smartmill_discrepancy/results/formatted.h"
+
+namespace smartmill::discrepancy {
+namespace {
+
+double valueOf(const FoundEffect& effect, const std::string& key) {
+  for (const FoundParameter& p : effect.parameters) {
+    if (p.key == key) return p.value;
+  }
+  return 0.0;
+}
+
+std::vector<double> seriesOf(const FoundEffect& effect, const std::string& key) {
+  std::vector<double> values;
+  for (const FoundParameter& p : effect.parameters) {
+    if (p.key.rfind(key + "[", 0) == 0) values.push_back(p.value);
+  }
+  return values;
+}
+
+const char* unitOf(const std::string& channel) {
+  return channel == "load_meter" ? "V" : "N";
+}
+
+const char* moreOrLess(double value) {
+  return value >= 0.0 ? "more" : "less";
+}
+
+// Whether factors follow (h / reference)^-exponent: slope of their logarithms, and the share of their
+// variance that it explains.
+struct Power {
+  double exponent = 0.0, explained = 0.0;
+};
+Power powerOf(const std::vector<double>& h, const std::vector<double>& factor) {
+  const auto n = static_cast<double>(h.size());
+  double x = 0.0, y = 0.0, xx = 0.0, xy = 0.0, yy = 0.0;
+  for (std::size_t k = 0; k < h.size(); ++k) {
+    const double u = std::log(h[k]), v = std::log(factor[k]);
+    x += u;
+    y += v;
+    xx += u * u;
+    xy += u * v;
+    yy += v * v;
+  }
+  const double sxx = xx - x * x / n, sxy = xy - x * y / n, syy = yy - y * y / n;
+  return {sxx > 0.0 ? -sxy / sxx : 0.0, sxx * syy > 0.0 ? sxy * sxy / (sxx * syy) : 0.0};
+}
+
+std::string ofChip(const FoundEffect& effect) {
+  constexpr double FOLLOWS = 0.97;
+  const std::vector<double> h = seriesOf(effect, "h_um"), factor = seriesOf(effect, "factor");
+  if (h.size() == 2) {
+    const double slope = (h[1] * factor[1] - h[0] * factor[0]) / (h[1] - h[0]) / factor[0];
+    return formatted(
+        "the cutting force has a kink: above a chip of %.3g um it rises %.0f %% as fast with the chip as "
+        "below",
+        h[0], 100.0 * slope);
+  }
+  std::string text = "the force per chip is no constant: against the model it is";
+  for (std::size_t k = 0; k < h.size(); ++k)
+    text += formatted("%s %.2f at %.0f um", k ? "," : "", factor[k], h[k]);
+  const Power power = powerOf(h, factor);
+  if (power.explained > FOLLOWS)
+    text += formatted(", which follows a power law as size_effect does, exponent %.2f", power.exponent);
+  return text;
+}
+
+std::string ofTime(const FoundEffect& effect) {
+  const double amplitude = valueOf(effect, "amplitude");
+  return formatted("a cut begins with %.0f %% %s cutting force and settles with a time constant of %.3g s",
+                   100.0 * std::abs(amplitude), moreOrLess(amplitude), valueOf(effect, "time_constant_s"));
+}
+
+std::string ofProfile(const FoundEffect& effect) {
+  const double extra = valueOf(effect, "factor") - 1.0;
+  const bool surface = effect.words.at("from") == "surface";
+  return formatted("the %s %.3g mm of the cut %s %.0f %% %s cutting force: look for %s",
+                   surface ? "uppermost" : "lowest", valueOf(effect, "height_mm"), surface ? "cost" : "take",
+                   100.0 * std::abs(extra), moreOrLess(extra),
+                   surface ? "a skin of the stock" : "a corner that is worn or of another shape");
+}
+
+std::string ofLostEdge(const FoundEffect& effect) {
+  return formatted(
+      "one tooth is out: the lowest %.3g mm of tooth %.0f do not cut and the next tooth takes its chip; look "
+      "for a lost corner",
+      valueOf(effect, "height_mm"), valueOf(effect, "tooth"));
+}
+
+std::string ofCurve(const FoundEffect& effect) {
+  const auto bend = [&](double kn) {
+    return kn * (valueOf(effect, "odd_per_kn") * std::abs(kn) + valueOf(effect, "even_per_kn") * kn +
+                 valueOf(effect, "cubic_per_kn2") * kn * kn);
+  };
+  return formatted(
+      "%s is not straight: it shows %+.3g N at 300 N and %+.3g N at -300 N beside the true force",
+      effect.words.at("channel").c_str(), 1e3 * bend(0.3), 1e3 * bend(-0.3));
+}
+
+std::string ofTone(const FoundEffect& effect) {
+  const std::string& channel = effect.words.at("channel");
+  return formatted("%s carries a tone of %.3g %s at %.5g Hz, %s", channel.c_str(),
+                   valueOf(effect, "amplitude"), unitOf(channel), valueOf(effect, "frequency_hz"),
+                   effect.words.at("while") == "turning"
+                       ? "at any speed of the spindle, but not while it stands"
+                       : "whatever the spindle does");
+}
+
+std::string ofOrder(const FoundEffect& effect) {
+  const std::string& channel = effect.words.at("channel");
+  return formatted(
+      "%s carries a tone of %.3g %s at %.4g times the spindle's turning, its phase another one each "
+      "record",
+      channel.c_str(), valueOf(effect, "amplitude"), unitOf(channel), valueOf(effect, "order"));
+}
+
+std::string ofSettling(const FoundEffect& effect) {
+  const std::string& channel = effect.words.at("channel");
+  return formatted("%s begins each record off by %.3g %s and comes back with a time constant of %.3g s",
+                   channel.c_str(), valueOf(effect, "amplitude"), unitOf(channel),
+                   valueOf(effect, "time_constant_s"));
+}
+
+}  // namespace
+
+std::string sentenceOf(const FoundEffect& effect) {
+  static const std::map<std::string, std::function<std::string(const FoundEffect&)>> SENTENCES{
+      {"chip_thickness", ofChip}, {"cutting_time", ofTime}, {"depth_profile", ofProfile},
+      {"lost_edge", ofLostEdge},  {"curve", ofCurve},       {"tone", ofTone},
+      {"order", ofOrder},         {"settling", ofSettling}};
+  const EffectKind* kind = findEffect(effect.name);
+  if (!kind || !kind->empirical()) return "";
+  return SENTENCES.at(kind->form)(effect);
+}
+
+std::string sentenceOf(const Explanation& explanation) {
+  std::string text;
+  for (const FoundEffect& effect : explanation.effects) {
+    const std::string one = sentenceOf(effect);
+    if (!one.empty()) text += (text.empty() ? "No effect of the catalogue, but it repeats: " : "; ") + one;
+  }
+  return text.empty() ? text : text + ".";
+}
+
+}  // namespace smartmill::discrepancy

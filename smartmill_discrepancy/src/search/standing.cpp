@@ -1,0 +1,130 @@
+#include "smartmill_discrepancy/search/standing.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numeric>
+#include <vector>
+
+#include "smartmill_core/signal/fourier.h"
+#include "smartmill_core/signal/window.h"
+
+namespace smartmill::discrepancy {
+namespace {
+
+// Squares by frequency, as many as those of the values; the mean square of the window is 3/8.
+std::vector<double> power(const double* values, std::size_t size) {
+  std::vector<double> part = hannWindow(size), squares;
+  for (std::size_t i = 0; i < size; ++i) part[i] *= values[i];
+  for (const std::complex<double>& x : fourier(part)) {
+    const bool single = squares.empty() || 2 * squares.size() == size;
+    squares.push_back((single ? 1.0 : 2.0) * std::norm(x) / (0.375 * static_cast<double>(size)));
+  }
+  return squares;
+}
+
+std::vector<AskedTest> askedBy(const TwinRunner& runner, const MachineModel& better,
+                               const MachineModel& other) {
+  const auto simulated = runner.simulate({better, other});
+  std::vector<double> between(runner.size()), left(runner.size());
+  for (std::size_t i = 0; i < between.size(); ++i) {
+    between[i] = simulated[0][i] - simulated[1][i];
+    left[i] = runner.measured()[i] - simulated[0][i];
+  }
+  std::map<std::size_t, AskedTest> by_test;
+  for (const Block& b : runner.blocks()) by_test[b.test].add(&between[b.offset], &left[b.offset], b.size);
+  std::vector<AskedTest> all;
+  for (const auto& [test, asked] : by_test) all.push_back(asked);
+  return all;
+}
+
+// Where structure is left, stated values are pulled by it too: its variance is that of the residuals.
+AskedTest askedByStated(const NominalFreedom& freedom, const FitState& better, const FitState& other,
+                        double variance) {
+  AskedTest asked;
+  const std::vector<Coordinate>& free = freedom.coordinates();
+  for (std::size_t c = 0; c < free.size(); ++c) {
+    const double d = (better.nominal[c] - other.nominal[c]) / free[c].prior_std;
+    asked.squares += d * d;
+    asked.product += d * (free[c].null - better.nominal[c]) / free[c].prior_std;
+  }
+  asked.variance = variance * asked.squares;
+  return asked;
+}
+
+}  // namespace
+
+// The window spreads a line over bins in such shares that the products of two lines' bins add up to half the
+// product of their squares, the variance at a random phase. Noise of unit variance, two degrees of freedom a
+// bin, is counted twice by that.
+void AskedTest::add(const double* between, const double* left, std::size_t size) {
+  double own = 0.0;
+  for (std::size_t i = 0; i < size; ++i) {
+    own += between[i] * between[i];
+    product += between[i] * left[i];
+  }
+  if (own <= 0.0) return;
+  squares += own;
+  const std::vector<double> of_between = power(between, size), of_left = power(left, size);
+  const double sum = std::inner_product(of_left.begin(), of_left.end(), of_between.begin(), 0.0);
+  variance += std::max(sum - own, 0.5 * sum);
+}
+
+AskedShare sharedBy(const std::vector<AskedTest>& tests) {
+  double weights = 0.0, sum = 0.0, spread = 0.0, count = 0.0;
+  const auto each = [&](const auto& use) {
+    for (const AskedTest& t : tests) {
+      if (t.squares > 0.0 && t.variance > 0.0)
+        use(1.0 + t.product / t.squares, t.squares * t.squares / t.variance);
+    }
+  };
+  each([&](double share, double weight) {
+    weights += weight;
+    sum += weight * share;
+    ++count;
+  });
+  if (weights <= 0.0) return {0.5, std::numeric_limits<double>::infinity()};
+  const double share = sum / weights;
+  each([&](double a, double weight) { spread += weight * (a - share) * (a - share); });
+  const double more = count > 1.0 ? std::max(1.0, spread / (count - 1.0)) : 1.0;
+  return {share, std::sqrt(more / weights)};
+}
+
+const AskedShare& Standing::weaker() const {
+  if (!std::isfinite(heldout.std_dev)) return fitted;
+  return heldout.beyond() < fitted.beyond() ? heldout : fitted;
+}
+
+double Standing::confidence() const {
+  return 0.5 * std::erfc(-weaker().beyond() / std::sqrt(2.0));
+}
+
+bool Standing::holds() const {
+  constexpr double BEYOND_DOUBT = 2.0;
+  return weaker().beyond() > BEYOND_DOUBT;
+}
+
+Standing standingOf(const Workbench& bench, const FitState& better, const FitState& other) {
+  constexpr double TELLS = 25.0;  // squares over the noise
+  const MachineModel first = bench.exact().model(better), second = bench.exact().model(other);
+  const std::vector<AskedTest> heldout = askedBy(bench.heldout(), first, second);
+  std::vector<AskedTest> fitted = askedBy(bench.fitted(), first, second);
+  const double variance = std::max(1.0, bench.exactSquaresHere(better) / bench.samples());
+  fitted.push_back(askedByStated(bench.freedom(), better, other, variance));
+  const double squares = std::accumulate(heldout.begin(), heldout.end(), 0.0,
+                                         [](double sum, const AskedTest& t) { return sum + t.squares; });
+  return {sharedBy(squares < TELLS ? std::vector<AskedTest>{} : heldout), sharedBy(fitted)};
+}
+
+double heldoutReduction(const Workbench& bench, const FitState& better, const FitState& other) {
+  const TwinRunner& heldout = bench.heldout();
+  const auto above = [&](const FitState& state) {
+    return squaresLeft(heldout, heldout.simulate(bench.exact().model(state))) -
+           static_cast<double>(heldout.size());
+  };
+  const double with = above(better), without_it = above(other);
+  return without_it > 0.0 ? std::clamp(1.0 - std::max(with, 0.0) / without_it, -1.0, 1.0) : 0.0;
+}
+
+}  // namespace smartmill::discrepancy

@@ -1,0 +1,130 @@
+// Causes that no effect of the catalogue is, put into the records by hand: built from what is left where they
+// repeat, left alone where they do not.
+#include <cmath>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "smartmill_core/model/effect_catalogue.h"
+#include "smartmill_core/testing/temporary_folder.h"
+
+#include "explain/small_campaign.h"
+
+namespace smartmill::discrepancy {
+namespace {
+
+const std::vector<const char*> FORCES_SHOWN{"fx", "fy", "fz"};
+
+// The machine without a hidden cause, without noise; its chip coefficients times a factor.
+Record pure(const CampaignTest& test, double chip_factor, std::uint64_t seed) {
+  MachineModel machine = real();
+  for (double CuttingCoefficients::*k :
+       {&CuttingCoefficients::ktc, &CuttingCoefficients::krc, &CuttingCoefficients::kac})
+    (*machine.cutting).*k *= chip_factor;
+  sim::SimulationOptions options;
+  options.substeps = 8;
+  options.noise = false;
+  options.seed = seed;
+  return sim::simulateTest(machine, test, 0.1, options);
+}
+
+void addNoise(Record& record, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  for (const char* c : FORCES_SHOWN) {
+    for (double& f : record.add(c)) f += normal(random);
+  }
+}
+
+double valueOf(const FoundEffect& effect, const std::string& key) {
+  for (const FoundParameter& p : effect.parameters) {
+    if (p.key == key) return p.value;
+  }
+  ADD_FAILURE() << key;
+  return 0.0;
+}
+
+// Names are not what is looked for here.
+ExplainOptions quickly() {
+  ExplainOptions options;
+  options.search.most_effects = 1;
+  options.search.fitted_per_round = 1;
+  return options;
+}
+
+void expectGapClosed(const Explanation& e) {
+  EXPECT_EQ(e.verdict, Verdict::unknown_effect);
+  ASSERT_TRUE(e.named_only);
+  EXPECT_LT(e.after.heldout, 0.5 * e.named_only->heldout);
+  EXPECT_LT(e.after.heldout, 1.05);
+  EXPECT_FALSE(e.unexplained.empty());  // by name
+  ASSERT_EQ(e.model.effects.size(), e.effects.size());
+}
+
+TEST(Nameless, aToneOfNoKnownFrequencyIsBuiltFromTheResidual) {
+  const TemporaryFolder folder;
+  const Explanation e = explained(
+      [](const CampaignTest& test, std::uint64_t seed) {
+        Record record = pure(test, 1.0, seed);
+        std::vector<double>& fx = record.add("fx");
+        for (std::size_t i = 0; i < fx.size(); ++i)
+          fx[i] += 5.0 * std::sin(units::TWO_PI * 236.8 * record.time[i] + 1.7 * static_cast<double>(seed));
+        addNoise(record, seed);
+        return record;
+      },
+      folder.file("."), quickly());
+  expectGapClosed(e);
+  ASSERT_EQ(e.effects.size(), 1u);
+  EXPECT_EQ(e.effects[0].name, "empirical:tone");
+  EXPECT_EQ(e.effects[0].words.at("channel"), "fx");
+  EXPECT_NEAR(valueOf(e.effects[0], "frequency_hz"), 236.8, 0.1);
+  EXPECT_NEAR(valueOf(e.effects[0], "amplitude"), 5.0, 0.1);
+  EXPECT_NE(e.sentence.find("tone of 5"), std::string::npos) << e.sentence;
+}
+
+// Rigid forces are linear in the coefficients: the record is the sum of what the edge and what the chip
+// gives.
+TEST(Nameless, materialThatSoftensAfterEntryIsBuiltFromTheResidual) {
+  const TemporaryFolder folder;
+  const Explanation e = explained(
+      [](const CampaignTest& test, std::uint64_t seed) {
+        Record record = pure(test, 1.0, seed);
+        const Record harder = pure(test, 2.0, seed);
+        for (const char* c : FORCES_SHOWN) {
+          std::vector<double>& f = record.add(c);
+          for (std::size_t i = 0; i < f.size(); ++i)
+            f[i] += 0.25 * std::exp(-(record.time[i] - 0.02) / 0.03) * (harder.column(c)[i] - f[i]);
+        }
+        addNoise(record, seed);
+        return record;
+      },
+      folder.file("."), quickly());
+  expectGapClosed(e);
+  ASSERT_EQ(e.effects.size(), 1u);
+  EXPECT_EQ(e.effects[0].name, "empirical:cutting_time");
+  EXPECT_NEAR(valueOf(e.effects[0], "amplitude"), 0.25, 0.01);
+  EXPECT_NEAR(valueOf(e.effects[0], "time_constant_s"), 0.03, 0.002);
+}
+
+// In every record another line: nothing of it comes again.
+TEST(Nameless, whatDoesNotRepeatIsLeftAlone) {
+  const TemporaryFolder folder;
+  const Explanation e = explained(
+      [](const CampaignTest& test, std::uint64_t seed) {
+        Record record = pure(test, 1.0, seed);
+        std::vector<double>& fy = record.add("fy");
+        const double frequency = 180.0 + 37.0 * static_cast<double>(seed * seed % 11);
+        for (std::size_t i = 0; i < fy.size(); ++i)
+          fy[i] += 6.0 * std::sin(units::TWO_PI * frequency * record.time[i]);
+        addNoise(record, seed);
+        return record;
+      },
+      folder.file("."), quickly());
+  EXPECT_EQ(e.verdict, Verdict::unknown_effect);
+  EXPECT_TRUE(e.effects.empty());
+  EXPECT_TRUE(e.sentence.empty());
+  EXPECT_FALSE(e.named_only);
+}
+
+}  // namespace
+}  // namespace smartmill::discrepancy

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "smartmill_core/modal/modal_estimate.h"
+#include "smartmill_hammer/analysis/tap_records.h"
+
+namespace smartmill {
+namespace hammer {
+
+/// Size, phase, coherence where known, and the fit. All @throw Error when gnuplot fails.
+void drawFrf(const FrequencyResponse& frf, const ModalEstimate& estimate, std::size_t index,
+             const std::string& title, const std::string& png);
+
+/// Poles over the order of the model, over the FRFs' size: stable ones, others; modes and doubts as lines.
+void drawStabilization(const std::vector<NamedFrf>& frfs, const ModalEstimate& estimate,
+                       const std::string& png);
+
+/// Force and response of every hit, accepted and refused ones apart.
+void drawHits(const std::vector<TapRecord>& taps, const std::vector<TapVerdict>& verdicts,
+              const std::string& png);
+
+}  // namespace hammer
+}  // namespace smartmill

@@ -1,0 +1,117 @@
+#include "smartmill_sim/twin/cut_traces.h"
+
+#include <functional>
+#include <string>
+
+#include "smartmill_sim/effects/effect.h"
+
+namespace smartmill::sim {
+namespace {
+
+using Values = std::vector<double>;
+
+double nameOf(const std::string& text) {
+  return static_cast<double>(std::hash<std::string>()(text));
+}
+
+void append(Values& values, const ModalModel& modes) {
+  values.push_back(static_cast<double>(modes.modes.size()));
+  for (const Mode& m : modes.modes) values.insert(values.end(), {m.frequency, m.damping_ratio, m.gain});
+  values.push_back(modes.direct);
+}
+
+void append(Values& values, const EffectEntry& effect) {
+  values.push_back(nameOf(effect.name));
+  for (const auto& [name, value] : effect.numbers) values.insert(values.end(), {nameOf(name), value});
+  for (const auto& [name, word] : effect.words) values.push_back(nameOf(name + "=" + word));
+  for (const auto& [name, list] : effect.lists) {
+    values.push_back(nameOf(name));
+    values.insert(values.end(), list.begin(), list.end());
+  }
+  append(values, effect.flexibility.x);
+  append(values, effect.flexibility.y);
+}
+
+void appendTool(Values& values, const MachineModel& model) {
+  if (const auto& t = model.tool) {
+    values.insert(values.end(), {static_cast<double>(t->teeth), t->diameter, t->helix});
+    values.insert(values.end(), t->pitch.begin(), t->pitch.end());
+  }
+}
+
+void appendCutting(Values& values, const MachineModel& model) {
+  if (const auto& c = model.cutting)
+    values.insert(values.end(), {c->ktc, c->krc, c->kac, c->kte, c->kre, c->kae});
+}
+
+bool ofTheTool(Stage stage) {
+  return stage == Stage::geometry || stage == Stage::motion || stage == Stage::cutting_law ||
+         stage == Stage::structure;
+}
+
+}  // namespace
+
+Values valuesOfRecord(const MachineModel& model, TestKind kind) {
+  Values values;
+  if (kind == TestKind::cut) {
+    appendTool(values, model);
+    appendCutting(values, model);
+  }
+  append(values, model.tool_tip.x);
+  append(values, model.tool_tip.y);
+  for (const ModalModel& a : model.force_sensor.axis) append(values, a);
+  if (const auto& s = model.spindle; s && kind != TestKind::tap) {
+    values.insert(values.end(), {s->viscous, s->coulomb, s->load_meter_gain, s->load_meter_bandwidth,
+                                 s->load_meter_resolution, s->friction_zero_below});
+  }
+  for (const EffectEntry& effect : model.effects) {
+    const EffectKind* known = findEffect(effect.name);
+    if (!known || touches(known->stage, kind)) append(values, effect);
+  }
+  return values;
+}
+
+Values valuesOfTrace(const MachineModel& model, TestKind kind) {
+  Values values;
+  const bool cut = kind == TestKind::cut;
+  bool rigid = model.tool_tip.x.modes.empty() && model.tool_tip.y.modes.empty();
+  for (const EffectEntry& effect : model.effects)
+    rigid = rigid && effect.flexibility.x.modes.empty() && effect.flexibility.y.modes.empty();
+  values.push_back(rigid ? 1.0 : 0.0);
+  if (cut) appendTool(values, model);
+  if (cut && !rigid) appendCutting(values, model);
+  append(values, model.tool_tip.x);
+  append(values, model.tool_tip.y);
+  for (const EffectEntry& effect : model.effects) {
+    const EffectKind* known = findEffect(effect.name);
+    if (known && (!ofTheTool(known->stage) || !touches(known->stage, kind))) continue;
+    if (rigid && known && known->stage == Stage::cutting_law && makeEffect(effect)->scalesForce()) continue;
+    append(values, effect);
+  }
+  return values;
+}
+
+std::shared_ptr<const CutTrace> CutTraces::find(const Values& values) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  for (std::size_t k = 0; k < held_.size(); ++k) {
+    if (held_[k].first != values) continue;
+    auto found = std::move(held_[k]);
+    held_.erase(held_.begin() + static_cast<std::ptrdiff_t>(k));
+    held_.push_front(std::move(found));
+    return held_.front().second;
+  }
+  return nullptr;
+}
+
+void CutTraces::hold(Values values, std::shared_ptr<const CutTrace> trace) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  held_.emplace_front(std::move(values), std::move(trace));
+  if (held_.size() > most_) held_.pop_back();
+}
+
+void CutTraces::clear() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  held_.clear();
+}
+
+}  // namespace smartmill::sim

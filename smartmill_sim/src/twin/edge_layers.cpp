@@ -1,0 +1,81 @@
+#include "smartmill_sim/twin/edge_layers.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace smartmill::sim {
+namespace {
+
+constexpr double LEAST_DEPTH = 1e-9;  // [m] of a layer that reaches nowhere
+constexpr double GONE = 1e-3;         // [m] by which a missing edge lies behind: deeper than any feed
+
+double depthOf(const EdgeLayer& layer, double depth) {
+  return std::max(layer.from_surface ? depth - layer.height : std::min(layer.height, depth), LEAST_DEPTH);
+}
+
+CuttingLaw lawOf(const EdgeLayer& layer, CuttingLaw law) {
+  if (!layer.chip_only) return law;
+  law.coefficients.kte = law.coefficients.kre = law.coefficients.kae = 0.0;
+  law.damping = 0.0;
+  return law;
+}
+
+}  // namespace
+
+EdgeLayers::EdgeLayers(const TwinSetup& setup, const CuttingLaw& law, double time_step, bool rigid) {
+  for (const EdgeLayer& of : setup.layers) {
+    if (of.weight == 0.0) continue;
+    std::vector<double> radius = setup.radius_offset;
+    if (of.missing_tooth >= 0) radius.at(static_cast<std::size_t>(of.missing_tooth)) -= GONE;
+    Layer layer{of, {}, {}};
+    if (rigid) {
+      layer.rigid.emplace(*setup.model.tool, lawOf(of, law), std::move(radius));
+    } else {
+      layer.process.emplace(*setup.model.tool, lawOf(of, law), time_step, std::move(radius));
+    }
+    layers_.push_back(std::move(layer));
+  }
+}
+
+void EdgeLayers::engage(const std::vector<ContactArc>& arcs, const ToolMotion& now) {
+  for (Layer& layer : layers_) {
+    std::vector<ContactArc> own = arcs;
+    for (ContactArc& a : own) a.depth = depthOf(layer.of, a.depth);
+    if (layer.rigid) layer.rigid->engage(own, feedOf(now));
+    if (layer.process) layer.process->engage(own, now);
+  }
+}
+
+void EdgeLayers::setDepths(const std::vector<double>& depths) {
+  for (Layer& layer : layers_) {
+    std::vector<double> own;
+    for (const double d : depths) own.push_back(depthOf(layer.of, d));
+    if (layer.rigid) layer.rigid->setDepths(own);
+    if (layer.process) layer.process->setDepths(own);
+  }
+}
+
+void EdgeLayers::setLaw(const CuttingLaw& law) {
+  for (Layer& layer : layers_) {
+    if (layer.rigid) layer.rigid->setLaw(lawOf(layer.of, law));
+    if (layer.process) layer.process->setLaw(lawOf(layer.of, law));
+  }
+}
+
+void EdgeLayers::add(const ToolMotion& now, CuttingForce& sum) {
+  for (Layer& layer : layers_) {
+    const CuttingForce own = layer.rigid ? layer.rigid->at(now.angle) : layer.process->step(now);
+    sum.fx += layer.of.weight * own.fx;
+    sum.fy += layer.of.weight * own.fy;
+    sum.fz += layer.of.weight * own.fz;
+    sum.torque += layer.of.weight * own.torque;
+  }
+}
+
+void EdgeLayers::settle(const std::array<double, 2>& displacement) {
+  for (Layer& layer : layers_) {
+    if (layer.process) layer.process->settle(displacement);
+  }
+}
+
+}  // namespace smartmill::sim

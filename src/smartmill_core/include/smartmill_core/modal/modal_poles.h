@@ -1,0 +1,47 @@
+#pragma once
+
+#include <complex>
+#include <cstddef>
+#include <vector>
+
+namespace smartmill {
+
+/// FRFs on common lines, each line with its weight.
+struct WeightedLines {
+  std::vector<double> frequency;                         ///< [Hz] rising
+  std::vector<std::vector<std::complex<double>>> value;  ///< [unit] per FRF and line
+  std::vector<std::vector<double>> weight;               ///< [1/unit] of real and imaginary part each
+
+  std::size_t size() const { return frequency.size(); }
+  std::size_t frfs() const { return value.size(); }
+  double step() const { return (frequency.back() - frequency.front()) / static_cast<double>(size() - 1); }
+};
+
+/// A pole of a structure as one order of a model sees it.
+struct Pole {
+  int order = 0;               ///< of the denominator
+  double frequency = 0.0;      ///< [Hz] undamped
+  double damping_ratio = 0.0;  ///< [1]
+  bool stable = false;         ///< the order before sees it in the same place
+
+  double halfWidth() const { return frequency * damping_ratio; }  ///< [Hz] of its peak
+};
+
+/// Which lines and orders polesByOrder() takes.
+struct PoleSearch {
+  std::size_t first = 0, last = 0;  ///< lines first .. last - 1
+  int largest_order = 60;
+  int order_step = 1;
+};
+
+/// Poles by the poly-reference least-squares complex frequency method (Peeters, Van der Auweraer, Guillaume
+/// and Leuridan, 2004; here one common denominator with complex coefficients in z = exp(i turn (f - f0) /
+/// span), so that any stretch of the lines can be taken alone), for every order up to the largest: the points
+/// of a stabilization diagram. The lowest coefficient is 1, which gives the poles of noise negative damping;
+/// these are left out.
+std::vector<Pole> polesByOrder(const WeightedLines& lines, const PoleSearch& search);
+
+/// Poles that stay in place over the orders: `order` tells over how many, most persistent first.
+std::vector<Pole> persistentPoles(const std::vector<Pole>& poles, const PoleSearch& search);
+
+}  // namespace smartmill

@@ -1,0 +1,286 @@
+#include <algorithm>
+#include <cmath>
+
+#include "smartmill_core/model/effect_catalogue.h"
+#include "smartmill_core/units.h"
+
+// Causes without a name: one entry a form. What is fitted has few numbers, each bounded so that force grows
+// with the chip and a factor stays positive.
+
+namespace smartmill {
+
+namespace {
+
+using Forms = std::vector<EffectForm>;
+using Need = EffectNeed;
+using Scope = EffectScope;
+using Stage = EffectStage;
+using Values = std::vector<double>;
+
+const std::vector<std::string> CHANNELS{"fx", "fy", "fz", "load_meter"};
+const std::vector<std::string> TIMES{"always", "turning"};  // of the spindle
+const FitRange LOGARITHM{-1.6, 1.6, 1e-4, 0.5};             // of a factor
+
+EffectParameter key(const char* name, const char* unit, const Range& range = {},
+                    EffectValue value = EffectValue::number) {
+  EffectParameter p;
+  p.key = name;
+  p.unit = unit;
+  p.range = range;
+  p.value = value;
+  return p;
+}
+
+EffectParameter orZero(const char* name, const char* unit, const Range& range = {}) {
+  EffectParameter p = key(name, unit, range);
+  p.optional = true;
+  return p;
+}
+
+EffectParameter oneOf(const char* name, const std::vector<std::string>& words) {
+  EffectParameter p = key(name, "1", {}, EffectValue::word);
+  p.words = words;
+  return p;
+}
+
+EffectKind empirical(const char* stage_word, const char* form, Stage stage, const char* says,
+                     const char* source, std::vector<EffectParameter> parameters, std::vector<Need> needs,
+                     std::function<Forms(const Scope&)> forms) {
+  EffectKind kind{std::string(EMPIRICAL) + ":" + form,
+                  stage,
+                  says,
+                  source,
+                  std::move(parameters),
+                  std::move(needs),
+                  std::move(forms)};
+  kind.form_stage = stage_word;
+  kind.form = form;
+  return kind;
+}
+
+// ---- chip thickness
+
+// The slope of the effective chip in each piece between nodes, over that of nothing changed. The last piece
+// goes on behind its node.
+void writeCourse(const Values& nodes, const Values& slopes, EffectEntry& e) {
+  Values &h = e.lists["h_um"], &factor = e.lists["factor"];
+  double effective = 0.0, before = 0.0;
+  for (std::size_t k = 0; k < nodes.size(); ++k) {
+    effective += slopes[k] * (nodes[k] - before);
+    before = nodes[k];
+    h.push_back(nodes[k]);
+    factor.push_back(effective / nodes[k]);
+  }
+}
+
+Values slopesOf(const EffectEntry& e) {
+  const Values &h = e.lists.at("h_um"), &factor = e.lists.at("factor");
+  Values slopes;
+  for (std::size_t k = 0; k < h.size(); ++k)
+    slopes.push_back(k == 0 ? factor[0] : (h[k] * factor[k] - h[k - 1] * factor[k - 1]) / (h[k] - h[k - 1]));
+  return slopes;
+}
+
+// Straight with one kink: below it nothing is changed.
+EffectCoordinates kink(double largest) {
+  constexpr double BEYOND = 4.0;  // second node over the first
+  const double low = 0.03 * largest, high = 0.9 * largest;
+  return {{{"ln h_um of the kink", std::log(0.4 * largest), std::log(low), std::log(high), 1e-3, 0.7},
+           {"ln slope behind it", 0.0, LOGARITHM.low, LOGARITHM.high, LOGARITHM.step, LOGARITHM.prior_std}},
+          [](const double* v, EffectEntry& e) {
+            const double at = std::exp(v[0]);
+            writeCourse({at, BEYOND * at}, {1.0, std::exp(v[1])}, e);
+          },
+          [](const EffectEntry& e, double* v) {
+            v[0] = std::log(e.lists.at("h_um").at(0));
+            v[1] = std::log(slopesOf(e).at(1));
+          }};
+}
+
+// Any course that rises: slopes between fixed nodes.
+EffectCoordinates course(const Values& nodes) {
+  EffectCoordinates c;
+  for (const double node : nodes)
+    c.coordinates.push_back({"ln slope to " + std::to_string(std::lround(node)) + " um", 0.0, LOGARITHM.low,
+                             LOGARITHM.high, LOGARITHM.step, LOGARITHM.prior_std});
+  c.write = [nodes](const double* v, EffectEntry& e) {
+    Values slopes;
+    for (std::size_t k = 0; k < nodes.size(); ++k) slopes.push_back(std::exp(v[k]));
+    writeCourse(nodes, slopes, e);
+  };
+  c.read = [](const EffectEntry& e, double* v) {
+    for (const double slope : slopesOf(e)) *v++ = std::log(slope);
+  };
+  return c;
+}
+
+Forms chipForms(const Scope& scope) {
+  const double largest = scope.largest_chip / units::UM;
+  EffectForm one({kink(largest)});
+  for (const double share : {0.2, 0.35, 0.5, 0.7}) {
+    const double at = std::log(share * largest);
+    one.probe({at, 0.0}, {{at, -0.05}});
+  }
+  Values nodes;
+  for (const double share : {0.12, 0.25, 0.4, 0.6, 1.0}) nodes.push_back(share * largest);
+  return {one.named("kink"), EffectForm({course(nodes)}).straight({0.02}).named("course")};
+}
+
+// ---- time and height
+
+Forms timeForms(const Scope&) {
+  return {EffectForm(
+              {amplitude("amplitude", {-0.9, 3.0, 1e-4, 0.3}),
+               logarithm("time_constant_s", {std::log(2e-3), std::log(5.0), 1e-3, 1.0}, 1.0, std::log(0.05))})
+              .scaled(0.05, {0.01, 0.03, 0.07, 0.2})};
+}
+
+Forms profileForms(const Scope& scope) {
+  const double depth = scope.largest_depth / units::MM;
+  Forms forms;
+  for (const char* from : {"tip", "surface"}) {
+    EffectForm form({amplitude("factor", {0.0, 5.0, 1e-4, 0.5}, 1.0),
+                     logarithm("height_mm", {std::log(0.02 * depth), std::log(0.95 * depth), 1e-3, 0.7}, 1.0,
+                               std::log(0.2 * depth))});
+    form.scaled(0.05, {0.1 * depth, 0.2 * depth, 0.35 * depth});
+    forms.push_back(form.word("from", from).named(from));
+  }
+  return forms;
+}
+
+Forms lostEdges(const Scope& scope) {
+  const double depth = scope.largest_depth / units::MM;
+  Forms forms;
+  for (int tooth = 1; tooth <= scope.nominal.tool->teeth; ++tooth) {
+    EffectForm form({amplitude("height_mm", {0.0, 0.95 * depth, 1e-3, 0.3 * depth})});
+    form.straight({0.05 * depth, 0.15 * depth, 0.3 * depth});
+    forms.push_back(form.number("tooth", tooth).named("tooth " + std::to_string(tooth)));
+  }
+  return forms;
+}
+
+// ---- channels
+
+Forms onChannels(const Scope& scope, const std::function<EffectForm(const std::string&)>& form) {
+  Forms forms;
+  for (const std::string& channel : CHANNELS) {
+    if (scope.channels.count(channel)) forms.push_back(form(channel).word("channel", channel).named(channel));
+  }
+  return forms;
+}
+
+// Steps and usual sizes of a force [N], of the load meter [V].
+double unitOf(const std::string& channel) {
+  return channel == "load_meter" ? 1e-3 : 1.0;
+}
+
+Forms curves(const Scope& scope) {
+  Forms forms;
+  for (EffectForm& form : onChannels(scope, [](const std::string&) {
+         return EffectForm({amplitude("odd_per_kn", {-3.0, 3.0, 1e-4, 0.3}),
+                            amplitude("even_per_kn", {-3.0, 3.0, 1e-4, 0.3}),
+                            amplitude("cubic_per_kn2", {-20.0, 20.0, 1e-4, 0.5})})
+             .straight({0.01});
+       })) {
+    if (form.variant != "load_meter") forms.push_back(std::move(form));
+  }
+  return forms;
+}
+
+// Where the line lies only the residual tells.
+Forms tones(const Scope& scope) {
+  Forms forms;
+  for (const std::string& when : TIMES) {
+    for (EffectForm& form : onChannels(scope, [](const std::string& channel) {
+           const double unit = unitOf(channel);
+           return EffectForm({amplitude("frequency_hz", {1.0, 6000.0, 2e-3, 1000.0}, 100.0),
+                              amplitude("amplitude", {0.0, 1e3 * unit, 5e-4 * unit, 10.0 * unit})});
+         })) {
+      if (when != TIMES.front()) form.named(form.variant + ", " + when);
+      forms.push_back(form.word("while", when));
+    }
+  }
+  return forms;
+}
+
+Forms orders(const Scope& scope) {
+  return onChannels(scope, [](const std::string& channel) {
+    const double unit = unitOf(channel);
+    return EffectForm({amplitude("amplitude", {0.0, 1e3 * unit, 5e-4 * unit, 10.0 * unit})});
+  });
+}
+
+Forms settlings(const Scope& scope) {
+  return onChannels(scope, [](const std::string& channel) {
+    const double unit = unitOf(channel);
+    return EffectForm({amplitude("amplitude", {-1e3 * unit, 1e3 * unit, 1e-3 * unit, 10.0 * unit}),
+                       logarithm("time_constant_s", {std::log(2e-3), std::log(2.0), 1e-3, 0.7}, 1.0,
+                                 std::log(0.05))})
+        .scaled(unit, {0.01, 0.03, 0.06, 0.15});
+  });
+}
+
+std::vector<EffectKind> makeCatalogue() {
+  const Range positive = Range::positive(), not_negative = Range::notNegative();
+  return {
+      empirical("geometry", "lost_edge", Stage::geometry,
+                "below this height one tooth does not cut, and the next one takes its chip",
+                "chip rule of formats.md with that edge far inside",
+                {key("tooth", "1", Range::closed(1.0, 20.0)), key("height_mm", "mm", not_negative)},
+                {Need::cuts, Need::several_teeth}, lostEdges),
+      empirical(
+          "chip", "chip_thickness", Stage::cutting_law,
+          "chip coefficients times a factor of chip thickness: chip times factor is straight between the "
+          "nodes, and rises",
+          "any course of the specific force",
+          {key("h_um", "um", positive, EffectValue::series),
+           key("factor", "1", positive, EffectValue::series)},
+          {Need::cuts}, chipForms),
+      empirical("law", "cutting_time", Stage::cutting_law,
+                "chip coefficients times 1 + amplitude exp(-t / constant), t since this cut began",
+                "exponential approach",
+                {key("amplitude", "1", Range::above(-1.0)), key("time_constant_s", "s", positive)},
+                {Need::cuts}, timeForms),
+      empirical(
+          "law", "depth_profile", Stage::cutting_law,
+          "chip coefficients times factor over this height from the tip up, or below the work's surface",
+          "a step over the height",
+          {oneOf("from", {"tip", "surface"}), key("height_mm", "mm", not_negative),
+           key("factor", "1", not_negative)},
+          {Need::cuts}, profileForms),
+      empirical("channel", "curve", Stage::signal,
+                "a channel that should show f shows f + odd f|f| + even f^2 + cubic f^3, f in kN",
+                "static characteristic to third order",
+                {oneOf("channel", CHANNELS), orZero("odd_per_kn", "1/kN"), orZero("even_per_kn", "1/kN"),
+                 orZero("cubic_per_kn2", "1/kN2")},
+                {Need::forces}, curves),
+      empirical("channel", "tone", Stage::signal,
+                "a sine at a fixed frequency on one channel, always or while the spindle turns; its phase is "
+                "found in each record",
+                "line that is not locked to the spindle",
+                {oneOf("channel", CHANNELS), oneOf("while", TIMES), key("frequency_hz", "Hz", positive),
+                 key("amplitude", "N or V", not_negative)},
+                {}, tones),
+      empirical(
+          "channel", "order", Stage::signal,
+          "a sine at a multiple of the spindle's turning on one channel; its phase is found in each record",
+          "line at a spindle order that keeps no phase",
+          {oneOf("channel", CHANNELS), key("order", "1", positive), key("amplitude", "N or V", not_negative)},
+          {}, orders),
+      empirical(
+          "channel", "settling", Stage::signal,
+          "a channel begins each record off by amplitude and comes back with exp(-t / constant)",
+          "exponential approach",
+          {oneOf("channel", CHANNELS), key("amplitude", "N or V"), key("time_constant_s", "s", positive)}, {},
+          settlings),
+  };
+}
+
+}  // namespace
+
+const std::vector<EffectKind>& empiricalCatalogue() {
+  static const std::vector<EffectKind> CATALOGUE = makeCatalogue();
+  return CATALOGUE;
+}
+
+}  // namespace smartmill

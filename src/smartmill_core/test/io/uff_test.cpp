@@ -1,0 +1,99 @@
+#include "smartmill_core/io/uff.h"
+
+#include <fstream>
+#include <iterator>
+
+#include <gtest/gtest.h>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/testing/temporary_folder.h"
+
+namespace smartmill {
+namespace {
+
+UffFunction receptance(bool even) {
+  UffFunction f;
+  f.type = uff::FREQUENCY_RESPONSE;
+  f.name = "point 1";
+  f.response_node = 7;
+  f.response_direction = 3;
+  f.reference_node = 1;
+  f.reference_direction = -3;
+  f.numerator = uff::DISPLACEMENT;
+  f.denominator = uff::EXCITATION_FORCE;
+  f.unit = "m";
+  for (int i = 0; i < 9; ++i) {
+    f.abscissa.push_back(even ? 100.0 + 0.5 * i : 100.0 + 0.3 * i * i);
+    f.value.emplace_back(1.25e-8 * (i - 4), -3e-9 * i);
+  }
+  return f;
+}
+
+TEST(Uff, ReadsWhatItWrote) {
+  const TemporaryFolder folder;
+  const std::string file = folder.file("frf.uff");
+  for (const bool binary : {false, true}) {
+    for (const bool even : {false, true}) {
+      const UffFunction due = receptance(even);
+      writeUff({due, due}, file, binary);
+      EXPECT_TRUE(isUff(file));
+      const std::vector<UffFunction> found = readUff(file);
+      ASSERT_EQ(found.size(), 2u);
+      EXPECT_EQ(found[1].response_node, 7);
+      EXPECT_EQ(found[1].response_direction, 3);
+      EXPECT_EQ(found[1].reference_direction, -3);
+      EXPECT_EQ(found[1].numerator, uff::DISPLACEMENT);
+      EXPECT_EQ(found[1].unit, "m");
+      ASSERT_EQ(found[1].value.size(), due.value.size());
+      for (std::size_t i = 0; i < due.value.size(); ++i) {
+        EXPECT_NEAR(found[1].abscissa[i], due.abscissa[i], 1e-5);
+        EXPECT_NEAR(std::abs(found[1].value[i] - due.value[i]), 0.0, 1e-18);
+      }
+    }
+  }
+}
+
+// As the description of dataset 58 lays it out: single precision in 13 columns that touch one another, other
+// datasets between, D exponents.
+TEST(Uff, ReadsSinglePrecisionText) {
+  const TemporaryFolder folder;
+  const std::string file = folder.file("old.unv");
+  std::ofstream(file)
+      << "    -1\n   151\nmodel\nnone\n    -1\n    -1\n    58\nhammer\nNONE\nNONE\nNONE\nNONE\n"
+         "    1         0    0         0 NONE               1   3 NONE               1   3\n"
+         "         2         5         1  0.00000E+00  1.00000D-03  0.00000E+00\n"
+         "        17    0    0    0 Time                 s\n"
+         "        13    0    0    0 Force                N\n"
+         "         0    0    0    0 NONE                 NONE\n"
+         "         0    0    0    0 NONE                 NONE\n"
+         " -1.00000E+00-2.00000E+00-3.00000E+00-4.00000E+00-5.00000E+00\n    -1\n";
+  const std::vector<UffFunction> found = readUff(file);
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].type, uff::TIME_RESPONSE);
+  EXPECT_EQ(found[0].numerator, uff::EXCITATION_FORCE);
+  ASSERT_EQ(found[0].value.size(), 5u);
+  EXPECT_DOUBLE_EQ(found[0].value[4].real(), -5.0);
+  EXPECT_DOUBLE_EQ(found[0].abscissa[4], 4e-3);
+}
+
+TEST(Uff, NamesWhatIsWrong) {
+  const TemporaryFolder folder;
+  const std::string file = folder.file("short.uff");
+  writeUff({receptance(true)}, file, true);
+  std::string text;
+  {
+    std::ifstream in(file, std::ios::binary);
+    text.assign(std::istreambuf_iterator<char>(in), {});
+  }
+  std::ofstream(file, std::ios::binary) << text.substr(0, text.size() - 60);
+  try {
+    readUff(file);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("short.uff: dataset 1: ends too early"), std::string::npos)
+        << error.what();
+  }
+}
+
+}  // namespace
+}  // namespace smartmill

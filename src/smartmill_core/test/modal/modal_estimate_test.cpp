@@ -1,0 +1,186 @@
+#include "smartmill_core/modal/modal_estimate.h"
+
+#include <cmath>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "modal/modal_window.h"
+#include "smartmill_core/error.h"
+#include "smartmill_core/fit/derivative_check.h"
+#include "smartmill_core/testing/coverage.h"
+
+namespace smartmill {
+namespace {
+
+struct Truth {
+  std::vector<Mode> modes;
+  double step, high, noise;  // noise: complex, of the FRF's root mean square
+};
+
+FrequencyResponse measured(const Truth& truth, unsigned seed) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal;
+  FrequencyResponse frf;
+  double squares = 0.0;
+  for (int i = 1; i * truth.step <= truth.high; ++i) {
+    std::complex<double> sum;
+    for (const Mode& m : truth.modes) sum += m.response(i * truth.step);
+    frf.frequency.push_back(i * truth.step);
+    frf.value.push_back(sum);
+    squares += std::norm(sum);
+  }
+  const double part = truth.noise * std::sqrt(squares / static_cast<double>(frf.size()) / 2.0);
+  for (auto& v : frf.value) v += std::complex<double>(part * normal(random), part * normal(random));
+  return frf;
+}
+
+void expectModes(const Truth& truth, double frequency, double damping, unsigned seed = 1) {
+  const ModalEstimate estimate = estimateModes({measured(truth, seed)}, {});
+  ASSERT_EQ(estimate.modes.size(), truth.modes.size());
+  EXPECT_FALSE(estimate.conjugated);
+  for (std::size_t k = 0; k < truth.modes.size(); ++k) {
+    EXPECT_NEAR(estimate.modes[k].frequency / truth.modes[k].frequency, 1.0, frequency) << k;
+    EXPECT_NEAR(estimate.modes[k].damping_ratio / truth.modes[k].damping_ratio, 1.0, damping) << k;
+  }
+}
+
+const Truth REFERENCE = {
+    {{480.0, 0.012, 1e-8}, {900.0, 0.02, 0.7e-8}, {1700.0, 0.03, -0.5e-8}, {2600.0, 0.035, 0.8e-8}},
+    0.8,
+    4000.0,
+    0.01};
+
+// The case of the published comparisons: pLSCF with poles picked by hand gives damping within 0.72 %.
+TEST(ModalEstimate, FindsTheReferenceCase) {
+  for (unsigned seed = 1; seed <= 8; ++seed) expectModes(REFERENCE, 5e-4, 6e-3, seed);
+}
+
+TEST(ModalEstimate, PartsAClosePair) {
+  for (const double second : {0.8e-8, -0.8e-8}) {
+    expectModes({{{1000.0, 0.02, 1e-8}, {1020.0, 0.02, second}}, 0.8, 4000.0, 0.01}, 5e-4, 0.02);
+  }
+}
+
+TEST(ModalEstimate, SeesAModeFortyDecibelsBelowItsNeighbour) {
+  expectModes({{{1000.0, 0.02, 1e-8}, {1300.0, 0.02, 1e-10}}, 0.8, 4000.0, 1e-3}, 5e-4, 0.02);
+}
+
+// From a peak that is a tenth of a line wide to one that is 1250 lines wide.
+TEST(ModalEstimate, TakesAnyDamping) {
+  expectModes({{{100.0, 1e-4, 1e-8}, {1000.0, 1e-4, 1e-8}, {1700.4, 3e-4, 1e-8}, {3000.5, 1e-4, 1e-8}},
+               1.0,
+               4000.0,
+               1e-3},
+              1e-5, 0.02);
+  expectModes({{{700.0, 0.1, 1e-8}, {2000.0, 0.1, 1e-8}}, 0.8, 4000.0, 0.01}, 1e-3, 0.01);
+}
+
+TEST(ModalEstimate, ProvesNothingInNoise) {
+  Truth noise = REFERENCE;
+  noise.noise = 1e3;
+  for (unsigned seed = 1; seed <= 8; ++seed)
+    EXPECT_EQ(estimateModes({measured(noise, seed)}, {}).modes.size(), 0u) << seed;
+}
+
+// Hum on one line is no mode.
+TEST(ModalEstimate, DoesNotTakeASpikeForAMode) {
+  FrequencyResponse frf = measured(REFERENCE, 1);
+  frf.value[2500] += 5e-7;
+  EXPECT_EQ(estimateModes({frf}, {}).modes.size(), 4u);
+}
+
+TEST(ModalEstimate, TurnsTheOtherSignOfPhase) {
+  FrequencyResponse frf = measured(REFERENCE, 1);
+  for (auto& v : frf.value) v = std::conj(v);
+  const ModalEstimate estimate = estimateModes({frf}, {});
+  EXPECT_TRUE(estimate.conjugated);
+  ASSERT_EQ(estimate.modes.size(), 4u);
+  EXPECT_NEAR(std::abs(fittedResponse(estimate, 0, 480.0) / frf.value[599] - 1.0), 0.0, 0.01);
+}
+
+// Complex residues: a share in quadrature is found again, and is left out where modes are to be real.
+TEST(ModalEstimate, FindsComplexResidues) {
+  FrequencyResponse frf = measured({{{1000.0, 0.02, 1e-8}}, 1.0, 2000.0, 1e-4}, 1);
+  const Mode mode{1000.0, 0.02, 1e-8};
+  for (std::size_t i = 0; i < frf.size(); ++i)
+    frf.value[i] +=
+        std::complex<double>(0.0, 0.3 * frf.frequency[i] / 1000.0) * mode.response(frf.frequency[i]);
+  ModalEstimateOptions options;
+  const ModalEstimate complex = estimateModes({frf}, options);
+  ASSERT_EQ(complex.modes.size(), 1u);
+  EXPECT_NEAR(complex.modes[0].phase_part[0], 0.3e-8, 1e-11);
+  options.real_modes = true;
+  const ModalEstimate real = estimateModes({measured(REFERENCE, 1)}, options);
+  ASSERT_EQ(real.modes.size(), 4u);
+  for (const EstimatedMode& m : real.modes) EXPECT_EQ(m.phase_part[0], 0.0);
+}
+
+TEST(ModalEstimate, StatesItsErrorsHonestly) {
+  Coverage frequency, damping, gain;
+  ModalEstimateOptions options;
+  options.largest_order = 20;
+  for (unsigned seed = 1; seed <= Coverage::RUNS; ++seed) {
+    const Truth truth{{{700.0, 0.02, 1e-8}, {1300.0, 0.03, -6e-9}}, 4.0, 2000.0, 0.02};
+    const ModalEstimate estimate = estimateModes({measured(truth, seed)}, options);
+    ASSERT_EQ(estimate.modes.size(), 2u);
+    const EstimatedMode& m = estimate.modes[seed % 2];
+    const Mode& due = truth.modes[seed % 2];
+    frequency.add(m.frequency - due.frequency, m.frequency_std);
+    damping.add(m.damping_ratio - due.damping_ratio, m.damping_ratio_std);
+    gain.add(m.gain[0] - due.gain, m.gain_std[0]);
+  }
+  EXPECT_TRUE(frequency.honest());
+  EXPECT_TRUE(damping.honest());
+  EXPECT_TRUE(gain.honest());
+}
+
+TEST(ModalEstimate, ReportsProgressAndEndsWhenTold) {
+  ModalEstimateOptions options;
+  double last = 0.0;
+  int calls = 0;
+  options.progress = [&](double share) {
+    EXPECT_GE(share, last);
+    last = share;
+    return ++calls < 25;
+  };
+  EXPECT_TRUE(estimateModes({measured(REFERENCE, 1)}, options).cancelled);
+  EXPECT_EQ(calls, 25);
+}
+
+TEST(ModalEstimate, RefusesWhatItCannotRead) {
+  FrequencyResponse frf = measured(REFERENCE, 1);
+  frf.value[7] = NAN;
+  EXPECT_THROW(estimateModes({frf}, {}), Error);
+  EXPECT_THROW(estimateModes({}, {}), Error);
+  EXPECT_THROW(estimateModes({measured(REFERENCE, 1), measured({REFERENCE.modes, 1.0, 4000.0, 0.01}, 1)}, {}),
+               Error);
+}
+
+// Kaufman's form leaves out a part that is orthogonal to the columns: of the squares' slope it misses
+// nothing.
+TEST(ModalWindow, SlopeOfTheSquaresAgreesWithDifferences) {
+  const FrequencyResponse frf =
+      measured({{{1000.0, 0.02, 1e-8}, {1080.0, 0.03, 5e-9}}, 4.0, 2000.0, 0.01}, 1);
+  WeightedLines lines{frf.frequency, {frf.value}, {std::vector<double>(frf.size(), 1e9)}};
+  const ModalWindow window(lines, false, frf.size());
+  const PoleList at = PoleList().with(990.0, 0.025).with(1090.0, 0.02);
+  Eigen::VectorXd left(window.count());
+  Eigen::MatrixXd jacobian = Eigen::MatrixXd::Zero(window.count(), 4);
+  ASSERT_TRUE(window.evaluate(at.p, &left, &jacobian));
+  const Eigen::VectorXd slope = 2.0 * jacobian.transpose() * left;
+  for (Eigen::Index i = 0; i < 4; ++i) {
+    constexpr double STEP = 1e-5;
+    double squares[2];
+    for (const int side : {0, 1}) {
+      Eigen::VectorXd moved = at.p;
+      moved[i] += side ? STEP : -STEP;
+      ASSERT_TRUE(window.evaluate(moved, &left, nullptr));
+      squares[side] = left.squaredNorm();
+    }
+    EXPECT_NEAR((squares[1] - squares[0]) / (2.0 * STEP) / slope[i], 1.0, 1e-5) << i;
+  }
+}
+
+}  // namespace
+}  // namespace smartmill
