@@ -28,6 +28,10 @@ std::string withDeviation(double value, double std_dev) {
 Explained::Effect effectOf(const Json& json) {
   Explained::Effect effect;
   effect.name = json.at("name");
+  // A cause without a name is told by where it acts and its form.
+  for (const char* key : {"stage", "form"}) {
+    if (json.contains(key)) effect.parameters.push_back({key, 0.0, 0.0, json.at(key)});
+  }
   for (const auto& [key, content] : json.at("parameters").items()) {
     Explained::Parameter p;
     p.key = key;
