@@ -16,6 +16,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr double SHOWS_NOTHING = 1.05;  // [1] gap; by chance it varies by some hundredths
+constexpr double BETTER = 0.98;         // [1] of the gap, from which on another model is worth having
 constexpr double SAME_ANGLE = 1e-3;     // [rad]
 
 std::string withDeviation(double value, double std_dev) {
@@ -27,6 +28,10 @@ std::string withDeviation(double value, double std_dev) {
 Explained::Effect effectOf(const Json& json) {
   Explained::Effect effect;
   effect.name = json.at("name");
+  // A cause without a name is told by where it acts and its form.
+  for (const char* key : {"stage", "form"}) {
+    if (json.contains(key)) effect.parameters.push_back({key, 0.0, 0.0, json.at(key)});
+  }
   for (const auto& [key, content] : json.at("parameters").items()) {
     Explained::Parameter p;
     p.key = key;
@@ -73,7 +78,7 @@ Explained explainedOf(const Json& report) {
   const char* const over = number("before", "heldout") > SHOWS_NOTHING ? "heldout" : "fit";
   e.gap_before = number("before", over);
   e.gap_after = number("after", over);
-  e.better = number("after", "fit") < number("before", "fit") &&
+  e.better = number("after", "fit") < BETTER * number("before", "fit") &&
              number("after", "heldout") <= SHOWS_NOTHING * number("before", "heldout");
   return e;
 }

@@ -22,8 +22,6 @@ namespace {
 namespace fs = std::filesystem;
 using discovery::Explained;
 
-constexpr const char* FOUND_NOTHING = "no_disagreement";
-
 std::string joined(const std::vector<std::string>& parts) {
   std::string text;
   for (const std::string& part : parts) text += (text.empty() ? "" : "; ") + part;
@@ -151,7 +149,7 @@ void Discovery::discover(const smartmill_msgs::DiscoverGoal& goal, Result& resul
   std::vector<std::string> said{explained.verdict};
   for (const std::string& effect : result.effects) said.push_back(effect);
   for (const std::string& rivals : explained.rivals) said.push_back("not told apart: " + rivals);
-  if (goal.install && explained.verdict != FOUND_NOTHING && explained.better) {
+  if (goal.install && explained.better) {
     install(result);
     said.push_back("installed, the model before is kept in " + place_.kept());
   }
