@@ -84,7 +84,8 @@ TEST(EmpiricalCatalogue, unknownFormsAreRefused) {
   refuses("{name: empirical, stage: chip, form: magic}", "'magic'");
   refuses("{name: empirical, stage: chip, form: tone}", "'tone'");
   refuses("{name: 'empirical:tone', channel: fx, frequency_hz: 36, amplitude: 2}", "no effect");
-  refuses("{name: empirical, stage: channel, form: tone, channel: fx, while: always, amplitude: 2}", "frequency_hz");
+  refuses("{name: empirical, stage: channel, form: tone, channel: fx, while: always, amplitude: 2}",
+          "frequency_hz");
 }
 
 // Whatever a fit moves, force rises with the chip.
