@@ -187,16 +187,15 @@ Fit Nameless::withoutNeedless(Fit fit, const NominalTangents& tangents) const {
 }
 
 // Fits the forms that promise most beside what a fit holds already.
-// @param least gain of BIC against that fit @param most fits
-std::vector<Fit> Nameless::fitsBeside(const Fit& now, const NominalTangents& tangents, double least,
-                                      std::size_t most, SearchResult* found) const {
-  constexpr double PROMISED = 0.25;  // of the gain: tangents say little of what is far away
+// @param promised, least gain of the tangents and of BIC against that fit @param most fits
+std::vector<Fit> Nameless::fitsBeside(const Fit& now, const NominalTangents& tangents, double promised,
+                                      double least, std::size_t most, SearchResult* found) const {
   const std::size_t round = found->ladder.empty() ? 0 : found->ladder.back().tried.round + 1;
   const Fitter& quick = bench_.quick();
   std::vector<Fit> fits;
   std::size_t fitted = 0;
   for (const Promise& p : screen(quick, now, tangents, forms_.back())) {
-    if (p.gain < PROMISED * least || ++fitted > most || bench_.cancelled()) break;
+    if (p.gain < promised || ++fitted > most || bench_.cancelled()) break;
     FitState with = now.state;
     with.members.push_back({p.hypothesis, bestStart(quick, now, p)});
     const auto begin = std::chrono::steady_clock::now();
@@ -219,7 +218,10 @@ std::vector<Fit> Nameless::fitsBeside(const Fit& now, const NominalTangents& tan
 std::vector<Fit> Nameless::fitsInstead(SearchResult* found) const {
   const Fit now = fitted({found->best.state.nominal, {}, found->best.state.turns});
   if (!now.converged) return {};
-  return fitsBeside(now, bench_.linearise(now.state), now.bic - found->best.bic, rule_.fitted_instead, found);
+  // Tangents say little of what is far away.
+  constexpr double PROMISED = 0.1;
+  const double least = now.bic - found->best.bic;
+  return fitsBeside(now, bench_.linearise(now.state), PROMISED * least, least, rule_.fitted_instead, found);
 }
 
 bool Nameless::take(const Fit& start, const FitState& before, SearchResult* found) const {
@@ -248,7 +250,7 @@ bool Nameless::addOne(SearchResult* found, const std::vector<Finding>& unexplain
   const NominalTangents tangents = bench_.linearise(before);
   const double least =
       std::max(options_.search.least_gain, rule_.least_share * (found->best.chi2 - bench_.samples()));
-  const std::vector<Fit> beside = fitsBeside(found->best, tangents, least, rule_.fitted, found);
+  const std::vector<Fit> beside = fitsBeside(found->best, tangents, 0.5 * least, least, rule_.fitted, found);
   const bool named = std::any_of(before.members.begin(), before.members.end(), [](const Member& m) {
     return !findEffect(m.hypothesis->effect)->empirical();
   });

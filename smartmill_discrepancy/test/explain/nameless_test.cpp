@@ -4,9 +4,12 @@
 #include <random>
 
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
+#include "smartmill_core/io/text_file.h"
 #include "smartmill_core/model/effect_catalogue.h"
 #include "smartmill_core/testing/temporary_folder.h"
+#include "smartmill_discrepancy/report/report_json.h"
 
 #include "explain/small_campaign.h"
 
@@ -61,17 +64,20 @@ void expectGapClosed(const Explanation& e) {
   ASSERT_EQ(e.model.effects.size(), e.effects.size());
 }
 
+// A tone on a channel of the record, its phase another one each time.
+Record withTone(const CampaignTest& test, std::uint64_t seed, const char* channel, double frequency) {
+  Record record = pure(test, 1.0, seed);
+  std::vector<double>& f = record.add(channel);
+  for (std::size_t i = 0; i < f.size(); ++i)
+    f[i] += 5.0 * std::sin(units::TWO_PI * frequency * record.time[i] + 1.7 * static_cast<double>(seed));
+  addNoise(record, seed);
+  return record;
+}
+
 TEST(Nameless, aToneOfNoKnownFrequencyIsBuiltFromTheResidual) {
   const TemporaryFolder folder;
   const Explanation e = explained(
-      [](const CampaignTest& test, std::uint64_t seed) {
-        Record record = pure(test, 1.0, seed);
-        std::vector<double>& fx = record.add("fx");
-        for (std::size_t i = 0; i < fx.size(); ++i)
-          fx[i] += 5.0 * std::sin(units::TWO_PI * 236.8 * record.time[i] + 1.7 * static_cast<double>(seed));
-        addNoise(record, seed);
-        return record;
-      },
+      [](const CampaignTest& test, std::uint64_t seed) { return withTone(test, seed, "fx", 236.8); },
       folder.file("."), quickly());
   expectGapClosed(e);
   ASSERT_EQ(e.effects.size(), 1u);
@@ -79,7 +85,15 @@ TEST(Nameless, aToneOfNoKnownFrequencyIsBuiltFromTheResidual) {
   EXPECT_EQ(e.effects[0].words.at("channel"), "fx");
   EXPECT_NEAR(valueOf(e.effects[0], "frequency_hz"), 236.8, 0.1);
   EXPECT_NEAR(valueOf(e.effects[0], "amplitude"), 5.0, 0.1);
-  EXPECT_NE(e.sentence.find("tone of 5"), std::string::npos) << e.sentence;
+  EXPECT_NE(e.sentence.find("carries a tone of"), std::string::npos) << e.sentence;
+
+  writeReport(e, folder.file("."));
+  const auto report = nlohmann::json::parse(readText(folder.file("report.json")));
+  EXPECT_EQ(report["effects"][0]["name"], "empirical");
+  EXPECT_EQ(report["effects"][0]["stage"], "channel");
+  EXPECT_EQ(report["effects"][0]["form"], "tone");
+  EXPECT_EQ(report["sentence"], e.sentence);
+  EXPECT_GT(report["gap"]["without_empirical"]["heldout"], report["gap"]["after"]["heldout"]);
 }
 
 // Rigid forces are linear in the coefficients: the record is the sum of what the edge and what the chip
@@ -111,13 +125,7 @@ TEST(Nameless, whatDoesNotRepeatIsLeftAlone) {
   const TemporaryFolder folder;
   const Explanation e = explained(
       [](const CampaignTest& test, std::uint64_t seed) {
-        Record record = pure(test, 1.0, seed);
-        std::vector<double>& fy = record.add("fy");
-        const double frequency = 180.0 + 37.0 * static_cast<double>(seed * seed % 11);
-        for (std::size_t i = 0; i < fy.size(); ++i)
-          fy[i] += 6.0 * std::sin(units::TWO_PI * frequency * record.time[i]);
-        addNoise(record, seed);
-        return record;
+        return withTone(test, seed, "fy", 180.0 + 37.0 * static_cast<double>(seed * seed % 11));
       },
       folder.file("."), quickly());
   EXPECT_EQ(e.verdict, Verdict::unknown_effect);

@@ -37,8 +37,8 @@ class Nameless {
 
  private:
   bool addOne(SearchResult* found, const std::vector<Finding>& unexplained);
-  std::vector<Fit> fitsBeside(const Fit& now, const NominalTangents& tangents, double least, std::size_t most,
-                              SearchResult* found) const;
+  std::vector<Fit> fitsBeside(const Fit& now, const NominalTangents& tangents, double promised, double least,
+                              std::size_t most, SearchResult* found) const;
   std::vector<Fit> fitsInstead(SearchResult* found) const;
   bool takeOne(std::vector<Fit> fits, const FitState& before, SearchResult* found) const;
   bool take(const Fit& start, const FitState& before, SearchResult* found) const;
