@@ -6,6 +6,7 @@
 #include <cstdarg>
 #include <cstdio>
 
+#include "smartmill_core/modal/impact_analysis.h"
 #include "smartmill_core/signal/fourier.h"
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/units.h"
@@ -48,7 +49,7 @@ std::string text(const char* format, ...) {
 }
 
 struct Quiet {
-  double level = 0.0, noise = 0.0;
+  double level = 0.0, noise = 0.0, scatter = 0.0;
 };
 
 /// Baseline and noise: before the hit, or of the record's end where it begins with the hit.
@@ -60,7 +61,7 @@ Quiet quietOf(const std::vector<double>& values, std::size_t before) {
           ? std::vector<double>(first, first + static_cast<std::ptrdiff_t>(n))
           : std::vector<double>(values.end() - static_cast<std::ptrdiff_t>(values.size() / 10), values.end());
   if (part.size() < 2) return {};
-  return {mean(part), standardDeviation(part)};
+  return {mean(part), noiseUnderRinging(part), standardDeviation(part)};
 }
 
 std::size_t longestRun(const std::vector<double>& values, double least) {
@@ -154,8 +155,9 @@ std::string hitReason(const Hit& hit, const HitJudgeOptions& options) {
   const HitFault fault = hitFault(hit, {std::max(options.weak_force, 1e-9), 1.0, options.response_range});
   if (!fault.text.empty()) return fault.text;
   const Quiet still = quietOf(hit.force, hit.pre_trigger), calm = quietOf(hit.response, hit.pre_trigger);
+  const bool rings = calm.scatter > 3.0 * calm.noise;  // then its mean is no baseline
   const std::vector<double> force = without(hit.force, still.level),
-                            response = without(hit.response, calm.level);
+                            response = without(hit.response, rings ? 0.0 : calm.level);
   const double peak = *std::max_element(force.begin(), force.end());
   if (!(peak > CLEAR_HIT * still.noise))
     return text("weak hit: peak %.2f, noise of the force %.2f", peak, still.noise);
@@ -172,7 +174,8 @@ std::string hitReason(const Hit& hit, const HitJudgeOptions& options) {
   if (std::abs(end.level) > DRIFT_SHARE * peak)
     return text("baseline: the force ends %.1f %% of its peak off", 100.0 * end.level / peak);
   const Quiet response_end = quietOf(response, 0);
-  if (std::abs(response_end.level) > 3.0 * DRIFT_SHARE * largest)
+  // A slow mode that still rings has a mean of its own.
+  if (std::abs(response_end.level) > std::max(3.0 * DRIFT_SHARE * largest, 2.0 * response_end.scatter))
     return text("baseline: the response ends %.1f %% of its largest off",
                 100.0 * response_end.level / largest);
   for (const std::string& reason :

@@ -140,7 +140,7 @@ TapRecord tapOf(const Record& record, const ChannelNames& channels) {
   tap.hit.force = record.column(channels.force.empty() ? "hammer" : channels.force);
   tap.hit.response = record.column(response);
   tap.kind = response == "acceleration"    ? ResponseKind::acceleration
-             : response.rfind("f", 0) == 0 ? ResponseKind::force
+             : response.rfind('f', 0) == 0 ? ResponseKind::force
                                            : ResponseKind::displacement;
   tap.hit.sample_rate = sampleRate(record.time, record.file);
   tap.hit.pre_trigger = onset(tap.hit.force);
@@ -203,7 +203,7 @@ ResponseKind kindOf(const UffFunction& f, const std::string& file) {
   if (u == "g" || u == "G" || u == "g/N" || (u.rfind("m/s", 0) == 0 && u.find('2') != std::string::npos))
     return ResponseKind::acceleration;
   if (u.rfind("m/s", 0) == 0) return ResponseKind::velocity;
-  return u.rfind("N", 0) == 0 || u.rfind("kN", 0) == 0 ? ResponseKind::force : ResponseKind::displacement;
+  return u.rfind('N', 0) == 0 || u.rfind("kN", 0) == 0 ? ResponseKind::force : ResponseKind::displacement;
 }
 
 /// SI value of one in the file; units that are none of these are taken for SI.

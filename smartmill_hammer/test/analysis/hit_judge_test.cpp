@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include "smartmill_core/modal/impact_analysis.h"
 #include "smartmill_core/modal/modal_filter.h"
 #include "smartmill_core/units.h"
 
@@ -42,6 +43,24 @@ Hit blow(unsigned seed, const std::function<double(double)>& second = {}) {
 
 TEST(HitJudge, TakesCleanHits) {
   for (unsigned seed = 1; seed <= 100; ++seed) EXPECT_EQ(hitReason(blow(seed), {}), "") << seed;
+}
+
+// A structure that hardly decays within the record, which begins with the hit: its ringing is no noise.
+TEST(HitJudge, TakesHitsThatRingOn) {
+  std::mt19937 random(2);
+  std::normal_distribution<double> normal;
+  Hit hit;
+  hit.sample_rate = RATE;
+  hit.pre_trigger = 10;
+  for (std::size_t i = 0; i < 25600; ++i) {
+    const double t = (static_cast<double>(i) - 10.0) / RATE;
+    hit.force.push_back((t > 0.0 && t < 0.3e-3 ? 13.0 * std::sin(units::PI * t / 0.3e-3) : 0.0) +
+                        0.01 * normal(random));
+    hit.response.push_back((t > 0.0 ? 20.0 * std::exp(-0.2 * t) * std::sin(units::TWO_PI * 320.0 * t) : 0.0) +
+                           0.02 * normal(random));
+  }
+  EXPECT_EQ(hitReason(hit, {}), "");
+  EXPECT_NEAR(noiseUnderRinging({hit.response.end() - 2560, hit.response.end()}), 0.02, 0.004);
 }
 
 TEST(HitJudge, RefusesDoubleHits) {

@@ -27,6 +27,21 @@ std::vector<double> part(const std::vector<double>& values, std::size_t from, st
 
 }  // namespace
 
+double noiseUnderRinging(const std::vector<double>& values) {
+  constexpr double BINOMIAL[] = {1.0, -6.0, 15.0, -20.0, 15.0, -6.0, 1.0};
+  constexpr double SQUARES = 924.0;  // of these
+  constexpr std::size_t TAPS = 7;
+  const double scatter = standardDeviation(values);
+  if (values.size() < 4 * TAPS) return scatter;
+  double sum = 0.0;
+  for (std::size_t i = 0; i + TAPS <= values.size(); ++i) {
+    double difference = 0.0;
+    for (std::size_t k = 0; k < TAPS; ++k) difference += BINOMIAL[k] * values[i + k];
+    sum += difference * difference;
+  }
+  return std::min(scatter, std::sqrt(sum / SQUARES / static_cast<double>(values.size() - TAPS + 1)));
+}
+
 ImpactAnalysis::ImpactAnalysis(const ImpactOptions& options) : options_(options) {
 }
 
@@ -59,9 +74,9 @@ void ImpactAnalysis::add(const Hit& hit) {
       for (double& r : response) r /= 1.0 + r / (options_.sensor_gain + base);
     }
   } else if (samples_ >= 10 * LEAST_QUIET) {
-    force_noise = standardDeviation(part(force, samples_ - samples_ / 10, samples_));
+    force_noise = noiseUnderRinging(part(force, samples_ - samples_ / 10, samples_));
     response_noise = std::abs(options_.response_scale) *
-                     standardDeviation(part(response, samples_ - samples_ / 10, samples_));
+                     noiseUnderRinging(part(response, samples_ - samples_ / 10, samples_));
   }
   double share = 1.0;
   if (options_.window_force) {

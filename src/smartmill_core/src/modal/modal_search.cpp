@@ -195,7 +195,7 @@ void ModalSearch::take(const std::vector<std::size_t>& members, const ModalWindo
 }
 
 // Fits members, and one more, together; drops the weakest while it is not proven.
-bool ModalSearch::refit(std::vector<std::size_t> members, const EstimatedMode* more, bool last) {
+bool ModalSearch::refit(const std::vector<std::size_t>& members, const EstimatedMode* more, bool last) {
   std::vector<EstimatedMode> all;
   PoleList poles;
   for (const std::size_t k : members) all.push_back(modes_[k]);

@@ -49,7 +49,7 @@ class ModalSearch {
                     double lines_a_half_width) const;
   double score(const Pole& candidate) const;
   bool tryPole(double frequency, double damping);
-  bool refit(std::vector<std::size_t> members, const EstimatedMode* more, bool last);
+  bool refit(const std::vector<std::size_t>& members, const EstimatedMode* more, bool last);
   Eigen::Index worst(const WindowFit& fit, double least) const;
   bool taken(const Pole& p) const;
   void fitCluster(const std::vector<Pole>& cluster);

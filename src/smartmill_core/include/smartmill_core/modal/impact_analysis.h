@@ -14,6 +14,10 @@ namespace smartmill {
 /// (eq. 4.27, noise of the response pulls it up), Hv between them: sqrt(|H1 H2|) with their phase.
 enum class FrfAverage { h1, h2, hv };
 
+/// Noise of a sample where a structure may still ring: its scatter, or, where that is less, what sixth
+/// differences leave, in which a slow ringing does not show.
+double noiseUnderRinging(const std::vector<double>& values);
+
 /// How hits become an FRF.
 struct ImpactOptions {
   bool window_force = true;  ///< Dunwoody eq. 4.17..4.19
