@@ -1,24 +1,14 @@
-#include <atomic>
-#include <csignal>
 #include <exception>
 
+#include "node/asked_end.h"
 #include "session/discovery.h"
 #include "smartmill_ros/run_node.h"
 
-namespace {
-std::atomic<bool> stop{false};
-void onSignal(int) {
-  stop = true;
-}
-}  // namespace
-
 int main(int argc, char** argv) {
-  using smartmill::session::Discovery;
+  using namespace smartmill::session;
   if (smartmill::printsParameters<Discovery::Parameters>(argc, argv)) return 0;
-  // The spindle must be stopped before ROS goes: the node handles Ctrl-C itself.
   ros::init(argc, argv, "discover", ros::init_options::NoSigintHandler);
-  std::signal(SIGINT, onSignal);
-  std::signal(SIGTERM, onSignal);
+  const std::atomic<bool>& stop = takeAskedEnd();
   const ros::NodeHandle nh, private_nh("~");
   try {
     Discovery discovery(nh, private_nh);
@@ -28,7 +18,7 @@ int main(int argc, char** argv) {
     discovery.stop();
     spinner.stop();
   } catch (const std::exception& error) {
-    ROS_FATAL("discover: %s", error.what());
+    ROS_FATAL_STREAM(error.what());
     return 1;
   }
   return 0;

@@ -1,22 +1,20 @@
 // rosrun smartmill_launch record -o BAG PATTERN...
 
 #include <atomic>
-#include <csignal>
 #include <string>
 #include <vector>
 
+#include "node/asked_end.h"
 #include "node/bag_recorder.h"
 #include "smartmill_core/program.h"
 
 namespace {
 
-std::atomic<bool> g_ended{false};
-
-void run(const std::string& path, const std::vector<std::string>& patterns) {
+void run(const std::string& path, const std::vector<std::string>& patterns, const std::atomic<bool>& ended) {
   constexpr double LOOK_EVERY = 0.5, STEP = 0.1;  // [s] of wall time
   smartmill::session::BagRecorder recorder(ros::NodeHandle(), path, patterns);
   ros::WallTime looked;
-  while (!g_ended && ros::ok()) {
+  while (!ended && ros::ok()) {
     if ((ros::WallTime::now() - looked).toSec() > LOOK_EVERY) {
       recorder.look();
       looked = ros::WallTime::now();
@@ -29,14 +27,14 @@ void run(const std::string& path, const std::vector<std::string>& patterns) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  // What waits when the end is asked for is still written: the end is taken here, not by ROS.
+  // What waits when the end is asked for is still written.
   ros::init(argc, argv, "record", ros::init_options::NoSigintHandler);
-  for (const int signal : {SIGINT, SIGTERM}) std::signal(signal, [](int) { g_ended = true; });
+  const std::atomic<bool>& ended = smartmill::session::takeAskedEnd();
   std::string path;
   std::vector<std::string> patterns;
   smartmill::CommandLine line(
       "Records topics into a bag without losing messages on a busy computer; Ctrl-C ends it.");
   line.option("-o,--out", path, "bag file to write").required();
   line.option("patterns", patterns, "regular expressions of whole topic names").required();
-  return smartmill::runProgram(line, argc, argv, [&] { run(path, patterns); });
+  return smartmill::runProgram(line, argc, argv, [&] { run(path, patterns, ended); });
 }

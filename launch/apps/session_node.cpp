@@ -1,29 +1,19 @@
-#include <atomic>
-#include <csignal>
-#include <cstdlib>
 #include <exception>
 
+#include "node/asked_end.h"
 #include "session/session.h"
 #include "smartmill_ros/run_node.h"
 
-namespace {
-std::atomic<bool> stop{false};
-void onSignal(int) {
-  stop = true;
-}
-}  // namespace
-
 int main(int argc, char** argv) {
-  if (smartmill::printsParameters<smartmill::session::SessionParameters>(argc, argv)) return 0;
-  // Goals must be cancelled before ROS goes: the session handles Ctrl-C itself.
+  using namespace smartmill::session;
+  if (smartmill::printsParameters<SessionParameters>(argc, argv)) return 0;
   ros::init(argc, argv, "session", ros::init_options::NoSigintHandler);
-  std::signal(SIGINT, onSignal);
-  std::signal(SIGTERM, onSignal);
+  const std::atomic<bool>& stop = takeAskedEnd();
   const ros::NodeHandle nh, private_nh("~");
   try {
-    return smartmill::session::Session(nh, private_nh, stop).run();
-  } catch (const std::exception& e) {
-    ROS_FATAL_STREAM(e.what());
+    return Session(nh, private_nh, stop).run();
+  } catch (const std::exception& error) {
+    ROS_FATAL_STREAM(error.what());
     return 1;
   }
 }
