@@ -96,6 +96,7 @@ class Search {
   };
 
   void fitNominal();
+  void keepStatedWhereBetter();
   void fitNominalHere();
   bool addEffect(std::size_t number);
   Round fitPromises(std::size_t number);
@@ -184,6 +185,7 @@ void Search::fitNominalHere() {
   }
   tangents_ = linearise(now_.state);
   now_ = withPhasesTurned(refit(now_, {3, 1e-5, true}));
+  keepStatedWhereBetter();
   result_.null = now_;
   options_.say("nominal model, values free within their uncertainty: " + gapText(now_.chi2));
   // The quick twin may lie far from where it was corrected: near its stability limit a tool vibrates in it
@@ -193,6 +195,15 @@ void Search::fitNominalHere() {
 
 // A tool with modes is guided by its displacement where that leaves less than the free simulation, which may
 // have run away; a displacement that is measured wrongly guides no better.
+// What is missing may pull the values to where the tool chatters.
+void Search::keepStatedWhereBetter() {
+  FitState stated = now_.state;
+  stated.nominal.assign(stated.nominal.size(), 0.0);
+  if (!(bench_.exactSquares(stated) < now_.chi2)) return;
+  tangents_ = linearise(stated);
+  now_ = quick_.fit(stated, &tangents_, {0, 1e-8, true});
+}
+
 void Search::fitNominal() {
   fitNominalHere();
   if (!bench_.canGuide() || excess(now_) < 0.02 * bench_.samples() || bench_.cancelled()) return;

@@ -72,37 +72,34 @@ void AskedTest::add(const double* between, const double* left, std::size_t size)
 }
 
 AskedShare sharedBy(const std::vector<AskedTest>& tests) {
-  double weights = 0.0, sum = 0.0, spread = 0.0, count = 0.0;
-  const auto each = [&](const auto& use) {
-    for (const AskedTest& t : tests) {
-      if (t.squares > 0.0 && t.variance > 0.0)
-        use(1.0 + t.product / t.squares, t.squares * t.squares / t.variance);
-    }
-  };
-  each([&](double share, double weight) {
-    weights += weight;
-    sum += weight * share;
-    ++count;
-  });
-  if (weights <= 0.0) return {0.5, std::numeric_limits<double>::infinity()};
-  const double share = sum / weights;
-  each([&](double a, double weight) { spread += weight * (a - share) * (a - share); });
-  const double more = count > 1.0 ? std::max(1.0, spread / (count - 1.0)) : 1.0;
-  return {share, std::sqrt(more / weights)};
+  double squares = 0.0, product = 0.0, variance = 0.0, scatter = 0.0, count = 0.0;
+  for (const AskedTest& t : tests) {
+    squares += t.squares;
+    product += t.product;
+    variance += t.variance;
+    count += t.squares > 0.0 ? 1.0 : 0.0;
+  }
+  if (squares <= 0.0) return {0.5, std::numeric_limits<double>::infinity()};
+  const double share = 1.0 + product / squares;
+  for (const AskedTest& t : tests) scatter += std::pow(t.product - t.squares * (share - 1.0), 2);
+  if (count > 1.0) variance = std::max(variance, scatter * count / (count - 1.0));
+  return {share, std::sqrt(variance) / squares};
 }
 
 const AskedShare& Standing::weaker() const {
   if (!std::isfinite(heldout.std_dev)) return fitted;
-  return heldout.beyond() < fitted.beyond() ? heldout : fitted;
+  return heldout.beyond() / HELDOUT_BEYOND < fitted.beyond() / FITTED_BEYOND ? heldout : fitted;
 }
 
 double Standing::confidence() const {
-  return 0.5 * std::erfc(-weaker().beyond() / std::sqrt(2.0));
+  const double beyond =
+      std::isfinite(heldout.std_dev) ? std::min(heldout.beyond(), fitted.beyond()) : fitted.beyond();
+  return 0.5 * std::erfc(-beyond / std::sqrt(2.0));
 }
 
 bool Standing::holds() const {
-  constexpr double BEYOND_DOUBT = 2.0;
-  return weaker().beyond() > BEYOND_DOUBT;
+  const bool told = std::isfinite(heldout.std_dev);
+  return fitted.beyond() > FITTED_BEYOND && (!told || heldout.beyond() > HELDOUT_BEYOND);
 }
 
 Standing standingOf(const Workbench& bench, const FitState& better, const FitState& other) {

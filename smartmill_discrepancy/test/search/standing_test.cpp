@@ -93,9 +93,10 @@ TEST(AskedShare, NothingToldIsNothingKnown) {
   const AskedShare asked = sharedBy({});
   EXPECT_EQ(asked.beyond(), 0.0);
   EXPECT_NEAR((AskedShare{1.8, 0.1}.beyond()), -3.0, 1e-12);  // of another size
-  const Standing standing{asked, {1.0, 0.01}};
-  EXPECT_TRUE(standing.holds());  // by the fit tests alone
-  EXPECT_FALSE((Standing{{0.9, 0.21}, {1.0, 0.01}}.holds()));
+  EXPECT_TRUE((Standing{asked, {1.0, 0.01}}.holds()));        // by the fit tests alone
+  EXPECT_FALSE((Standing{asked, {1.0, 0.2}}.holds()));
+  EXPECT_TRUE((Standing{{0.9, 0.3}, {1.0, 0.01}}.holds()));
+  EXPECT_FALSE((Standing{{0.9, 0.45}, {1.0, 0.01}}.holds()));
   EXPECT_NEAR((Standing{{0.9, 0.2}, {1.0, 0.01}}.confidence()), 0.97725, 1e-5);
 }
 

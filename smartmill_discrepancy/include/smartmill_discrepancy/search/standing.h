@@ -20,7 +20,7 @@ namespace smartmill::discrepancy {
 /// variance sum_k |D_k|^2 |R_k|^2 over the frequencies: little where what is left lies elsewhere, much where
 /// it lies just where d acts.
 struct AskedShare {
-  double share = 0.5;    ///< [1] mean of the a, by their variances
+  double share = 0.5;    ///< [1] for which the tests ask together: mean of the a, by |d|^2
   double std_dev = 0.0;  ///< [1] of it; where the tests differ by more than their variances say, as they do
 
   /// Standard deviations by which the tests ask for more than half and less than one and a half.
@@ -42,14 +42,17 @@ AskedShare sharedBy(const std::vector<AskedTest>& tests);
 
 /// How one model stands against another in tests that it was not fitted to, and in those that it was.
 struct Standing {
+  /// Standard deviations by which each group asks for more than half and less than one and a half: few tests
+  /// are held out, and the fit has not seen them; of the others there are many, and it has.
+  static constexpr double HELDOUT_BEYOND = 1.0, FITTED_BEYOND = 3.0;
+
   AskedShare heldout;  ///< unknown (infinite deviation) where no held-out test tells the two apart
   AskedShare fitted;   ///< the stated uncertainty of the nominal values is one test more of these
 
   /// The group that is less sure of it.
   const AskedShare& weaker() const;
-  /// Probability that the weaker group asks for more than half and less than one and a half.
+  /// Probability that the less sure group asks for more than half and less than one and a half.
   double confidence() const;
-  /// Whether both groups do, by two standard deviations each.
   bool holds() const;
 };
 
