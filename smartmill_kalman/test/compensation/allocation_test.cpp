@@ -21,6 +21,10 @@ void* operator new(std::size_t size) {
   ++made;
   return place;
 }
+void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
+  ++made;
+  return std::malloc(size > 0 ? size : 1);
+}
 void operator delete(void* place) noexcept {
   std::free(place);
 }

@@ -32,6 +32,13 @@ void* operator new(std::size_t size) {
   ++made;
   return place;
 }
+void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
+  void* place = std::malloc(size > 0 ? size : 1);
+  if (!place) return nullptr;
+  ++live;
+  ++made;
+  return place;
+}
 void operator delete(void* place) noexcept {
   if (place) --live;
   std::free(place);
