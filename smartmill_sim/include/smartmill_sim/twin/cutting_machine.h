@@ -24,8 +24,8 @@ enum class Feed { any, steady };
 struct CutTrace {
   struct Step {
     CuttingForce force;
-    std::array<double, 2> displacement;  ///< [m] of the tip
-    double acceleration;                 ///< [m/s2] where a probe stands
+    std::array<double, 2> displacement{{0, 0}};  ///< [m] of the tip
+    double acceleration = 0.0;                   ///< [m/s2] where a probe stands
   };
   std::vector<EdgeSums> sums;  ///< of a tool without modes: coefficients and factors of the law act later
   std::vector<Step> steps;     ///< of one with modes
