@@ -60,7 +60,7 @@ TEST(Fitter, priorWeightIsThatOfItsSquares) {
   const Dataset data = airCuts(machine, nominal, random);
   const TwinRunner runner(data, {0, 1, 2, 3, 4, 5}, 1, 1);
   const NominalFreedom freedom(nominal), sure_freedom(surer);
-  const FitState start{std::vector<double>(freedom.coordinates().size(), 0.0), {}};
+  const FitState start{std::vector<double>(freedom.coordinates().size(), 0.0), {}, {}};
   FitOptions weighted{30, 1e-12, true};
   weighted.prior_weight = 4.0;
   const Fit a = Fitter(runner, freedom).fit(start, nullptr, weighted);
