@@ -42,6 +42,7 @@ class BridgeTest : public ::testing::Test {
     focas.port = port;
     focas.reply_timeout = 10.0;
     MotionParameters motion;
+    motion.read_only = false;
     motion.limits.travel = {{{-0.2, 0.2}, {-0.2, 0.2}, {-0.2, 0.2}}};
     motion.limits.max_feed = 0.5;
     motion.limits.max_spindle_speed = units::radPerSecFromRpm(12000.0);
@@ -555,7 +556,7 @@ TEST(BridgeConnect, ClosedPortIsOneLine) {
   }
   ASSERT_EQ(notes.size(), 1u);
   EXPECT_EQ(notes[0].text,
-            "cannot connect to the controller at 127.0.0.1:1: Connection refused; trying again every 1.0 s");
+            "cannot connect to the controller at 127.0.0.1:1: Connection refused; trying again every 1.0 to 8.0 s");
 }
 
 }  // namespace
