@@ -44,7 +44,7 @@ TEST(Program, EveryWordOfTheSubsetGoesWhereItSays) {
            {"#1=3\n#2=[#1+4]*2\nG91 G0 X#2 Y-#1 Z-[SQRT[#1*3]/2]\n", mm(14, -3, -1.5)},
            {"#101=10*SIN[30]\nG91 G0 X#101 Y[10*COS[60]]\n", mm(5, 5, 0)},
            {"#1=1\n#[100+#1]=7\nG91 G0 X##1\n", mm(1, 0, 0)},  // ##1 is #1, which is 1
-           {"G91 G0 X#33 Y2\n", mm(0, 2, 0)},                    // a vacant variable is no word
+           {"G91 G0 X#33 Y2\n", mm(0, 2, 0)},                  // a vacant variable is no word
            {"O0042(SLOT)\nN7 G94 G21 G17 G90\nG91 G0 X1 (COMMENT)\n%\n", mm(1, 0, 0)},
        }) {
     Machine m(options);
@@ -85,8 +85,9 @@ TEST(Program, FlowAndOtherUnknownThingsAreRefusedByName) {
     m.run(DT);
     EXPECT_EQ(m.alarmText().substr(0, word.size() + 13), word + " IS NOT KNOWN") << m.alarmText();
   }
-  for (const std::string block : {"G2 X1 R0.1 F100", "G2 X1 Y1 F100", "G3 X9 I1 F100", "#1=1/0", "#1=SQRT[-1]",
-                                  "#1=[[[[[[1]]]]]]", "#1=[1", "#1=1]", "#5021=1", "#1=--1", "M6", "G41", "T1"}) {
+  for (const std::string block :
+       {"G2 X1 R0.1 F100", "G2 X1 Y1 F100", "G3 X9 I1 F100", "#1=1/0", "#1=SQRT[-1]", "#1=[[[[[[1]]]]]]",
+        "#1=[1", "#1=1]", "#5021=1", "#1=--1", "M6", "G41", "T1"}) {
     Machine m;
     m.start(block + "\n");
     m.run(DT);
@@ -230,8 +231,8 @@ TEST(Memory, PmcShowsTheSignalsOfTheConnectionManual) {
   m.run(2.0);
   EXPECT_EQ(byte(focas::PmcArea::f, 0), 0xe0);  // OP SA STL
   EXPECT_EQ(byte(focas::PmcArea::f, 40) + 256 * byte(focas::PmcArea::f, 41), 1500);
-  EXPECT_EQ(byte(focas::PmcArea::f, 45), 0x08);                // SAR
-  EXPECT_EQ(byte(focas::PmcArea::g, 12), 0xff & ~100);         // *FV
+  EXPECT_EQ(byte(focas::PmcArea::f, 45), 0x08);         // SAR
+  EXPECT_EQ(byte(focas::PmcArea::g, 12), 0xff & ~100);  // *FV
   EXPECT_EQ(m.controller.writePmc(focas::PmcArea::g, 12, {0}), focas::EW_OK);
   EXPECT_EQ(byte(focas::PmcArea::g, 12), 0xff & ~100) << "the ladder writes it anew";
   EXPECT_EQ(m.controller.writePmc(focas::PmcArea::d, 100, {1, 2}), focas::EW_OK);
@@ -330,7 +331,8 @@ TEST(ServoGuide, CurrentsLoadAndTriggerAtABlock) {
   // At 0.1 m/s friction alone; while it speeds up with 2 m/s2 the mass as well.
   const double friction = (drive.viscous * 0.1 + drive.coulomb) / drive.force_per_ampere;
   EXPECT_NEAR(at(300, 1), friction, 1e-9);
-  EXPECT_NEAR(at(25, 1), (drive.mass * 2.0 + drive.viscous * 0.05 + drive.coulomb) / drive.force_per_ampere, 0.01);
+  EXPECT_NEAR(at(25, 1), (drive.mass * 2.0 + drive.viscous * 0.05 + drive.coulomb) / drive.force_per_ampere,
+              0.01);
   EXPECT_EQ(at(300, 0), 0.25);
   EXPECT_EQ(at(300, 4), 10.0);
   EXPECT_EQ(at(300, 5), 0.0);

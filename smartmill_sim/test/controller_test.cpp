@@ -314,9 +314,9 @@ TEST(Panel, OvertravelIsRefusedBeforeAnythingMoves) {
 
 TEST(Panel, UnknownWordsRaiseAProgramAlarmWithTheBlock) {
   for (const std::string block :
-       {"G18",   "G1 X1 Q2 F10", "M8",    "X",    "X1.2.3", "G0 G1 X1",      "X1 X2",     "S#99",
-        "P5",    "G4 X1 P2",     "G4",    "F-5",  "#100=",  "#100",          "#100=#200", "#99=1",
-        "O-1",   "G1 X1",        "(open", "X1e3", "M119",   "X1234567890123"}) {
+       {"G18", "G1 X1 Q2 F10", "M8",    "X",    "X1.2.3", "G0 G1 X1",      "X1 X2",     "S#99",
+        "P5",  "G4 X1 P2",     "G4",    "F-5",  "#100=",  "#100",          "#100=#200", "#99=1",
+        "O-1", "G1 X1",        "(open", "X1e3", "M119",   "X1234567890123"}) {
     Machine m;
     m.start("#100=1\n" + block + "\n#100=2\n");
     m.run(0.01);

@@ -62,8 +62,8 @@ class CncNode {
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
   const NodeParameters parameters_;
-  Bridge bridge_;                 // the bridge's thread only
-  std::optional<Active> active_;  // the bridge's thread only
+  Bridge bridge_;                                            // the bridge's thread only
+  std::optional<Active> active_;                             // the bridge's thread only
   std::optional<std::vector<ControllerAlarm>> told_alarms_;  // the bridge's thread only
 
   ros::Publisher state_publisher_, load_publisher_, condition_publisher_, alarms_publisher_;

@@ -9,8 +9,8 @@ namespace {
 // Room that sensor and hammer take, as in Dunwoody fig. 4.1: a probe of 10 mm and a solenoid of 20 mm, 60 mm
 // long; the hammer rests as far behind the sensor's face as its plunger goes.
 constexpr double SENSOR_HALF_WIDTH = 5e-3, SENSOR_ABOVE_TIP = 5e-3;  // [m]
-constexpr double HAMMER_HALF_WIDTH = 10e-3, PLUNGER = 3e-3;         // [m]
-constexpr double BODY_LENGTH = 60e-3;                               // [m]
+constexpr double HAMMER_HALF_WIDTH = 10e-3, PLUNGER = 3e-3;          // [m]
+constexpr double BODY_LENGTH = 60e-3;                                // [m]
 constexpr double FACE_GAPS = 2.0;  // the sensor faces the tool at about twice its gap at zero volt
 constexpr double FAR = 10.0;       // [m]
 
@@ -27,7 +27,8 @@ CollisionWatch CollisionWatch::ofModel(const MachineModel& model) {
     for (const auto& [direction, place] : station.position) {
       const std::size_t along = direction == "y" ? 1 : 0;
       const std::size_t across = 1 - along;
-      const auto body = [&](const std::string& name, double behind, double half_width, double low, double high) {
+      const auto body = [&](const std::string& name, double behind, double half_width, double low,
+                            double high) {
         Body b{name + " " + direction, place, place};
         b.low[along] = place[along] + watch.tool_radius + behind;
         b.high[along] = b.low[along] + BODY_LENGTH;

@@ -18,8 +18,8 @@ using focas::EwCode;
 using Lock = std::lock_guard<std::mutex>;
 
 constexpr double MM_PER_MIN = units::MM / 60.0;
-constexpr double SCREW_LEAD = 10.0 * units::MM;      // [m] a turn of an axis' motor
-constexpr double LOAD_METER_STEP_VOLT = 3.0e-4;      // [V] as the thesis saw the load meter (Dunwoody 3.2.1)
+constexpr double SCREW_LEAD = 10.0 * units::MM;  // [m] a turn of an axis' motor
+constexpr double LOAD_METER_STEP_VOLT = 3.0e-4;  // [V] as the thesis saw the load meter (Dunwoody 3.2.1)
 
 std::vector<double> inMm(const std::array<double, 3>& v) {
   return {v[0] / units::MM, v[1] / units::MM, v[2] / units::MM};
@@ -351,7 +351,8 @@ std::vector<focas::NumberedValue> Controller::diagnoses(int first, int last) con
   state.waits_for_m = status.mstb != 0;
   state.moves = status.motion == focas::MOTION_MOVES;
   state.dwells = machine.dwells();
-  state.at_zero_feed = status.run == focas::RUN_START && !state.moves && machine.distanceToGo() != Variables::Point{};
+  state.at_zero_feed =
+      status.run == focas::RUN_START && !state.moves && machine.distanceToGo() != Variables::Point{};
   state.spindle_load = impl_->polled(machine.spindle_load);
   state.spindle_angle = machine.motion().spindle_angle;
   return within(machineDiagnoses(state), first, last);

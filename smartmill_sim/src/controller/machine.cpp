@@ -33,8 +33,7 @@ constexpr int OT_PLUS = 500;
 constexpr int OT_MINUS = 501;
 constexpr int EX_COLLISION = 3003;
 
-constexpr const char* RESIDENT_PROGRAM =
-    "O0001(PARK)\nG21 G90 G94\nG53 G0 Z0\nM5\nG53 G0 X0 Y0\nM30\n";
+constexpr const char* RESIDENT_PROGRAM = "O0001(PARK)\nG21 G90 G94\nG53 G0 Z0\nM5\nG53 G0 X0 Y0\nM30\n";
 
 }  // namespace
 
@@ -130,8 +129,8 @@ focas::Status ControlledMachine::status() const {
   focas::Status status;
   status.aut = static_cast<std::int16_t>(mode_);
   const bool started = busy() && !stopped_;
-  status.run = held_                 ? focas::RUN_HOLD
-               : started             ? focas::RUN_START
+  status.run = held_                  ? focas::RUN_HOLD
+               : started              ? focas::RUN_START
                : session_ || stopped_ ? focas::RUN_STOP
                                       : focas::RUN_RESET;
   status.motion = moving() ? focas::MOTION_MOVES : dwells() ? focas::MOTION_DWELL : focas::MOTION_NONE;
@@ -159,7 +158,8 @@ PmcSignals ControlledMachine::signals() const {
   s.alarm = !alarms.empty();
   s.emergency = emergency_;
   s.at_rest = speed == 0.0;
-  s.at_speed = turn_ != Turn::off && std::abs(speed - commandedSpeed()) <= AT_SPEED * std::abs(commandedSpeed());
+  s.at_speed =
+      turn_ != Turn::off && std::abs(speed - commandedSpeed()) <= AT_SPEED * std::abs(commandedSpeed());
   s.oriented = oriented_ && speed == 0.0 && now_ >= spindle_.settled();
   s.m_code = last_m_;
   s.s_code = static_cast<int>(std::lround(units::rpmFromRadPerSec(modal_.speed)));
@@ -313,7 +313,8 @@ std::size_t ControlledMachine::take(const char* data, std::size_t size) {
   if (!session_) {
     return size;  // of a session that has ended: thrown away
   }
-  const std::size_t taken = std::min(size, options.buffer_size - std::min(options.buffer_size, buffer_.size()));
+  const std::size_t taken =
+      std::min(size, options.buffer_size - std::min(options.buffer_size, buffer_.size()));
   buffer_.append(data, taken);
   return taken;
 }
@@ -344,8 +345,8 @@ EwCode ControlledMachine::abort() {
 // --- memory
 
 std::optional<double> ControlledMachine::readVariable(int number) const {
-  return variables.read(number, {pending_.empty() ? move_.target() : pending_.back().move.target(), position(),
-                                 workPosition()});
+  return variables.read(number, {pending_.empty() ? move_.target() : pending_.back().move.target(),
+                                 position(), workPosition()});
 }
 
 EwCode ControlledMachine::select(int number) {
@@ -469,15 +470,14 @@ double ControlledMachine::unit() const {
   return modal_.inch ? INCH : units::MM;
 }
 
-std::array<double, 3> ControlledMachine::targetOf(const NcBlock& block, const std::array<double, 3>& from) const {
+std::array<double, 3> ControlledMachine::targetOf(const NcBlock& block,
+                                                  const std::array<double, 3>& from) const {
   std::array<double, 3> to = from;
   for (std::size_t i = 0; i < 3; ++i) {
     if (!block.axis[i]) {
       continue;
     }
-    const double zero = block.machine          ? 0.0
-                        : modal_.relative ? from[i]
-                                               : variables.offsets[modal_.work][i];
+    const double zero = block.machine ? 0.0 : modal_.relative ? from[i] : variables.offsets[modal_.work][i];
     to[i] = *block.axis[i] * unit() + zero;
   }
   return to;

@@ -86,9 +86,9 @@ class ControlledMachine {
   std::vector<focas::AlarmMessage> alarms;
   int sequence = 0, blocks = 0;
   std::string block_text;
-  double spindle_load = 0.0;                                                // [percent]
+  double spindle_load = 0.0;                                              // [percent]
   std::array<double, 3> servo_load{{0, 0, 0}}, servo_current{{0, 0, 0}};  // [percent], [A]
-  std::int64_t clock_offset = 0;                                            // [s]
+  std::int64_t clock_offset = 0;                                          // [s]
 
  private:
   struct Modal {

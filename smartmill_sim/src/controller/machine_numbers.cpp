@@ -53,28 +53,28 @@ std::vector<NumberedValue> machineParameters(const ControllerOptions& o) {
       ofAxes(1240, NumberedType::real, home, o.info.position_decimals),  // first reference position [mm]
       ofAxes(1320, NumberedType::real, travel(1), o.info.position_decimals),  // stroke limits [mm]
       ofAxes(1321, NumberedType::real, travel(0), o.info.position_decimals),
-      single(1410, NumberedType::real, rapid, 1),               // dry run [mm/min]
-      ofAxes(1420, NumberedType::real, all(rapid), 1),          // rapid traverse [mm/min]
-      ofAxes(1430, NumberedType::real, all(rapid), 1),          // highest cutting feed [mm/min]
+      single(1410, NumberedType::real, rapid, 1),                // dry run [mm/min]
+      ofAxes(1420, NumberedType::real, all(rapid), 1),           // rapid traverse [mm/min]
+      ofAxes(1430, NumberedType::real, all(rapid), 1),           // highest cutting feed [mm/min]
       ofAxes(1620, NumberedType::double_word, all(rapid_ramp)),  // ramp of rapid traverse [ms]
-      single(3741, NumberedType::double_word, max_speed),       // spindle at gear 1 [rpm]
-      single(3772, NumberedType::double_word, max_speed),       // highest spindle speed [rpm]
-      single(4020, NumberedType::double_word, max_speed),       // highest motor speed [rpm]
+      single(3741, NumberedType::double_word, max_speed),        // spindle at gear 1 [rpm]
+      single(3772, NumberedType::double_word, max_speed),        // highest spindle speed [rpm]
+      single(4020, NumberedType::double_word, max_speed),        // highest motor speed [rpm]
   };
 }
 
 std::vector<NumberedValue> machineDiagnoses(const DiagnosisState& state) {
   const double steps = state.spindle_angle / units::TWO_PI * POSITION_STEPS;
   return {
-      single(0, NumberedType::byte, state.waits_for_m ? 1 : 0),   // waits for FIN
-      single(1, NumberedType::byte, state.moves ? 1 : 0),         // motion
-      single(2, NumberedType::byte, state.dwells ? 1 : 0),        // dwell
-      single(5, NumberedType::byte, state.at_zero_feed ? 1 : 0),  // feed override 0 %
-      ofAxes(300, NumberedType::double_word, all(0.0)),           // servo error: an ideal follower
-      ofAxes(308, NumberedType::byte, all(AMBIENT)),              // servo motor temperature [deg C]
-      ofAxes(309, NumberedType::byte, all(AMBIENT)),              // encoder temperature [deg C]
-      single(403, NumberedType::byte, AMBIENT),                   // spindle motor temperature [deg C]
-      single(410, NumberedType::real, state.spindle_load, 2),     // spindle load meter [percent]
+      single(0, NumberedType::byte, state.waits_for_m ? 1 : 0),         // waits for FIN
+      single(1, NumberedType::byte, state.moves ? 1 : 0),               // motion
+      single(2, NumberedType::byte, state.dwells ? 1 : 0),              // dwell
+      single(5, NumberedType::byte, state.at_zero_feed ? 1 : 0),        // feed override 0 %
+      ofAxes(300, NumberedType::double_word, all(0.0)),                 // servo error: an ideal follower
+      ofAxes(308, NumberedType::byte, all(AMBIENT)),                    // servo motor temperature [deg C]
+      ofAxes(309, NumberedType::byte, all(AMBIENT)),                    // encoder temperature [deg C]
+      single(403, NumberedType::byte, AMBIENT),                         // spindle motor temperature [deg C]
+      single(410, NumberedType::real, state.spindle_load, 2),           // spindle load meter [percent]
       single(445, NumberedType::double_word, static_cast<int>(steps)),  // spindle position, 4096 a turn
   };
 }

@@ -12,8 +12,8 @@ using focas::PmcArea;
 constexpr std::array<std::size_t, 10> SIZES{768, 768, 128, 128, 250, 8000, 500, 100, 400, 10000};
 
 // Signals of the 30i's connection manual (function): address and bit.
-constexpr std::size_t F_OPERATION = 0, F_ALARM = 1, F_MODE = 3, F_MODE_REFERENCE = 4, F_M_CODE = 10, F_S_CODE = 22,
-                      F_SPINDLE_SPEED = 40, F_SPINDLE = 45;
+constexpr std::size_t F_OPERATION = 0, F_ALARM = 1, F_MODE = 3, F_MODE_REFERENCE = 4, F_M_CODE = 10,
+                      F_S_CODE = 22, F_SPINDLE_SPEED = 40, F_SPINDLE = 45;
 constexpr std::uint8_t OP = 0x80, SA = 0x40, STL = 0x20, SPL = 0x10;  // F0
 constexpr std::uint8_t AL = 0x01, MA = 0x80;                          // F1
 constexpr std::uint8_t SST = 0x02, SAR = 0x08, ORAR = 0x80;           // F45

@@ -14,13 +14,13 @@ struct PmcSignals {
   bool operating = false, started = false, held = false, alarm = false, emergency = false;
   bool at_speed = false, at_rest = true, oriented = false;
   int m_code = 0;
-  int s_code = 0;             ///< [rpm] commanded
+  int s_code = 0;              ///< [rpm] commanded
   double spindle_speed = 0.0;  ///< [rpm] actual
   double feed_override = 1.0, spindle_override = 1.0;
 };
 
-/// Addresses of the PMC of a 30i (sizes of its first path). Signals of the control (F) and of the panel (G, X)
-/// stand for themselves: what is written there the ladder overwrites at once.
+/// Addresses of the PMC of a 30i (sizes of its first path). Signals of the control (F) and of the panel (G,
+/// X) stand for themselves: what is written there the ladder overwrites at once.
 class PmcMemory {
  public:
   PmcMemory();

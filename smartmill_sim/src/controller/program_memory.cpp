@@ -96,7 +96,8 @@ std::optional<std::string> ProgramMemory::fetch(int first, int last) const {
 std::vector<focas::StoredProgram> ProgramMemory::list() const {
   std::vector<focas::StoredProgram> entries;
   for (const auto& [number, program] : programs_) {
-    entries.push_back({number, nameOf(number), commentOf(program.text), program.text.size(), program.changed});
+    entries.push_back(
+        {number, nameOf(number), commentOf(program.text), program.text.size(), program.changed});
   }
   return entries;
 }

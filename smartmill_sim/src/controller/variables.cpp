@@ -33,7 +33,8 @@ bool Variables::writable(int number) {
 std::optional<double> Variables::read(int number, const Positions& positions) const {
   if (isOffset(number)) {
     const int at = number - OFFSETS;
-    return offsets[static_cast<std::size_t>(at / OFFSET_STRIDE)][static_cast<std::size_t>(at % OFFSET_STRIDE)] /
+    return offsets[static_cast<std::size_t>(at / OFFSET_STRIDE)]
+                  [static_cast<std::size_t>(at % OFFSET_STRIDE)] /
            units::MM;
   }
   for (const auto& [first, point] :

@@ -222,7 +222,9 @@ class World::Impl {
     }
     const double share = 1.0 / options_.substeps;
     torque_ += share * torque;
-    servo_.push({time, now, load_meter_ / *spindle_.load_meter_full_scale,
+    servo_.push({time,
+                 now,
+                 load_meter_ / *spindle_.load_meter_full_scale,
                  {share * force[0], share * force[1], share * force[2]}});
     block.hammer.samples.push_back(share * hammer + (hammer_ ? noise(hammer_->force_noise_rms) : 0.0));
     if (station_) {

@@ -143,8 +143,8 @@ std::string contentOf(Layout layout, const Bytes& data) {
       }
       return inHex(data.data(), data.size());
     case Layout::hexadecimal:
-      return std::to_string(data.size()) + " bytes " + inHex(data.data(), std::min<std::size_t>(data.size(), 24)) +
-             (data.size() > 24 ? "..." : "");
+      return std::to_string(data.size()) + " bytes " +
+             inHex(data.data(), std::min<std::size_t>(data.size(), 24)) + (data.size() > 24 ? "..." : "");
   }
   return {};
 }
@@ -182,9 +182,10 @@ std::string replyLine(const SubReply& reply) {
            std::to_string(reply.detail);
   }
   const auto found = calls().find(reply.c3);
-  return text + (reply.data.empty() ? "OK"
-                                    : contentOf(found != calls().end() ? found->second.layout : Layout::hexadecimal,
-                                                reply.data));
+  return text +
+         (reply.data.empty()
+              ? "OK"
+              : contentOf(found != calls().end() ? found->second.layout : Layout::hexadecimal, reply.data));
 }
 
 template <class Packets, class Line>
@@ -232,8 +233,9 @@ std::string describe(const Frame& frame) {
     }
     if (frame.is(FRAME_OPEN, DIR_REPLY)) {
       const OpenReply reply = decodeOpenReply(frame.body);
-      return "opened: version " + std::to_string(frame.version) + ", " + std::to_string(reply.axes) + " axes, " +
-             std::to_string(reply.spindles) + " spindles, " + std::to_string(reply.paths) + " paths";
+      return "opened: version " + std::to_string(frame.version) + ", " + std::to_string(reply.axes) +
+             " axes, " + std::to_string(reply.spindles) + " spindles, " + std::to_string(reply.paths) +
+             " paths";
     }
     if (frame.is(FRAME_OPEN, DIR_REQUEST) && frame.body.size() >= 2) {
       return "open circuit " + std::to_string(Reader(frame.body).u16());

@@ -8,11 +8,11 @@
 namespace smartmill::focas {
 namespace {
 
-constexpr std::size_t MAX_AXIS = 32;             // slots of a parameter or diagnosis number
-constexpr std::size_t MAX_NUMBERED = 200;        // in one reply: they must fit a frame
-constexpr std::size_t PATH_WIDTH = 256;          // [byte]
-constexpr std::size_t COMMENT_WIDTH = 64;        // [byte] in a program list
-constexpr std::size_t NAME_WIDTH = 36;           // [byte] in a folder's list
+constexpr std::size_t MAX_AXIS = 32;              // slots of a parameter or diagnosis number
+constexpr std::size_t MAX_NUMBERED = 200;         // in one reply: they must fit a frame
+constexpr std::size_t PATH_WIDTH = 256;           // [byte]
+constexpr std::size_t COMMENT_WIDTH = 64;         // [byte] in a program list
+constexpr std::size_t NAME_WIDTH = 36;            // [byte] in a folder's list
 constexpr std::size_t FOLDER_COMMENT_WIDTH = 52;  // [byte]
 constexpr int MAX_LISTED = 400;
 constexpr int ALL_AXES = -1;
@@ -141,9 +141,8 @@ int MemoryCalls::numbered(const SubRequest& request, bool parameters, bool legac
   if (axis < ALL_AXES || axis > axes) {
     return EW_ATTRIB;
   }
-  const std::vector<NumberedValue> entries = parameters
-                                                 ? controller_.parameters(request.v[0], request.v[1])
-                                                 : controller_.diagnoses(request.v[0], request.v[1]);
+  const std::vector<NumberedValue> entries = parameters ? controller_.parameters(request.v[0], request.v[1])
+                                                        : controller_.diagnoses(request.v[0], request.v[1]);
   if (entries.empty()) {
     return EW_NUMBER;
   }
@@ -158,7 +157,8 @@ int MemoryCalls::numbered(const SubRequest& request, bool parameters, bool legac
       values = {values.at(static_cast<std::size_t>(axis - 1))};
     }
     out.i32(entry.number).i16(static_cast<std::int16_t>(entry.of_axis ? axis : 0));
-    out.u16(static_cast<std::uint16_t>(parameters ? static_cast<int>(entry.type) : diagnosisType(entry.type)));
+    out.u16(
+        static_cast<std::uint16_t>(parameters ? static_cast<int>(entry.type) : diagnosisType(entry.type)));
     values.resize(MAX_AXIS, 0.0);
     for (const double value : values) {
       const Value8 coded = Value8::fromDouble(value, entry.type == NumberedType::real ? entry.decimals : 0);

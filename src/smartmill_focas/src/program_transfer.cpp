@@ -10,6 +10,7 @@ namespace {
 
 constexpr std::size_t MAX_TEXT = 1 << 20;    // [byte] of one download
 constexpr std::size_t UPLOAD_CHUNK = 0x500;  // [byte] as a 16i pushes it
+constexpr std::chrono::milliseconds PUSH_PERIOD{4};
 
 void refuse(const ProgramTransfer::Send& send, std::uint8_t type, int code) {
   ErrorBody error;
@@ -48,6 +49,7 @@ bool ProgramTransfer::handle(const Frame& frame, ControllerInterface& controller
   } else if (frame.is(FRAME_UPLOAD_START, DIR_REQUEST)) {
     upload(frame, controller, send);
   } else if (frame.is(FRAME_UPLOAD_END, DIR_REQUEST)) {
+    waiting_.clear();
     send(FRAME_UPLOAD_END, DIR_REPLY, {});  // a client that gives up before the end has come
   } else {
     return frame.is(FRAME_UPLOAD_END, DIR_REPLY);
@@ -82,11 +84,23 @@ void ProgramTransfer::upload(const Frame& frame, const ControllerInterface& cont
     return;
   }
   send(FRAME_UPLOAD_START, DIR_REPLY, {});
+  pushed_ = std::chrono::steady_clock::now();
+  waiting_.clear();
   for (std::size_t at = 0; at < text.size(); at += UPLOAD_CHUNK) {
     const std::size_t size = std::min(UPLOAD_CHUNK, text.size() - at);
-    send(FRAME_UPLOAD_DATA, DIR_STREAM, Bytes(text.data() + at, text.data() + at + size));
+    waiting_.push_back({FRAME_UPLOAD_DATA, DIR_STREAM, Bytes(text.data() + at, text.data() + at + size)});
   }
-  send(FRAME_UPLOAD_END, DIR_REQUEST, {});
+  waiting_.push_back({FRAME_UPLOAD_END, DIR_REQUEST, {}});
+}
+
+void ProgramTransfer::push(const Send& send) {
+  const auto now = std::chrono::steady_clock::now();
+  if (waiting_.empty() || now - pushed_ < PUSH_PERIOD) {
+    return;
+  }
+  pushed_ = now;
+  send(waiting_.front().type, waiting_.front().direction, waiting_.front().body);
+  waiting_.pop_front();
 }
 
 }  // namespace smartmill::focas

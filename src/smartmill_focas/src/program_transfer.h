@@ -1,5 +1,7 @@
 #pragma once
 
+#include <chrono>
+#include <deque>
 #include <functional>
 #include <string>
 
@@ -16,12 +18,24 @@ class ProgramTransfer {
   /// @return whether the frame belongs to a transfer; its answers went to send.
   bool handle(const Frame& frame, ControllerInterface& controller, const Send& send);
 
+  /// An upload goes out a frame at a time, as a control sends it, so that a client which takes what one
+  /// recv() brings for one frame is served too.
+  bool uploading() const { return !waiting_.empty(); }
+  void push(const Send& send);
+
  private:
+  struct Waiting {
+    std::uint8_t type;
+    Direction direction;
+    Bytes body;
+  };
   void endDownload(ControllerInterface& controller, const Send& send);
-  static void upload(const Frame& frame, const ControllerInterface& controller, const Send& send);
+  void upload(const Frame& frame, const ControllerInterface& controller, const Send& send);
 
   bool receiving_ = false, too_long_ = false;
   std::string text_;
+  std::deque<Waiting> waiting_;
+  std::chrono::steady_clock::time_point pushed_{};
 };
 
 }  // namespace smartmill::focas

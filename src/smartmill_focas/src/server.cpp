@@ -136,6 +136,9 @@ class Server::Impl {
         }
         // A closed peer would end every poll at once.
         waits.push_back({c.peer_closed ? -1 : c.socket.get(), events, 0});
+        if (c.transfer.uploading()) {
+          timeout = std::min(timeout, SESSION_POLL_MS);
+        }
         if (c.blocked) {
           timeout = std::min(timeout, BLOCKED_POLL_MS);
         } else if (c.dnc == Dnc::open) {
@@ -227,6 +230,9 @@ class Server::Impl {
         return;
       }
       serveFrames(c);
+      if (c.unsent.empty()) {
+        c.transfer.push(sender(c));
+      }
       if (!c.unsent.empty() && writeSome(c.socket.get(), c.unsent) == Transfer::closed) {
         drop(c);
         return;
@@ -341,9 +347,12 @@ class Server::Impl {
   }
 
   bool transferred(Connection& c, const Frame& frame) {
-    return c.transfer.handle(frame, controller_, [&](std::uint8_t type, Direction direction, const Bytes& body) {
-      send(c, type, direction, body);
-    });
+    return c.transfer.handle(frame, controller_, sender(c));
+  }
+
+  static ProgramTransfer::Send sender(Connection& c) {
+    return
+        [&c](std::uint8_t type, Direction direction, const Bytes& body) { send(c, type, direction, body); };
   }
 
   void dncStart(Connection& c) {

@@ -32,17 +32,23 @@ TEST_F(ConformanceTest, ParametersAndDiagnosisOfA30i) {
     fill += "00000000 000a 0003";
   }
   expectReply(*data, "001e 0001 001c 0001 0001 008d 00000528 00000528 ffffffff Z8",
-              "011a 0001 0118 0001 0001 008d" + OK6 + "0108 00000528 ffff 0004 0003d090 000a 0003 00030f34 000a 0003 "
-              "ffffffff 000a 0003" + fill);
+              "011a 0001 0118 0001 0001 008d" + OK6 +
+                  "0108 00000528 ffff 0004 0003d090 000a 0003 00030f34 000a 0003 "
+                  "ffffffff 000a 0003" +
+                  fill);
   // Of one axis its value stands in the first slot.
-  expectReply(*data, "001e 0001 001c 0001 0001 008d 000003fc 000003fc 00000002 Z8",
-              "011a 0001 0118 0001 0001 008d" + OK6 + "0108 000003fc 0002 0001 00000059 000a 0000" + zeroValues(31));
-  expectReply(*data, "001e 0001 001c 0001 0001 008d 00000e9d 00000e9d 00000000 Z8",
-              "011a 0001 0118 0001 0001 008d" + OK6 + "0108 00000e9d 0000 0003 00004e20 000a 0000" + zeroValues(31));
+  expectReply(
+      *data, "001e 0001 001c 0001 0001 008d 000003fc 000003fc 00000002 Z8",
+      "011a 0001 0118 0001 0001 008d" + OK6 + "0108 000003fc 0002 0001 00000059 000a 0000" + zeroValues(31));
+  expectReply(
+      *data, "001e 0001 001c 0001 0001 008d 00000e9d 00000e9d 00000000 Z8",
+      "011a 0001 0118 0001 0001 008d" + OK6 + "0108 00000e9d 0000 0003 00004e20 000a 0000" + zeroValues(31));
   // pyfanuc's sample of a live 30i: #308 of all axes, type 0.
   expectReply(*data, "001e 0001 001c 0001 0001 0093 00000134 00000134 ffffffff Z8",
-              "011a 0001 0118 0001 0001 0093" + OK6 + "0108 00000134 ffff 0000 0000001c 000a 0000 0000001c 000a 0000 "
-              "0000002c 000a 0000" + zeroValues(29));
+              "011a 0001 0118 0001 0001 0093" + OK6 +
+                  "0108 00000134 ffff 0000 0000001c 000a 0000 0000001c 000a 0000 "
+                  "0000002c 000a 0000" +
+                  zeroValues(29));
   // A number that is not there, an axis that is not there, an axis parameter asked without one.
   expectReply(*data, "001e 0001 001c 0001 0001 008d 00000001 00000001 00000000 Z8",
               "0012 0001 0010 0001 0001 008d 0003 0000 0000 0000");
@@ -65,7 +71,8 @@ TEST(Conformance31i, RefusesTheForerunnersParameterOpcode) {
   socket.send(hex("a0a0a0a0 0001 0101 0002 0002"));
   socket.receive(82);
   socket.send(hex("a0a0a0a0 0001 2101 001e 0001 001c 0001 0001 000e 00000528 00000528 00000001 Z8"));
-  EXPECT_EQ(show(socket.receive(28)), show(hex("a0a0a0a0 0003 2102 0012 0001 0010 0001 0001 000e 0001 0000 0000 0000")));
+  EXPECT_EQ(show(socket.receive(28)),
+            show(hex("a0a0a0a0 0003 2102 0012 0001 0010 0001 0001 000e 0001 0000 0000 0000")));
 }
 
 TEST_F(ConformanceTest, ClockIsReadAndSet) {
@@ -102,12 +109,14 @@ TEST_F(ConformanceTest, PmcRangesAreBigEndianOnTheWireAndLowByteFirstInMemory) {
               "0012 0001 0010 0002 0001 8001 0004 0000 0000 0000");
   expectReply(*data, "001e 0001 001c 0002 0001 8001 00000000 00000002 00000009 00000001 Z4",
               "0012 0001 0010 0002 0001 8001 0002 0000 0000 0000");
-  expectReply(*data, "001e 0001 001c 0002 0001 8055 Z20", "0012 0001 0010 0002 0001 8055 0001 0000 0000 0000");
+  expectReply(*data, "001e 0001 001c 0002 0001 8055 Z20",
+              "0012 0001 0010 0002 0001 8055 0001 0000 0000 0000");
 }
 
 TEST_F(ConformanceTest, ProgramListsAndFolders) {
   const auto data = open(2);
-  // pyfanuc's listprog: 19 from a number on, u32 number, u32 size, 64 bytes of comment; an empty list ends it.
+  // pyfanuc's listprog: 19 from a number on, u32 number, u32 size, 64 bytes of comment; an empty list ends
+  // it.
   expectReply(*data, "001e 0001 001c 0001 0001 0006 00000002 00000013 00000002 Z8",
               "005a 0001 0058 0001 0001 0006" + OK6 + "0048 000004d2 00000064 \"(SLOT)\" Z58");
   expectReply(*data, "001e 0001 001c 0001 0001 0006 000004d3 00000013 00000002 Z8",
@@ -116,9 +125,10 @@ TEST_F(ConformanceTest, ProgramListsAndFolders) {
   const std::string folder = " \"//CNC_MEM/USER/PATH1/\" Z235";
   expectReply(*data, head + "00b4 Z16 00000100" + folder,
               "001a 0001 0018 0001 0001 00b4" + OK6 + "0008 00000000 00000002");
-  expectReply(*data, head + "00b3 00000000 00000001 00000000 00000001 00000100" + folder,
-              "0092 0001 0090 0001 0001 00b3" + OK6 +
-                  "0080 0001 07ea 0005 000e 0008 001e 0001 Z6 00000028 00000000 \"O0001\" Z31 \"(PARK)\" Z46 Z12");
+  expectReply(
+      *data, head + "00b3 00000000 00000001 00000000 00000001 00000100" + folder,
+      "0092 0001 0090 0001 0001 00b3" + OK6 +
+          "0080 0001 07ea 0005 000e 0008 001e 0001 Z6 00000028 00000000 \"O0001\" Z31 \"(PARK)\" Z46 Z12");
   expectReply(*data, head + "00b3 00000000 0000000a 00000000 00000001 00000100 \"//CNC_MEM\" Z247",
               "0092 0001 0090 0001 0001 00b3" + OK6 + "0080 0000 Z26 \"USER\" Z32 Z64");
   expectReply(*data, head + "00b4 Z16 00000100 \"//NOWHERE/\" Z246",
@@ -127,11 +137,13 @@ TEST_F(ConformanceTest, ProgramListsAndFolders) {
               "0112 0001 0110 0001 0001 00b0" + OK6 + "0100" + folder);
   expectReply(*data, head + "00ba Z16 00000100 \"//CNC_MEM/USER/PATH1/O1234\" Z230",
               "0012 0001 0010 0001 0001 00ba" + OK6 + "0000");
-  expectReply(*data, "001e 0001 001c 0001 0001 0003 000004d2 Z16", "0012 0001 0010 0001 0001 0003" + OK6 + "0000");
+  expectReply(*data, "001e 0001 001c 0001 0001 0003 000004d2 Z16",
+              "0012 0001 0010 0001 0001 0003" + OK6 + "0000");
   expectReply(*data, "001e 0001 001c 0001 0001 0005 00000007 Z16",
               "0012 0001 0010 0001 0001 0005 0005 0000 0000 0000");
   expectReply(*data, "001e 0001 001c 0001 0001 001f Z20", "0012 0001 0010 0001 0001 001f" + OK6 + "0000");
-  expectReply(*data, "001e 0001 001c 0001 0001 0001 Z20", "0012 0001 0010 0001 0001 0001" + OK6 + "0000");
+  expectReply(*data, "001e 0001 001c 0001 0001 0001 Z20",
+              "0012 0001 0010 0001 0001 0001 0001 0000 0000 0000");  // a controller that does not start
   // The running block, and servo currents in A.
   expectReply(*data, "001e 0001 001c 0001 0001 0020 00000006 Z16",
               "001c 0001 001a 0001 0001 0020" + OK6 + "000a 00000058 \"N77 G1\"");
@@ -153,7 +165,8 @@ TEST_F(ConformanceTest, DownloadAsCncDwnstart4AndItsForerunner) {
   }
   // A start within a download, an end without a start, a program without a number.
   stream->send(hex("a0a0a0a0 0001 1101 0204 00000001 Z512 a0a0a0a0 0001 1101 0204 00000001 Z512"));
-  EXPECT_EQ(show(stream->receive(28)), show(hex("a0a0a0a0 0003 1102 0000 a0a0a0a0 0003 1103 0008 0000 ffff 0000 0000")));
+  EXPECT_EQ(show(stream->receive(28)),
+            show(hex("a0a0a0a0 0003 1102 0000 a0a0a0a0 0003 1103 0008 0000 ffff 0000 0000")));
   stream->send(hex("a0a0a0a0 0001 1204 0001 \"X\" a0a0a0a0 0001 1301 0000"));
   EXPECT_EQ(show(stream->receive(18)), show(hex("a0a0a0a0 0003 1303 0008 0000 0005 0000 0000")));
   stream->send(hex("a0a0a0a0 0001 1301 0000"));
@@ -216,7 +229,8 @@ TEST_F(ConformanceTest, TenThousandBytesOfMergedRequestsAreAnsweredInOrder) {
     const Frame frame = nextFrame(*data);
     ASSERT_TRUE(frame.is(FRAME_DATA, DIR_REPLY)) << i;
     const double due[] = {2.5, std::numeric_limits<double>::quiet_NaN(), -7.0};
-    Reader reader(decodeReplies(frame.body).at(0).data);
+    const std::vector<SubReply> replies = decodeReplies(frame.body);
+    Reader reader(replies.at(0).data);
     const double value = reader.value8().toDouble();
     EXPECT_TRUE(value == due[i % 3] || (i % 3 == 1 && std::isnan(value))) << i;
   }
@@ -230,14 +244,16 @@ TEST(Describe, OneLineTellsWhatAFrameSays) {
     return describe(*reader.next());
   };
   EXPECT_EQ(line("a0a0a0a0 0001 0101 0002 0001"), "open circuit 1");
-  EXPECT_EQ(line("a0a0a0a0 0001 2101 001e 0001 001c 0001 0001 0015 000001f4 000001f4 Z12"), "rdmacro(500,500)");
+  EXPECT_EQ(line("a0a0a0a0 0001 2101 001e 0001 001c 0001 0001 0015 000001f4 000001f4 Z12"),
+            "rdmacro(500,500)");
   EXPECT_EQ(line("a0a0a0a0 0003 2102 001a 0001 0018 0001 0001 0015 000000000000 0008 0001e240 000a 0003"),
             "rdmacro = 123.456");
   EXPECT_EQ(line("a0a0a0a0 0003 2102 0012 0001 0010 0001 0001 0015 0003 0000 0000 0000"),
             "rdmacro = EW_NUMBER (3), detail 0");
   EXPECT_EQ(line("a0a0a0a0 0003 1903 0008 0000 000c 0000 0000"), "dnc start refused: EW_MODE (12), detail 0");
   EXPECT_EQ(line("a0a0a0a0 0001 1a04 0006 0a \"G0 X\" 0a"), "dnc 6 bytes \"|G0 X|\"");
-  EXPECT_EQ(line("a0a0a0a0 0001 2101 0004 0001 ffff"), "data: FOCAS data end early: 65533 bytes wanted, 0 left");
+  EXPECT_EQ(line("a0a0a0a0 0001 2101 0004 0001 ffff"),
+            "data: FOCAS data end early: 65533 bytes wanted, 0 left");
 }
 
 }  // namespace

@@ -105,7 +105,6 @@ class TestController : public ControllerInterface {
   EwCode selectProgram(int number) override { return number == 1234 ? EW_OK : EW_DATA; }
   EwCode deleteProgram(int number) override { return number == 1234 ? EW_OK : EW_DATA; }
   EwCode rewindProgram() override { return EW_OK; }
-  EwCode cycleStart() override { return EW_OK; }
   EwCode storePrograms(const std::string& program) override {
     const std::lock_guard<std::mutex> lock(mutex);
     stored = program;

@@ -70,10 +70,10 @@ struct Reading {
   CncState state;                  ///< stamp, connected and armed are the bridge's to fill in
   std::optional<LoadSample> load;  ///< stamp as well; nothing when the controller does not tell loads
   std::vector<ControllerAlarm> alarms;
-  std::vector<double> absolute;    ///< [m] positions in workpiece coordinates, order of state.axes
-  double increment = 1e-6;         ///< [m] of its positions
-  bool at_rest = true;             ///< neither axes move nor a dwell runs
-  bool program_done = false;       ///< every block of the program begun last has been executed
+  std::vector<double> absolute;  ///< [m] positions in workpiece coordinates, order of state.axes
+  double increment = 1e-6;       ///< [m] of its positions
+  bool at_rest = true;           ///< neither axes move nor a dwell runs
+  bool program_done = false;     ///< every block of the program begun last has been executed
 };
 
 /// How much of a program is with the controller.

@@ -17,8 +17,8 @@ class Poller {
     int made = 0, lost = 0, attempts = 0;
   };
 
-  /// @param reconnect_period [s] between the first two attempts; each further one waits twice as long, at most
-  /// eight times
+  /// @param reconnect_period [s] between the first two attempts; each further one waits twice as long, at
+  /// most eight times
   Poller(Controller& controller, double reconnect_period, Log& log);
 
   /// Connects when it is time to, reads. @param now [s] any steady time.

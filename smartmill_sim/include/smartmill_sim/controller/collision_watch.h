@@ -14,7 +14,7 @@ namespace smartmill::sim {
 class CollisionWatch {
  public:
   struct Body {
-    std::string name;              ///< as the alarm says it
+    std::string name;                       ///< as the alarm says it
     Axes3 low{{0, 0, 0}}, high{{0, 0, 0}};  ///< [m]
   };
 

@@ -55,10 +55,10 @@ struct MotionState {
 /// and an exact stop at the end of each, a spindle whose drive has a torque to accelerate its inertia and to
 /// carry the cut. Time comes in through advance(). Every method may be called from any thread.
 ///
-/// Dialect of the program text: see nc_block.h. A program begins in G90, G21, G94, G54 and G1 without F. `#n=`
-/// is done when all blocks before it are, M3 and M4 are not waited for, M5, M19, M119, M30 and M2 are; M0 waits
-/// for cycle start. A block that is not understood, would leave the travel or lacks F raises an alarm, which
-/// stops everything and ends the session; so does a tool that touches an obstacle.
+/// Dialect of the program text: see nc_block.h. A program begins in G90, G21, G94, G54 and G1 without F.
+/// `#n=` is done when all blocks before it are, M3 and M4 are not waited for, M5, M19, M119, M30 and M2 are;
+/// M0 waits for cycle start. A block that is not understood, would leave the travel or lacks F raises an
+/// alarm, which stops everything and ends the session; so does a tool that touches an obstacle.
 ///
 /// Programs come by DNC, or from its memory: mode MEM, cycle start.
 class Controller : public focas::ControllerInterface {
@@ -106,8 +106,8 @@ class Controller : public focas::ControllerInterface {
   std::vector<double> servoLoad() const override;
   std::vector<double> servoCurrent() const override;
   std::vector<double> servoSpeed() const override;
-  /// Variables 1..33, 100..199, 500..999 and 1133, vacant in the beginning; work offsets 5221..5323, positions
-  /// 5001.., 5021.., 5041.., which cannot be written.
+  /// Variables 1..33, 100..199, 500..999 and 1133, vacant in the beginning; work offsets 5221..5323,
+  /// positions 5001.., 5021.., 5041.., which cannot be written.
   focas::EwCode readMacro(int number, std::optional<double>* value) const override;
   focas::EwCode writeMacro(int number, std::optional<double> value) override;
   std::uint32_t alarmBits() const override;

@@ -28,21 +28,21 @@ enum AlarmType { ALARM_PS = 3, ALARM_OT = 4, ALARM_EX = 15 };
 
 /// What one block says, in the units of the text; what it leaves out is empty.
 struct NcBlock {
-  std::optional<int> program;                 ///< O
-  std::optional<int> sequence;                ///< N
-  std::optional<int> motion;                  ///< 0 G0, 1 G1, 2 G2, 3 G3
-  std::optional<bool> relative;               ///< G91, G90
-  std::optional<bool> inch;                   ///< G20, G21
-  std::optional<bool> per_turn;               ///< G95, G94
-  std::optional<int> work;                    ///< 0..5 for G54..G59
-  bool machine = false;                       ///< G53
-  bool reference = false;                     ///< G28
-  std::optional<double> dwell;                ///< [s] G4
-  std::array<std::optional<double>, 3> axis;  ///< X, Y, Z
+  std::optional<int> program;                   ///< O
+  std::optional<int> sequence;                  ///< N
+  std::optional<int> motion;                    ///< 0 G0, 1 G1, 2 G2, 3 G3
+  std::optional<bool> relative;                 ///< G91, G90
+  std::optional<bool> inch;                     ///< G20, G21
+  std::optional<bool> per_turn;                 ///< G95, G94
+  std::optional<int> work;                      ///< 0..5 for G54..G59
+  bool machine = false;                         ///< G53
+  bool reference = false;                       ///< G28
+  std::optional<double> dwell;                  ///< [s] G4
+  std::array<std::optional<double>, 3> axis;    ///< X, Y, Z
   std::array<std::optional<double>, 2> centre;  ///< I, J from the start
-  std::optional<double> radius;               ///< R
-  std::optional<double> feed;                 ///< F
-  std::optional<double> speed;                ///< [rpm] S
+  std::optional<double> radius;                 ///< R
+  std::optional<double> feed;                   ///< F
+  std::optional<double> speed;                  ///< [rpm] S
   std::optional<int> m_code;
   std::optional<int> macro;  ///< n of #n=value
   std::optional<double> macro_value;
@@ -56,8 +56,9 @@ using NcVariables = std::function<std::optional<double>(int)>;
 
 /// Reads one line. Dialect: O and N; G0 G1 G2 G3 (I J or R, plane G17) G4 (P in ms or X in s) G20 G21 G28 G53
 /// G54..G59 G90 G91 G94 G95; X Y Z F S; M0 M2 M3 M4 M5 M19 M30 M119; or #n=value. A value is a number, which
-/// needs no decimal point, #n, or an expression in brackets with + - * / SIN COS SQRT (degrees); a word with a
-/// vacant #n counts as not written. Blanks, comments in parentheses and lines that begin with % mean nothing.
+/// needs no decimal point, #n, or an expression in brackets with + - * / SIN COS SQRT (degrees); a word with
+/// a vacant #n counts as not written. Blanks, comments in parentheses and lines that begin with % mean
+/// nothing.
 /// @throws NcAlarm (PS) for all else; IF, WHILE and GOTO are refused by name.
 NcBlock parseBlock(const std::string& line, const NcVariables& variables = {});
 

@@ -5,9 +5,9 @@
 
 namespace smartmill::sim {
 
-/// A point's motion along a straight line or an arc in x and y (z in proportion), with trapezoidal speed: from
-/// the speed that it has to the feed, to rest exactly at the target. Closed form in time. Times [s] are those of
-/// the caller's clock and never go back.
+/// A point's motion along a straight line or an arc in x and y (z in proportion), with trapezoidal speed:
+/// from the speed that it has to the feed, to rest exactly at the target. Closed form in time. Times [s] are
+/// those of the caller's clock and never go back.
 class PathMove {
  public:
   using Point = std::array<double, 3>;
@@ -25,7 +25,7 @@ class PathMove {
   /// Brakes to rest on the path; where that is becomes the target.
   void stop(double time, double acceleration);
 
-  double length() const { return length_; }         ///< [m]
+  double length() const { return length_; }          ///< [m]
   double end() const { return begin_ + duration_; }  ///< [s] from when on it rests
   /// Rests before the target.
   bool held() const { return end_distance_ < length_; }
@@ -50,11 +50,11 @@ class PathMove {
   double radius_ = 0.0, start_angle_ = 0.0, sweep_ = 0.0;
 
   // Speed: from begin_ a ramp of ramp_ seconds from first_ to peak_, steady_ seconds, a ramp to rest.
-  double begin_ = 0.0, duration_ = 0.0;            // [s]
+  double begin_ = 0.0, duration_ = 0.0;              // [s]
   double from_distance_ = 0.0, end_distance_ = 0.0;  // [m]
-  double first_ = 0.0, peak_ = 0.0;                // [m/s]
-  double ramp_ = 0.0, steady_ = 0.0, down_ = 0.0;  // [s]
-  double acceleration_ = 1.0;                      // [m/s2]
+  double first_ = 0.0, peak_ = 0.0;                  // [m/s]
+  double ramp_ = 0.0, steady_ = 0.0, down_ = 0.0;    // [s]
+  double acceleration_ = 1.0;                        // [m/s2]
 };
 
 }  // namespace smartmill::sim

@@ -5,15 +5,15 @@
 namespace smartmill::sim {
 
 /// Speed and angle of a spindle that changes its speed with a constant acceleration; closed form in time, so
-/// that an angle does not drift however long the spindle turns. Times are those of the caller's clock and never
-/// go back. A negative speed turns backwards.
+/// that an angle does not drift however long the spindle turns. Times are those of the caller's clock and
+/// never go back. A negative speed turns backwards.
 class SpindleMotion {
  public:
   /// At rest at angle 0. @param acceleration [rad/s2] > 0.
   explicit SpindleMotion(double acceleration);
 
-  /// What the drive can do from time on [rad/s2]. @param up away from rest; 0 or less: the load is more than the
-  /// drive can carry, a spindle that turns gets slower by that @param down towards rest, > 0.
+  /// What the drive can do from time on [rad/s2]. @param up away from rest; 0 or less: the load is more than
+  /// the drive can carry, a spindle that turns gets slower by that @param down towards rest, > 0.
   void setAccelerations(double time, double up, double down);
 
   /// From time on [s] to a speed [rad/s], which is kept.
@@ -37,10 +37,10 @@ class SpindleMotion {
   void append(double duration, double acceleration, double end_speed);
   void plan(double time);
 
-  double drive_;            // [rad/s2] without load
-  double up_, down_;        // [rad/s2]
-  double target_ = 0.0;     // [rad/s]
-  bool orienting_ = false;  // the load does not disturb that
+  double drive_;               // [rad/s2] without load
+  double up_, down_;           // [rad/s2]
+  double target_ = 0.0;        // [rad/s]
+  bool orienting_ = false;     // the load does not disturb that
   std::vector<Phase> phases_;  // never empty; the last has no acceleration
 };
 

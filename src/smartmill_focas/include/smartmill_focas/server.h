@@ -45,8 +45,8 @@ struct DateTime {
 /// A program in the controller's memory.
 struct StoredProgram {
   int number = 0;
-  std::string name;     ///< of its file, for example O0001
-  std::string comment;  ///< of its first line
+  std::string name;      ///< of its file, for example O0001
+  std::string comment;   ///< of its first line
   std::size_t size = 0;  ///< [byte]
   DateTime changed;
 };
