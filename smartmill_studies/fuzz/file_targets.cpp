@@ -31,7 +31,7 @@ void campaign(const std::uint8_t* data, std::size_t size) {
 
 void dynoware(const std::uint8_t* data, std::size_t size) {
   told([&] { readDynoware(scratchFile(data, size), {}); });
-  told([&] { readDynoware(scratchFile(data, size), {{"Fx", "fx"}, {"Fy", "fy"}}); });
+  told([&] { readDynoware(scratchFile(data, size), {{"fx", "Fy"}, {"fz", "Fz"}}); });
   told([&] { readCsv(scratchFile(data, size)); });
 }
 

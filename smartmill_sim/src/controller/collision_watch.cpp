@@ -24,7 +24,9 @@ CollisionWatch CollisionWatch::ofModel(const MachineModel& model) {
   watch.tool_radius = model.tool->radius();
   if (model.hammer) {
     const HammerStation& station = *model.hammer;
-    for (const auto& [direction, place] : station.position) {
+    for (const auto& entry : station.position) {
+      const std::string& direction = entry.first;
+      const Axes3& place = entry.second;
       const std::size_t along = direction == "y" ? 1 : 0;
       const std::size_t across = 1 - along;
       const auto body = [&](const std::string& name, double behind, double half_width, double low,
