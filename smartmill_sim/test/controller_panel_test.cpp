@@ -312,6 +312,21 @@ TEST(Collision, ToolThatMeetsAnObstacleStopsWithAnAlarm) {
   }
 }
 
+// The room between two flutes lets a standing tool nearer; then it may not turn.
+TEST(Collision, TheSpindleMayNotTurnWhereOnlyTheCoreHasRoom) {
+  ControllerOptions options = testOptions();
+  options.obstacles.tool_radius = 0.010;
+  options.obstacles.core_radius = 0.009;
+  options.obstacles.add({"SENSOR", {0.02, -0.005, -1.0}, {0.08, 0.005, 1.0}});
+  Machine m(options);
+  m.start("G1 X10.5 F600\n");
+  m.runToEnd();
+  EXPECT_EQ(m.alarmText(), "");
+  m.send("#1133=2048\nM119\n");
+  m.run(0.1);
+  EXPECT_EQ(m.alarmText(), "TOOL MET SENSOR");
+}
+
 TEST(ServoGuide, CurrentsLoadAndTriggerAtABlock) {
   Machine m;
   ServoRecorder recorder(20);

@@ -22,7 +22,9 @@ CollisionWatch CollisionWatch::ofModel(const MachineModel& model) {
     return watch;
   }
   watch.tool_radius = model.tool->radius();
+  watch.core_radius = watch.tool_radius;
   if (model.hammer) {
+    watch.core_radius = std::max(0.0, watch.tool_radius - model.hammer->flute_depth);
     const HammerStation& station = *model.hammer;
     for (const auto& entry : station.position) {
       const std::string& direction = entry.first;
@@ -53,7 +55,8 @@ CollisionWatch CollisionWatch::ofModel(const MachineModel& model) {
   return watch;
 }
 
-const CollisionWatch::Body* CollisionWatch::touched(const Axes3& position) const {
+const CollisionWatch::Body* CollisionWatch::touched(const Axes3& position, bool turning) const {
+  const double radius = turning ? tool_radius : core_radius;
   for (const Body& body : bodies_) {
     if (position[2] >= body.high[2]) {
       continue;  // the tip is above it, so is all of the tool
@@ -63,7 +66,7 @@ const CollisionWatch::Body* CollisionWatch::touched(const Axes3& position) const
       const double nearest = std::clamp(position[i], body.low[i], body.high[i]);
       square += (position[i] - nearest) * (position[i] - nearest);
     }
-    if (square < tool_radius * tool_radius) {
+    if (square < radius * radius) {
       return &body;
     }
   }

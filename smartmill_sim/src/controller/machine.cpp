@@ -94,10 +94,11 @@ void ControlledMachine::step(double dt) {
 
 void ControlledMachine::watchObstacles() {
   looked_ = now_;
-  if (!moving()) {
+  const bool turning = spindle_.speed(now_) != 0.0;
+  if (!moving() && !turning) {
     return;
   }
-  if (const CollisionWatch::Body* body = options.obstacles.touched(position())) {
+  if (const CollisionWatch::Body* body = options.obstacles.touched(position(), turning)) {
     if (alarms.empty()) {
       alarm({EX_COLLISION, ALARM_EX, 0, "TOOL MET " + body->name});
     }

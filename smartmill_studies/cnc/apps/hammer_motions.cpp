@@ -25,6 +25,7 @@ constexpr double BLOCK_TIME = sim::World::BLOCK / sim::World::SAMPLE_RATE;  // [
 constexpr double MOST_TIME = 240.0;                                         // [s] of a run
 constexpr double STATE_PERIOD = 0.02;                                       // [s]
 constexpr int COLLISION = 3003;                                             // alarm of the simulated machine
+constexpr double NARROW_SHARE = 0.1;
 constexpr double MM = units::MM;
 
 enum class Trouble { none, cancel, alarm, emergency, reset, hold, mode };
@@ -75,7 +76,11 @@ Draw drawRun(const MachineModel& model, std::mt19937_64& random, double trouble_
     d.trouble = static_cast<Trouble>(std::uniform_int_distribution<int>(1, 6)(random));
     d.trouble_time = uniform(random, 0.5, 40.0);
   }
-  const auto& travel = model.axes->travel;
+  if (uniform(random, 0.0, 1.0) < NARROW_SHARE) {
+    // Limits that do not reach the station: a motion there is to be refused before it is sent.
+    d.believed.axes->travel[0][1] = d.believed.hammer->position.at("x")[0] - 5.0 * MM;
+  }
+  const auto& travel = d.believed.axes->travel;
   d.start = {uniform(random, travel[0][0], travel[0][1]), uniform(random, travel[1][0], travel[1][1]),
              uniform(random, -20.0 * MM, travel[2][1])};
   return d;
@@ -331,7 +336,8 @@ int main(int argc, char** argv) {
     const MachineModel model = readMachineModel(model_file);
     Counts counts;
     for (int i = 0; i < runs; ++i) {
-      std::mt19937_64 random(seed + static_cast<std::uint64_t>(i));
+      std::seed_seq mix{seed, static_cast<std::uint64_t>(i)};
+      std::mt19937_64 random(mix);
       const Draw draw = drawRun(model, random, trouble_share);
       Driver(draw, seed + static_cast<std::uint64_t>(i), counts).run();
       if ((i + 1) % 10 == 0) {

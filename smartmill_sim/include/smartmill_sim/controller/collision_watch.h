@@ -27,10 +27,12 @@ class CollisionWatch {
   void add(const Body& body) { bodies_.push_back(body); }
   const std::vector<Body>& bodies() const { return bodies_; }
 
-  /// The body that the tool reaches into at a position [m]; nothing: free.
-  const Body* touched(const Axes3& position) const;
+  /// The body that the tool reaches into at a position [m]; nothing: free. A standing tool may turn the room
+  /// between two flutes to it, so only its core counts. @param turning the spindle turns
+  const Body* touched(const Axes3& position, bool turning) const;
 
-  double tool_radius = 0.0;  ///< [m]
+  double tool_radius = 0.0;  ///< [m] over the edges
+  double core_radius = 0.0;  ///< [m] between the flutes
 
  private:
   std::vector<Body> bodies_;
