@@ -1,0 +1,129 @@
+// Speaks LinuxCNC's NML on one side and smartmill_cnc's local protocol on the other.
+//
+// Copyright (c) SmartMill developers.
+// SPDX-License-Identifier: GPL-2.0-or-later
+//
+// This program is free software; you can redistribute it and/or modify it under the terms of the GNU General
+// Public License as published by the Free Software Foundation; either version 2 of the License, or (at your
+// option) any later version. It is distributed in the hope that it will be useful, but WITHOUT ANY WARRANTY;
+// without even the implied warranty of MERCHANTABILITY or FITNESS FOR A PARTICULAR PURPOSE. See COPYING.
+
+#include <poll.h>
+
+#include <csignal>
+#include <exception>
+#include <iostream>
+#include <list>
+#include <vector>
+
+#include "controller_link.h"
+#include "smartmill_cnc/linuxcnc/local_socket.h"
+#include "smartmill_core/error.h"
+
+namespace smartmill::cnc::linuxcnc {
+namespace {
+
+constexpr int LOOK_EVERY = 2;         // [ms]
+constexpr std::size_t MOST_CLIENTS = 8;
+
+volatile std::sig_atomic_t stopping = 0;
+
+struct Client {
+  LocalConnection connection;
+  bool drives = false;  // has opened programs: what runs is its
+};
+
+class Gateway {
+ public:
+  explicit Gateway(const std::string& folder)
+      : link_(folder + "/mill.nml", folder + "/sub/piece.ngc"), listener_(listenAt(folder + "/" + GATEWAY_SOCKET)) {}
+
+  void step() {
+    std::vector<pollfd> entries{{listener_.get(), POLLIN, 0}};
+    for (const Client& client : clients_) {
+      entries.push_back({client.connection.descriptor(), POLLIN, 0});
+    }
+    ::poll(entries.data(), entries.size(), LOOK_EVERY);
+    link_.look();
+    if (std::optional<LocalConnection> connection = acceptFrom(listener_)) {
+      if (clients_.size() < MOST_CLIENTS) {
+        clients_.push_back({std::move(*connection), false});
+      }
+    }
+    for (Client& client : clients_) {
+      client.connection.receive();
+      while (const std::optional<Received> received = client.connection.next()) {
+        answer(client, *received);
+      }
+      client.connection.flush();
+    }
+    clients_.remove_if([this](const Client& client) { return left(client); });
+  }
+
+  /// Nobody watches any more what runs.
+  void leave() {
+    for (const Client& client : clients_) {
+      stopFor(client);
+    }
+  }
+
+ private:
+  void answer(Client& client, const Received& received) {
+    if (std::holds_alternative<Ask>(received.message)) {
+      client.connection.send(link_.status(), received.sequence);
+    } else if (const auto* command = std::get_if<Command>(&received.message)) {
+      const Reply reply = link_.carryOut(*command);
+      if (command->word == Word::open && reply.code == Reply::Code::done) {
+        client.drives = true;
+      }
+      if (command->word == Word::close) {
+        client.drives = false;
+      }
+      client.connection.send(reply, received.sequence);
+    }
+  }
+
+  bool left(const Client& client) {
+    if (client.connection.open()) {
+      return false;
+    }
+    stopFor(client);
+    return true;
+  }
+
+  void stopFor(const Client& client) {
+    if (client.drives) {
+      link_.carryOut({Word::abort, 0, 0.0, {}});
+    }
+  }
+
+  ControllerLink link_;
+  LocalDescriptor listener_;
+  std::list<Client> clients_;
+};
+
+}  // namespace
+}  // namespace smartmill::cnc::linuxcnc
+
+int main(int argc, char** argv) {
+  using namespace smartmill::cnc::linuxcnc;
+  if (argc < 2 || argv[1][0] == '-') {
+    std::cout << "usage: linuxcnc_gateway FOLDER\n"
+                 "Serves FOLDER/gateway.socket for the LinuxCNC whose mill.nml stands in FOLDER (docs/linuxcnc.md).\n";
+    return argc == 2 ? 0 : 2;
+  }
+  for (const int signal : {SIGINT, SIGTERM}) {
+    std::signal(signal, [](int) { stopping = 1; });
+  }
+  try {
+    Gateway gateway(argv[1]);
+    while (!stopping) {
+      gateway.step();
+    }
+    gateway.leave();
+  } catch (const std::exception& error) {
+    std::cerr << "linuxcnc_gateway: " << error.what() << '\n';
+    return 1;
+  }
+  return 0;
+}

@@ -1,0 +1,255 @@
+// Reads LinuxCNC's servo cycles from a HAL sampler and serves them on a local socket; writes a drive's load and
+// the permit of motion. A process of its own: LinuxCNC's end ends every HAL component.
+
+#include <hal.h>
+#include <poll.h>
+#include <sys/shm.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <csignal>
+#include <exception>
+#include <iostream>
+#include <list>
+#include <thread>
+
+#include "smartmill_cnc/linuxcnc/configuration.h"
+#include "smartmill_cnc/linuxcnc/local_socket.h"
+#include "smartmill_core/error.h"
+#include "smartmill_core/units.h"
+
+namespace smartmill::cnc::linuxcnc {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr int HAL_SEGMENT = 0x48414c32, SAMPLER_FIFO = 0x48534130;  // keys that LinuxCNC's sources fix
+constexpr int READ_EVERY = 3;                                       // [ms]
+constexpr std::chrono::milliseconds ASK_EVERY{30}, ANSWER_LASTS{150}, SILENT{500}, TRY_EVERY{100};
+constexpr int GONE = 3;  // exit code: the controller has
+
+volatile std::sig_atomic_t stopping = 0;
+
+/// This process as a component of HAL. Its pins are bidirectional: what a dead one has left does not bar the
+/// next.
+class Component {
+ public:
+  Component() : prefix_("smartmill-" + std::to_string(::getpid())), id_(::hal_init(prefix_.c_str())) {
+    if (id_ < 0) {
+      throw Error("no component of HAL can be made (code " + std::to_string(id_) + ")");
+    }
+    pins_ = static_cast<Pins*>(::hal_malloc(sizeof(Pins)));
+    const bool made =
+        pins_ && ::hal_pin_bit_new((prefix_ + ".permit").c_str(), HAL_IO, &pins_->permit, id_) == 0 &&
+        ::hal_pin_bit_new((prefix_ + ".beat").c_str(), HAL_IO, &pins_->beat, id_) == 0 &&
+        ::hal_pin_float_new((prefix_ + ".load").c_str(), HAL_IO, &pins_->load, id_) == 0;
+    ::hal_ready(id_);
+    if (!made || ::hal_link((prefix_ + ".permit").c_str(), PERMIT_SIGNAL) != 0 ||
+        ::hal_link((prefix_ + ".beat").c_str(), BEAT_SIGNAL) != 0) {
+      ::hal_exit(id_);
+      throw Error("the controller's configuration has no signals '" + std::string(PERMIT_SIGNAL) + "' and '" +
+                  BEAT_SIGNAL + "'");
+    }
+    // A signal that the drive writes itself is left to it.
+    loads_ = ::hal_link((prefix_ + ".load").c_str(), LOAD_SIGNAL) == 0;
+    if (::hal_stream_attach(&stream_, id_, SAMPLER_FIFO, SAMPLER_PINS) < 0) {
+      ::hal_exit(id_);
+      throw Error("the controller's configuration has no sampler '" + std::string(SAMPLER_PINS) + "'");
+    }
+    // Stale: a full FIFO drops the newest.
+    unsigned number = 0;
+    hal_stream_data data[HAL_STREAM_MAX_PINS];
+    while (::hal_stream_readable(&stream_) && ::hal_stream_read(&stream_, data, &number) >= 0) {
+    }
+  }
+  ~Component() {
+    *pins_->permit = false;
+    ::hal_stream_detach(&stream_);
+    ::hal_exit(id_);
+  }
+  Component(const Component&) = delete;
+  Component& operator=(const Component&) = delete;
+
+  /// Samples that follow one another without a gap, as many as there are; none when there are none.
+  ServoBlock read() {
+    ServoBlock block;
+    while (block.samples.size() < ServoBlock::MOST) {
+      if (!ahead_ && !readOne()) {
+        break;
+      }
+      if (block.samples.empty()) {
+        block.first = number_;
+      } else if (number_ != block.first + block.samples.size()) {
+        break;
+      }
+      block.samples.push_back(sample_);
+      ahead_ = false;
+    }
+    return block;
+  }
+
+  void permit(bool on) {
+    *pins_->permit = on;
+    *pins_->beat = !*pins_->beat;
+  }
+  void setLoad(double load) {
+    if (loads_) {
+      *pins_->load = load;
+    }
+  }
+
+ private:
+  struct Pins {
+    hal_bit_t *permit, *beat;
+    hal_float_t* load;
+  };
+
+  bool readOne() {
+    hal_stream_data d[HAL_STREAM_MAX_PINS];
+    unsigned number = 0;
+    if (!::hal_stream_readable(&stream_) || ::hal_stream_read(&stream_, d, &number) < 0) {
+      return false;
+    }
+    number_ = number;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      sample_.position[axis] = d[axis].f * units::MM;
+    }
+    sample_.revolutions = d[3].f;
+    sample_.spindle_speed = units::radPerSecFromRpm(d[4].f);
+    sample_.velocity = d[5].f * units::MM;
+    sample_.distance_to_go = d[6].f * units::MM;
+    sample_.spindle_load = d[7].f;
+    sample_.marker = d[8].f;
+    return ahead_ = true;
+  }
+
+  const std::string prefix_;
+  const int id_;
+  Pins* pins_ = nullptr;
+  bool loads_ = false;
+  hal_stream_t stream_{};
+  bool ahead_ = false;  // a sample that was read and not handed out
+  std::uint32_t number_ = 0;
+  ServoSample sample_;
+};
+
+/// Asks the gateway whether it and the controller's task live: only then may the machine move.
+class Watch {
+ public:
+  explicit Watch(std::string path) : path_(std::move(path)) {}
+
+  bool alive() {
+    const Clock::time_point now = Clock::now();
+    if (!gateway_.open() && now - tried_ > TRY_EVERY) {
+      tried_ = now;
+      try {
+        gateway_ = LocalConnection::to(path_);
+      } catch (const Error&) {
+      }
+    }
+    gateway_.receive();
+    while (const std::optional<Received> received = gateway_.next()) {
+      if (const auto* status = std::get_if<MachineStatus>(&received->message)) {
+        good_ = status->alive ? now : Clock::time_point();
+      }
+    }
+    if (now - asked_ > ASK_EVERY) {
+      asked_ = now;
+      gateway_.send(Ask{});
+    }
+    return gateway_.open() && now - good_ < ANSWER_LASTS;
+  }
+
+ private:
+  const std::string path_;
+  LocalConnection gateway_;
+  Clock::time_point tried_, asked_, good_;
+};
+
+class Server {
+ public:
+  explicit Server(const std::string& folder)
+      : listener_(listenAt(folder + "/" + STREAM_SOCKET)), watch_(folder + "/" + GATEWAY_SOCKET) {}
+
+  /// Waits for a controller. @return whether there is one
+  bool wait() const {
+    while (!stopping) {
+      // hal_init() by itself would make the segment, with the wrong owner.
+      if (::shmget(HAL_SEGMENT, 0, 0) >= 0) {
+        return true;
+      }
+      std::this_thread::sleep_for(TRY_EVERY);
+    }
+    return false;
+  }
+
+  /// @return the exit code
+  int serve(Component& component) {
+    Clock::time_point heard = Clock::now();
+    while (!stopping) {
+      pollfd entry{listener_.get(), POLLIN, 0};
+      ::poll(&entry, 1, READ_EVERY);
+      if (std::optional<LocalConnection> connection = acceptFrom(listener_)) {
+        clients_.push_back(std::move(*connection));
+      }
+      component.permit(watch_.alive());
+      for (ServoBlock block = component.read(); !block.samples.empty(); block = component.read()) {
+        heard = Clock::now();
+        for (LocalConnection& client : clients_) {
+          client.send(block);
+        }
+      }
+      for (LocalConnection& client : clients_) {
+        listen(client, component);
+      }
+      clients_.remove_if([](const LocalConnection& client) { return !client.open(); });
+      if (Clock::now() - heard > SILENT) {
+        std::cerr << "linuxcnc_stream: the controller has fallen silent\n";
+        return GONE;
+      }
+    }
+    return 0;
+  }
+
+ private:
+  static void listen(LocalConnection& client, Component& component) {
+    client.flush();
+    client.receive();
+    while (const std::optional<Received> received = client.next()) {
+      if (const auto* load = std::get_if<SetLoad>(&received->message)) {
+        component.setLoad(load->spindle_load);
+      }
+    }
+  }
+
+  LocalDescriptor listener_;
+  Watch watch_;
+  std::list<LocalConnection> clients_;
+};
+
+}  // namespace
+}  // namespace smartmill::cnc::linuxcnc
+
+int main(int argc, char** argv) {
+  using namespace smartmill::cnc::linuxcnc;
+  if (argc < 2 || argv[1][0] == '-') {
+    std::cout << "usage: linuxcnc_stream FOLDER\n"
+                 "Serves FOLDER/stream.socket with every servo cycle of the LinuxCNC on this computer\n"
+                 "(docs/linuxcnc.md); ends with code 3 when the controller goes.\n";
+    return argc == 2 ? 0 : 2;
+  }
+  for (const int signal : {SIGINT, SIGTERM}) {
+    std::signal(signal, [](int) { stopping = 1; });
+  }
+  try {
+    Server server(argv[1]);
+    if (!server.wait()) {
+      return 0;
+    }
+    Component component;
+    return server.serve(component);
+  } catch (const std::exception& error) {
+    std::cerr << "linuxcnc_stream: " << error.what() << '\n';
+    return 1;
+  }
+}
