@@ -3,8 +3,12 @@
 #include <chrono>
 #include <cstdio>
 #include <map>
+#include <optional>
 #include <string>
 #include <thread>
+#include <vector>
+
+#include <ros/init.h>
 
 #include "smartmill_cnc/linuxcnc/gateway_client.h"
 #include "smartmill_core/program.h"
@@ -25,16 +29,19 @@ void show(const MachineStatus& s) {
               1e3 * s.position[2], 6e4 * s.velocity, s.errors.empty() ? "" : ", ", s.errors.c_str());
 }
 
-/// Until the gateway is there and its controller lives.
-void connect(GatewayClient& client, double patience) {
+/// One word; what does not come about is tried again while there is patience: everything may just be starting.
+MachineStatus carryOut(GatewayClient& client, const std::optional<Word>& word, double patience) {
   const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(patience);
   for (;;) {
     try {
       client.connect();
-      if (client.status().alive) {
-        return;
+      if (word) {
+        const Reply reply = client.carryOut({*word, 0, 0.0, {}});
+        if (reply.code != Reply::Code::done) {
+          throw Error(reply.text);
+        }
       }
-      throw Error("the controller does not run");
+      return client.status();
     } catch (const Error&) {
       if (std::chrono::steady_clock::now() > end) {
         throw;
@@ -58,15 +65,14 @@ int main(int argc, char** argv) {
       .required()
       .oneOf({"ready", "estop", "hold", "resume", "abort", "show"});
   line.option("--wait", patience, "[s] for the controller to be there").notNegative().showDefault();
-  return runProgram(line, argc, argv, [&] {
+  std::vector<std::string> due;  // without those of roslaunch
+  ros::removeROSArgs(argc, argv, due);
+  std::vector<const char*> arguments;
+  for (const std::string& argument : due) {
+    arguments.push_back(argument.c_str());
+  }
+  return runProgram(line, static_cast<int>(arguments.size()), arguments.data(), [&] {
     GatewayClient client(folder, ANSWER);
-    connect(client, patience);
-    if (word != "show") {
-      const Reply reply = client.carryOut({words.at(word), 0, 0.0, {}});
-      if (reply.code != Reply::Code::done) {
-        throw Error(reply.text);
-      }
-    }
-    show(client.status());
+    show(carryOut(client, word == "show" ? std::nullopt : std::optional<Word>(words.at(word)), patience));
   });
 }

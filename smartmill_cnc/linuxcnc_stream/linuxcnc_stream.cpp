@@ -2,6 +2,7 @@
 // the permit of motion. A process of its own: LinuxCNC's end ends every HAL component.
 
 #include <hal.h>
+#include <rtapi.h>
 #include <poll.h>
 #include <sys/shm.h>
 #include <unistd.h>
@@ -11,6 +12,7 @@
 #include <exception>
 #include <iostream>
 #include <list>
+#include <memory>
 #include <thread>
 
 #include "smartmill_cnc/linuxcnc/configuration.h"
@@ -25,7 +27,8 @@ using Clock = std::chrono::steady_clock;
 
 constexpr int HAL_SEGMENT = 0x48414c32, SAMPLER_FIFO = 0x48534130;  // keys that LinuxCNC's sources fix
 constexpr int READ_EVERY = 3;                                       // [ms]
-constexpr std::chrono::milliseconds ASK_EVERY{30}, ANSWER_LASTS{150}, SILENT{500}, TRY_EVERY{100};
+constexpr std::chrono::milliseconds ASK_EVERY{30}, ANSWER_LASTS{150}, SILENT{500}, TRY_EVERY{100},
+    LOADING{10000};
 constexpr int GONE = 3;  // exit code: the controller has
 
 volatile std::sig_atomic_t stopping = 0;
@@ -171,16 +174,23 @@ class Server {
   explicit Server(const std::string& folder)
       : listener_(listenAt(folder + "/" + STREAM_SOCKET)), watch_(folder + "/" + GATEWAY_SOCKET) {}
 
-  /// Waits for a controller. @return whether there is one
-  bool wait() const {
+  /// Waits for a controller whose configuration is loaded; none when it is to end before.
+  std::unique_ptr<Component> component() const {
+    Clock::time_point found = Clock::now();
     while (!stopping) {
       // hal_init() by itself would make the segment, with the wrong owner.
-      if (::shmget(HAL_SEGMENT, 0, 0) >= 0) {
-        return true;
+      if (::shmget(HAL_SEGMENT, 0, 0) < 0) {
+        found = Clock::now();
+      } else {
+        try {
+          return std::make_unique<Component>();
+        } catch (const Error&) {
+          if (Clock::now() - found > LOADING) throw;
+        }
       }
       std::this_thread::sleep_for(TRY_EVERY);
     }
-    return false;
+    return nullptr;
   }
 
   /// @return the exit code
@@ -243,11 +253,9 @@ int main(int argc, char** argv) {
   }
   try {
     Server server(argv[1]);
-    if (!server.wait()) {
-      return 0;
-    }
-    Component component;
-    return server.serve(component);
+    rtapi_set_msg_level(RTAPI_MSG_NONE);
+    const std::unique_ptr<Component> component = server.component();
+    return component ? server.serve(*component) : 0;
   } catch (const std::exception& error) {
     std::cerr << "linuxcnc_stream: " << error.what() << '\n';
     return 1;

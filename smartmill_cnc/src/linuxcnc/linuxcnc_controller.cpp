@@ -82,9 +82,10 @@ class LinuxCncController : public Controller {
   Result<std::string> connect() override {
     try {
       client_.connect();
-      if (!client_.status().alive) {
-        client_.close();
-        return Failure{Failure::Kind::lost, "cannot connect to the " + name() + ": it does not run"};
+      const MachineStatus status = client_.status();
+      if (!status.alive || !status.homed) {
+        return lost("cannot connect to the " + name() +
+                    (status.alive ? ": nobody has made it ready (linuxcnc_panel)" : ": it does not run"));
       }
     } catch (const Error& e) {
       return lost(e.what());

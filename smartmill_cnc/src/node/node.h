@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "node/parameters.h"
+#include "node/servo_publisher.h"
 #include "smartmill_cnc/bridge.h"
 #include "smartmill_msgs/ArmMotion.h"
 #include "smartmill_msgs/JogAction.h"
@@ -61,6 +62,7 @@ class CncNode {
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
   const NodeParameters parameters_;
+  const std::shared_ptr<linuxcnc::ServoStream> stream_;  // of a LinuxCNC
   Bridge bridge_;                 // the bridge's thread only
   std::optional<Active> active_;  // the bridge's thread only
   std::string last_note_;         // the bridge's thread only
@@ -72,6 +74,7 @@ class CncNode {
   std::unique_ptr<Server<smartmill_msgs::JogAction>> jog_;
   std::unique_ptr<Server<smartmill_msgs::OrientSpindleAction>> orient_;
   NodeShell shell_;
+  std::unique_ptr<ServoPublisher> servo_;
 
   std::mutex mutex_;  // of what follows
   std::vector<Job> jobs_;
