@@ -12,7 +12,8 @@ int main(int argc, char** argv) {
   using namespace smartmill;
   std::string model, folder;
   CommandLine line{
-      "Writes a configuration of LinuxCNC: ideal axes and spindle with the travel, speeds and accelerations of a "
+      "Writes a configuration of LinuxCNC: ideal axes and spindle with the travel, speeds and accelerations "
+      "of a "
       "machine\nmodel, for linuxcnc_machine to start (docs/linuxcnc.md)."};
   line.option("model", model, "machine model file: its sections axes and spindle").required();
   line.option("-o,--out", folder, "folder to write to; made where it is missing").required();

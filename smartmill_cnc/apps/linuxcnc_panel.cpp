@@ -25,11 +25,15 @@ void show(const MachineStatus& s) {
   const char* modes[] = {"", "manual", "automatic", "mdi"};
   std::printf("%s, %s, %s%s%s, x %.4f y %.4f z %.4f mm, %.1f mm/min%s%s\n", s.alive ? "alive" : "gone",
               states[static_cast<int>(s.state)], modes[static_cast<int>(s.mode)], s.homed ? ", homed" : "",
-              s.held ? ", feed hold" : s.busy ? ", busy" : "", 1e3 * s.position[0], 1e3 * s.position[1],
-              1e3 * s.position[2], 6e4 * s.velocity, s.errors.empty() ? "" : ", ", s.errors.c_str());
+              s.held   ? ", feed hold"
+              : s.busy ? ", busy"
+                       : "",
+              1e3 * s.position[0], 1e3 * s.position[1], 1e3 * s.position[2], 6e4 * s.velocity,
+              s.errors.empty() ? "" : ", ", s.errors.c_str());
 }
 
-/// One word; what does not come about is tried again while there is patience: everything may just be starting.
+/// One word; what does not come about is tried again while there is patience: everything may just be
+/// starting.
 MachineStatus carryOut(GatewayClient& client, const std::optional<Word>& word, double patience) {
   const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(patience);
   for (;;) {
@@ -54,14 +58,18 @@ MachineStatus carryOut(GatewayClient& client, const std::optional<Word>& word, d
 }  // namespace
 
 int main(int argc, char** argv) {
-  const std::map<std::string, Word> words{{"ready", Word::ready}, {"estop", Word::estop}, {"hold", Word::hold},
-                                          {"resume", Word::resume}, {"abort", Word::abort}};
+  const std::map<std::string, Word> words{{"ready", Word::ready},
+                                          {"estop", Word::estop},
+                                          {"hold", Word::hold},
+                                          {"resume", Word::resume},
+                                          {"abort", Word::abort}};
   std::string folder, word;
   double patience = 0.0;
   CommandLine line{"The panel of a LinuxCNC behind linuxcnc_gateway."};
   line.option("folder", folder, "of the machine").required();
-  line.option("word", word,
-              "ready: resets the emergency stop and errors, switches on, homes; estop, hold, resume, abort; show")
+  line.option(
+          "word", word,
+          "ready: resets the emergency stop and errors, switches on, homes; estop, hold, resume, abort; show")
       .required()
       .oneOf({"ready", "estop", "hold", "resume", "abort", "show"});
   line.option("--wait", patience, "[s] for the controller to be there").notNegative().showDefault();

@@ -21,10 +21,10 @@ namespace {
 using Code = Reply::Code;
 
 constexpr std::chrono::milliseconds LOOK{1};
-constexpr std::chrono::milliseconds STILL{200};    // a task whose heartbeat stands so long is gone
+constexpr std::chrono::milliseconds STILL{300};     // a task whose heartbeat stands so long is gone
 constexpr std::chrono::milliseconds REATTACH{500};  // between two attempts to find it
-constexpr double ANSWER = 1.0, HOMING = 3.0;        // [s]
-constexpr std::uint32_t SETTLED = 4;                // servo cycles of an idle task after a program
+constexpr double ANSWER = 1.0, HOMING = 3.0, COMES_TO_REST = 0.3;  // [s]
+constexpr std::uint32_t SETTLED = 4;  // servo cycles of an idle task after a program
 constexpr const char* PIECE = "o<piece> call";
 
 char* writable(const std::string& text) {
@@ -51,8 +51,11 @@ struct ControllerLink::Channels {
   NML error;
 };
 
-ControllerLink::ControllerLink(std::string nml_file, std::string program_file)
-    : nml_file_(std::move(nml_file)), program_file_(std::move(program_file)) {
+ControllerLink::ControllerLink(std::string nml_file, std::string program_file,
+                               std::function<void()> meanwhile)
+    : nml_file_(std::move(nml_file)),
+      program_file_(std::move(program_file)),
+      meanwhile_(std::move(meanwhile)) {
   set_rcs_print_destination(RCS_PRINT_TO_NULL);
 }
 
@@ -125,10 +128,12 @@ void ControllerLink::fill() {
 void ControllerLink::takeErrors() {
   for (NMLTYPE type = channels_->error.read(); type > 0; type = channels_->error.read()) {
     const NMLmsg* message = channels_->error.get_address();
-    const char* text = type == EMC_OPERATOR_ERROR_TYPE ? static_cast<const EMC_OPERATOR_ERROR*>(message)->error
-                       : type == NML_ERROR_TYPE        ? static_cast<const NML_ERROR*>(message)->error
-                                                       : nullptr;
-    if (text && status_.errors.size() < LONGEST_TEXT / 2) {
+    const char* text = type == EMC_OPERATOR_ERROR_TYPE
+                           ? static_cast<const EMC_OPERATOR_ERROR*>(message)->error
+                       : type == NML_ERROR_TYPE ? static_cast<const NML_ERROR*>(message)->error
+                                                : nullptr;
+    // What the controller calls a note is none, though it comes as an error.
+    if (text && std::string(text).rfind("Note:", 0) != 0 && status_.errors.size() < LONGEST_TEXT / 2) {
       std::string line(text);
       std::replace(line.begin(), line.end(), '\n', ' ');
       status_.errors += (status_.errors.empty() ? "" : "; ") + line;
@@ -156,14 +161,15 @@ void ControllerLink::noticeEnd() {
 }
 
 bool ControllerLink::waitFor(const std::function<bool()>& so, double seconds) {
-  const Clock::time_point end = Clock::now() + std::chrono::duration_cast<Clock::duration>(
-                                                   std::chrono::duration<double>(seconds));
+  const Clock::time_point end =
+      Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
   while (!so()) {
     if (Clock::now() > end || !channels_) {
       return false;
     }
     std::this_thread::sleep_for(LOOK);
     look();
+    meanwhile_();
   }
   return true;
 }
@@ -262,7 +268,8 @@ Reply ControllerLink::home() {
   if (homing.code != Code::done) {
     return homing;
   }
-  return waitFor([&] { return status_.homed; }, HOMING) ? Reply{} : Reply{Code::refused, "homing does not end"};
+  return waitFor([&] { return status_.homed; }, HOMING) ? Reply{}
+                                                        : Reply{Code::refused, "homing does not end"};
 }
 
 /// Why no program can be taken.
@@ -289,7 +296,8 @@ Reply ControllerLink::open() {
   if (status_.mode == MachineStatus::Mode::automatic && status_.busy) {
     return {Code::wrong_mode, "the controller runs a program of its own"};
   }
-  if (status_.busy || !status_.in_position) {
+  // What was stopped a moment ago comes to rest.
+  if (!waitFor([&] { return !status_.busy && status_.in_position; }, COMES_TO_REST)) {
     return {Code::not_yet, "the machine still moves"};
   }
   return setMode(EMC_TASK_MODE_MDI);
@@ -353,7 +361,7 @@ Reply ControllerLink::variable(const Command& command) {
 
 Reply ControllerLink::carryOut(const Command& command) {
   look();
-  if (!status_.alive && !waitFor([&] { return status_.alive; }, ANSWER)) {
+  if (!status_.alive) {
     return {Code::lost, "the controller has gone"};
   }
   switch (command.word) {

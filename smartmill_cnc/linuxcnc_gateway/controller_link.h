@@ -16,7 +16,8 @@ namespace smartmill::cnc::linuxcnc {
 class ControllerLink {
  public:
   /// @param nml_file of the controller @param program_file that `o<piece> call` reads
-  ControllerLink(std::string nml_file, std::string program_file);
+  /// @param meanwhile is called again and again while a command waits for the controller
+  ControllerLink(std::string nml_file, std::string program_file, std::function<void()> meanwhile);
   ~ControllerLink();
   ControllerLink(const ControllerLink&) = delete;
   ControllerLink& operator=(const ControllerLink&) = delete;
@@ -55,10 +56,11 @@ class ControllerLink {
   std::optional<Reply> unfit() const;
 
   const std::string nml_file_, program_file_;
+  const std::function<void()> meanwhile_;
   std::unique_ptr<Channels> channels_;
   MachineStatus status_;
-  Clock::time_point beat_, attached_;     // when the heartbeat was seen to count, when the channels were opened
-  std::optional<int> program_;            // serial number of the one that runs
+  Clock::time_point beat_, attached_;  // when the heartbeat was seen to count, when the channels were opened
+  std::optional<int> program_;         // serial number of the one that runs
   std::optional<std::uint32_t> idle_at_;  // heartbeat since when nothing of it is left
 };
 

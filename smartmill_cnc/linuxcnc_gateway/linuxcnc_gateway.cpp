@@ -10,33 +10,32 @@
 
 #include <poll.h>
 
-#include <csignal>
-#include <exception>
-#include <iostream>
+#include <deque>
 #include <list>
 #include <vector>
 
 #include "controller_link.h"
 #include "smartmill_cnc/linuxcnc/local_socket.h"
-#include "smartmill_core/error.h"
+#include "smartmill_cnc/linuxcnc/stop_signal.h"
+#include "smartmill_core/program.h"
 
 namespace smartmill::cnc::linuxcnc {
 namespace {
 
-constexpr int LOOK_EVERY = 2;         // [ms]
-constexpr std::size_t MOST_CLIENTS = 8;
-
-volatile std::sig_atomic_t stopping = 0;
+constexpr int LOOK_EVERY = 2;  // [ms]
+constexpr std::size_t MOST_CLIENTS = 8, MOST_WAITING = 8;
 
 struct Client {
   LocalConnection connection;
-  bool drives = false;  // has opened programs: what runs is its
+  bool drives = false;           // has opened programs: what runs is its
+  std::deque<Received> waiting;  // commands
 };
 
 class Gateway {
  public:
   explicit Gateway(const std::string& folder)
-      : link_(folder + "/mill.nml", folder + "/sub/piece.ngc"), listener_(listenAt(folder + "/" + GATEWAY_SOCKET)) {}
+      : link_(folder + "/mill.nml", folder + "/sub/piece.ngc", [this] { hear(); }),
+        listener_(listenAt(folder + "/" + GATEWAY_SOCKET)) {}
 
   void step() {
     std::vector<pollfd> entries{{listener_.get(), POLLIN, 0}};
@@ -47,15 +46,16 @@ class Gateway {
     link_.look();
     if (std::optional<LocalConnection> connection = acceptFrom(listener_)) {
       if (clients_.size() < MOST_CLIENTS) {
-        clients_.push_back({std::move(*connection), false});
+        clients_.push_back({std::move(*connection), false, {}});
       }
     }
+    hear();
     for (Client& client : clients_) {
-      client.connection.receive();
-      while (const std::optional<Received> received = client.connection.next()) {
-        answer(client, *received);
+      while (!client.waiting.empty()) {
+        const Received received = std::move(client.waiting.front());
+        client.waiting.pop_front();
+        carryOut(client, std::get<Command>(received.message), received.sequence);
       }
-      client.connection.flush();
     }
     clients_.remove_if([this](const Client& client) { return left(client); });
   }
@@ -68,19 +68,31 @@ class Gateway {
   }
 
  private:
-  void answer(Client& client, const Received& received) {
-    if (std::holds_alternative<Ask>(received.message)) {
-      client.connection.send(link_.status(), received.sequence);
-    } else if (const auto* command = std::get_if<Command>(&received.message)) {
-      const Reply reply = link_.carryOut(*command);
-      if (command->word == Word::open && reply.code == Reply::Code::done) {
-        client.drives = true;
+  /// Questions are answered at once, also while a command is carried out; commands wait for their turn.
+  void hear() {
+    for (Client& client : clients_) {
+      client.connection.receive();
+      while (std::optional<Received> received = client.connection.next()) {
+        if (std::holds_alternative<Ask>(received->message)) {
+          client.connection.send(link_.status(), received->sequence);
+        } else if (std::holds_alternative<Command>(received->message) &&
+                   client.waiting.size() < MOST_WAITING) {
+          client.waiting.push_back(std::move(*received));
+        }
       }
-      if (command->word == Word::close) {
-        client.drives = false;
-      }
-      client.connection.send(reply, received.sequence);
+      client.connection.flush();
     }
+  }
+
+  void carryOut(Client& client, const Command& command, std::uint16_t sequence) {
+    const Reply reply = link_.carryOut(command);
+    if (command.word == Word::open && reply.code == Reply::Code::done) {
+      client.drives = true;
+    }
+    if (command.word == Word::close) {
+      client.drives = false;
+    }
+    client.connection.send(reply, sequence);
   }
 
   bool left(const Client& client) {
@@ -107,23 +119,15 @@ class Gateway {
 
 int main(int argc, char** argv) {
   using namespace smartmill::cnc::linuxcnc;
-  if (argc < 2 || argv[1][0] == '-') {
-    std::cout << "usage: linuxcnc_gateway FOLDER\n"
-                 "Serves FOLDER/gateway.socket for the LinuxCNC whose mill.nml stands in FOLDER (docs/linuxcnc.md).\n";
-    return argc == 2 ? 0 : 2;
-  }
-  for (const int signal : {SIGINT, SIGTERM}) {
-    std::signal(signal, [](int) { stopping = 1; });
-  }
-  try {
-    Gateway gateway(argv[1]);
-    while (!stopping) {
+  std::string folder;
+  smartmill::CommandLine line{"Speaks to the LinuxCNC whose mill.nml stands in a folder (docs/linuxcnc.md)."};
+  line.option("folder", folder, "of the machine: its gateway.socket is served").required();
+  return smartmill::runProgram(line, argc, argv, [&] {
+    catchStopSignals();
+    Gateway gateway(folder);
+    while (!stopRequested()) {
       gateway.step();
     }
     gateway.leave();
-  } catch (const std::exception& error) {
-    std::cerr << "linuxcnc_gateway: " << error.what() << '\n';
-    return 1;
-  }
-  return 0;
+  });
 }

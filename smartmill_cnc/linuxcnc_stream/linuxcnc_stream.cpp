@@ -1,15 +1,13 @@
-// Reads LinuxCNC's servo cycles from a HAL sampler and serves them on a local socket; writes a drive's load and
-// the permit of motion. A process of its own: LinuxCNC's end ends every HAL component.
+// Reads LinuxCNC's servo cycles from a HAL sampler and serves them on a local socket; writes a drive's load
+// and the permit of motion. A process of its own: LinuxCNC's end ends every HAL component.
 
 #include <hal.h>
-#include <rtapi.h>
 #include <poll.h>
+#include <rtapi.h>
 #include <sys/shm.h>
 #include <unistd.h>
 
 #include <chrono>
-#include <csignal>
-#include <exception>
 #include <iostream>
 #include <list>
 #include <memory>
@@ -17,7 +15,9 @@
 
 #include "smartmill_cnc/linuxcnc/configuration.h"
 #include "smartmill_cnc/linuxcnc/local_socket.h"
+#include "smartmill_cnc/linuxcnc/stop_signal.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/program.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::cnc::linuxcnc {
@@ -27,11 +27,9 @@ using Clock = std::chrono::steady_clock;
 
 constexpr int HAL_SEGMENT = 0x48414c32, SAMPLER_FIFO = 0x48534130;  // keys that LinuxCNC's sources fix
 constexpr int READ_EVERY = 3;                                       // [ms]
-constexpr std::chrono::milliseconds ASK_EVERY{30}, ANSWER_LASTS{150}, SILENT{500}, TRY_EVERY{100},
+constexpr std::chrono::milliseconds ASK_EVERY{30}, ANSWER_LASTS{400}, SILENT{500}, TRY_EVERY{100},
     LOADING{10000};
 constexpr int GONE = 3;  // exit code: the controller has
-
-volatile std::sig_atomic_t stopping = 0;
 
 /// This process as a component of HAL. Its pins are bidirectional: what a dead one has left does not bar the
 /// next.
@@ -42,10 +40,10 @@ class Component {
       throw Error("no component of HAL can be made (code " + std::to_string(id_) + ")");
     }
     pins_ = static_cast<Pins*>(::hal_malloc(sizeof(Pins)));
-    const bool made =
-        pins_ && ::hal_pin_bit_new((prefix_ + ".permit").c_str(), HAL_IO, &pins_->permit, id_) == 0 &&
-        ::hal_pin_bit_new((prefix_ + ".beat").c_str(), HAL_IO, &pins_->beat, id_) == 0 &&
-        ::hal_pin_float_new((prefix_ + ".load").c_str(), HAL_IO, &pins_->load, id_) == 0;
+    const bool made = pins_ &&
+                      ::hal_pin_bit_new((prefix_ + ".permit").c_str(), HAL_IO, &pins_->permit, id_) == 0 &&
+                      ::hal_pin_bit_new((prefix_ + ".beat").c_str(), HAL_IO, &pins_->beat, id_) == 0 &&
+                      ::hal_pin_float_new((prefix_ + ".load").c_str(), HAL_IO, &pins_->load, id_) == 0;
     ::hal_ready(id_);
     if (!made || ::hal_link((prefix_ + ".permit").c_str(), PERMIT_SIGNAL) != 0 ||
         ::hal_link((prefix_ + ".beat").c_str(), BEAT_SIGNAL) != 0) {
@@ -177,7 +175,7 @@ class Server {
   /// Waits for a controller whose configuration is loaded; none when it is to end before.
   std::unique_ptr<Component> component() const {
     Clock::time_point found = Clock::now();
-    while (!stopping) {
+    while (!stopRequested()) {
       // hal_init() by itself would make the segment, with the wrong owner.
       if (::shmget(HAL_SEGMENT, 0, 0) < 0) {
         found = Clock::now();
@@ -196,7 +194,7 @@ class Server {
   /// @return the exit code
   int serve(Component& component) {
     Clock::time_point heard = Clock::now();
-    while (!stopping) {
+    while (!stopRequested()) {
       pollfd entry{listener_.get(), POLLIN, 0};
       ::poll(&entry, 1, READ_EVERY);
       if (std::optional<LocalConnection> connection = acceptFrom(listener_)) {
@@ -242,22 +240,16 @@ class Server {
 
 int main(int argc, char** argv) {
   using namespace smartmill::cnc::linuxcnc;
-  if (argc < 2 || argv[1][0] == '-') {
-    std::cout << "usage: linuxcnc_stream FOLDER\n"
-                 "Serves FOLDER/stream.socket with every servo cycle of the LinuxCNC on this computer\n"
-                 "(docs/linuxcnc.md); ends with code 3 when the controller goes.\n";
-    return argc == 2 ? 0 : 2;
-  }
-  for (const int signal : {SIGINT, SIGTERM}) {
-    std::signal(signal, [](int) { stopping = 1; });
-  }
-  try {
-    Server server(argv[1]);
+  std::string folder;
+  smartmill::CommandLine line{
+      "Reads every servo cycle of the LinuxCNC on this computer (docs/linuxcnc.md); ends with code 3 when it "
+      "goes."};
+  line.option("folder", folder, "of the machine: its stream.socket is served").required();
+  return smartmill::runProgram(line, argc, argv, [&]() -> int {
+    catchStopSignals();
     rtapi_set_msg_level(RTAPI_MSG_NONE);
+    Server server(folder);
     const std::unique_ptr<Component> component = server.component();
     return component ? server.serve(*component) : 0;
-  } catch (const std::exception& error) {
-    std::cerr << "linuxcnc_stream: " << error.what() << '\n';
-    return 1;
-  }
+  });
 }

@@ -10,12 +10,12 @@
 namespace smartmill::cnc::linuxcnc {
 namespace {
 
-constexpr double SPINDLE_NEAR = 10.0;     // [rpm] counts as at speed, besides 1 %
-constexpr double STANDING = 0.5;          // [rpm]
-constexpr double ORIENT_GAIN = 20.0;      // [1/s]
-constexpr double ORIENT_MOST = 5.0;       // [rev/s]
+constexpr double SPINDLE_NEAR = 10.0;      // [rpm] counts as at speed, besides 1 %
+constexpr double STANDING = 0.5;           // [rpm]
+constexpr double ORIENT_GAIN = 20.0;       // [1/s]
+constexpr double ORIENT_MOST = 5.0;        // [rev/s]
 constexpr double ORIENT_TOLERANCE = 0.02;  // [deg]
-constexpr double BEAT_LASTS = 0.25;       // [s]
+constexpr double BEAT_LASTS = 0.35;        // [s]
 
 std::string number(double value) {
   char text[40];
@@ -30,8 +30,8 @@ std::string jointSection(const MachineAxes& axes, std::size_t axis) {
                        "\nMIN_LIMIT = " + number(axes.travel[axis][0] * mm) +
                        "\nMAX_LIMIT = " + number(axes.travel[axis][1] * mm) + "\n";
   const std::string home = number(axes.home[axis] * mm);
-  return std::string("[AXIS_") + "XYZ"[axis] + "]\n" + common + "[JOINT_" + std::to_string(axis) + "]\n" + common +
-         "TYPE = LINEAR\nFERROR = 1\nMIN_FERROR = 0.2\nHOME = " + home + "\nHOME_OFFSET = " + home +
+  return std::string("[AXIS_") + "XYZ"[axis] + "]\n" + common + "[JOINT_" + std::to_string(axis) + "]\n" +
+         common + "TYPE = LINEAR\nFERROR = 1\nMIN_FERROR = 0.2\nHOME = " + home + "\nHOME_OFFSET = " + home +
          "\nHOME_SEQUENCE = 0\nHOME_ABSOLUTE_ENCODER = 2\n";
 }
 
@@ -45,7 +45,8 @@ std::string iniOf(const MachineAxes& axes, double max_rpm, const std::string& fo
       << "[EMCIO]\nEMCIO = io\nCYCLE_TIME = 0.002\nTOOL_TABLE = mill.tbl\n"
       << "[HAL]\nHALFILE = mill.hal\n"
       << "[TRAJ]\nCOORDINATES = X Y Z\nLINEAR_UNITS = mm\nANGULAR_UNITS = degree\nMAX_LINEAR_VELOCITY = "
-      << number(axes.rapid / units::MM) << "\nMAX_LINEAR_ACCELERATION = " << number(axes.acceleration / units::MM)
+      << number(axes.rapid / units::MM)
+      << "\nMAX_LINEAR_ACCELERATION = " << number(axes.acceleration / units::MM)
       << "\n[KINS]\nKINEMATICS = trivkins coordinates=xyz\nJOINTS = 3\n"
       << "[SPINDLE_0]\nMAX_FORWARD_VELOCITY = " << number(max_rpm) << "\nMIN_FORWARD_VELOCITY = 0\n";
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -81,15 +82,16 @@ void spindleOf(std::ostringstream& hal) {
 std::string halOf(double spindle_acceleration) {
   std::ostringstream hal;
   hal << "loadrt [KINS]KINEMATICS\n"
-         "loadrt [EMCMOT]EMCMOT servo_period_nsec=[EMCMOT]SERVO_PERIOD num_joints=[KINS]JOINTS num_spindles=1\n"
+         "loadrt [EMCMOT]EMCMOT servo_period_nsec=[EMCMOT]SERVO_PERIOD num_joints=[KINS]JOINTS "
+         "num_spindles=1\n"
          "loadrt sim_spindle names=spin\nloadrt limit2 names=ramp\nloadrt near names=atspeed,stands\n"
          "loadrt scale names=rps,rpm\nloadrt mux2 names=drive,power\nloadrt orient names=orient\n"
          "loadrt pid names=opid\nloadrt oneshot names=lives\nloadrt and2 names=may,chain\n"
          "loadrt sampler depth=4000 cfg="
       << SAMPLER_PINS << "\n";
   for (const char* function :
-       {"lives", "may", "chain", "motion-command-handler", "motion-controller", "orient", "opid.do-pid-calcs", "rpm",
-        "drive", "power", "ramp", "spin", "rps", "atspeed", "stands", "sampler.0"}) {
+       {"lives", "may", "chain", "motion-command-handler", "motion-controller", "orient", "opid.do-pid-calcs",
+        "rpm", "drive", "power", "ramp", "spin", "rps", "atspeed", "stands", "sampler.0"}) {
     hal << "addf " << function << " servo-thread\n";
   }
   setp(hal, "ramp.maxv", spindle_acceleration);
@@ -106,15 +108,16 @@ std::string halOf(double spindle_acceleration) {
   setp(hal, "lives.width", BEAT_LASTS);
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const std::string joint = "joint." + std::to_string(axis), name(1, "xyz"[axis]);
-    hal << "net " << name << "-motor " << joint << ".motor-pos-cmd => " << joint << ".motor-pos-fb\nnet " << name
-        << " " << joint << ".pos-cmd => sampler.0.pin." << axis << "\n";
+    hal << "net " << name << "-motor " << joint << ".motor-pos-cmd => " << joint << ".motor-pos-fb\nnet "
+        << name << " " << joint << ".pos-cmd => sampler.0.pin." << axis << "\n";
   }
   spindleOf(hal);
   hal << "net v motion.current-vel => sampler.0.pin.5\n"
          "net dtg motion.distance-to-go => sampler.0.pin.6\n"
       << "net " << LOAD_SIGNAL << " sampler.0.pin.7\n"
       << "net marker motion.analog-out-00 => sampler.0.pin.8\n"
-         "# linuxcnc_stream lives and permits: else no axis and no spindle moves, and the emergency stop falls\n"
+         "# linuxcnc_stream lives and permits: else no axis and no spindle moves, and the emergency stop "
+         "falls\n"
       << "net " << BEAT_SIGNAL << " lives.in\nnet lives lives.out => may.in0\nnet " << PERMIT_SIGNAL
       << " may.in1\nnet may may.out => motion.enable chain.in0\n"
          "net estop iocontrol.0.user-enable-out => chain.in1\n"
@@ -130,7 +133,8 @@ std::map<std::string, std::string> configurationOf(const MachineModel& model, co
   const MachineAxes& axes = model.needAxes("configure LinuxCNC");
   const Spindle& spindle = model.needSpindle("configure LinuxCNC");
   if (!spindle.max_speed || !spindle.acceleration) {
-    throw Error(model.file + ": spindle.max_speed_rpm and acceleration_rpm_per_s are due to configure LinuxCNC");
+    throw Error(model.file +
+                ": spindle.max_speed_rpm and acceleration_rpm_per_s are due to configure LinuxCNC");
   }
   return {{"mill.ini", iniOf(axes, units::rpmFromRadPerSec(*spindle.max_speed), folder)},
           {"mill.hal", halOf(units::rpmFromRadPerSec(*spindle.acceleration))},

@@ -12,12 +12,13 @@
 namespace smartmill::cnc::linuxcnc {
 namespace {
 
-constexpr int DECIMALS = 4;              // of mm; LinuxCNC computes in doubles
-constexpr double INCREMENT = 1e-7;       // [m]
-constexpr double NO_WAY = 1e-9;          // [m] a distance to go below this is none
-constexpr double STREAM_SILENT = 0.3;    // [s]
-constexpr int ORIENT_MACRO = 1133;       // what M119 turns to, 0 .. 4095, as on a Fanuc
-constexpr const char* STANDS = "M66 P0 L3 Q30\n";  // waits for the input "spindle stands"
+constexpr int DECIMALS = 4;            // of mm; LinuxCNC computes in doubles
+constexpr double INCREMENT = 1e-7;     // [m]
+constexpr double NO_WAY = 1e-9;        // [m] a distance to go below this is none
+constexpr double STREAM_SILENT = 0.4;  // [s]
+constexpr int ORIENT_MACRO = 1133;     // what M119 turns to, 0 .. 4095, as on a Fanuc
+constexpr const char* UNMARK = "M68 E0 Q0\n";
+constexpr const char* STOP = "M5\nM66 P0 L3 Q30\n";  // waits for the input "spindle stands"
 
 std::string number(double value) {
   char text[40];
@@ -37,10 +38,10 @@ std::string blockText(const std::string& line, std::size_t count) {
       const double value = std::stod(word.substr(1));
       word = "P" + number(letter == 'P' ? 1e-3 * value : value);
     } else if (word == "M5") {
-      tail = std::string("M5\n") + STANDS;
+      tail = std::string(UNMARK) + STOP;
       continue;
     } else if (word == "M119") {
-      tail = std::string("M5\n") + STANDS + "M19 R[#" + std::to_string(ORIENT_MACRO) + "*360/4096] Q20\n";
+      tail = std::string(UNMARK) + STOP + "M19 R[#" + std::to_string(ORIENT_MACRO) + "*360/4096] Q20\n";
       continue;
     } else {
       moves = moves || (letter >= 'X' && letter <= 'Z');
@@ -111,9 +112,7 @@ class LinuxCncController : public Controller {
     return readingOf(*servo);
   }
 
-  Status setVariable(int number, double value) override {
-    return tell({Word::variable, number, value, {}});
-  }
+  Status setVariable(int number, double value) override { return tell({Word::variable, number, value, {}}); }
 
   DialectOptions dialect() const override {
     DialectOptions options;
@@ -249,7 +248,7 @@ std::string linuxCncText(const std::string& program) {
   for (std::size_t count = 1; std::getline(lines, line); ++count) {
     text += line.empty() ? "" : line.front() == '#' ? line + "\n" : blockText(line, count);
   }
-  return text + "M68 E0 Q0\n";
+  return text + UNMARK;
 }
 
 std::unique_ptr<Controller> makeLinuxCncController(const LinuxCncParameters& parameters,

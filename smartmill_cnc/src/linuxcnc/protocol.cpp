@@ -15,7 +15,7 @@ static_assert(sizeof(double) == 8, "doubles travel as their eight bytes");
 /// The kinds by their place in Message, from 1, and how long their payloads may be.
 constexpr std::size_t SAMPLE = 9 * sizeof(double);  // [byte]
 constexpr std::array<std::size_t, std::variant_size_v<Message>> LONGEST{
-    LONGEST_PROGRAM + 32, LONGEST_TEXT + 32, 0, LONGEST_TEXT + 256, 16 + ServoBlock::MOST * SAMPLE, 8};
+    LONGEST_PROGRAM + 32, LONGEST_TEXT + 32, 0, LONGEST_TEXT + 256, 16 + ServoBlock::MOST* SAMPLE, 8};
 
 class Packer {
  public:
@@ -207,8 +207,8 @@ void unpack(ServoBlock& m, Unpacker& u) {
   m.samples.resize(count);
   for (ServoSample& s : m.samples) {
     u.numbers(s.position);
-    for (double* value : {&s.revolutions, &s.spindle_speed, &s.velocity, &s.distance_to_go, &s.spindle_load,
-                          &s.marker}) {
+    for (double* value :
+         {&s.revolutions, &s.spindle_speed, &s.velocity, &s.distance_to_go, &s.spindle_load, &s.marker}) {
       *value = u.finite();
     }
   }
@@ -274,8 +274,8 @@ std::optional<Received> FrameDecoder::next() {
     throw Error("a frame of the unknown kind " + std::to_string(kind));
   }
   if (length > LONGEST[kind - 1]) {
-    throw Error("a frame of kind " + std::to_string(kind) + " and " + std::to_string(length) + " bytes, at most " +
-                std::to_string(LONGEST[kind - 1]));
+    throw Error("a frame of kind " + std::to_string(kind) + " and " + std::to_string(length) +
+                " bytes, at most " + std::to_string(LONGEST[kind - 1]));
   }
   if (waiting() < FRAME_HEADER + length) {
     return std::nullopt;

@@ -8,11 +8,11 @@
 namespace smartmill::cnc::linuxcnc {
 namespace {
 
-constexpr double SETTLING = 0.5;     // [s] of arrivals before times are told
-constexpr double WINDOW = 10.0;      // [s] in which some sample has waited for nobody
-constexpr double SLEW = 1e-4;        // [1] the zero follows by at most this
-constexpr double LATE_BIN = 1e-4;    // [s]
-constexpr double TRY_EVERY = 0.2;    // [s]
+constexpr double SETTLING = 0.5;           // [s] of arrivals before times are told
+constexpr double WINDOW = 10.0;            // [s] in which some sample has waited for nobody
+constexpr double SLEW = 1e-4;              // [1] the zero follows by at most this
+constexpr double LATE_BIN = 1e-4;          // [s]
+constexpr double TRY_EVERY = 0.2;          // [s]
 constexpr std::uint64_t RESTART = 60'000;  // samples; a larger jump is another start of the controller
 
 }  // namespace

@@ -31,6 +31,11 @@ double steadySeconds() {
   return std::chrono::duration<double>(Clock::now().time_since_epoch()).count();
 }
 
+std::shared_ptr<linuxcnc::ServoStream> makeStream(const NodeParameters& parameters) {
+  return parameters.kind == "linuxcnc" ? std::make_shared<linuxcnc::ServoStream>(parameters.linuxcnc.folder)
+                                       : nullptr;
+}
+
 std::unique_ptr<Controller> makeController(const NodeParameters& parameters,
                                            const std::shared_ptr<linuxcnc::ServoStream>& stream) {
   return stream ? linuxcnc::makeLinuxCncController(parameters.linuxcnc, stream, rosSeconds)
@@ -61,11 +66,11 @@ std::string conditionFault(const smartmill_msgs::CuttingCondition& c) {
 
 CncNode::CncNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
     : parameters_(ParameterReader::fromServer(private_nh).readAll<NodeParameters>().completed()),
-      stream_(parameters_.kind == "linuxcnc"
-                  ? std::make_shared<linuxcnc::ServoStream>(parameters_.linuxcnc.folder)
-                  : nullptr),
+      stream_(makeStream(parameters_)),
       bridge_(makeController(parameters_, stream_), parameters_.reconnect_period, parameters_.motion),
-      shell_(nh, private_nh, bridge_.controllerName(), 1.0) {
+      shell_(nh, private_nh, bridge_.controllerName(), 1.0),
+      servo_(stream_ ? std::make_unique<ServoPublisher>(nh, shell_, stream_, parameters_.load_input)
+                     : nullptr) {
   state_publisher_ = nh.advertise<smartmill_msgs::CncState>(names::CNC_STATE, STREAM_QUEUE);
   load_publisher_ = nh.advertise<smartmill_msgs::LoadSample>(names::CNC_LOAD, STREAM_QUEUE);
   condition_publisher_ =
@@ -117,9 +122,6 @@ CncNode::CncNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
   arm_service_ = nh.advertiseService(names::ARM_MOTION, &CncNode::armMotion, this);
   macro_service_ = nh.advertiseService(names::SET_MACRO, &CncNode::setMacro, this);
   shell_.diagnose("controller", [this](auto& status) { diagnose(status); });
-  if (stream_) {
-    servo_ = std::make_unique<ServoPublisher>(nh, shell_, stream_, parameters_.load_input);
-  }
   thread_ = std::thread([this] { run(); });
 }
 

@@ -63,9 +63,9 @@ class CncNode {
 
   const NodeParameters parameters_;
   const std::shared_ptr<linuxcnc::ServoStream> stream_;  // of a LinuxCNC
-  Bridge bridge_;                 // the bridge's thread only
-  std::optional<Active> active_;  // the bridge's thread only
-  std::string last_note_;         // the bridge's thread only
+  Bridge bridge_;                                        // the bridge's thread only
+  std::optional<Active> active_;                         // the bridge's thread only
+  std::string last_note_;                                // the bridge's thread only
 
   ros::Publisher state_publisher_, load_publisher_, condition_publisher_;
   tf2_ros::TransformBroadcaster broadcaster_;

@@ -29,12 +29,14 @@ void fill(NodeParameters& parameters, const MachineModel& model) {
 void NodeParameters::declare(ParameterTable& table) {
   table.title("Parameters of cnc_node (package smartmill_cnc): the bridge to the controller.");
   table.section();
-  table.choice("controller", kind, {"fanuc", "linuxcnc"}, "what it is: over FOCAS Ethernet, or a LinuxCNC of this computer");
+  table.choice("controller", kind, {"fanuc", "linuxcnc"},
+               "what it is: over FOCAS Ethernet, or a LinuxCNC of this computer");
   table.section("Of a Fanuc.");
   controller.declare(table);
   table.section("Of a LinuxCNC.");
   linuxcnc.declare(table);
-  table.text("load_input", load_input, "topic (LoadSample) of a load meter that the controller does not read itself; empty: none");
+  table.text("load_input", load_input,
+             "topic (LoadSample) of a load meter that the controller does not read itself; empty: none");
   table.section();
   table.number("rate", rate, "Hz", Range::closed(1.0, 200.0), "of cnc/state and cnc/load");
   table.number("reconnect_period", reconnect_period, "s", Range::positive(),

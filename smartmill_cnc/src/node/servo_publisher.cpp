@@ -5,7 +5,6 @@
 #include <smartmill_msgs/LoadSample.h>
 #include <smartmill_msgs/SampleBlock.h>
 #include <smartmill_msgs/SpindleAngle.h>
-#include <boost/function.hpp>
 
 #include "smartmill_core/math/angle.h"
 #include "smartmill_core/names.h"
@@ -15,9 +14,9 @@ namespace smartmill::cnc {
 namespace {
 
 constexpr const char* SERVO_TOPIC = "cnc/servo";
-constexpr double WAIT = 0.02;       // [s] for what comes next
-constexpr double PERIOD = 1e-3;     // [s] of the servo thread
-constexpr double SILENT = 0.3;      // [s]
+constexpr double WAIT = 0.02;    // [s] for what comes next
+constexpr double PERIOD = 1e-3;  // [s] of the servo thread
+constexpr double SILENT = 0.3;   // [s]
 
 }  // namespace
 
@@ -31,12 +30,11 @@ ServoPublisher::ServoPublisher(ros::NodeHandle nh, NodeShell& shell,
       servo_(nh.advertise<smartmill_msgs::SampleBlock>(SERVO_TOPIC, STREAM_QUEUE)),
       angle_(nh.advertise<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE, STREAM_QUEUE)) {
   if (!load_input.empty()) {
-    load_ = nh.subscribe<smartmill_msgs::LoadSample>(
-        load_input, 10, boost::function<void(const smartmill_msgs::LoadSample&)>([this](const auto& m) {
-          if (std::isfinite(m.spindle_load)) {
-            stream_->setLoad(m.spindle_load);
-          }
-        }));
+    shell.inputs().on<smartmill_msgs::LoadSample>(load_input, [this](const auto& load, double) {
+      if (std::isfinite(load.spindle_load)) {
+        stream_->setLoad(load.spindle_load);
+      }
+    });
   }
   shell.diagnose("servo stream", [this](auto& status) { diagnose(status); });
   thread_ = std::thread([this] { run(); });
@@ -65,14 +63,14 @@ void ServoPublisher::publish(const linuxcnc::ServoStretch& stretch) {
   block.stamp = stretch.stamp;
   block.sample_rate = 1.0 / PERIOD;
   block.first_index = stretch.first;
-  block.channels = {"x", "y", "z", "revolutions", "spindle_speed", "velocity", "distance_to_go", "spindle_load",
-                    "marker"};
+  block.channels = {
+      "x", "y", "z", "revolutions", "spindle_speed", "velocity", "distance_to_go", "spindle_load", "marker"};
   block.units = {"m", "m", "m", "1", "rad/s", "m/s", "m", "1", "1"};
   SpindleAngle angle;
   for (const linuxcnc::ServoSample& s : stretch.samples) {
     block.samples.insert(block.samples.end(),
-                         {s.position[0], s.position[1], s.position[2], s.revolutions, s.spindle_speed, s.velocity,
-                          s.distance_to_go, s.spindle_load, s.marker});
+                         {s.position[0], s.position[1], s.position[2], s.revolutions, s.spindle_speed,
+                          s.velocity, s.distance_to_go, s.spindle_load, s.marker});
     const auto index = static_cast<double>(block.size() - 1);
     angle.stamp = stretch.stamp + index * PERIOD;
     angle.angle = wrapped(units::TWO_PI * (s.revolutions - std::floor(s.revolutions)));

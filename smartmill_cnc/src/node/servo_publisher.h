@@ -30,7 +30,6 @@ class ServoPublisher {
 
   std::shared_ptr<linuxcnc::ServoStream> stream_;
   ros::Publisher servo_, angle_;
-  ros::Subscriber load_;
   std::atomic<bool> stopping_{false};
   std::thread thread_;
 };

@@ -4,6 +4,7 @@
 
 #include "smartmill_cnc/linuxcnc/configuration.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/units.h"
 
 namespace smartmill::cnc::linuxcnc {
 namespace {
@@ -32,13 +33,15 @@ TEST(LinuxCncText, SaysTheSameInTheOtherDialect) {
             "G4 P2.5000\n"
             "S4000 M3\n"
             "M67 E0 Q6\nG0 Z-1.0000\n"
-            "M5\nM66 P0 L3 Q30\n"
+            "M68 E0 Q0\nM5\nM66 P0 L3 Q30\n"
             "M68 E0 Q0\n");
 }
 
 TEST(LinuxCncText, OrientsFromAVariableAsAFanucDoes) {
   const std::string text = textOf(orientProgram(1.5707963267948966, 1133));
-  EXPECT_NE(text.find("#1133=1024\nM5\nM66 P0 L3 Q30\nM19 R[#1133*360/4096] Q20\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("#1133=1024\nM68 E0 Q0\nM5\nM66 P0 L3 Q30\nM19 R[#1133*360/4096] Q20\n"),
+            std::string::npos)
+      << text;
 }
 
 MachineModel model() {
@@ -46,8 +49,8 @@ MachineModel model() {
   m.file = "mill.yaml";
   m.axes = MachineAxes{{{{-0.25, 0.25}, {-0.2, 0.2}, {-0.3, 0.0}}}, 0.4, 5.0, {{0, 0, 0}}};
   m.spindle.emplace();
-  m.spindle->max_speed = 2094.395;
-  m.spindle->acceleration = 1047.198;
+  m.spindle->max_speed = units::radPerSecFromRpm(20000.0);
+  m.spindle->acceleration = units::radPerSecFromRpm(10000.0);
   return m;
 }
 

@@ -41,8 +41,12 @@ ServoBlock someBlock(std::size_t count) {
 }
 
 std::vector<Message> everyKind() {
-  return {Command{Word::run, 5, 1.5, "G1 X1\n"}, Reply{Reply::Code::not_yet, "later"}, Ask{}, someStatus(),
-          someBlock(3), SetLoad{0.25}};
+  return {Command{Word::run, 5, 1.5, "G1 X1\n"},
+          Reply{Reply::Code::not_yet, "later"},
+          Ask{},
+          someStatus(),
+          someBlock(3),
+          SetLoad{0.25}};
 }
 
 std::string refusalOf(const std::string& bytes) {

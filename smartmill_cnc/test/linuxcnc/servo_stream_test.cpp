@@ -87,8 +87,8 @@ TEST(ServoStream, HandsOutStretchesAndCountsLoss) {
     EXPECT_LE(all[i].samples.size(), ServoStream::STRETCH);
     const std::uint64_t due = all[i - 1].first + all[i - 1].samples.size();
     lost += all[i].first - due;
-    EXPECT_NEAR(all[i].stamp - all[i - 1].stamp, PERIOD * static_cast<double>(all[i].first - all[i - 1].first),
-                1e-5);
+    EXPECT_NEAR(all[i].stamp - all[i - 1].stamp,
+                PERIOD * static_cast<double>(all[i].first - all[i - 1].first), 1e-5);
   }
   EXPECT_EQ(lost, 7u);
   EXPECT_TRUE(stream.latest(now, 0.1));

@@ -25,7 +25,7 @@ namespace {
 constexpr double TRUTH_STEP = 2.0, TRUTH_END = 6000.0;  // [Hz] lines of the true FRFs
 constexpr double BLOCK_TIME = World::BLOCK / World::SAMPLE_RATE;
 constexpr double LOOK_AGAIN = 2e-3;  // [s]
-constexpr double MOST_WAIT = 0.8;     // [1] of most_behind, for where the axes are led
+constexpr double MOST_WAIT = 0.8;    // [1] of most_behind, for where the axes are led
 
 NodeParameters read(const ros::NodeHandle& private_nh) {
   NodeParameters parameters = ParameterReader::fromServer(private_nh).readAll<NodeParameters>();
@@ -74,11 +74,11 @@ void Node::serve() {
 
 void Node::listen() {
   load_meter_ = nh_.advertise<smartmill_msgs::LoadSample>(names::daq("spindle_load"), STREAM_QUEUE);
-  shell_.inputs().on<smartmill_msgs::SampleBlock>(
-      parameters_.axes_input, [this](const smartmill_msgs::SampleBlock& block, double) {
-        const std::lock_guard<std::mutex> lock(axes_mutex_);
-        axes_.push(fromMsg(block));
-      });
+  shell_.inputs().on<smartmill_msgs::SampleBlock>(parameters_.axes_input,
+                                                  [this](const smartmill_msgs::SampleBlock& block, double) {
+                                                    const std::lock_guard<std::mutex> lock(axes_mutex_);
+                                                    axes_.push(fromMsg(block));
+                                                  });
   ROS_INFO("sim: axes and spindle follow %s", parameters_.axes_input.c_str());
 }
 

@@ -40,7 +40,14 @@ struct Command {
 };
 
 struct Reply {
-  enum class Code : std::uint8_t { done = 0, refused = 1, emergency = 2, wrong_mode = 3, not_yet = 4, lost = 5 };
+  enum class Code : std::uint8_t {
+    done = 0,
+    refused = 1,
+    emergency = 2,
+    wrong_mode = 3,
+    not_yet = 4,
+    lost = 5
+  };
   Code code = Code::done;
   std::string text;  ///< one line
 };
@@ -55,15 +62,15 @@ struct MachineStatus {
   bool alive = false;  ///< its task still counts its cycles; if not, what follows is the last that was seen
   State state = State::emergency;
   Mode mode = Mode::manual;
-  bool busy = false;         ///< a program runs or waits
-  bool held = false;         ///< feed hold
+  bool busy = false;  ///< a program runs or waits
+  bool held = false;  ///< feed hold
   bool homed = false;
-  bool in_position = true;   ///< no axis is on its way
-  double dwell_left = 0.0;   ///< [s]
-  std::int32_t line = 0;     ///< of the program that motion is at
-  std::int32_t running = 0;  ///< number of the program taken last
-  std::int32_t done = 0;     ///< number of the program carried out last, to its end
-  double velocity = 0.0;     ///< [m/s] along the path
+  bool in_position = true;                 ///< no axis is on its way
+  double dwell_left = 0.0;                 ///< [s]
+  std::int32_t line = 0;                   ///< of the program that motion is at
+  std::int32_t running = 0;                ///< number of the program taken last
+  std::int32_t done = 0;                   ///< number of the program carried out last, to its end
+  double velocity = 0.0;                   ///< [m/s] along the path
   std::array<double, 3> position{};        ///< [m] machine
   std::array<double, 3> distance_to_go{};  ///< [m]
   std::array<double, 3> offset{};          ///< [m] machine minus workpiece coordinates

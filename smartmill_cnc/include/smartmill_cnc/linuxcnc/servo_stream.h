@@ -24,7 +24,9 @@ class ServoClock {
   void saw(std::uint64_t number, double arrival);
   /// Enough has been seen to say times.
   bool settled() const { return settled_; }
-  double timeOf(std::uint64_t number) const { return zero_ + static_cast<double>(number) * period_; }  ///< [s]
+  double timeOf(std::uint64_t number) const {
+    return zero_ + static_cast<double>(number) * period_;
+  }  ///< [s]
 
  private:
   double period_, zero_ = 0.0, begun_ = 0.0, window_begun_ = 0.0, last_ = 0.0;

@@ -49,8 +49,8 @@ class World {
     SampleBlock hammer;       ///< hammer [N] positive in compression, gap [V]
     SampleBlock dynamometer;  ///< fx, fy, fz [N]
     std::array<SpindleAngle, ANGLES> angle;
-    ForceBlock force;       ///< true force of the cut on the tool
-    SampleBlock vibration;  ///< true displacement of the tip, x, y [m]
+    ForceBlock force;           ///< true force of the cut on the tool
+    SampleBlock vibration;      ///< true displacement of the tip, x, y [m]
     double spindle_load = 0.0;  ///< [1] what the load meter shows at the end, 1 is full scale
   };
   enum class StrikeAnswer { ok, by_hand, failed };
