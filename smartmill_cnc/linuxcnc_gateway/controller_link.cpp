@@ -21,7 +21,7 @@ namespace {
 using Code = Reply::Code;
 
 constexpr std::chrono::milliseconds LOOK{1};
-constexpr std::chrono::milliseconds STILL{300};     // a task whose heartbeat stands so long is gone
+constexpr double STILL = 0.3;                       // [s] a task whose heartbeat stands so long is gone
 constexpr std::chrono::milliseconds REATTACH{500};  // between two attempts to find it
 constexpr double ANSWER = 1.0, HOMING = 3.0, COMES_TO_REST = 0.3;  // [s]
 constexpr std::uint32_t SETTLED = 4;  // servo cycles of an idle task after a program
@@ -83,13 +83,14 @@ void ControllerLink::look() {
   }
   channels_->status.peek();
   const std::uint32_t heartbeat = channels_->stat().motion.heartbeat;
-  const Clock::time_point now = Clock::now();
-  if (heartbeat != 0 && heartbeat != status_.heartbeat) {
-    beat_ = now;
-    fill();
-  } else if (now - beat_ > STILL && status_.alive) {
+  const bool beats = heartbeat != 0 && heartbeat != status_.heartbeat;
+  const double now = std::chrono::duration<double>(Clock::now().time_since_epoch()).count();
+  if (heartbeat_.look(beats, now) > STILL && status_.alive) {
     status_.alive = false;
     program_.reset();
+  }
+  if (beats) {
+    fill();
   }
   takeErrors();
   noticeEnd();

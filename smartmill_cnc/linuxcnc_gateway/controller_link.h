@@ -9,6 +9,7 @@
 #include <string>
 
 #include "smartmill_cnc/linuxcnc/protocol.h"
+#include "smartmill_cnc/linuxcnc/stillness.h"
 
 namespace smartmill::cnc::linuxcnc {
 
@@ -59,8 +60,9 @@ class ControllerLink {
   const std::function<void()> meanwhile_;
   std::unique_ptr<Channels> channels_;
   MachineStatus status_;
-  Clock::time_point beat_, attached_;  // when the heartbeat was seen to count, when the channels were opened
-  std::optional<int> program_;         // serial number of the one that runs
+  Clock::time_point attached_;  // when the channels were opened
+  Stillness heartbeat_;
+  std::optional<int> program_;            // serial number of the one that runs
   std::optional<std::uint32_t> idle_at_;  // heartbeat since when nothing of it is left
 };
 

@@ -15,6 +15,7 @@
 
 #include "smartmill_cnc/linuxcnc/configuration.h"
 #include "smartmill_cnc/linuxcnc/local_socket.h"
+#include "smartmill_cnc/linuxcnc/stillness.h"
 #include "smartmill_cnc/linuxcnc/stop_signal.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/program.h"
@@ -27,9 +28,13 @@ using Clock = std::chrono::steady_clock;
 
 constexpr int HAL_SEGMENT = 0x48414c32, SAMPLER_FIFO = 0x48534130;  // keys that LinuxCNC's sources fix
 constexpr int READ_EVERY = 3;                                       // [ms]
-constexpr std::chrono::milliseconds ASK_EVERY{30}, ANSWER_LASTS{400}, SILENT{500}, TRY_EVERY{100},
-    LOADING{10000};
-constexpr int GONE = 3;  // exit code: the controller has
+constexpr std::chrono::milliseconds ASK_EVERY{30}, TRY_EVERY{100}, LOADING{10000};
+constexpr double ANSWER_LASTS = 0.4, SILENT = 0.5;  // [s]
+constexpr int GONE = 3;                             // exit code: the controller has
+
+double seconds() {
+  return std::chrono::duration<double>(Clock::now().time_since_epoch()).count();
+}
 
 /// This process as a component of HAL. Its pins are bidirectional: what a dead one has left does not bar the
 /// next.
@@ -149,22 +154,26 @@ class Watch {
       }
     }
     gateway_.receive();
+    bool good = false;
     while (const std::optional<Received> received = gateway_.next()) {
       if (const auto* status = std::get_if<MachineStatus>(&received->message)) {
-        good_ = status->alive ? now : Clock::time_point();
+        good = alive_ = status->alive;
       }
     }
+    silence_.look(good, seconds());
     if (now - asked_ > ASK_EVERY) {
       asked_ = now;
       gateway_.send(Ask{});
     }
-    return gateway_.open() && now - good_ < ANSWER_LASTS;
+    return gateway_.open() && alive_ && silence_.still() < ANSWER_LASTS;
   }
 
  private:
   const std::string path_;
   LocalConnection gateway_;
-  Clock::time_point tried_, asked_, good_;
+  Clock::time_point tried_, asked_;
+  bool alive_ = false;
+  Stillness silence_;
 };
 
 class Server {
@@ -193,7 +202,7 @@ class Server {
 
   /// @return the exit code
   int serve(Component& component) {
-    Clock::time_point heard = Clock::now();
+    Stillness silence;
     while (!stopRequested()) {
       pollfd entry{listener_.get(), POLLIN, 0};
       ::poll(&entry, 1, READ_EVERY);
@@ -201,8 +210,9 @@ class Server {
         clients_.push_back(std::move(*connection));
       }
       component.permit(watch_.alive());
+      bool heard = false;
       for (ServoBlock block = component.read(); !block.samples.empty(); block = component.read()) {
-        heard = Clock::now();
+        heard = true;
         for (LocalConnection& client : clients_) {
           client.send(block);
         }
@@ -211,7 +221,7 @@ class Server {
         listen(client, component);
       }
       clients_.remove_if([](const LocalConnection& client) { return !client.open(); });
-      if (Clock::now() - heard > SILENT) {
+      if (silence.look(heard, seconds()) > SILENT) {
         std::cerr << "linuxcnc_stream: the controller has fallen silent\n";
         return GONE;
       }

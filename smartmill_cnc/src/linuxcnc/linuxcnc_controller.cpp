@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "smartmill_cnc/linuxcnc/gateway_client.h"
+#include "smartmill_cnc/linuxcnc/stillness.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/units.h"
 
@@ -105,8 +106,10 @@ class LinuxCncController : public Controller {
     if (!status_.alive) {
       return lost("connection to the " + name() + " lost: its task has stopped");
     }
-    const std::optional<ServoSample> servo = stream_->latest(now_(), STREAM_SILENT);
-    if (!servo) {
+    const std::optional<ServoSample> servo = stream_->latest();
+    const std::uint64_t count = stream_->count();
+    const double silence = silence_.look(std::exchange(servo_count_, count) != count, now_());
+    if (!servo || silence > STREAM_SILENT) {
       return lost("connection to the " + name() + " lost: its servo stream is silent");
     }
     return readingOf(*servo);
@@ -234,6 +237,8 @@ class LinuxCncController : public Controller {
   GatewayClient client_;
   std::shared_ptr<const ServoStream> stream_;
   double (*now_)();
+  Stillness silence_;
+  std::uint64_t servo_count_ = 0;
   MachineStatus status_;
   bool open_ = false, complete_ = false;
   std::string text_;

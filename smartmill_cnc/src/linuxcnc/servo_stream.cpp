@@ -47,7 +47,6 @@ std::vector<ServoStretch> ServoStream::step(double wait, double (*now)()) {
     tried_ = now();
     try {
       connection_ = LocalConnection::to(path_);
-      begun_ = false;
     } catch (const Error&) {
       // Who reads the machine tells that its stream is silent.
     }
@@ -103,7 +102,7 @@ std::vector<ServoStretch> ServoStream::take(const ServoBlock& block, double arri
     if (!clock_.settled()) {
       continue;
     }
-    count(arrival - clock_.timeOf(number));
+    countLate(arrival - clock_.timeOf(number));
     if (stretch_.samples.empty()) {
       stretch_.first = number;
       stretch_.stamp = clock_.timeOf(number);
@@ -114,19 +113,23 @@ std::vector<ServoStretch> ServoStream::take(const ServoBlock& block, double arri
     }
   }
   latest_ = block.samples.back();
-  latest_at_ = arrival;
   return stretches;
 }
 
-void ServoStream::count(double late) {
+void ServoStream::countLate(double late) {
   const double bin = std::clamp(late / LATE_BIN, 0.0, static_cast<double>(LATE_BINS - 1));
   ++late_[static_cast<std::size_t>(bin)];
   statistics_.late_worst = std::max(statistics_.late_worst, late);
 }
 
-std::optional<ServoSample> ServoStream::latest(double now, double age) const {
+std::optional<ServoSample> ServoStream::latest() const {
   const std::lock_guard<std::mutex> lock(mutex_);
-  return latest_ && now - latest_at_ < age ? latest_ : std::nullopt;
+  return latest_;
+}
+
+std::uint64_t ServoStream::count() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return statistics_.samples;
 }
 
 void ServoStream::setLoad(double spindle_load) {

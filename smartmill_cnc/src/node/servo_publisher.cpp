@@ -16,7 +16,6 @@ namespace {
 constexpr const char* SERVO_TOPIC = "cnc/servo";
 constexpr double WAIT = 0.02;    // [s] for what comes next
 constexpr double PERIOD = 1e-3;  // [s] of the servo thread
-constexpr double SILENT = 0.3;   // [s]
 
 }  // namespace
 
@@ -80,10 +79,11 @@ void ServoPublisher::publish(const linuxcnc::ServoStretch& stretch) {
   servo_.publish(toMsg(block));
 }
 
-void ServoPublisher::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) const {
+void ServoPublisher::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
   using Level = diagnostic_msgs::DiagnosticStatus;
   const linuxcnc::ServoStatistics seen = stream_->statistics();
-  if (!stream_->latest(rosSeconds(), SILENT)) {
+  const std::uint64_t before = std::exchange(told_, seen.samples);
+  if (before == seen.samples) {
     status.summary(Level::ERROR, "silent");
   } else if (seen.lost > 0) {
     status.summary(Level::WARN, "samples were lost");

@@ -26,10 +26,11 @@ class ServoPublisher {
  private:
   void run();
   void publish(const linuxcnc::ServoStretch& stretch);
-  void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) const;
+  void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
   std::shared_ptr<linuxcnc::ServoStream> stream_;
   ros::Publisher servo_, angle_;
+  std::uint64_t told_ = 0;  // samples at the last diagnostics
   std::atomic<bool> stopping_{false};
   std::thread thread_;
 };

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <random>
 
+#include "smartmill_cnc/linuxcnc/stillness.h"
+
 namespace smartmill::cnc::linuxcnc {
 namespace {
 
@@ -91,8 +93,9 @@ TEST(ServoStream, HandsOutStretchesAndCountsLoss) {
                 PERIOD * static_cast<double>(all[i].first - all[i - 1].first), 1e-5);
   }
   EXPECT_EQ(lost, 7u);
-  EXPECT_TRUE(stream.latest(now, 0.1));
-  EXPECT_FALSE(stream.latest(now + 0.2, 0.1));
+  ASSERT_TRUE(stream.latest());
+  EXPECT_EQ(stream.latest()->revolutions, static_cast<double>(next - 1));
+  EXPECT_EQ(stream.count(), 3300u);
 }
 
 TEST(ServoStream, AnotherStartOfTheControllerIsNoLoss) {
@@ -105,6 +108,19 @@ TEST(ServoStream, AnotherStartOfTheControllerIsNoLoss) {
   }
   EXPECT_EQ(stream.statistics().lost, 0u);
   EXPECT_EQ(stream.statistics().restarts, 1u);
+}
+
+TEST(Stillness, ThePausesOfTheObserverAreNotThoseOfTheWorld) {
+  Stillness stillness;
+  double now = 10.0;
+  EXPECT_EQ(stillness.look(true, now), 0.0);
+  for (int i = 0; i < 20; ++i) {
+    stillness.look(false, now += 0.01);
+  }
+  EXPECT_NEAR(stillness.still(), 0.2, 1e-12);
+  EXPECT_NEAR(stillness.look(false, now += 30.0), 0.2 + Stillness::LONGEST_STEP, 1e-12);
+  EXPECT_NEAR(stillness.look(false, now -= 5.0), 0.2 + Stillness::LONGEST_STEP, 1e-12);
+  EXPECT_EQ(stillness.look(true, now + 0.01), 0.0);
 }
 
 }  // namespace

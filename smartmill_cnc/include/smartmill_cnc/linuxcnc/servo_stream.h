@@ -61,8 +61,8 @@ class ServoStream {
   /// What step() does with a block, for itself.
   std::vector<ServoStretch> take(const ServoBlock& block, double arrival);
 
-  /// The newest sample when it is younger than that. @param now [s] @param age [s]
-  std::optional<ServoSample> latest(double now, double age) const;
+  std::optional<ServoSample> latest() const;  ///< none before the first
+  std::uint64_t count() const;                ///< samples that have come
   void setLoad(double spindle_load);
   ServoStatistics statistics() const;
 
@@ -70,7 +70,7 @@ class ServoStream {
   static constexpr std::size_t LATE_BINS = 1000;
 
   void restart(const ServoBlock& block);
-  void count(double late);
+  void countLate(double late);
 
   const std::string path_;
   LocalConnection connection_;
@@ -84,7 +84,6 @@ class ServoStream {
   ServoStatistics statistics_;
   std::array<std::uint64_t, LATE_BINS> late_{};
   std::optional<ServoSample> latest_;
-  double latest_at_ = 0.0;  // [s]
   std::optional<double> load_;
 };
 
