@@ -27,6 +27,9 @@ class Bridge {
   Bridge(const Bridge&) = delete;
   Bridge& operator=(const Bridge&) = delete;
 
+  /// Of log lines and diagnostics.
+  std::string controllerName() const { return controller_->name(); }
+
   /// Connects when it is time to, reads the controller. @param now [s] any steady time.
   void fetch(double now);
   /// Takes what fetch() read and goes on with the running motion. @param now [s] the stamp of what was read.

@@ -33,6 +33,17 @@ double steadySeconds() {
   return std::chrono::duration<double>(Clock::now().time_since_epoch()).count();
 }
 
+std::shared_ptr<linuxcnc::ServoStream> makeStream(const NodeParameters& parameters) {
+  return parameters.kind == "linuxcnc" ? std::make_shared<linuxcnc::ServoStream>(parameters.linuxcnc.folder)
+                                       : nullptr;
+}
+
+std::unique_ptr<Controller> makeController(const NodeParameters& parameters,
+                                           const std::shared_ptr<linuxcnc::ServoStream>& stream) {
+  return stream ? linuxcnc::makeLinuxCncController(parameters.linuxcnc, stream, rosSeconds)
+                : makeFocasController(parameters.controller);
+}
+
 /// Empty when the condition can be published.
 std::string conditionFault(const smartmill_msgs::CuttingCondition& c) {
   if (c.kind > smartmill_msgs::CuttingCondition::CUT) {
@@ -57,10 +68,11 @@ std::string conditionFault(const smartmill_msgs::CuttingCondition& c) {
 
 CncNode::CncNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
     : parameters_(ParameterReader::fromServer(private_nh).readAll<NodeParameters>().completed()),
-      bridge_(makeFocasController(parameters_.controller), parameters_.reconnect_period, parameters_.motion),
-      shell_(nh, private_nh,
-             "controller " + parameters_.controller.host + ":" + std::to_string(parameters_.controller.port),
-             1.0) {
+      stream_(makeStream(parameters_)),
+      bridge_(makeController(parameters_, stream_), parameters_.reconnect_period, parameters_.motion),
+      shell_(nh, private_nh, bridge_.controllerName(), 1.0),
+      servo_(stream_ ? std::make_unique<ServoPublisher>(nh, shell_, stream_, parameters_.load_input)
+                     : nullptr) {
   state_publisher_ = nh.advertise<smartmill_msgs::CncState>(names::CNC_STATE, STREAM_QUEUE);
   alarms_publisher_ = nh.advertise<smartmill_msgs::CncAlarms>(ALARMS, 1, true);
   load_publisher_ = nh.advertise<smartmill_msgs::LoadSample>(names::CNC_LOAD, STREAM_QUEUE);

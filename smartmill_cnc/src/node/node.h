@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "node/parameters.h"
+#include "node/servo_publisher.h"
 #include "smartmill_cnc/bridge.h"
 #include "smartmill_msgs/ArmMotion.h"
 #include "smartmill_msgs/JogAction.h"
@@ -62,8 +63,10 @@ class CncNode {
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
   const NodeParameters parameters_;
+  const std::shared_ptr<linuxcnc::ServoStream> stream_;      // of a LinuxCNC
   Bridge bridge_;                                            // the bridge's thread only
   std::optional<Active> active_;                             // the bridge's thread only
+  std::string last_note_;                                    // the bridge's thread only
   std::optional<std::vector<ControllerAlarm>> told_alarms_;  // the bridge's thread only
 
   ros::Publisher state_publisher_, load_publisher_, condition_publisher_, alarms_publisher_;
@@ -73,6 +76,7 @@ class CncNode {
   std::unique_ptr<Server<smartmill_msgs::JogAction>> jog_;
   std::unique_ptr<Server<smartmill_msgs::OrientSpindleAction>> orient_;
   NodeShell shell_;
+  std::unique_ptr<ServoPublisher> servo_;
 
   std::mutex mutex_;  // of what follows
   std::vector<Job> jobs_;

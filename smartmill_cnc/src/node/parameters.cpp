@@ -27,9 +27,16 @@ void fill(NodeParameters& parameters, const MachineModel& model) {
 }  // namespace
 
 void NodeParameters::declare(ParameterTable& table) {
-  table.title("Parameters of cnc_node (package smartmill_cnc): the bridge to the controller over FOCAS.");
+  table.title("Parameters of cnc_node (package smartmill_cnc): the bridge to the controller.");
   table.section();
+  table.choice("controller", kind, {"fanuc", "linuxcnc"},
+               "what it is: over FOCAS Ethernet, or a LinuxCNC of this computer");
+  table.section("Of a Fanuc.");
   controller.declare(table);
+  table.section("Of a LinuxCNC.");
+  linuxcnc.declare(table);
+  table.text("load_input", load_input,
+             "topic (LoadSample) of a load meter that the controller does not read itself; empty: none");
   table.section();
   table.number("rate", rate, "Hz", Range::closed(1.0, 200.0), "of cnc/state and cnc/load");
   table.number("reconnect_period", reconnect_period, "s", Range::positive(),
@@ -48,7 +55,11 @@ void NodeParameters::declare(ParameterTable& table) {
 
 void NodeParameters::validate() const {
   checkBounds(*this);
-  controller.validate();
+  if (kind == "fanuc") {
+    controller.validate();
+  } else if (linuxcnc.folder.empty()) {
+    throw Error("linuxcnc_folder: the folder of the machine is due");
+  }
 }
 
 NodeParameters NodeParameters::completed() const {

@@ -5,13 +5,17 @@
 #include <vector>
 
 #include "smartmill_cnc/bridge.h"
+#include "smartmill_cnc/linuxcnc/linuxcnc_controller.h"
 #include "smartmill_core/parameters/parameter_table.h"
 
 namespace smartmill::cnc {
 
 /// Parameters of cnc_node.
 struct NodeParameters {
+  std::string kind = "fanuc";
   FocasParameters controller;
+  linuxcnc::LinuxCncParameters linuxcnc;
+  std::string load_input;
   double rate = 50.0;
   double reconnect_period = 1.0;
   MotionParameters motion;

@@ -6,6 +6,7 @@
 
 #include <smartmill_msgs/CuttingCoefficients.h>
 #include <smartmill_msgs/ForceBlock.h>
+#include <smartmill_msgs/LoadSample.h>
 #include <smartmill_msgs/SampleBlock.h>
 #include <smartmill_msgs/SpindleAngle.h>
 
@@ -23,7 +24,8 @@ namespace {
 
 constexpr double TRUTH_STEP = 2.0, TRUTH_END = 6000.0;  // [Hz] lines of the true FRFs
 constexpr double BLOCK_TIME = World::BLOCK / World::SAMPLE_RATE;
-constexpr std::uint32_t QUEUE = 100000;  // messages: a busy listener catches up instead of losing some
+constexpr double LOOK_AGAIN = 2e-3;  // [s]
+constexpr double MOST_WAIT = 0.8;    // [1] of most_behind, for where the axes are led
 
 NodeParameters read(const ros::NodeHandle& private_nh) {
   NodeParameters parameters = ParameterReader::fromServer(private_nh).readAll<NodeParameters>();
@@ -42,7 +44,6 @@ Node::Node(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
       world_(std::make_unique<World>(model_, parameters_.world)),
       hammer_(nh_.advertise<smartmill_msgs::SampleBlock>(names::HAMMER, STREAM_QUEUE)),
       dynamometer_(nh_.advertise<smartmill_msgs::SampleBlock>(names::DYNAMOMETER, STREAM_QUEUE)),
-      angle_(nh_.advertise<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE, STREAM_QUEUE)),
       force_(nh_.advertise<smartmill_msgs::ForceBlock>(names::TRUE_FORCE, STREAM_QUEUE)),
       vibration_(nh_.advertise<smartmill_msgs::SampleBlock>(names::TRUE_VIBRATION, STREAM_QUEUE)),
       servo_(nh_.advertise<smartmill_msgs::SampleBlock>(names::daq("servo"), STREAM_QUEUE)),
@@ -50,11 +51,11 @@ Node::Node(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
       frf_(nh_, names::TRUE_FRF),
       modes_(nh_, names::TRUE_MODES),
       shell_(nh_, private_nh, "simulated mill", 1.0) {
-  focas::ServerOptions options;
-  options.port = static_cast<std::uint16_t>(parameters_.port);
-  options.bind_address = parameters_.bind;
-  server_ = std::make_unique<focas::Server>(options, world_->controller());
-  ROS_INFO("sim: controller listens on %s:%d", parameters_.bind.c_str(), server_->port());
+  if (parameters_.axes_input.empty()) {
+    serve();
+  } else {
+    listen();
+  }
 
   start_ = toSec(ros::Time::now());
   publishTruth();
@@ -62,6 +63,25 @@ Node::Node(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
   offerPanel();
   shell_.diagnose("simulated machine", [this](auto& status) { diagnose(status); });
   thread_ = std::thread([this] { run(); });
+}
+
+void Node::serve() {
+  focas::ServerOptions options;
+  options.port = static_cast<std::uint16_t>(parameters_.port);
+  options.bind_address = parameters_.bind;
+  server_ = std::make_unique<focas::Server>(options, world_->controller());
+  angle_ = nh_.advertise<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE, STREAM_QUEUE);
+  ROS_INFO("sim: controller listens on %s:%d", parameters_.bind.c_str(), server_->port());
+}
+
+void Node::listen() {
+  load_meter_ = nh_.advertise<smartmill_msgs::LoadSample>(names::daq("spindle_load"), STREAM_QUEUE);
+  shell_.inputs().on<smartmill_msgs::SampleBlock>(parameters_.axes_input,
+                                                  [this](const smartmill_msgs::SampleBlock& block, double) {
+                                                    const std::lock_guard<std::mutex> lock(axes_mutex_);
+                                                    axes_.push(fromMsg(block));
+                                                  });
+  ROS_INFO("sim: axes and spindle follow %s", parameters_.axes_input.c_str());
 }
 
 Node::~Node() {
@@ -112,7 +132,15 @@ void Node::publish(const World::Block& block) {
   };
   hammer_.publish(toMsg(shifted(block.hammer)));
   dynamometer_.publish(toMsg(shifted(block.dynamometer), frames::DYNAMOMETER));
-  for (const SpindleAngle& angle : block.angle) angle_.publish(toMsg(shifted(angle)));
+  if (server_) {
+    for (const SpindleAngle& angle : block.angle) angle_.publish(toMsg(shifted(angle)));
+  } else {
+    LoadSample load;
+    load.stamp = start_ + block.dynamometer.timeOf(World::BLOCK);
+    load.spindle_load = block.spindle_load;
+    load.spindle_speed = std::abs(states_.back().spindle_speed);
+    load_meter_.publish(toMsg(load));
+  }
   force_.publish(toMsg(shifted(block.force), frames::MACHINE));
   vibration_.publish(toMsg(shifted(block.vibration)));
   servo_.publish(toMsg(shifted(block.servo)));
@@ -135,13 +163,46 @@ void Node::run() {
       std::this_thread::sleep_for(std::chrono::duration<double>(done + BLOCK_TIME - now));
       continue;
     }
+    if (!server_ && !lead(now, done)) {
+      std::this_thread::sleep_for(std::chrono::duration<double>(LOOK_AGAIN));
+      continue;
+    }
     const auto before = std::chrono::steady_clock::now();
-    world_->advance(block);
+    if (server_) {
+      world_->advance(block);
+    } else {
+      world_->advance(block, states_);
+      tellAlarms();
+    }
     const std::chrono::duration<double> took = std::chrono::steady_clock::now() - before;
     load_ = 0.98 * load_ + 0.02 * took.count() / BLOCK_TIME;
     publish(block);
     done += BLOCK_TIME;
   }
+}
+
+/// Where the controller elsewhere leads the machine in the next block, once that is known.
+bool Node::lead(double now, double done) {
+  const std::lock_guard<std::mutex> lock(axes_mutex_);
+  const double end = start_ + done + BLOCK_TIME;
+  if (!(axes_.newest() >= end)) {
+    // Nothing comes: without a command every drive stands.
+    if (now - done < MOST_WAIT * parameters_.most_behind) return false;
+    axes_.stand(end);
+  }
+  states_.resize(World::BLOCK);
+  for (std::size_t i = 0; i < World::BLOCK; ++i) {
+    states_[i] = axes_.at(start_ + done + (static_cast<double>(i) + 0.5) / World::SAMPLE_RATE);
+  }
+  return true;
+}
+
+/// The machine's own controller, which leads nothing then, is where collisions are noticed.
+void Node::tellAlarms() {
+  std::string text;
+  for (const focas::AlarmMessage& alarm : world_->controller().alarmMessages()) text += " " + alarm.text;
+  if (text != told_alarm_ && !text.empty()) ROS_ERROR_STREAM("sim:" << text);
+  told_alarm_ = text;
 }
 
 bool Node::strike(smartmill_msgs::Strike::Request& request, smartmill_msgs::Strike::Response& response) {

@@ -3,6 +3,7 @@
 #include <atomic>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <thread>
 #include <vector>
@@ -19,6 +20,7 @@
 #include "smartmill_focas/server.h"
 #include "smartmill_ros/kept_topic.h"
 #include "smartmill_ros/node_shell.h"
+#include "smartmill_sim/world/axes_track.h"
 #include "smartmill_sim/world/world.h"
 
 namespace smartmill::sim {
@@ -37,6 +39,10 @@ class Node {
  private:
   void run();
   void publish(const World::Block& block);
+  void serve();
+  void listen();
+  bool lead(double now, double done);
+  void tellAlarms();
   void publishTruth();
   bool strike(smartmill_msgs::Strike::Request& request, smartmill_msgs::Strike::Response& response);
   void addTruth(const std::string& point, const std::string& direction, const ModalModel& modes);
@@ -53,7 +59,7 @@ class Node {
   std::unique_ptr<focas::Server> server_;
 
   double start_ = 0.0;  // [s] stamp of sample 0
-  ros::Publisher hammer_, dynamometer_, angle_, force_, vibration_, servo_, coefficients_;
+  ros::Publisher hammer_, dynamometer_, angle_, force_, vibration_, servo_, coefficients_, load_meter_;
   KeptTopic<smartmill_msgs::Frf> frf_;
   KeptTopic<smartmill_msgs::ModalModel> modes_;
   ros::ServiceServer strike_server_;
@@ -61,6 +67,12 @@ class Node {
   NodeShell shell_;
   std::atomic<double> load_{0.0};  // [1] share of real time that the twin needs
   std::atomic<std::uint64_t> lost_{0};
+
+  // Axes and spindle that a controller elsewhere leads.
+  std::mutex axes_mutex_;  // of the track
+  AxesTrack axes_;
+  std::vector<MotionState> states_;
+  std::string told_alarm_;
 
   std::atomic<bool> stopping_{false};
   std::thread thread_;

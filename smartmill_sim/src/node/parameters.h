@@ -12,6 +12,7 @@ struct NodeParameters {
   std::string model;
   int port = 8193;
   std::string bind = "127.0.0.1";
+  std::string axes_input;
   WorldOptions world;
   double most_behind = 0.25;
 
@@ -22,6 +23,10 @@ struct NodeParameters {
     table.section();
     table.number("port", port, "1", Range::closed(0, 65535), "FOCAS port of the controller, 0: any free one");
     table.text("bind", bind, "address it listens on");
+    table.text(
+        "axes_input", axes_input,
+        "topic (SampleBlock: x, y, z, revolutions) of a controller elsewhere that leads axes and spindle; "
+        "empty: the own one");
     world.declare(table);
     table.number("most_behind", most_behind, "s", Range::atLeast(0.05),
                  "of lag behind the clock; beyond it samples are lost, as a real device loses them");

@@ -96,24 +96,16 @@ class World::Impl {
   void advance(Block& block) {
     const std::lock_guard<std::mutex> lock(mutex_);
     controller_.advance(1.0 / SAMPLE_RATE, BLOCK, states_);
-    begin(block);
-    for (std::size_t i = 0; i < BLOCK; ++i) {
-      if ((index_ + i) % LOOK == 0) look(states_[i]);
-      sample(static_cast<double>(index_ + i) / SAMPLE_RATE, states_[i], block);
-      last_ = states_[i];
-    }
-    for (std::size_t k = 0; k < ANGLES; ++k) {
-      const std::size_t i = BLOCK * (k + 1) / ANGLES - 1;
-      block.angle[k] = {(static_cast<double>(index_ + i) + 0.5) / SAMPLE_RATE, states_[i].spindle_angle,
-                        states_[i].spindle_speed};
-    }
-    index_ += BLOCK;
-    block.servo = servo_.take();
+    follow(block, states_);
     controller_.setSpindleLoad(100.0 * load_meter_ / *spindle_.load_meter_full_scale);
     controller_.setSpindleTorque(torque_ / BLOCK);
-    torque_ = 0.0;
     controller_.setServoCurrent(servo_.current());
     controller_.setServoLoad(servo_.load());
+  }
+
+  void advance(Block& block, const std::vector<MotionState>& states) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    follow(block, states);
   }
 
   void lose(std::uint64_t samples) {
@@ -136,6 +128,24 @@ class World::Impl {
     return peak * std::clamp(1.0 + options_.force_scatter * normal_(random_), 0.5, 1.5);
   }
   double noise(double rms) { return rms * normal_(random_); }
+
+  void follow(Block& block, const std::vector<MotionState>& states) {
+    begin(block);
+    torque_ = 0.0;
+    for (std::size_t i = 0; i < BLOCK; ++i) {
+      if ((index_ + i) % LOOK == 0) look(states[i]);
+      sample(static_cast<double>(index_ + i) / SAMPLE_RATE, states[i], block);
+      last_ = states[i];
+    }
+    for (std::size_t k = 0; k < ANGLES; ++k) {
+      const std::size_t i = BLOCK * (k + 1) / ANGLES - 1;
+      block.angle[k] = {(static_cast<double>(index_ + i) + 0.5) / SAMPLE_RATE, states[i].spindle_angle,
+                        states[i].spindle_speed};
+    }
+    index_ += BLOCK;
+    block.servo = servo_.take();
+    block.spindle_load = machine_.rounded(load_meter_) / *spindle_.load_meter_full_scale;
+  }
 
   void begin(Block& block) const {
     const double stamp = static_cast<double>(index_) / SAMPLE_RATE;
@@ -291,6 +301,11 @@ World::StrikeAnswer World::strike(const std::string& point, const std::string& d
 
 void World::advance(Block& block) {
   impl_->advance(block);
+}
+
+void World::advance(Block& block, const std::vector<MotionState>& states) {
+  if (states.size() != BLOCK) throw Error("axes: " + std::to_string(states.size()) + " states for one block");
+  impl_->advance(block, states);
 }
 
 void World::lose(std::uint64_t samples) {

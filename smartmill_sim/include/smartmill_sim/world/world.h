@@ -55,9 +55,10 @@ class World {
     SampleBlock hammer;       ///< hammer [N] positive in compression, gap [V]
     SampleBlock dynamometer;  ///< fx, fy, fz [N]
     std::array<SpindleAngle, ANGLES> angle;
-    ForceBlock force;       ///< true force of the cut on the tool
-    SampleBlock vibration;  ///< true displacement of the tip, x, y [m]
-    SampleBlock servo;      ///< ServoRecorder's: spindle load and axis currents at 1 kHz
+    ForceBlock force;           ///< true force of the cut on the tool
+    SampleBlock vibration;      ///< true displacement of the tip, x, y [m]
+    SampleBlock servo;          ///< ServoRecorder's: spindle load and axis currents at 1 kHz
+    double spindle_load = 0.0;  ///< [1] what the load meter shows at the end, 1 is full scale
   };
   enum class StrikeAnswer { ok, by_hand, failed };
 
@@ -77,6 +78,9 @@ class World {
 
   /// The next BLOCK samples.
   void advance(Block& block);
+  /// The same with axes and spindle that obey a controller elsewhere. @param states of half a sample after
+  /// each sample, BLOCK of them
+  void advance(Block& block, const std::vector<MotionState>& states);
 
   /// Samples that nobody took: the index goes on, the machine does not move.
   void lose(std::uint64_t samples);

@@ -1,0 +1,399 @@
+// Copyright (c) SmartMill developers.
+// SPDX-License-Identifier: GPL-2.0-or-later
+#include "controller_link.h"
+
+#include <rcs.hh>
+// in this order
+#include <emc.hh>
+#include <emc_nml.hh>
+#include <nml_oi.hh>
+#include <rcs_print.hh>
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <thread>
+
+namespace smartmill::cnc::linuxcnc {
+namespace {
+
+using Code = Reply::Code;
+
+constexpr std::chrono::milliseconds LOOK{1};
+constexpr double STILL = 0.3;                       // [s] a task whose heartbeat stands so long is gone
+constexpr std::chrono::milliseconds REATTACH{500};  // between two attempts to find it
+constexpr double ANSWER = 1.0, HOMING = 3.0, COMES_TO_REST = 0.3;  // [s]
+constexpr std::uint32_t SETTLED = 4;  // servo cycles of an idle task after a program
+constexpr const char* PIECE = "o<piece> call";
+
+char* writable(const std::string& text) {
+  return const_cast<char*>(text.c_str());  // NML's interface; it only reads
+}
+
+std::array<double, 3> metres(const EmcPose& pose, double units_per_mm) {
+  const double scale = units_per_mm > 0.0 ? 1e-3 / units_per_mm : 1e-3;
+  return {pose.tran.x * scale, pose.tran.y * scale, pose.tran.z * scale};
+}
+
+}  // namespace
+
+struct ControllerLink::Channels {
+  explicit Channels(const std::string& file)
+      : status(emcFormat, "emcStatus", "xemc", writable(file)),
+        command(emcFormat, "emcCommand", "xemc", writable(file)),
+        error(nmlErrorFormat, "emcError", "xemc", writable(file)) {}
+  bool valid() { return status.valid() && command.valid() && error.valid(); }
+  EMC_STAT& stat() { return *static_cast<EMC_STAT*>(status.get_address()); }
+
+  RCS_STAT_CHANNEL status;
+  RCS_CMD_CHANNEL command;
+  NML error;
+};
+
+ControllerLink::ControllerLink(std::string nml_file, std::string program_file,
+                               std::function<void()> meanwhile)
+    : nml_file_(std::move(nml_file)),
+      program_file_(std::move(program_file)),
+      meanwhile_(std::move(meanwhile)) {
+  set_rcs_print_destination(RCS_PRINT_TO_NULL);
+}
+
+ControllerLink::~ControllerLink() = default;
+
+void ControllerLink::attach() {
+  const Clock::time_point now = Clock::now();
+  if (attached_ != Clock::time_point() && now - attached_ < REATTACH) {
+    return;
+  }
+  attached_ = now;
+  channels_ = std::make_unique<Channels>(nml_file_);
+  if (!channels_->valid()) {
+    channels_.reset();
+  }
+}
+
+void ControllerLink::look() {
+  if (!channels_ || (!status_.alive && Clock::now() - attached_ > REATTACH)) {
+    attach();
+  }
+  if (!channels_) {
+    status_.alive = false;
+    return;
+  }
+  channels_->status.peek();
+  const std::uint32_t heartbeat = channels_->stat().motion.heartbeat;
+  const bool beats = heartbeat != 0 && heartbeat != status_.heartbeat;
+  const double now = std::chrono::duration<double>(Clock::now().time_since_epoch()).count();
+  if (heartbeat_.look(beats, now) > STILL && status_.alive) {
+    status_.alive = false;
+    program_.reset();
+  }
+  if (beats) {
+    fill();
+  }
+  takeErrors();
+  noticeEnd();
+}
+
+void ControllerLink::fill() {
+  const EMC_STAT& s = channels_->stat();
+  const EMC_TRAJ_STAT& t = s.motion.traj;
+  // The first heartbeat that is seen may be of a controller that has gone; the second one counts.
+  status_.alive = status_.alive || status_.heartbeat != 0;
+  status_.heartbeat = s.motion.heartbeat;
+  status_.state = static_cast<MachineStatus::State>(s.task.state);
+  status_.mode = static_cast<MachineStatus::Mode>(s.task.mode);
+  status_.busy = s.task.interpState != EMC_TASK_INTERP_IDLE || s.task.execState != EMC_TASK_EXEC_DONE ||
+                 s.status == RCS_EXEC || t.queue > 0;
+  status_.held = s.task.task_paused != 0 || t.paused;
+  status_.homed = true;
+  for (int joint = 0; joint < t.joints; ++joint) {
+    status_.homed = status_.homed && s.motion.joint[joint].homed;
+  }
+  status_.in_position = t.inpos;
+  status_.dwell_left = s.task.delayLeft;
+  status_.line = s.task.motionLine;
+  status_.velocity = t.current_vel * (t.linearUnits > 0.0 ? 1e-3 / t.linearUnits : 1e-3);
+  status_.position = metres(t.actualPosition, t.linearUnits);
+  status_.distance_to_go = metres(t.dtg, t.linearUnits);
+  const std::array<double, 3> g5x = metres(s.task.g5x_offset, t.linearUnits);
+  const std::array<double, 3> g92 = metres(s.task.g92_offset, t.linearUnits);
+  const std::array<double, 3> tool = metres(s.task.toolOffset, t.linearUnits);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    status_.offset[axis] = g5x[axis] + g92[axis] + tool[axis];
+  }
+}
+
+/// What one reader takes no other sees: all of it is kept, up to what a frame carries.
+void ControllerLink::takeErrors() {
+  for (NMLTYPE type = channels_->error.read(); type > 0; type = channels_->error.read()) {
+    const NMLmsg* message = channels_->error.get_address();
+    const char* text = type == EMC_OPERATOR_ERROR_TYPE
+                           ? static_cast<const EMC_OPERATOR_ERROR*>(message)->error
+                       : type == NML_ERROR_TYPE ? static_cast<const NML_ERROR*>(message)->error
+                                                : nullptr;
+    // What the controller calls a note is none, though it comes as an error.
+    if (text && std::string(text).rfind("Note:", 0) != 0 && status_.errors.size() < LONGEST_TEXT / 2) {
+      std::string line(text);
+      std::replace(line.begin(), line.end(), '\n', ' ');
+      status_.errors += (status_.errors.empty() ? "" : "; ") + line;
+    }
+  }
+}
+
+/// A program has come to its end when the task has been done with it for some cycles and no error came.
+void ControllerLink::noticeEnd() {
+  if (!program_ || !status_.alive) {
+    return;
+  }
+  const EMC_STAT& s = channels_->stat();
+  const bool taken = s.echo_serial_number - *program_ >= 0;
+  if (!taken || status_.busy || !status_.in_position) {
+    idle_at_.reset();
+  } else if (!idle_at_) {
+    idle_at_ = status_.heartbeat;
+  } else if (status_.heartbeat - *idle_at_ >= SETTLED) {
+    program_.reset();
+    if (s.status != RCS_ERROR && status_.errors.empty()) {
+      status_.done = status_.running;
+    }
+  }
+}
+
+bool ControllerLink::waitFor(const std::function<bool()>& so, double seconds) {
+  const Clock::time_point end =
+      Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
+  while (!so()) {
+    if (Clock::now() > end || !channels_) {
+      return false;
+    }
+    std::this_thread::sleep_for(LOOK);
+    look();
+    meanwhile_();
+  }
+  return true;
+}
+
+/// @return the command's serial number once the task has taken it.
+template <class NmlMessage>
+std::optional<int> ControllerLink::tell(NmlMessage& message) {
+  if (!channels_ || channels_->command.write(&message) != 0) {
+    return std::nullopt;
+  }
+  const int serial = message.serial_number;
+  const bool taken = waitFor([&] { return channels_->stat().echo_serial_number - serial >= 0; }, ANSWER);
+  return taken ? std::optional<int>(serial) : std::nullopt;
+}
+
+/// Tells and waits until the task is done with it.
+template <class NmlMessage>
+Reply ControllerLink::done(NmlMessage& message, const char* what) {
+  const std::optional<int> serial = tell(message);
+  if (!serial) {
+    return {Code::lost, std::string(what) + ": the controller does not answer"};
+  }
+  const auto ended = [&] {
+    const EMC_STAT& s = channels_->stat();
+    return s.echo_serial_number - *serial > 0 || s.status != RCS_EXEC;
+  };
+  if (!waitFor(ended, ANSWER)) {
+    return {Code::not_yet, std::string(what) + ": not done within a second"};
+  }
+  if (channels_->stat().status == RCS_ERROR) {
+    waitFor([&] { return !status_.errors.empty(); }, 0.02);
+    return refusal(Code::refused, what);
+  }
+  return {};
+}
+
+Reply ControllerLink::refusal(Code code, const std::string& what) const {
+  return {code, what + ": refused" + (status_.errors.empty() ? "" : ": " + status_.errors)};
+}
+
+Reply ControllerLink::setState(int state) {
+  EMC_TASK_SET_STATE message;
+  message.state = static_cast<EMC_TASK_STATE_ENUM>(state);
+  return done(message, "machine state");
+}
+
+Reply ControllerLink::setMode(int mode) {
+  if (channels_ && channels_->stat().task.mode == mode) {
+    return {};
+  }
+  EMC_TASK_SET_MODE message;
+  message.mode = static_cast<EMC_TASK_MODE_ENUM>(mode);
+  const Reply reply = done(message, "mode");
+  if (reply.code != Code::done) {
+    return reply;
+  }
+  const bool changed = waitFor([&] { return channels_->stat().task.mode == mode; }, ANSWER);
+  return changed ? Reply{} : Reply{Code::not_yet, "the controller stays in its mode"};
+}
+
+Reply ControllerLink::makeReady() {
+  status_.errors.clear();
+  program_.reset();
+  const Reply reset = setState(EMC_TASK_STATE_ESTOP_RESET);
+  if (reset.code != Code::done) {
+    return reset;
+  }
+  // It says done even where the emergency stop is held from outside.
+  if (!waitFor([&] { return status_.state != MachineStatus::State::emergency; }, ANSWER)) {
+    return {Code::emergency, "the emergency stop cannot be reset: it is held outside the controller"};
+  }
+  const Reply on = setState(EMC_TASK_STATE_ON);
+  if (on.code != Code::done) {
+    return on;
+  }
+  if (!waitFor([&] { return status_.state == MachineStatus::State::on; }, ANSWER)) {
+    return {Code::refused, "the machine cannot be switched on"};
+  }
+  return status_.homed ? Reply{} : home();
+}
+
+Reply ControllerLink::home() {
+  const Reply manual = setMode(EMC_TASK_MODE_MANUAL);
+  if (manual.code != Code::done) {
+    return manual;
+  }
+  EMC_TRAJ_SET_TELEOP_ENABLE joints;
+  joints.enable = 0;
+  const Reply free = done(joints, "joint mode");
+  if (free.code != Code::done) {
+    return free;
+  }
+  EMC_JOINT_HOME all;
+  all.joint = -1;
+  const Reply homing = done(all, "homing");
+  if (homing.code != Code::done) {
+    return homing;
+  }
+  return waitFor([&] { return status_.homed; }, HOMING) ? Reply{}
+                                                        : Reply{Code::refused, "homing does not end"};
+}
+
+/// Why no program can be taken.
+std::optional<Reply> ControllerLink::unfit() const {
+  if (!status_.alive) {
+    return Reply{Code::lost, "the controller has gone"};
+  }
+  if (status_.state == MachineStatus::State::emergency) {
+    return Reply{Code::emergency, "emergency stop" + (status_.errors.empty() ? "" : ": " + status_.errors)};
+  }
+  if (status_.state != MachineStatus::State::on) {
+    return Reply{Code::emergency, "the machine is off"};
+  }
+  if (!status_.homed) {
+    return Reply{Code::refused, "the machine has not been homed"};
+  }
+  return std::nullopt;
+}
+
+Reply ControllerLink::open() {
+  if (const std::optional<Reply> no = unfit()) {
+    return *no;
+  }
+  if (status_.mode == MachineStatus::Mode::automatic && status_.busy) {
+    return {Code::wrong_mode, "the controller runs a program of its own"};
+  }
+  // What was stopped a moment ago comes to rest.
+  if (!waitFor([&] { return !status_.busy && status_.in_position; }, COMES_TO_REST)) {
+    return {Code::not_yet, "the machine still moves"};
+  }
+  return setMode(EMC_TASK_MODE_MDI);
+}
+
+Reply ControllerLink::immediate(const char* text, const char* what) {
+  EMC_TASK_PLAN_EXECUTE message;
+  std::snprintf(message.command, sizeof message.command, "%s", text);
+  return done(message, what);
+}
+
+Reply ControllerLink::run(const Command& command) {
+  if (const std::optional<Reply> no = unfit()) {
+    return *no;
+  }
+  if (status_.mode != MachineStatus::Mode::mdi) {
+    return {Code::wrong_mode, "the controller is not in MDI"};
+  }
+  if (program_ || status_.busy) {
+    return {Code::not_yet, "a program is running"};
+  }
+  {
+    std::ofstream file(program_file_, std::ios::trunc);
+    file << "o<piece> sub\n" << command.text << "\no<piece> endsub\n";
+    if (!file.flush()) {
+      return {Code::refused, program_file_ + ": cannot be written"};
+    }
+  }
+  std::filesystem::permissions(program_file_, std::filesystem::perms(0644));
+  EMC_TASK_PLAN_EXECUTE message;
+  std::snprintf(message.command, sizeof message.command, "%s", PIECE);
+  status_.running = command.number;
+  status_.done = 0;
+  idle_at_.reset();
+  program_ = tell(message);
+  if (!program_) {
+    return {Code::lost, "program: the controller does not answer"};
+  }
+  return {};
+}
+
+Reply ControllerLink::close() {
+  // Where nothing can be taken, nothing turns either.
+  if (unfit() || status_.mode != MachineStatus::Mode::mdi || status_.busy) {
+    return {};
+  }
+  return immediate("M5", "spindle stop");
+}
+
+Reply ControllerLink::variable(const Command& command) {
+  if (const std::optional<Reply> no = unfit()) {
+    return *no;
+  }
+  if (status_.mode != MachineStatus::Mode::mdi || status_.busy) {
+    return {Code::wrong_mode, "variables are written while motion is armed and nothing runs"};
+  }
+  char text[80];
+  std::snprintf(text, sizeof text, "#%d=%.9f", command.number, command.value);
+  return immediate(text, "variable");
+}
+
+Reply ControllerLink::carryOut(const Command& command) {
+  look();
+  if (!status_.alive) {
+    return {Code::lost, "the controller has gone"};
+  }
+  switch (command.word) {
+    case Word::ready:
+      return makeReady();
+    case Word::open:
+      return open();
+    case Word::run:
+      return run(command);
+    case Word::close:
+      return close();
+    case Word::abort: {
+      program_.reset();
+      EMC_TASK_ABORT message;
+      return done(message, "abort");
+    }
+    case Word::estop:
+      program_.reset();
+      return setState(EMC_TASK_STATE_ESTOP);
+    case Word::hold: {
+      EMC_TASK_PLAN_PAUSE message;
+      return tell(message) ? Reply{} : Reply{Code::lost, "feed hold: the controller does not answer"};
+    }
+    case Word::resume: {
+      EMC_TASK_PLAN_RESUME message;
+      return tell(message) ? Reply{} : Reply{Code::lost, "resume: the controller does not answer"};
+    }
+    case Word::variable:
+      return variable(command);
+  }
+  return {Code::refused, "unknown command"};
+}
+
+}  // namespace smartmill::cnc::linuxcnc

@@ -1,0 +1,133 @@
+// Speaks LinuxCNC's NML on one side and smartmill_cnc's local protocol on the other.
+//
+// Copyright (c) SmartMill developers.
+// SPDX-License-Identifier: GPL-2.0-or-later
+//
+// This program is free software; you can redistribute it and/or modify it under the terms of the GNU General
+// Public License as published by the Free Software Foundation; either version 2 of the License, or (at your
+// option) any later version. It is distributed in the hope that it will be useful, but WITHOUT ANY WARRANTY;
+// without even the implied warranty of MERCHANTABILITY or FITNESS FOR A PARTICULAR PURPOSE. See COPYING.
+
+#include <poll.h>
+
+#include <deque>
+#include <list>
+#include <vector>
+
+#include "controller_link.h"
+#include "smartmill_cnc/linuxcnc/local_socket.h"
+#include "smartmill_cnc/linuxcnc/stop_signal.h"
+#include "smartmill_core/program.h"
+
+namespace smartmill::cnc::linuxcnc {
+namespace {
+
+constexpr int LOOK_EVERY = 2;  // [ms]
+constexpr std::size_t MOST_CLIENTS = 8, MOST_WAITING = 8;
+
+struct Client {
+  LocalConnection connection;
+  bool drives = false;           // has opened programs: what runs is its
+  std::deque<Received> waiting;  // commands
+};
+
+class Gateway {
+ public:
+  explicit Gateway(const std::string& folder)
+      : link_(folder + "/mill.nml", folder + "/sub/piece.ngc", [this] { hear(); }),
+        listener_(listenAt(folder + "/" + GATEWAY_SOCKET)) {}
+
+  void step() {
+    std::vector<pollfd> entries{{listener_.get(), POLLIN, 0}};
+    for (const Client& client : clients_) {
+      entries.push_back({client.connection.descriptor(), POLLIN, 0});
+    }
+    ::poll(entries.data(), entries.size(), LOOK_EVERY);
+    link_.look();
+    if (std::optional<LocalConnection> connection = acceptFrom(listener_)) {
+      if (clients_.size() < MOST_CLIENTS) {
+        clients_.push_back({std::move(*connection), false, {}});
+      }
+    }
+    hear();
+    for (Client& client : clients_) {
+      while (!client.waiting.empty()) {
+        const Received received = std::move(client.waiting.front());
+        client.waiting.pop_front();
+        carryOut(client, std::get<Command>(received.message), received.sequence);
+      }
+    }
+    clients_.remove_if([this](const Client& client) { return left(client); });
+  }
+
+  /// Nobody watches any more what runs.
+  void leave() {
+    for (const Client& client : clients_) {
+      stopFor(client);
+    }
+  }
+
+ private:
+  /// Questions are answered at once, also while a command is carried out; commands wait for their turn.
+  void hear() {
+    for (Client& client : clients_) {
+      client.connection.receive();
+      while (std::optional<Received> received = client.connection.next()) {
+        if (std::holds_alternative<Ask>(received->message)) {
+          client.connection.send(link_.status(), received->sequence);
+        } else if (std::holds_alternative<Command>(received->message) &&
+                   client.waiting.size() < MOST_WAITING) {
+          client.waiting.push_back(std::move(*received));
+        }
+      }
+      client.connection.flush();
+    }
+  }
+
+  void carryOut(Client& client, const Command& command, std::uint16_t sequence) {
+    const Reply reply = link_.carryOut(command);
+    if (command.word == Word::open && reply.code == Reply::Code::done) {
+      client.drives = true;
+    }
+    if (command.word == Word::close) {
+      client.drives = false;
+    }
+    client.connection.send(reply, sequence);
+  }
+
+  bool left(const Client& client) {
+    if (client.connection.open()) {
+      return false;
+    }
+    stopFor(client);
+    return true;
+  }
+
+  void stopFor(const Client& client) {
+    if (client.drives) {
+      link_.carryOut({Word::abort, 0, 0.0, {}});
+    }
+  }
+
+  ControllerLink link_;
+  LocalDescriptor listener_;
+  std::list<Client> clients_;
+};
+
+}  // namespace
+}  // namespace smartmill::cnc::linuxcnc
+
+int main(int argc, char** argv) {
+  using namespace smartmill::cnc::linuxcnc;
+  std::string folder;
+  smartmill::CommandLine line{"Speaks to the LinuxCNC whose mill.nml stands in a folder (docs/linuxcnc.md)."};
+  line.option("folder", folder, "of the machine: its gateway.socket is served").required();
+  return smartmill::runProgram(line, argc, argv, [&] {
+    catchStopSignals();
+    Gateway gateway(folder);
+    while (!stopRequested()) {
+      gateway.step();
+    }
+    gateway.leave();
+  });
+}

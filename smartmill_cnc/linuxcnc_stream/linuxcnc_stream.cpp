@@ -1,0 +1,265 @@
+// Reads LinuxCNC's servo cycles from a HAL sampler and serves them on a local socket; writes a drive's load
+// and the permit of motion. A process of its own: LinuxCNC's end ends every HAL component.
+
+#include <hal.h>
+#include <poll.h>
+#include <rtapi.h>
+#include <sys/shm.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <iostream>
+#include <list>
+#include <memory>
+#include <thread>
+
+#include "smartmill_cnc/linuxcnc/configuration.h"
+#include "smartmill_cnc/linuxcnc/local_socket.h"
+#include "smartmill_cnc/linuxcnc/stillness.h"
+#include "smartmill_cnc/linuxcnc/stop_signal.h"
+#include "smartmill_core/error.h"
+#include "smartmill_core/program.h"
+#include "smartmill_core/units.h"
+
+namespace smartmill::cnc::linuxcnc {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr int HAL_SEGMENT = 0x48414c32, SAMPLER_FIFO = 0x48534130;  // keys that LinuxCNC's sources fix
+constexpr int READ_EVERY = 3;                                       // [ms]
+constexpr std::chrono::milliseconds ASK_EVERY{30}, TRY_EVERY{100}, LOADING{10000};
+constexpr double ANSWER_LASTS = 0.4, SILENT = 0.5;  // [s]
+constexpr int GONE = 3;                             // exit code: the controller has
+
+double seconds() {
+  return std::chrono::duration<double>(Clock::now().time_since_epoch()).count();
+}
+
+/// This process as a component of HAL. Its pins are bidirectional: what a dead one has left does not bar the
+/// next.
+class Component {
+ public:
+  Component() : prefix_("smartmill-" + std::to_string(::getpid())), id_(::hal_init(prefix_.c_str())) {
+    if (id_ < 0) {
+      throw Error("no component of HAL can be made (code " + std::to_string(id_) + ")");
+    }
+    pins_ = static_cast<Pins*>(::hal_malloc(sizeof(Pins)));
+    const bool made = pins_ &&
+                      ::hal_pin_bit_new((prefix_ + ".permit").c_str(), HAL_IO, &pins_->permit, id_) == 0 &&
+                      ::hal_pin_bit_new((prefix_ + ".beat").c_str(), HAL_IO, &pins_->beat, id_) == 0 &&
+                      ::hal_pin_float_new((prefix_ + ".load").c_str(), HAL_IO, &pins_->load, id_) == 0;
+    ::hal_ready(id_);
+    if (!made || ::hal_link((prefix_ + ".permit").c_str(), PERMIT_SIGNAL) != 0 ||
+        ::hal_link((prefix_ + ".beat").c_str(), BEAT_SIGNAL) != 0) {
+      ::hal_exit(id_);
+      throw Error("the controller's configuration has no signals '" + std::string(PERMIT_SIGNAL) + "' and '" +
+                  BEAT_SIGNAL + "'");
+    }
+    // A signal that the drive writes itself is left to it.
+    loads_ = ::hal_link((prefix_ + ".load").c_str(), LOAD_SIGNAL) == 0;
+    if (::hal_stream_attach(&stream_, id_, SAMPLER_FIFO, SAMPLER_PINS) < 0) {
+      ::hal_exit(id_);
+      throw Error("the controller's configuration has no sampler '" + std::string(SAMPLER_PINS) + "'");
+    }
+    // Stale: a full FIFO drops the newest.
+    unsigned number = 0;
+    hal_stream_data data[HAL_STREAM_MAX_PINS];
+    while (::hal_stream_readable(&stream_) && ::hal_stream_read(&stream_, data, &number) >= 0) {
+    }
+  }
+  ~Component() {
+    *pins_->permit = false;
+    ::hal_stream_detach(&stream_);
+    ::hal_exit(id_);
+  }
+  Component(const Component&) = delete;
+  Component& operator=(const Component&) = delete;
+
+  /// Samples that follow one another without a gap, as many as there are; none when there are none.
+  ServoBlock read() {
+    ServoBlock block;
+    while (block.samples.size() < ServoBlock::MOST) {
+      if (!ahead_ && !readOne()) {
+        break;
+      }
+      if (block.samples.empty()) {
+        block.first = number_;
+      } else if (number_ != block.first + block.samples.size()) {
+        break;
+      }
+      block.samples.push_back(sample_);
+      ahead_ = false;
+    }
+    return block;
+  }
+
+  void permit(bool on) {
+    *pins_->permit = on;
+    *pins_->beat = !*pins_->beat;
+  }
+  void setLoad(double load) {
+    if (loads_) {
+      *pins_->load = load;
+    }
+  }
+
+ private:
+  struct Pins {
+    hal_bit_t *permit, *beat;
+    hal_float_t* load;
+  };
+
+  bool readOne() {
+    hal_stream_data d[HAL_STREAM_MAX_PINS];
+    unsigned number = 0;
+    if (!::hal_stream_readable(&stream_) || ::hal_stream_read(&stream_, d, &number) < 0) {
+      return false;
+    }
+    number_ = number;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      sample_.position[axis] = d[axis].f * units::MM;
+    }
+    sample_.revolutions = d[3].f;
+    sample_.spindle_speed = units::radPerSecFromRpm(d[4].f);
+    sample_.velocity = d[5].f * units::MM;
+    sample_.distance_to_go = d[6].f * units::MM;
+    sample_.spindle_load = d[7].f;
+    sample_.marker = d[8].f;
+    return ahead_ = true;
+  }
+
+  const std::string prefix_;
+  const int id_;
+  Pins* pins_ = nullptr;
+  bool loads_ = false;
+  hal_stream_t stream_{};
+  bool ahead_ = false;  // a sample that was read and not handed out
+  std::uint32_t number_ = 0;
+  ServoSample sample_;
+};
+
+/// Asks the gateway whether it and the controller's task live: only then may the machine move.
+class Watch {
+ public:
+  explicit Watch(std::string path) : path_(std::move(path)) {}
+
+  bool alive() {
+    const Clock::time_point now = Clock::now();
+    if (!gateway_.open() && now - tried_ > TRY_EVERY) {
+      tried_ = now;
+      try {
+        gateway_ = LocalConnection::to(path_);
+      } catch (const Error&) {
+      }
+    }
+    gateway_.receive();
+    bool good = false;
+    while (const std::optional<Received> received = gateway_.next()) {
+      if (const auto* status = std::get_if<MachineStatus>(&received->message)) {
+        good = alive_ = status->alive;
+      }
+    }
+    silence_.look(good, seconds());
+    if (now - asked_ > ASK_EVERY) {
+      asked_ = now;
+      gateway_.send(Ask{});
+    }
+    return gateway_.open() && alive_ && silence_.still() < ANSWER_LASTS;
+  }
+
+ private:
+  const std::string path_;
+  LocalConnection gateway_;
+  Clock::time_point tried_, asked_;
+  bool alive_ = false;
+  Stillness silence_;
+};
+
+class Server {
+ public:
+  explicit Server(const std::string& folder)
+      : listener_(listenAt(folder + "/" + STREAM_SOCKET)), watch_(folder + "/" + GATEWAY_SOCKET) {}
+
+  /// Waits for a controller whose configuration is loaded; none when it is to end before.
+  std::unique_ptr<Component> component() const {
+    Clock::time_point found = Clock::now();
+    while (!stopRequested()) {
+      // hal_init() by itself would make the segment, with the wrong owner.
+      if (::shmget(HAL_SEGMENT, 0, 0) < 0) {
+        found = Clock::now();
+      } else {
+        try {
+          return std::make_unique<Component>();
+        } catch (const Error&) {
+          if (Clock::now() - found > LOADING) throw;
+        }
+      }
+      std::this_thread::sleep_for(TRY_EVERY);
+    }
+    return nullptr;
+  }
+
+  /// @return the exit code
+  int serve(Component& component) {
+    Stillness silence;
+    while (!stopRequested()) {
+      pollfd entry{listener_.get(), POLLIN, 0};
+      ::poll(&entry, 1, READ_EVERY);
+      if (std::optional<LocalConnection> connection = acceptFrom(listener_)) {
+        clients_.push_back(std::move(*connection));
+      }
+      component.permit(watch_.alive());
+      bool heard = false;
+      for (ServoBlock block = component.read(); !block.samples.empty(); block = component.read()) {
+        heard = true;
+        for (LocalConnection& client : clients_) {
+          client.send(block);
+        }
+      }
+      for (LocalConnection& client : clients_) {
+        listen(client, component);
+      }
+      clients_.remove_if([](const LocalConnection& client) { return !client.open(); });
+      if (silence.look(heard, seconds()) > SILENT) {
+        std::cerr << "linuxcnc_stream: the controller has fallen silent\n";
+        return GONE;
+      }
+    }
+    return 0;
+  }
+
+ private:
+  static void listen(LocalConnection& client, Component& component) {
+    client.flush();
+    client.receive();
+    while (const std::optional<Received> received = client.next()) {
+      if (const auto* load = std::get_if<SetLoad>(&received->message)) {
+        component.setLoad(load->spindle_load);
+      }
+    }
+  }
+
+  LocalDescriptor listener_;
+  Watch watch_;
+  std::list<LocalConnection> clients_;
+};
+
+}  // namespace
+}  // namespace smartmill::cnc::linuxcnc
+
+int main(int argc, char** argv) {
+  using namespace smartmill::cnc::linuxcnc;
+  std::string folder;
+  smartmill::CommandLine line{
+      "Reads every servo cycle of the LinuxCNC on this computer (docs/linuxcnc.md); ends with code 3 when it "
+      "goes."};
+  line.option("folder", folder, "of the machine: its stream.socket is served").required();
+  return smartmill::runProgram(line, argc, argv, [&]() -> int {
+    catchStopSignals();
+    rtapi_set_msg_level(RTAPI_MSG_NONE);
+    Server server(folder);
+    const std::unique_ptr<Component> component = server.component();
+    return component ? server.serve(*component) : 0;
+  });
+}

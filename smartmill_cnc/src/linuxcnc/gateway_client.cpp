@@ -1,0 +1,49 @@
+#include "smartmill_cnc/linuxcnc/gateway_client.h"
+
+#include <chrono>
+
+#include "smartmill_core/error.h"
+
+namespace smartmill::cnc::linuxcnc {
+
+GatewayClient::GatewayClient(const std::string& folder, double timeout)
+    : path_(folder + "/" + GATEWAY_SOCKET), timeout_(timeout) {
+}
+
+void GatewayClient::connect() {
+  connection_ = LocalConnection::to(path_);
+}
+
+template <class Answer>
+Answer GatewayClient::exchange(const Message& question) {
+  using Clock = std::chrono::steady_clock;
+  const Clock::time_point begin = Clock::now();
+  connection_.send(question, ++sequence_);
+  while (connection_.open()) {
+    connection_.receive();
+    while (std::optional<Received> received = connection_.next()) {
+      Answer* answer = std::get_if<Answer>(&received->message);
+      if (received->sequence == sequence_ && answer) {
+        return std::move(*answer);
+      }
+    }
+    connection_.flush();
+    const double left = timeout_ - std::chrono::duration<double>(Clock::now() - begin).count();
+    if (left <= 0.0) {
+      connection_.close();
+      throw Error(path_ + ": no answer in time");
+    }
+    connection_.wait(connection_.unsent() ? std::min(left, 0.005) : left);
+  }
+  throw Error(path_ + ": " + (connection_.fault().empty() ? "not connected" : connection_.fault()));
+}
+
+MachineStatus GatewayClient::status() {
+  return exchange<MachineStatus>(Ask{});
+}
+
+Reply GatewayClient::carryOut(const Command& command) {
+  return exchange<Reply>(command);
+}
+
+}  // namespace smartmill::cnc::linuxcnc

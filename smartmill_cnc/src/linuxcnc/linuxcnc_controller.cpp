@@ -1,0 +1,268 @@
+#include "smartmill_cnc/linuxcnc/linuxcnc_controller.h"
+
+#include <cmath>
+#include <cstdio>
+#include <sstream>
+#include <utility>
+
+#include "smartmill_cnc/linuxcnc/gateway_client.h"
+#include "smartmill_cnc/linuxcnc/stillness.h"
+#include "smartmill_core/error.h"
+#include "smartmill_core/units.h"
+
+namespace smartmill::cnc::linuxcnc {
+namespace {
+
+constexpr int DECIMALS = 4;            // of mm; LinuxCNC computes in doubles
+constexpr double INCREMENT = 1e-7;     // [m]
+constexpr double NO_WAY = 1e-9;        // [m] a distance to go below this is none
+constexpr double STREAM_SILENT = 0.4;  // [s]
+constexpr int ORIENT_MACRO = 1133;     // what M119 turns to, 0 .. 4095, as on a Fanuc
+constexpr const char* UNMARK = "M68 E0 Q0\n";
+constexpr const char* STOP = "M5\nM66 P0 L3 Q30\n";  // waits for the input "spindle stands"
+
+std::string number(double value) {
+  char text[40];
+  std::snprintf(text, sizeof text, "%.4f", value);
+  return text;
+}
+
+/// One block: its words are separated by blanks (checkProgram).
+std::string blockText(const std::string& line, std::size_t count) {
+  std::istringstream words(line);
+  std::string word, out, tail;
+  bool dwell = false, moves = false;
+  while (words >> word) {
+    const char letter = word.front();
+    dwell = dwell || word == "G4";
+    if (dwell && (letter == 'P' || letter == 'X')) {
+      const double value = std::stod(word.substr(1));
+      word = "P" + number(letter == 'P' ? 1e-3 * value : value);
+    } else if (word == "M5") {
+      tail = std::string(UNMARK) + STOP;
+      continue;
+    } else if (word == "M119") {
+      tail = std::string(UNMARK) + STOP + "M19 R[#" + std::to_string(ORIENT_MACRO) + "*360/4096] Q20\n";
+      continue;
+    } else {
+      moves = moves || (letter >= 'X' && letter <= 'Z');
+    }
+    out += (out.empty() ? "" : " ") + word;
+  }
+  const std::string mark = moves ? "M67 E0 Q" + std::to_string(count) + "\n" : "";
+  return mark + (out.empty() ? "" : out + "\n") + tail;
+}
+
+Failure::Kind kindOf(Reply::Code code) {
+  switch (code) {
+    case Reply::Code::lost:
+      return Failure::Kind::lost;
+    case Reply::Code::emergency:
+      return Failure::Kind::alarm;
+    case Reply::Code::wrong_mode:
+      return Failure::Kind::wrong_mode;
+    case Reply::Code::not_yet:
+      return Failure::Kind::not_yet;
+    case Reply::Code::done:
+    case Reply::Code::refused:
+      break;
+  }
+  return Failure::Kind::refused;
+}
+
+class LinuxCncController : public Controller {
+ public:
+  LinuxCncController(const LinuxCncParameters& parameters, std::shared_ptr<const ServoStream> stream,
+                     double (*now)())
+      : folder_(parameters.folder),
+        client_(parameters.folder, parameters.timeout),
+        stream_(std::move(stream)),
+        now_(now) {}
+
+  std::string name() const override { return "controller LinuxCNC in " + folder_; }
+
+  Result<std::string> connect() override {
+    try {
+      client_.connect();
+      const MachineStatus status = client_.status();
+      if (!status.alive || !status.homed) {
+        return lost("cannot connect to the " + name() +
+                    (status.alive ? ": nobody has made it ready (linuxcnc_panel)" : ": it does not run"));
+      }
+    } catch (const Error& e) {
+      return lost(e.what());
+    }
+    return std::string("LinuxCNC");
+  }
+  bool connected() const override { return client_.connected(); }
+  void close() override { client_.close(); }
+
+  Result<Reading> read() override {
+    try {
+      status_ = client_.status();
+    } catch (const Error& e) {
+      return lost(e.what());
+    }
+    if (!status_.alive) {
+      return lost("connection to the " + name() + " lost: its task has stopped");
+    }
+    const std::optional<ServoSample> servo = stream_->latest();
+    const std::uint64_t count = stream_->count();
+    const double silence = silence_.look(std::exchange(servo_count_, count) != count, now_());
+    if (!servo || silence > STREAM_SILENT) {
+      return lost("connection to the " + name() + " lost: its servo stream is silent");
+    }
+    return readingOf(*servo);
+  }
+
+  Status setVariable(int number, double value) override { return tell({Word::variable, number, value, {}}); }
+
+  DialectOptions dialect() const override {
+    DialectOptions options;
+    options.marker_macro = 0;  // it needs none
+    options.decimals = DECIMALS;
+    return options;
+  }
+  std::string orientProgram(double angle) const override { return cnc::orientProgram(angle, ORIENT_MACRO); }
+
+  Status openPrograms() override {
+    const Status opened = tell({Word::open, 0, 0.0, {}});
+    open_ = static_cast<bool>(opened);
+    if (open_) {
+      status_.mode = MachineStatus::Mode::mdi;
+    }
+    return opened;
+  }
+  bool programsOpen() const override { return open_ && client_.connected(); }
+  Status checkPrograms() override {
+    if (status_.mode == MachineStatus::Mode::mdi) {
+      return {};
+    }
+    open_ = false;
+    return Failure{Failure::Kind::wrong_mode, "the controller has been taken out of MDI"};
+  }
+  Status closePrograms() override {
+    return std::exchange(open_, false) ? tell({Word::close, 0, 0.0, {}}) : Status();
+  }
+
+  void begin(const std::string& program) override {
+    text_ = linuxCncText(program);
+    ++number_;
+    complete_ = false;
+  }
+  Status send() override {
+    const Status taken = tell({Word::run, number_, 0.0, text_});
+    complete_ = static_cast<bool>(taken);
+    if (!taken && taken.failure().kind == Failure::Kind::not_yet) {
+      return {};
+    }
+    open_ = open_ && complete_;
+    return taken;
+  }
+  Transfer transfer() const override { return {complete_ ? text_.size() : 0, text_.size(), complete_}; }
+  Status abandonPrograms() override {
+    open_ = false;
+    return tell({Word::abort, 0, 0.0, {}});
+  }
+  Status abort() override { return abandonPrograms(); }
+
+ private:
+  Failure lost(const std::string& why) {
+    client_.close();
+    open_ = false;
+    return {Failure::Kind::lost, why};
+  }
+
+  Status tell(const Command& command) {
+    try {
+      const Reply reply = client_.carryOut(command);
+      if (reply.code == Reply::Code::done) {
+        return {};
+      }
+      return reply.code == Reply::Code::lost ? lost(reply.text) : Failure{kindOf(reply.code), reply.text};
+    } catch (const Error& e) {
+      return lost(e.what());
+    }
+  }
+
+  /// What arming and running look at: whether it takes programs from outside.
+  CncMode mode() const {
+    switch (status_.mode) {
+      case MachineStatus::Mode::mdi:
+        return CncMode::dnc;
+      case MachineStatus::Mode::manual:
+        return open_ || status_.busy ? CncMode::jog : CncMode::dnc;
+      case MachineStatus::Mode::automatic:
+        break;
+    }
+    return CncMode::mem;
+  }
+
+  Reading readingOf(const ServoSample& servo) const {
+    Reading reading;
+    CncState& state = reading.state;
+    const bool on = status_.state == MachineStatus::State::on;
+    state.mode = mode();
+    state.run = status_.held   ? CncRun::hold
+                : status_.busy ? CncRun::start
+                : open_        ? CncRun::stop
+                               : CncRun::reset;
+    state.motion = !status_.in_position || std::abs(status_.velocity) > 0.0;
+    state.emergency = status_.state == MachineStatus::State::emergency;
+    state.alarm = !status_.errors.empty() || (!on && !state.emergency);
+    state.alarm_text = status_.errors.empty() && state.alarm ? "the machine is off" : status_.errors;
+    state.sequence = status_.line;
+    state.axes = {"X", "Y", "Z"};
+    state.position.assign(status_.position.begin(), status_.position.end());
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const double left = status_.distance_to_go[axis];
+      state.distance_to_go.push_back(std::abs(left) < NO_WAY ? 0.0 : left);
+      reading.absolute.push_back(status_.position[axis] - status_.offset[axis]);
+    }
+    state.spindle_speed = std::abs(servo.spindle_speed);
+    state.feed = status_.velocity;
+    reading.increment = INCREMENT;
+    reading.at_rest = !state.motion && status_.dwell_left <= 0.0;
+    reading.program_done = complete_ && status_.done == number_;
+    LoadSample load;
+    load.spindle_load = servo.spindle_load;
+    load.spindle_speed = state.spindle_speed;
+    load.axes = state.axes;
+    load.axis_load.assign(3, NOT_A_NUMBER);
+    reading.load = std::move(load);
+    return reading;
+  }
+
+  const std::string folder_;
+  GatewayClient client_;
+  std::shared_ptr<const ServoStream> stream_;
+  double (*now_)();
+  Stillness silence_;
+  std::uint64_t servo_count_ = 0;
+  MachineStatus status_;
+  bool open_ = false, complete_ = false;
+  std::string text_;
+  std::int32_t number_ = 0;
+};
+
+}  // namespace
+
+std::string linuxCncText(const std::string& program) {
+  std::string text = "G21 G94 G61.1\n", line;
+  std::istringstream lines(program);
+  for (std::size_t count = 1; std::getline(lines, line); ++count) {
+    text += line.empty() ? "" : line.front() == '#' ? line + "\n" : blockText(line, count);
+  }
+  return text + UNMARK;
+}
+
+std::unique_ptr<Controller> makeLinuxCncController(const LinuxCncParameters& parameters,
+                                                   std::shared_ptr<const ServoStream> stream,
+                                                   double (*now)()) {
+  if (parameters.folder.empty()) {
+    throw Error("linuxcnc_folder: the folder of the machine is due");
+  }
+  return std::make_unique<LinuxCncController>(parameters, std::move(stream), now);
+}
+
+}  // namespace smartmill::cnc::linuxcnc

@@ -1,0 +1,161 @@
+#include "smartmill_cnc/linuxcnc/servo_stream.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "smartmill_core/error.h"
+
+namespace smartmill::cnc::linuxcnc {
+namespace {
+
+constexpr double SETTLING = 0.5;           // [s] of arrivals before times are told
+constexpr double WINDOW = 10.0;            // [s] in which some sample has waited for nobody
+constexpr double SLEW = 1e-4;              // [1] the zero follows by at most this
+constexpr double LATE_BIN = 1e-4;          // [s]
+constexpr double TRY_EVERY = 0.2;          // [s]
+constexpr std::uint64_t RESTART = 60'000;  // samples; a larger jump is another start of the controller
+
+}  // namespace
+
+void ServoClock::saw(std::uint64_t number, double arrival) {
+  const double zero = arrival - static_cast<double>(number) * period_;
+  if (!std::exchange(begun_at_all_, true)) {
+    begun_ = window_begun_ = last_ = arrival;
+    zero_ = zero;
+  }
+  window_ = std::min(window_, zero);
+  const double earliest = std::min(window_, before_);
+  if (settled_) {
+    const double most = SLEW * std::max(0.0, arrival - last_);
+    zero_ += std::clamp(earliest - zero_, -most, most);
+  } else {
+    zero_ = earliest;
+    settled_ = arrival - begun_ > SETTLING;
+  }
+  last_ = arrival;
+  if (arrival - window_begun_ > WINDOW) {
+    window_begun_ = arrival;
+    before_ = std::exchange(window_, std::numeric_limits<double>::infinity());
+  }
+}
+
+ServoStream::ServoStream(const std::string& folder) : path_(folder + "/" + STREAM_SOCKET) {
+}
+
+std::vector<ServoStretch> ServoStream::step(double wait, double (*now)()) {
+  if (!connection_.open() && (now() - tried_ > TRY_EVERY || now() < tried_)) {
+    tried_ = now();
+    try {
+      connection_ = LocalConnection::to(path_);
+    } catch (const Error&) {
+      // Who reads the machine tells that its stream is silent.
+    }
+  }
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (load_ && connection_.open()) {
+      connection_.send(SetLoad{*std::exchange(load_, std::nullopt)});
+    }
+  }
+  std::vector<ServoStretch> stretches;
+  connection_.wait(wait);
+  connection_.receive();
+  const double arrival = now();
+  while (const std::optional<Received> received = connection_.next()) {
+    if (const auto* block = std::get_if<ServoBlock>(&received->message)) {
+      for (ServoStretch& stretch : take(*block, arrival)) {
+        stretches.push_back(std::move(stretch));
+      }
+    }
+  }
+  return stretches;
+}
+
+void ServoStream::restart(const ServoBlock& block) {
+  clock_ = ServoClock(static_cast<double>(block.period_ns) * 1e-9);
+  next_ = block.first;
+  stretch_ = {};
+  begun_ = true;
+}
+
+std::vector<ServoStretch> ServoStream::take(const ServoBlock& block, double arrival) {
+  std::vector<ServoStretch> stretches;
+  if (block.samples.empty()) {
+    return stretches;
+  }
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const std::uint32_t gap = block.first - static_cast<std::uint32_t>(next_);  // modulo 2^32, as it counts
+  if (!begun_ || gap > RESTART) {
+    statistics_.restarts += statistics_.samples > 0 ? 1 : 0;
+    restart(block);
+  } else if (gap > 0) {
+    statistics_.lost += gap;
+    next_ += gap;
+    if (!stretch_.samples.empty()) {
+      stretches.push_back(std::exchange(stretch_, {}));
+    }
+  }
+  clock_.saw(next_ + block.samples.size() - 1, arrival);
+  for (const ServoSample& sample : block.samples) {
+    const std::uint64_t number = next_++;
+    ++statistics_.samples;
+    if (!clock_.settled()) {
+      continue;
+    }
+    countLate(arrival - clock_.timeOf(number));
+    if (stretch_.samples.empty()) {
+      stretch_.first = number;
+      stretch_.stamp = clock_.timeOf(number);
+    }
+    stretch_.samples.push_back(sample);
+    if (stretch_.samples.size() == STRETCH) {
+      stretches.push_back(std::exchange(stretch_, {}));
+    }
+  }
+  latest_ = block.samples.back();
+  return stretches;
+}
+
+void ServoStream::countLate(double late) {
+  const double bin = std::clamp(late / LATE_BIN, 0.0, static_cast<double>(LATE_BINS - 1));
+  ++late_[static_cast<std::size_t>(bin)];
+  statistics_.late_worst = std::max(statistics_.late_worst, late);
+}
+
+std::optional<ServoSample> ServoStream::latest() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return latest_;
+}
+
+std::uint64_t ServoStream::count() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return statistics_.samples;
+}
+
+void ServoStream::setLoad(double spindle_load) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  load_ = spindle_load;
+}
+
+ServoStatistics ServoStream::statistics() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  ServoStatistics result = statistics_;
+  std::uint64_t all = 0, below = 0;
+  for (const std::uint64_t n : late_) {
+    all += n;
+  }
+  for (std::size_t bin = 0; bin < LATE_BINS; ++bin) {
+    const bool median_due = 2 * below < all, last_due = 100 * below < 99 * all;
+    below += late_[bin];
+    const double end = static_cast<double>(bin + 1) * LATE_BIN;
+    if (median_due && 2 * below >= all) {
+      result.late_median = end;
+    }
+    if (last_due && 100 * below >= 99 * all) {
+      result.late_99 = end;
+    }
+  }
+  return result;
+}
+
+}  // namespace smartmill::cnc::linuxcnc

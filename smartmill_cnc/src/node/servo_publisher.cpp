@@ -1,0 +1,101 @@
+#include "node/servo_publisher.h"
+
+#include <cmath>
+
+#include <smartmill_msgs/LoadSample.h>
+#include <smartmill_msgs/SampleBlock.h>
+#include <smartmill_msgs/SpindleAngle.h>
+
+#include "smartmill_core/math/angle.h"
+#include "smartmill_core/names.h"
+#include "smartmill_ros/conversions.h"
+
+namespace smartmill::cnc {
+namespace {
+
+constexpr const char* SERVO_TOPIC = "cnc/servo";
+constexpr double WAIT = 0.02;    // [s] for what comes next
+constexpr double PERIOD = 1e-3;  // [s] of the servo thread
+
+}  // namespace
+
+double rosSeconds() {
+  return ros::Time::now().toSec();
+}
+
+ServoPublisher::ServoPublisher(ros::NodeHandle nh, NodeShell& shell,
+                               std::shared_ptr<linuxcnc::ServoStream> stream, const std::string& load_input)
+    : stream_(std::move(stream)),
+      servo_(nh.advertise<smartmill_msgs::SampleBlock>(SERVO_TOPIC, STREAM_QUEUE)),
+      angle_(nh.advertise<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE, STREAM_QUEUE)) {
+  if (!load_input.empty()) {
+    shell.inputs().on<smartmill_msgs::LoadSample>(load_input, [this](const auto& load, double) {
+      if (std::isfinite(load.spindle_load)) {
+        stream_->setLoad(load.spindle_load);
+      }
+    });
+  }
+  shell.diagnose("servo stream", [this](auto& status) { diagnose(status); });
+  thread_ = std::thread([this] { run(); });
+}
+
+ServoPublisher::~ServoPublisher() {
+  stopping_ = true;
+  thread_.join();
+}
+
+void ServoPublisher::run() {
+  while (!stopping_) {
+    const double before = rosSeconds();
+    for (const linuxcnc::ServoStretch& stretch : stream_->step(WAIT, rosSeconds)) {
+      publish(stretch);
+    }
+    // Without a connection nothing is waited for there.
+    if (rosSeconds() - before < PERIOD) {
+      std::this_thread::sleep_for(std::chrono::duration<double>(PERIOD));
+    }
+  }
+}
+
+void ServoPublisher::publish(const linuxcnc::ServoStretch& stretch) {
+  SampleBlock block;
+  block.stamp = stretch.stamp;
+  block.sample_rate = 1.0 / PERIOD;
+  block.first_index = stretch.first;
+  block.channels = {
+      "x", "y", "z", "revolutions", "spindle_speed", "velocity", "distance_to_go", "spindle_load", "marker"};
+  block.units = {"m", "m", "m", "1", "rad/s", "m/s", "m", "1", "1"};
+  SpindleAngle angle;
+  for (const linuxcnc::ServoSample& s : stretch.samples) {
+    block.samples.insert(block.samples.end(),
+                         {s.position[0], s.position[1], s.position[2], s.revolutions, s.spindle_speed,
+                          s.velocity, s.distance_to_go, s.spindle_load, s.marker});
+    const auto index = static_cast<double>(block.size() - 1);
+    angle.stamp = stretch.stamp + index * PERIOD;
+    angle.angle = wrapped(units::TWO_PI * (s.revolutions - std::floor(s.revolutions)));
+    angle.speed = std::abs(s.spindle_speed);
+    angle_.publish(toMsg(angle));
+  }
+  servo_.publish(toMsg(block));
+}
+
+void ServoPublisher::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
+  using Level = diagnostic_msgs::DiagnosticStatus;
+  const linuxcnc::ServoStatistics seen = stream_->statistics();
+  const std::uint64_t before = std::exchange(told_, seen.samples);
+  if (before == seen.samples) {
+    status.summary(Level::ERROR, "silent");
+  } else if (seen.lost > 0) {
+    status.summary(Level::WARN, "samples were lost");
+  } else {
+    status.summary(Level::OK, "every servo cycle has come");
+  }
+  status.add("samples [1]", std::to_string(seen.samples));
+  status.add("lost [1]", std::to_string(seen.lost));
+  status.add("starts of the controller seen anew [1]", std::to_string(seen.restarts));
+  status.addf("late, median [ms]", "%.1f", 1e3 * seen.late_median);
+  status.addf("late, 99 % [ms]", "%.1f", 1e3 * seen.late_99);
+  status.addf("late, worst [ms]", "%.1f", 1e3 * seen.late_worst);
+}
+
+}  // namespace smartmill::cnc

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <ros/ros.h>
+
+#include <atomic>
+#include <memory>
+#include <string>
+#include <thread>
+
+#include "smartmill_cnc/linuxcnc/servo_stream.h"
+#include "smartmill_ros/node_shell.h"
+
+namespace smartmill::cnc {
+
+/// Publishes what a LinuxCNC does in every servo cycle: cnc/servo in blocks, spindle/angle one by one; hands
+/// the load of a meter outside the controller back to it. Tells loss and jitter in the diagnostics.
+class ServoPublisher {
+ public:
+  /// @param load_input topic of that meter; empty: none
+  ServoPublisher(ros::NodeHandle nh, NodeShell& shell, std::shared_ptr<linuxcnc::ServoStream> stream,
+                 const std::string& load_input);
+  ~ServoPublisher();
+  ServoPublisher(const ServoPublisher&) = delete;
+  ServoPublisher& operator=(const ServoPublisher&) = delete;
+
+ private:
+  void run();
+  void publish(const linuxcnc::ServoStretch& stretch);
+  void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
+
+  std::shared_ptr<linuxcnc::ServoStream> stream_;
+  ros::Publisher servo_, angle_;
+  std::uint64_t told_ = 0;  // samples at the last diagnostics
+  std::atomic<bool> stopping_{false};
+  std::thread thread_;
+};
+
+/// [s] of the clock that stamps are of.
+double rosSeconds();
+
+}  // namespace smartmill::cnc

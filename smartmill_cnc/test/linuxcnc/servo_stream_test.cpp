@@ -1,0 +1,127 @@
+#include "smartmill_cnc/linuxcnc/servo_stream.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "smartmill_cnc/linuxcnc/stillness.h"
+
+namespace smartmill::cnc::linuxcnc {
+namespace {
+
+constexpr double PERIOD = 1e-3;
+
+ServoBlock blockOf(std::uint32_t first, std::size_t count) {
+  ServoBlock block;
+  block.first = first;
+  block.samples.resize(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    block.samples[i].revolutions = static_cast<double>(first + i);
+  }
+  return block;
+}
+
+/// Arrivals as they are on a busy computer: some at once, most late, by 3 ms on average, seldom by 80 ms.
+double late(std::mt19937& random) {
+  const double usual = std::exponential_distribution<double>(1.0 / 3e-3)(random);
+  return std::bernoulli_distribution(0.01)(random) ? 0.08 : usual;
+}
+
+TEST(ServoClock, TimesAreThoseOfTheEarliestArrivals) {
+  std::mt19937 random(3);
+  ServoClock clock(PERIOD);
+  for (std::uint64_t n = 0; n < 60'000; n += 3) {
+    clock.saw(n, 100.0 + PERIOD * static_cast<double>(n) + late(random));
+    if (n > 10'000) {
+      ASSERT_NEAR(clock.timeOf(n), 100.0 + PERIOD * static_cast<double>(n), 1e-4);
+    }
+  }
+}
+
+TEST(ServoClock, FollowsAClockThatRunsFastOrSlowWithoutASteps) {
+  for (const double drift : {5e-5, -5e-5}) {
+    std::mt19937 random(4);
+    ServoClock clock(PERIOD);
+    double before = 0.0;
+    for (std::uint64_t n = 0; n < 300'000; n += 3) {
+      const double taken = 100.0 + PERIOD * (1.0 + drift) * static_cast<double>(n);
+      clock.saw(n, taken + late(random));
+      if (n > 60'000) {
+        // The earliest arrival of the two last windows of 10 s: at most 20 s of drift old.
+        EXPECT_NEAR(clock.timeOf(n), taken, 20.0 * std::abs(drift) + 1e-4) << n;
+        EXPECT_NEAR(clock.timeOf(n) - before, 3.0 * PERIOD, 3.0 * PERIOD * 0.01 + 1e-4 * 0.1);
+      }
+      before = clock.timeOf(n);
+    }
+  }
+}
+
+TEST(ServoStream, HandsOutStretchesAndCountsLoss) {
+  ServoStream stream("/nowhere");
+  std::vector<ServoStretch> all;
+  std::uint32_t next = 4'294'966'000u;  // its count begins anew in between
+  double now = 50.0;
+  const auto feed = [&](std::uint32_t count) {
+    now += PERIOD * count;
+    for (ServoStretch& s : stream.take(blockOf(next, count), now)) {
+      all.push_back(std::move(s));
+    }
+    next += count;
+  };
+  for (int i = 0; i < 1000; ++i) {
+    feed(3);
+  }
+  next += 7;
+  now += 7 * PERIOD;
+  for (int i = 0; i < 100; ++i) {
+    feed(3);
+  }
+  const ServoStatistics seen = stream.statistics();
+  EXPECT_EQ(seen.samples, 3300u);
+  EXPECT_EQ(seen.lost, 7u);
+  EXPECT_EQ(seen.restarts, 0u);
+  EXPECT_LE(seen.late_worst, 3.1 * PERIOD);  // samples wait for the end of their block
+  ASSERT_GT(all.size(), 100u);
+  std::uint64_t lost = 0;
+  for (std::size_t i = 1; i < all.size(); ++i) {
+    EXPECT_LE(all[i].samples.size(), ServoStream::STRETCH);
+    const std::uint64_t due = all[i - 1].first + all[i - 1].samples.size();
+    lost += all[i].first - due;
+    EXPECT_NEAR(all[i].stamp - all[i - 1].stamp,
+                PERIOD * static_cast<double>(all[i].first - all[i - 1].first), 1e-5);
+  }
+  EXPECT_EQ(lost, 7u);
+  ASSERT_TRUE(stream.latest());
+  EXPECT_EQ(stream.latest()->revolutions, static_cast<double>(next - 1));
+  EXPECT_EQ(stream.count(), 3300u);
+}
+
+TEST(ServoStream, AnotherStartOfTheControllerIsNoLoss) {
+  ServoStream stream("/nowhere");
+  for (std::uint32_t i = 0; i < 100; ++i) {
+    stream.take(blockOf(100'000 + 10 * i, 10), 1.0 + 0.01 * i);
+  }
+  for (std::uint32_t i = 0; i < 100; ++i) {
+    stream.take(blockOf(10 * i, 10), 5.0 + 0.01 * i);
+  }
+  EXPECT_EQ(stream.statistics().lost, 0u);
+  EXPECT_EQ(stream.statistics().restarts, 1u);
+}
+
+TEST(Stillness, ThePausesOfTheObserverAreNotThoseOfTheWorld) {
+  Stillness stillness;
+  double now = 10.0;
+  EXPECT_EQ(stillness.look(true, now), 0.0);
+  for (int i = 0; i < 20; ++i) {
+    stillness.look(false, now += 0.01);
+  }
+  EXPECT_NEAR(stillness.still(), 0.2, 1e-12);
+  EXPECT_NEAR(stillness.look(false, now += 30.0), 0.2 + Stillness::LONGEST_STEP, 1e-12);
+  EXPECT_NEAR(stillness.look(false, now -= 5.0), 0.2 + Stillness::LONGEST_STEP, 1e-12);
+  EXPECT_EQ(stillness.look(true, now + 0.01), 0.0);
+}
+
+}  // namespace
+}  // namespace smartmill::cnc::linuxcnc
