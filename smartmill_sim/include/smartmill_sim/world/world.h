@@ -10,6 +10,7 @@
 #include "smartmill_core/parameters/parameter_table.h"
 #include "smartmill_core/signal/streams.h"
 #include "smartmill_sim/controller/controller.h"
+#include "smartmill_sim/world/station_traits.h"
 
 namespace smartmill::sim {
 
@@ -20,6 +21,7 @@ struct WorldOptions {
   double tap_contact = 4.0e-4;
   double operator_delay = 0.0;
   double force_scatter = 0.05;
+  StationTraits hammer;
 
   void declare(ParameterTable& table) {
     table.number("seed", seed, "1", Range::notNegative(), "of noise and scatter");
@@ -30,6 +32,8 @@ struct WorldOptions {
                  "above 0 a person hits the workpiece, so long after being asked; 0: automatic");
     table.number("force_scatter", force_scatter, "1", Range::closed(0.0, 0.5),
                  "standard deviation of a blow's peak over its nominal value");
+    table.part("hammer_", hammer);
+    table.section();
   }
   /// @throws Error naming key and value.
   void validate() const;
@@ -46,7 +50,7 @@ class World {
 
   /// What the sensors deliver and what is true; stamps [s] count from sample 0.
   struct Block {
-    SampleBlock hammer;       ///< hammer [N] positive in compression, gap [V]
+    SampleBlock hammer;       ///< hammer [N] positive in compression, gap [V]; gap_cross [V] where it stands
     SampleBlock dynamometer;  ///< fx, fy, fz [N]
     std::array<SpindleAngle, ANGLES> angle;
     ForceBlock force;       ///< true force of the cut on the tool
@@ -63,6 +67,9 @@ class World {
 
   /// May be used from any thread.
   Controller& controller();
+
+  /// Direct receptances of the tool's tip, of the model or of the hammer station's beam.
+  const ToolTip& toolTip() const;
 
   /// Fires a hammer, once. May be called from any thread. @param point tool or force_sensor @param message
   /// one line
