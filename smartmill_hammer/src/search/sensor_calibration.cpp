@@ -3,9 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <utility>
 
+#include <Eigen/Core>
+
 #include "smartmill_core/error.h"
+#include "smartmill_core/math/linear_algebra.h"
 
 namespace smartmill {
 namespace hammer {
@@ -13,10 +17,15 @@ namespace {
 
 /// Readings this close to the end of the range tell nothing about the distance.
 constexpr double RANGE_SHARE = 0.95;
+/// The sensor's curve is taken from readings within this share of the gap at zero volt.
+constexpr double CURVE_REACH = 1.0;
+/// A bend beyond these shares of the nominal gap is none.
+constexpr double LEAST_BEND = 0.4, MOST_BEND = 4.0;
 
 }  // namespace
 
-SensorCalibration::SensorCalibration(const SensorCalibrationOptions& options) : options_(options) {
+SensorCalibration::SensorCalibration(const SensorCalibrationOptions& options)
+    : options_(options), bend_gap_(std::numeric_limits<double>::quiet_NaN()) {
   const auto& o = options_;
   if (!(o.least_jog > 0.0 && o.first_jog >= o.least_jog && o.max_jog >= o.first_jog)) {
     throw Error("sensor calibration: 0 < least_jog <= first_jog <= max_jog is due, got " +
@@ -36,6 +45,7 @@ double SensorCalibration::nominalGap(double volt) const {
 void SensorCalibration::start(double volt, double volt_std) {
   volt_ = volt;
   volt_std_ = volt_std;
+  readings_.push_back({0.0, volt});
   if (clipped(volt)) {
     ask(volt < 0.0 ? options_.max_jog : -options_.max_jog);
   } else {
@@ -48,6 +58,22 @@ void SensorCalibration::ask(double distance) {
   const double rounded = std::round(distance / options_.resolution) * options_.resolution;
   if (jogs_ >= options_.max_jogs) {
     return fail("the sensor's voltage is not zero after " + std::to_string(jogs_) + " jogs");
+  }
+  if (phase_ == Phase::approach && travelled_ + rounded > options_.safe_travel - options_.check_jog) {
+    const double left = options_.safe_travel - options_.check_jog - travelled_;
+    const double step = std::floor(left / options_.resolution) * options_.resolution;
+    if (step >= options_.least_jog) {
+      next_ = step;
+      return;
+    }
+    held_back_ = true;
+    if (sensitivity_ > 0.0) return check();
+    char text[160];
+    std::snprintf(
+        text, sizeof text,
+        "the sensor is still out of range (%.2f V) where the tool's edges may touch it, %.2f mm nearer",
+        volt_, 1e3 * travelled_);
+    return fail(text);
   }
   if (travelled_ + rounded > options_.max_travel) {
     char text[120];
@@ -75,6 +101,7 @@ void SensorCalibration::give(double volt, double volt_std) {
   const bool usable = !clipped(volt) && !clipped(volt_);
   volt_ = volt;
   volt_std_ = volt_std;
+  readings_.push_back({travelled_, volt});
   switch (phase_) {
     case Phase::check_near:
       near_volt_ = volt;
@@ -92,18 +119,21 @@ void SensorCalibration::give(double volt, double volt_std) {
       return ask(options_.check_jog);
     }
     case Phase::check_back:
-      state_ = State::done;
-      return;
+      return finish();
     case Phase::approach:
       break;
   }
-  if (!usable) {  // no sensitivity yet: on by the longest jog (the thesis's program does so too)
-    if (!clipped(volt)) return ask(volt < 0.0 ? options_.first_jog : -options_.first_jog);
-    return ask(volt < 0.0 ? options_.max_jog : -options_.max_jog);
-  }
+  if (usable) return approached(change, moved, noise);
+  // No sensitivity yet: on by the longest jog (the thesis's program does so too).
+  if (!clipped(volt)) return ask(volt < 0.0 ? options_.first_jog : -options_.first_jog);
+  ask(volt < 0.0 ? options_.max_jog : -options_.max_jog);
+}
+
+void SensorCalibration::approached(double change, double moved, double noise) {
   const double slope = change / moved;  // eq. 4.8
   const bool clear = std::abs(change) >= 5.0 * noise;
-  if (!clear && volt < -0.5 * options_.range_volt) return ask(options_.max_jog);  // far off, hardly sensitive
+  // Far off, hardly sensitive.
+  if (!clear && volt_ < -0.5 * options_.range_volt) return ask(options_.max_jog);
   if (!clear || !(slope > 0.0)) {
     char text[120];
     std::snprintf(text, sizeof text, "the sensor answers a jog of %.0f um by %.4f V: no sensitivity",
@@ -119,15 +149,58 @@ void SensorCalibration::give(double volt, double volt_std) {
 void SensorCalibration::plan() {
   const double remaining = -volt_ * sensitivity_;  // eq. 4.9
   if (std::abs(volt_) <= options_.zero_volt || std::abs(remaining) <= 0.5 * options_.least_jog) {
-    if (options_.check_jog <= 0.0) {
-      state_ = State::done;
-      return;
-    }
-    phase_ = Phase::check_near;
-    return ask(options_.check_jog);
+    return check();
   }
   const double size = std::clamp(0.5 * std::abs(remaining), options_.least_jog, options_.max_jog);
   ask(std::copysign(size, remaining));
+}
+
+void SensorCalibration::check() {
+  if (options_.check_jog <= 0.0) return finish();
+  phase_ = Phase::check_near;
+  ask(options_.check_jog);
+}
+
+void SensorCalibration::finish() {
+  bend_gap_ = hyperbola();
+  if (std::isfinite(bend_gap_) && options_.check_jog > 0.0) {
+    // K / (g^2 - d^2) is what +-d measures of K / g^2.
+    const double share = options_.check_jog / bend_gap_;
+    sensitivity_ /= 1.0 - share * share;
+  }
+  if (held_back_ && sensitivity_std_ > options_.largest_std * sensitivity_) {
+    char text[160];
+    std::snprintf(text, sizeof text,
+                  "the tool's edges hold it back at %.2f V, where the sensitivity is known to %.1f %% only",
+                  volt_, 100.0 * sensitivity_std_ / sensitivity_);
+    return fail(text);
+  }
+  state_ = State::done;
+}
+
+/// [m] g of V = a + K / (g - (x - x_now)), least squares of V x = g V + a x + c over the readings nearby.
+double SensorCalibration::hyperbola() const {
+  const double reach = CURVE_REACH * options_.gap_at_zero_volt;
+  std::vector<Reading> near;
+  for (const Reading& r : readings_) {
+    if (!clipped(r.volt) && std::abs(r.at - travelled_) <= reach) near.push_back(r);
+  }
+  const double none = std::numeric_limits<double>::quiet_NaN();
+  double furthest = 0.0;
+  for (const Reading& r : near) furthest = std::max(furthest, std::abs(r.at - travelled_));
+  if (near.size() < 5 || furthest < 0.2 * options_.gap_at_zero_volt) return none;
+  const auto rows = static_cast<Eigen::Index>(near.size());
+  Eigen::MatrixXd a(rows, 3), b(rows, 1);
+  for (Eigen::Index i = 0; i < rows; ++i) {
+    const Reading& r = near[static_cast<std::size_t>(i)];
+    const double x = (r.at - travelled_) / options_.gap_at_zero_volt, v = r.volt / options_.range_volt;
+    a.row(i) << v, x, 1.0;
+    b(i, 0) = v * x;
+  }
+  const linear::LeastSquares fit = linear::leastSquares(a, b);
+  const double gap = fit.x(0, 0);
+  if (fit.rank < 3 || !(gap > LEAST_BEND && gap < MOST_BEND)) return none;
+  return gap * options_.gap_at_zero_volt;
 }
 
 void SensorCalibration::fail(std::string reason) {

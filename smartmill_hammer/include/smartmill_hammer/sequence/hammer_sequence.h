@@ -28,6 +28,7 @@ struct HammerParameters : HitTestParameters {
   double flute_tolerance = 0.02618;
   double noise_sigmas = 5.0;
   double least_rise = 0.005;
+  int golden_only = 0;
   // When a command is done.
   double command_delay = 0.2;
   double settle_time = 0.05;
@@ -43,6 +44,7 @@ struct HammerParameters : HitTestParameters {
   double retract_height = 50.0e-3;
   double approach_feed = 16.7e-3;
   double jog_feed = 1.0e-3;
+  double near_path = 1.0e-3;
   // Sensor calibration.
   double first_jog = 50.0e-6;
   double max_jog = 100.0e-6;
@@ -56,6 +58,7 @@ struct HammerParameters : HitTestParameters {
   // Hits.
   double exponential_time = 0.0;
   int straighten_sensor = 1;
+  int cross_frf = 1;
 
   HammerParameters() {
     fit_low = 200.0;
@@ -77,6 +80,11 @@ struct MeasureFrfResult {
   double flute_low = NOT_A_NUMBER;        ///< [rad] spindle angle with a flute at the sensor, at the tip
   double flute_high = NOT_A_NUMBER;       ///< [rad] halfway up to the hammer
   double flute_hammer = NOT_A_NUMBER;     ///< [rad] a flute at the hammer (eq. 4.1)
+  double flute_sure = NOT_A_NUMBER;       ///< [1] probability that both searches hold their flute, by noise
+  int spindle_moves = 0;                  ///< [1] orientations of the spindle
+  /// Struck along the direction, read at right angles to it; direction "xy" or "yx". Empty: no second sensor,
+  /// or the message says why.
+  MeasuredFrf cross;
 };
 
 struct Waypoint {
@@ -153,11 +161,20 @@ class HammerSequence {
     to_tip,
     orient_flute,
     calibrate,
+    calibrate_cross,
+    calibrate_again,
     strike,
     stopping,
     retract
   };
   enum class Wait { nothing, position, angle, average, hit, rest, standstill };
+
+  /// A sensor as its calibration left it.
+  struct SensorState {
+    double sensitivity = NOT_A_NUMBER, sensitivity_std = NOT_A_NUMBER;  // [m/V]
+    double bend_gap = NOT_A_NUMBER;                                     // [m]
+    double volt = 0.0;                                                  // [V] at rest
+  };
 
   void start(double now);
   void orient(double now, double angle);
@@ -168,15 +185,22 @@ class HammerSequence {
   void send(Command command, Wait wait, double timeout);
 
   FluteSearchOptions searchOptions() const;
-  SensorCalibrationOptions calibrationOptions() const;
+  SensorCalibrationOptions calibrationOptions(std::size_t axis) const;
+  double safeTravel(std::size_t axis) const;
+  std::size_t calibratedAxis() const;
+  void sensorKnown(double now);
+  void crossFailed(double now);
+  bool tooNear(double volt);
   void moveToStation(double now);
   void reached(double now);
   void measured(double now, double volt, double volt_std);
   void calibrated(double now, double volt, double volt_std);
   void fluteFound(double now);
   void search(double now);
-  void recorded(double now, HitCollector::Record record);
+  void recorded(double now, HitCollector::Record record, std::optional<HitCollector::Record> cross);
   void badHit(double now, const std::string& why, bool bad_data);
+  ImpactOptions impactOptions(const SensorState& sensor, double factor) const;
+  void evaluateCross(double factor);
   void evaluate();
 
   void abort(double now, FrfCode code, const std::string& why);
@@ -220,8 +244,12 @@ class HammerSequence {
   std::optional<FluteSearch> search_;
   double expected_angle_ = 0.0;
   std::optional<SensorCalibration> calibration_;
-  HitCollector collector_;
-  std::vector<Hit> hits_;
+  SensorState sensor_, cross_sensor_;
+  bool has_cross_ = false;
+  std::string no_cross_;  // why there is no cross FRF
+  int near_samples_ = 0;
+  HitCollector collector_, cross_collector_;
+  std::vector<Hit> hits_, cross_hits_;
   int bad_hits_ = 0;
 
   std::vector<Command> commands_;
