@@ -55,8 +55,8 @@ bool FluteSearch::above(const Point& a, const Point& b) const {
 
 void FluteSearch::give(double angle, double volt, double volt_std) {
   if (state_ != State::searching) return;
-  ++measurements_;
   const Point p{nearAngle(angle, next_), volt, volt_std};
+  readings_.push_back({p.angle, volt});
   if (!bracketed_) {
     bracket(p);
   } else {

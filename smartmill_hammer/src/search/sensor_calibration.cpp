@@ -17,10 +17,11 @@ namespace {
 
 /// Readings this close to the end of the range tell nothing about the distance.
 constexpr double RANGE_SHARE = 0.95;
-/// The sensor's curve is taken from readings within this share of the gap at zero volt.
-constexpr double CURVE_REACH = 1.0;
+/// Readings must reach so far of what is asked; and how often the reach follows the gap found.
+constexpr double LEAST_REACH = 0.2;
+constexpr int CURVE_ROUNDS = 4;
 /// A bend beyond these shares of the nominal gap is none.
-constexpr double LEAST_BEND = 0.4, MOST_BEND = 4.0;
+constexpr double LEAST_BEND = 0.08, MOST_BEND = 4.0;
 
 }  // namespace
 
@@ -68,6 +69,11 @@ void SensorCalibration::ask(double distance) {
     }
     held_back_ = true;
     if (sensitivity_ > 0.0) return check();
+    // Here already: the sensitivity needs a jog all the same, away from the sensor.
+    if (readings_.size() == 1 && !clipped(volt_)) {
+      next_ = -options_.first_jog;
+      return;
+    }
     char text[160];
     std::snprintf(
         text, sizeof text,
@@ -178,17 +184,30 @@ void SensorCalibration::finish() {
   state_ = State::done;
 }
 
-/// [m] g of V = a + K / (g - (x - x_now)), least squares of V x = g V + a x + c over the readings nearby.
+/// [m] g of V = a + K / (g - (x - x_now)) through the readings nearby, as near as that gap itself where
+/// there are enough: further off another part of the tool counts.
 double SensorCalibration::hyperbola() const {
-  const double reach = CURVE_REACH * options_.gap_at_zero_volt;
+  double gap = hyperbola(options_.gap_at_zero_volt);
+  for (int k = 0; k < CURVE_ROUNDS && std::isfinite(gap); ++k) {
+    const double nearer = hyperbola(std::max(gap, 2.0 * options_.check_jog));
+    if (!std::isfinite(nearer)) break;
+    gap = nearer;
+  }
+  return gap;
+}
+
+/// Least squares of V x = g V + a x + c over the readings within `reach` [m]; NaN: too few tell.
+double SensorCalibration::hyperbola(double reach) const {
   std::vector<Reading> near;
+  double furthest = 0.0;
   for (const Reading& r : readings_) {
-    if (!clipped(r.volt) && std::abs(r.at - travelled_) <= reach) near.push_back(r);
+    const double away = std::abs(r.at - travelled_);
+    if (clipped(r.volt) || away > reach) continue;
+    near.push_back(r);
+    furthest = std::max(furthest, away);
   }
   const double none = std::numeric_limits<double>::quiet_NaN();
-  double furthest = 0.0;
-  for (const Reading& r : near) furthest = std::max(furthest, std::abs(r.at - travelled_));
-  if (near.size() < 5 || furthest < 0.2 * options_.gap_at_zero_volt) return none;
+  if (near.size() < 5 || furthest < LEAST_REACH * reach) return none;
   const auto rows = static_cast<Eigen::Index>(near.size());
   Eigen::MatrixXd a(rows, 3), b(rows, 1);
   for (Eigen::Index i = 0; i < rows; ++i) {

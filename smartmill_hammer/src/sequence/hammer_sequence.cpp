@@ -4,6 +4,7 @@
 #include <cctype>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <utility>
 
 #include "smartmill_core/error.h"
@@ -29,6 +30,9 @@ constexpr double NEAR_SHARE = 0.98;
 constexpr int NEAR_SAMPLES = 8;
 /// Of the first search's step: the helix tells the second where to begin.
 constexpr double SECOND_STEP = 0.5;
+/// Of a depth read from the sensor's nominal curve, which a round and fluted tool does not quite follow.
+constexpr double TRUSTED_DEPTH = 0.8;
+constexpr int FACE_STEPS = 24;
 /// Two tips of a fit band: share of the sensor's range that counts as its end.
 constexpr double RANGE_SHARE = 0.98;
 
@@ -514,22 +518,84 @@ std::size_t HammerSequence::calibratedAxis() const {
   return stage_ == Stage::calibrate_cross ? 1 - along : along;
 }
 
-/// [m] towards the sensor until an edge would be as near to its face as allowed: at the station a flute that
-/// points at the sensor leaves about twice the gap at zero volt; one that points past it by an angle a stands
-/// back by R (1 - cos a), and the spindle now stands as it does for the hammer.
-double HammerSequence::safeTravel(std::size_t axis) const {
-  const double turned = axis == static_cast<std::size_t>(direction_) ? 0.0
+void HammerSequence::keepProfile() {
+  profile_.clear();
+  flute_volt_ = search_->volt();
+  flute_gap_ = std::min(2.0 * station_.gap_at_zero_volt, nominalGap(flute_volt_));
+  for (const FluteSearch::Reading& r : search_->readings())
+    profile_.push_back({nearAngle(r.angle, result_.flute_low) - result_.flute_low, retreatOf(r.volt, 0.0)});
+}
+
+double HammerSequence::nominalGap(double volt) const {
+  return station_.gap_at_zero_volt / std::max(0.02, 1.0 + volt / station_.gain_volt);
+}
+
+/// [m] behind a flute at the sensor, of a reading so much nearer than the station.
+double HammerSequence::retreatOf(double volt, double moved) const {
+  const double depth = nominalGap(volt) + moved - nominalGap(flute_volt_);
+  return TRUSTED_DEPTH * std::clamp(depth, 0.0, station_.flute_depth);
+}
+
+/// What a sensor sees with the flute at the hammer belongs to the flanks of the flutes on either side.
+void HammerSequence::addToProfile(std::size_t axis, double volt) {
+  const double off = turnedFrom(axis), moved = target_[axis] - stationPosition()[axis];
+  double ahead = units::TWO_PI, behind = -units::TWO_PI;
+  for (int tooth = 0; tooth < tool_.teeth; ++tooth) {
+    const double turned = std::remainder(off - tool_.toothAngle(tooth), units::TWO_PI);
+    if (turned >= 0.0) ahead = std::min(ahead, turned);
+    if (turned <= 0.0) behind = std::max(behind, turned);
+  }
+  for (const double place : {ahead, behind}) {
+    if (std::abs(place) < units::TWO_PI) profile_.push_back({place, retreatOf(volt, moved)});
+  }
+}
+
+/// [rad] that the spindle, a flute at the hammer, stands from a flute at the sensor of an axis.
+double HammerSequence::turnedFrom(std::size_t axis) const {
+  const double across = axis == static_cast<std::size_t>(direction_) ? 0.0
                         : axis == 0                                  ? 0.5 * units::PI
                                                                      : -0.5 * units::PI;
-  double behind = 2.0 * tool_.radius();
+  return result_.flute_hammer - result_.flute_low - across;
+}
+
+/// [m] at least, of the surface that the sensor would see with the spindle so far from a flute. The root of
+/// the depth runs straight between two readings, which lies below a flank that is round or straight; beyond
+/// the last reading the surface falls towards the gullet.
+double HammerSequence::leastRetreat(double off) const {
+  double least = station_.flute_depth;
   for (int tooth = 0; tooth < tool_.teeth; ++tooth) {
-    const double off = result_.flute_hammer - result_.flute_low + tool_.toothAngle(tooth) - turned;
-    behind = std::min(behind, tool_.radius() * (1.0 - std::cos(off)));
+    const double turned = std::remainder(off - tool_.toothAngle(tooth), units::TWO_PI);
+    const double sense = turned < 0.0 ? -1.0 : 1.0, at = sense * turned;
+    Retreat below, above{std::numeric_limits<double>::infinity(), 0.0};
+    for (const Retreat& r : profile_) {
+      const double place = sense * r.off;
+      if (place > below.off && place <= at) below = {place, r.depth};
+      if (place > at && place < above.off) above = {place, r.depth};
+    }
+    double depth = below.depth;
+    if (std::isfinite(above.off) && above.depth > below.depth) {
+      const double share = (at - below.off) / (above.off - below.off);
+      const double root = std::sqrt(below.depth) + share * (std::sqrt(above.depth) - std::sqrt(below.depth));
+      depth = root * root;
+    }
+    least = std::min(least, depth);
   }
-  const double station = stationPosition()[axis];
-  const double moved = target_[axis] - station;
-  return 2.0 * station_.gap_at_zero_volt + behind - parameters_.min_gap_share * station_.gap_at_zero_volt -
-         moved;
+  return least;
+}
+
+/// [m] towards the sensor until the tool would be as near to its face as allowed. At the station a flute that
+/// points at the sensor leaves about twice the gap at zero volt; now the spindle stands as it does for the
+/// hammer, and what is foremost before the face follows from the first search.
+double HammerSequence::safeTravel(std::size_t axis) const {
+  const double turned = turnedFrom(axis), radius = tool_.radius();
+  const double widest = std::asin(std::min(0.9, 0.5 * parameters_.sensor_face / radius));
+  double behind = 2.0 * radius;
+  for (int k = -FACE_STEPS; k <= FACE_STEPS; ++k) {
+    const double a = widest * k / FACE_STEPS;
+    behind = std::min(behind, radius * (1.0 - std::cos(a)) + leastRetreat(turned - a) * std::cos(a));
+  }
+  const double moved = target_[axis] - stationPosition()[axis];
+  return flute_gap_ - parameters_.min_gap_share * station_.gap_at_zero_volt + behind - moved;
 }
 
 SensorCalibrationOptions HammerSequence::calibrationOptions(std::size_t axis) const {
@@ -570,6 +636,7 @@ void HammerSequence::measured(double now, double volt, double volt_std) {
 
 void HammerSequence::calibrated(double now, double volt, double volt_std) {
   if (!calibration_) {
+    if (stage_ != Stage::calibrate_again) addToProfile(calibratedAxis(), volt);
     calibration_.emplace(calibrationOptions(calibratedAxis()));
     calibration_->start(volt, volt_std);
   } else {
@@ -623,6 +690,7 @@ void HammerSequence::fluteFound(double now) {
   if (stage_ == Stage::search_low) {
     result_.flute_low = search_->angle();
     result_.flute_sure = search_->sure();
+    keepProfile();
     stage_ = Stage::to_height;
     say("lowering the tool to find the flute halfway up to the hammer", 0.28);
     return jog(now, "z", -half, parameters_.approach_feed);

@@ -14,6 +14,7 @@ constexpr double BESIDE = 2e-3;    // [m]
 constexpr double ABOVE = 30e-3;    // [m]
 constexpr double FAR = 4e-3;       // [m]
 constexpr double STANDING = 0.02;  // [rad/s] a hammer that meets no standing tool hits the air
+constexpr double RINGS = 2.0;      // [s] after a blow all is still
 constexpr int LOOK = 32;           // samples between two looks at a moving surface
 constexpr std::array<const char*, 2> AXIS{{"x", "y"}};
 
@@ -121,6 +122,8 @@ void HammerStation::stand(const Place& place, std::mt19937_64& random) {
   if (before != before_) {
     before_ = before;
     faced_.reset();
+    rings_until_ = -1.0;
+    now_ = {{0, 0}};
     for (Way& way : ways_) {
       for (ModalFilter& f : way.read) f.reset();
       for (ModalFilter& f : way.tip) f.reset();
@@ -139,6 +142,7 @@ void HammerStation::stand(const Place& place, std::mt19937_64& random) {
       if (axis != *before_ && !traits_.cross_sensor) continue;
       const double off = place.position[1 - axis] - p[1 - axis] + traits_.beside;
       sensor_[axis].face(surface_, place.angle, above, off);
+      seen_[axis] = Seen();
     }
   }
 }
@@ -147,7 +151,8 @@ HammerStation::Push HammerStation::push(double time) {
   Push push;
   const bool meets = fired_ && before_ == fired_axis_ && place_.speed <= STANDING;
   if (meets) push.force = solenoid_.force(time);
-  if (structure_ && before_) {
+  if (push.force != 0.0) rings_until_ = time + RINGS;
+  if (structure_ && before_ && time < rings_until_) {
     // The blow comes from the sensor's side.
     Way& way = ways_[fired_axis_];
     for (std::size_t axis = 0; axis < 2; ++axis) {
@@ -178,10 +183,15 @@ void HammerStation::hear(const std::array<double, 2>& displacement) {
   const std::array<double, 2> gap = gaps({{displacement[0] + now_[0], displacement[1] + now_[1]}});
   for (std::size_t axis = 0; axis < 2; ++axis) {
     if (axis != *before_ && !traits_.cross_sensor) continue;
-    const double clearance = sensor_[axis].clearance(gap[axis]);
-    closest_ = std::min(closest_, clearance);
-    if (clearance <= 0.0 && traits_.housing > 0.0) touched_ = true;
-    volt_sum_[axis] += clearance > 0.0 ? sensor_[axis].voltage(gap[axis]) : station_.range_volt;
+    Seen& seen = seen_[axis];
+    if (gap[axis] != seen.gap) {
+      seen.gap = gap[axis];
+      seen.clearance = sensor_[axis].clearance(gap[axis]);
+      seen.volt = seen.clearance > 0.0 ? sensor_[axis].voltage(gap[axis]) : station_.range_volt;
+    }
+    closest_ = std::min(closest_, seen.clearance);
+    if (seen.clearance <= 0.0 && traits_.housing > 0.0) touched_ = true;
+    volt_sum_[axis] += seen.volt;
   }
 }
 

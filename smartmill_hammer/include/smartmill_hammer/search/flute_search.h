@@ -47,7 +47,11 @@ class FluteSearch {
 
   double angle() const { return angle_; }     ///< [rad] of the flute, unwrapped; when found
   double volt() const { return best_volt_; }  ///< [V] best reading
-  int measurements() const { return measurements_; }
+  int measurements() const { return static_cast<int>(readings_.size()); }
+  struct Reading {
+    double angle, volt;  ///< [rad] unwrapped, [V]
+  };
+  const std::vector<Reading>& readings() const { return readings_; }  ///< in their order
   double bracketWidth() const;  ///< [rad] of the present bracket; 0 while bracketing
   /// [1] probability, by the readings' noise, that the top lies inside the bracket: both ends read less than
   /// its best place. When found.
@@ -82,7 +86,7 @@ class FluteSearch {
   Point left_{}, centre_{}, right_{};
   std::vector<double> widths_;  // of the bracket, after each reading
   double angle_ = 0.0, best_volt_ = 0.0, sure_ = 0.0;
-  int measurements_ = 0;
+  std::vector<Reading> readings_;
 };
 
 /// [rad] angle brought to within half a turn of a reference by whole turns.

@@ -70,6 +70,7 @@ class SensorCalibration {
   void finish();
   void approached(double change, double moved, double noise);
   double hyperbola() const;
+  double hyperbola(double reach) const;
 
   enum class Phase { approach, check_near, check_far, check_back };
 

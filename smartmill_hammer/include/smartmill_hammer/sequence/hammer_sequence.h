@@ -53,7 +53,8 @@ struct HammerParameters : HitTestParameters {
   double zero_volt = 0.1;
   double check_jog = 10.0e-6;
   double position_std = 0.1e-6;
-  double min_gap_share = 0.4;
+  double min_gap_share = 0.5;
+  double sensor_face = 10.0e-3;
   double max_approach = 1.0e-3;
   // Hits.
   double exponential_time = 0.0;
@@ -187,6 +188,12 @@ class HammerSequence {
   FluteSearchOptions searchOptions() const;
   SensorCalibrationOptions calibrationOptions(std::size_t axis) const;
   double safeTravel(std::size_t axis) const;
+  void keepProfile();
+  void addToProfile(std::size_t axis, double volt);
+  double nominalGap(double volt) const;
+  double retreatOf(double volt, double moved) const;
+  double turnedFrom(std::size_t axis) const;
+  double leastRetreat(double off) const;
   std::size_t calibratedAxis() const;
   void sensorKnown(double now);
   void crossFailed(double now);
@@ -243,6 +250,12 @@ class HammerSequence {
 
   std::optional<FluteSearch> search_;
   double expected_angle_ = 0.0;
+  struct Retreat {
+    double off = 0.0, depth = 0.0;  // [rad] of the spindle from a flute at the sensor, [m] behind that flute
+  };
+  std::vector<Retreat> profile_;  // of the tool at the tip, as the first search saw it
+  double flute_volt_ = 0.0;       // [V] of that flute at the sensor
+  double flute_gap_ = 0.0;        // [m] at most, from the sensor to a flute that points at it, at the station
   std::optional<SensorCalibration> calibration_;
   SensorState sensor_, cross_sensor_;
   bool has_cross_ = false;
