@@ -138,7 +138,8 @@ DrawnStation drawStation(std::uint64_t seed, int number) {
   d.out_of_range = dice.chance(0.03);
   d.true_model = d.believed;
   for (auto& [name, place] : d.true_model.hammer->position) {
-    for (std::size_t axis = 0; axis < 2; ++axis) place[axis] += d.set_up[axis] + (d.out_of_range ? 3e-3 : 0.0);
+    for (std::size_t axis = 0; axis < 2; ++axis)
+      place[axis] += d.set_up[axis] + (d.out_of_range ? 3e-3 : 0.0);
   }
   return d;
 }

@@ -9,14 +9,14 @@
 namespace smartmill::hammer {
 namespace {
 
-constexpr double RATE = 25600.0;        // [Hz]
-constexpr std::size_t BLOCK = 256;      // samples
-constexpr int STEPS = 4;                // a sample
-constexpr double LATENCY = 0.05;        // [s]
-constexpr double RAPID = 0.4;           // [m/s]
-constexpr double TURNING = 12.0;        // [rad/s] of an orientation
-constexpr double HAMMER_DELAY = 0.03;   // [s]
-constexpr double LONGEST = 1200.0;      // [s] of a measurement
+constexpr double RATE = 25600.0;       // [Hz]
+constexpr std::size_t BLOCK = 256;     // samples
+constexpr int STEPS = 4;               // a sample
+constexpr double LATENCY = 0.05;       // [s]
+constexpr double RAPID = 0.4;          // [m/s]
+constexpr double TURNING = 12.0;       // [rad/s] of an orientation
+constexpr double HAMMER_DELAY = 0.03;  // [s]
+constexpr double LONGEST = 1200.0;     // [s] of a measurement
 
 double stamp(double time) {
   return std::round(time * 1e9) * 1e-9;

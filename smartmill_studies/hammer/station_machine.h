@@ -30,12 +30,12 @@ class StationMachine {
   /// The next 10 ms.
   void block(Streams& streams);
 
-  double time() const { return time_; }            ///< [s]
-  double closest() const { return closest_; }      ///< [m] of the tool to a sensor's face, ever
-  bool touched() const { return touched_; }        ///< a collision with a sensor
-  double struckRetreat() const { return struck_; } ///< [m] behind the cutting circle, largest over the blows
+  double time() const { return time_; }             ///< [s]
+  double closest() const { return closest_; }       ///< [m] of the tool to a sensor's face, ever
+  bool touched() const { return touched_; }         ///< a collision with a sensor
+  double struckRetreat() const { return struck_; }  ///< [m] behind the cutting circle, largest over the blows
   int strikes() const { return strikes_; }
-  double restVolt() const { return rest_volt_; }   ///< [V] of the sensor when the last blow was asked for
+  double restVolt() const { return rest_volt_; }  ///< [V] of the sensor when the last blow was asked for
 
  private:
   void moveOn(double dt);

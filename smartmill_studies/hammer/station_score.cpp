@@ -17,8 +17,8 @@ using nlohmann::json;
 
 constexpr double BAND_LOW = 250.0, BAND_HIGH = 4900.0;  // [Hz] of the modes that count
 constexpr double FIT_HIGH = 8000.0;  // [Hz] a mode above the band that counts bends its upper end
-constexpr double SAME_MODE = 0.015;                     // [1] of the frequency
-constexpr double SHOWS = 0.05;                          // [1] of the largest peak: a mode that counts
+constexpr double SAME_MODE = 0.015;  // [1] of the frequency
+constexpr double SHOWS = 0.05;       // [1] of the largest peak: a mode that counts
 
 struct Truth {
   ModalModel tip, measured;  // the same modes
@@ -46,7 +46,8 @@ std::optional<std::size_t> shownAs(const Truth& truth, std::size_t k, const std:
   std::optional<std::size_t> best;
   for (std::size_t i = 0; i < fitted.size(); ++i) {
     const double off = std::abs(fitted[i].frequency / mode.frequency - 1.0);
-    if (off < SAME_MODE && (!best || off < std::abs(fitted[*best].frequency / mode.frequency - 1.0))) best = i;
+    if (off < SAME_MODE && (!best || off < std::abs(fitted[*best].frequency / mode.frequency - 1.0)))
+      best = i;
   }
   return best;
 }
@@ -92,8 +93,8 @@ json modeLines(const Truth& truth, const std::vector<Mode>& fitted, double facto
 }
 
 /// [1] spindle moves of the thesis's search: golden section alone.
-int thesisMoves(const StationStudy& study, int number, const DrawnStation& drawn,
-                HammerParameters parameters, const MeasureFrfGoal& goal) {
+int thesisMoves(const StationStudy& study, int number, const DrawnStation& drawn, HammerParameters parameters,
+                const MeasureFrfGoal& goal) {
   parameters.golden_only = 1;
   StationMachine machine(drawn, study.seed + 7919u * static_cast<std::uint64_t>(number));
   HammerSequence sequence(parameters, drawn.believed);
@@ -119,6 +120,7 @@ json runStation(const StationStudy& study, int number) {
   HammerParameters parameters;
   parameters.frf_high = parameters.fit_high = FIT_HIGH;
   parameters.max_modes = 12;
+  parameters.sensor_face = drawn.traits.housing;  // whoever set the sensor up knows it
   parameters.max_bad_hits = 2 * study.hits;
   MeasureFrfGoal goal;
   goal.stamp = 1000.0;
@@ -217,10 +219,12 @@ json scoreStations(const std::vector<json>& lines) {
     spurious += line["spurious"].get<int>();
     for (const json& mode : line["modes"]) modes.push_back(mode);
   }
-  json score{{"machines", lines.size()}, {"due", due},           {"measured", good},
-             {"out_of_range", away},     {"told_so", told},      {"collisions", touched},
-             {"struck_a_gullet", gullet}, {"missed_modes", missed}, {"modes_unseen", unseen},
-             {"spurious_modes", spurious}, {"modes", modes.size()}};
+  json score{{"machines", lines.size()},  {"due", due},
+             {"measured", good},          {"out_of_range", away},
+             {"told_so", told},           {"collisions", touched},
+             {"struck_a_gullet", gullet}, {"missed_modes", missed},
+             {"modes_unseen", unseen},    {"spurious_modes", spurious},
+             {"modes", modes.size()}};
   score["least_gap_um"] = closest.empty() ? 0.0 : *std::min_element(closest.begin(), closest.end());
   for (const auto& [name, values] : {std::pair{"spindle_moves", &moves}, std::pair{"thesis_moves", &thesis},
                                      std::pair{"seconds", &seconds}, std::pair{"cpu_seconds", &cpu}})

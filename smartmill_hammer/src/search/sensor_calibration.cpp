@@ -20,6 +20,11 @@ constexpr double RANGE_SHARE = 0.95;
 /// Readings must reach so far of what is asked; and how often the reach follows the gap found.
 constexpr double LEAST_REACH = 0.2;
 constexpr int CURVE_ROUNDS = 4;
+/// [m] of a jog whose slope tells of the gap, and by how much the next one's must be steeper.
+constexpr double LEAST_SLOPE = 10e-6;
+constexpr double CLEAR_RISE = 1.05;
+/// Of the nominal gap: below it something sharper than the sensor's electrode is before it.
+constexpr double SHARP = 0.8;
 /// A bend beyond these shares of the nominal gap is none.
 constexpr double LEAST_BEND = 0.08, MOST_BEND = 4.0;
 
@@ -60,8 +65,9 @@ void SensorCalibration::ask(double distance) {
   if (jogs_ >= options_.max_jogs) {
     return fail("the sensor's voltage is not zero after " + std::to_string(jogs_) + " jogs");
   }
-  if (phase_ == Phase::approach && travelled_ + rounded > options_.safe_travel - options_.check_jog) {
-    const double left = options_.safe_travel - options_.check_jog - travelled_;
+  const double safe = std::min(options_.safe_travel, travelled_ + localGap() - options_.min_gap);
+  if (phase_ == Phase::approach && rounded > 0.0 && travelled_ + rounded > safe - options_.check_jog) {
+    const double left = safe - options_.check_jog - travelled_;
     const double step = std::floor(left / options_.resolution) * options_.resolution;
     if (step >= options_.least_jog) {
       next_ = step;
@@ -95,6 +101,22 @@ void SensorCalibration::ask(double distance) {
     return fail(text);
   }
   next_ = rounded;
+}
+
+/// [m] gap of the hyperbola through the last three readings of the approach: its slopes go as 1 / gap^2.
+/// Where a sharp edge is before the sensor it tells of it long before the nominal curve does. Infinite: it
+/// does not tell.
+double SensorCalibration::localGap() const {
+  const double far = std::numeric_limits<double>::infinity();
+  const std::size_t n = readings_.size();
+  if (n < 3) return far;
+  const Reading &a = readings_[n - 3], &b = readings_[n - 2], &c = readings_[n - 1];
+  if (clipped(a.volt) || !(b.at - a.at >= LEAST_SLOPE && c.at - b.at >= LEAST_SLOPE)) return far;
+  const double before = (b.volt - a.volt) / (b.at - a.at), now = (c.volt - b.volt) / (c.at - b.at);
+  if (!(before > 0.0 && now > CLEAR_RISE * before)) return far;
+  const double between = 0.5 * (c.at - a.at), middle = between / (std::sqrt(now / before) - 1.0);
+  const double gap = middle - 0.5 * (c.at - b.at);
+  return gap < SHARP * nominalGap(c.volt) ? gap : far;
 }
 
 void SensorCalibration::give(double volt, double volt_std) {

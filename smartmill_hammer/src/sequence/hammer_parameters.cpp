@@ -65,8 +65,9 @@ void declareCalibration(HammerParameters& p, ParameterTable& table) {
   table.number("position_std", p.position_std, "m", Range::notNegative(), "of a distance moved");
   table.number("min_gap_share", p.min_gap_share, "1", Range::open(0.0, 1.0),
                "of gap_at_zero_volt: no nearer");
-  table.number("sensor_face", p.sensor_face, "m", Range::closed(0.0, 0.1),
-               "diameter of the sensor's face, which the tool beside the sensor's middle must not touch either");
+  table.number(
+      "sensor_face", p.sensor_face, "m", Range::closed(0.0, 0.1),
+      "diameter of the sensor's face, which the tool beside the sensor's middle must not touch either");
   table.number("max_approach", p.max_approach, "m", Range::positive(),
                "to the sensor, beyond the depth between two flutes");
 }

@@ -31,7 +31,7 @@ constexpr int NEAR_SAMPLES = 8;
 /// Of the first search's step: the helix tells the second where to begin.
 constexpr double SECOND_STEP = 0.5;
 /// Of a depth read from the sensor's nominal curve, which a round and fluted tool does not quite follow.
-constexpr double TRUSTED_DEPTH = 0.8;
+constexpr double TRUSTED_DEPTH = 1.0;
 constexpr int FACE_STEPS = 24;
 /// Two tips of a fit band: share of the sensor's range that counts as its end.
 constexpr double RANGE_SHARE = 0.98;
@@ -127,7 +127,7 @@ bool HammerSequence::handle(const MeasureFrfGoal& goal) {
   search_.reset();
   calibration_.reset();
   sensor_ = cross_sensor_ = SensorState();
-  has_cross_ = false;
+  has_cross_ = surveyed_ = false;
   no_cross_.clear();
   collector_.reset();
   cross_collector_.reset();
@@ -486,6 +486,7 @@ void HammerSequence::reached(double now) {
       return orient(now, search_->next());
     case Stage::search_low:
     case Stage::search_high:
+    case Stage::survey:
     case Stage::calibrate:
     case Stage::calibrate_cross:
     case Stage::calibrate_again:
@@ -537,8 +538,9 @@ double HammerSequence::retreatOf(double volt, double moved) const {
 }
 
 /// What a sensor sees with the flute at the hammer belongs to the flanks of the flutes on either side.
-void HammerSequence::addToProfile(std::size_t axis, double volt) {
-  const double off = turnedFrom(axis), moved = target_[axis] - stationPosition()[axis];
+/// @param further [rad] that the spindle has turned on from there
+void HammerSequence::addToProfile(std::size_t axis, double further, double volt) {
+  const double off = turnedFrom(axis) + further, moved = target_[axis] - stationPosition()[axis];
   double ahead = units::TWO_PI, behind = -units::TWO_PI;
   for (int tooth = 0; tooth < tool_.teeth; ++tooth) {
     const double turned = std::remainder(off - tool_.toothAngle(tooth), units::TWO_PI);
@@ -621,6 +623,7 @@ void HammerSequence::measured(double now, double volt, double volt_std) {
   if (stage_ == Stage::calibrate || stage_ == Stage::calibrate_cross || stage_ == Stage::calibrate_again) {
     return calibrated(now, volt, volt_std);
   }
+  if (stage_ == Stage::survey) return surveyed(now, volt);
   search_->give(reached_angle_, volt, volt_std);
   if (search_->state() == FluteSearch::State::searching) return orient(now, search_->next());
   if (search_->state() == FluteSearch::State::no_flute) {
@@ -634,9 +637,34 @@ void HammerSequence::measured(double now, double volt, double volt_std) {
   fluteFound(now);
 }
 
+/// Whether what is known of the flanks would hold the tool back before the sensor is zeroed: then two more
+/// readings to either side, from the station's safe distance.
+bool HammerSequence::surveyDue(double volt) {
+  if (std::exchange(surveyed_, true)) return false;
+  const auto along = static_cast<std::size_t>(direction_);
+  const double due = nominalGap(volt) - station_.gap_at_zero_volt + parameters_.check_jog;
+  if (safeTravel(along) >= due) return false;
+  const double beside = 0.5 * std::asin(std::min(0.9, 0.5 * parameters_.sensor_face / tool_.radius()));
+  survey_ = {beside, -beside};
+  return true;
+}
+
+void HammerSequence::surveyed(double now, double volt) {
+  addToProfile(static_cast<std::size_t>(direction_), survey_.back(), volt);
+  survey_.pop_back();
+  if (!survey_.empty()) return orient(now, result_.flute_hammer + survey_.back());
+  stage_ = Stage::orient_flute;
+  orient(now, result_.flute_hammer);
+}
+
 void HammerSequence::calibrated(double now, double volt, double volt_std) {
   if (!calibration_) {
-    if (stage_ != Stage::calibrate_again) addToProfile(calibratedAxis(), volt);
+    if (stage_ != Stage::calibrate_again) addToProfile(calibratedAxis(), 0.0, volt);
+    if (stage_ == Stage::calibrate && surveyDue(volt)) {
+      stage_ = Stage::survey;
+      say("looking at the flanks that the sensor's face will meet", 0.52);
+      return orient(now, result_.flute_hammer + survey_.back());
+    }
     calibration_.emplace(calibrationOptions(calibratedAxis()));
     calibration_->start(volt, volt_std);
   } else {

@@ -56,7 +56,8 @@ int main(int argc, char** argv) {
   Options o;
   CommandLine line{
       "Measures drawn tools in drawn machines with the automatic hammer and scores the answers. One line of "
-      "JSON a machine in OUT/stations_SEED_HITS.jsonl; goes on where an earlier run ended; prints the score."};
+      "JSON a machine in OUT/stations_SEED_HITS.jsonl; goes on where an earlier run ended; prints the "
+      "score."};
   line.option("--machines", o.machines, "to draw").within(1, 100000).showDefault();
   line.option("--seed", o.study.seed, "of everything drawn").showDefault();
   line.option("--hits", o.study.hits, "a measurement").within(1, 100).showDefault();

@@ -69,6 +69,7 @@ class SensorCalibration {
   void check();
   void finish();
   void approached(double change, double moved, double noise);
+  double localGap() const;
   double hyperbola() const;
   double hyperbola(double reach) const;
 

@@ -54,7 +54,7 @@ struct HammerParameters : HitTestParameters {
   double check_jog = 10.0e-6;
   double position_std = 0.1e-6;
   double min_gap_share = 0.5;
-  double sensor_face = 10.0e-3;
+  double sensor_face = 8.0e-3;
   double max_approach = 1.0e-3;
   // Hits.
   double exponential_time = 0.0;
@@ -161,6 +161,7 @@ class HammerSequence {
     search_high,
     to_tip,
     orient_flute,
+    survey,
     calibrate,
     calibrate_cross,
     calibrate_again,
@@ -189,7 +190,9 @@ class HammerSequence {
   SensorCalibrationOptions calibrationOptions(std::size_t axis) const;
   double safeTravel(std::size_t axis) const;
   void keepProfile();
-  void addToProfile(std::size_t axis, double volt);
+  void addToProfile(std::size_t axis, double further, double volt);
+  bool surveyDue(double volt);
+  void surveyed(double now, double volt);
   double nominalGap(double volt) const;
   double retreatOf(double volt, double moved) const;
   double turnedFrom(std::size_t axis) const;
@@ -254,8 +257,10 @@ class HammerSequence {
     double off = 0.0, depth = 0.0;  // [rad] of the spindle from a flute at the sensor, [m] behind that flute
   };
   std::vector<Retreat> profile_;  // of the tool at the tip, as the first search saw it
-  double flute_volt_ = 0.0;       // [V] of that flute at the sensor
-  double flute_gap_ = 0.0;        // [m] at most, from the sensor to a flute that points at it, at the station
+  std::vector<double> survey_;    // [rad] still to be read beside the place for the hammer, last first
+  bool surveyed_ = false;
+  double flute_volt_ = 0.0;  // [V] of that flute at the sensor
+  double flute_gap_ = 0.0;   // [m] at most, from the sensor to a flute that points at it, at the station
   std::optional<SensorCalibration> calibration_;
   SensorState sensor_, cross_sensor_;
   bool has_cross_ = false;

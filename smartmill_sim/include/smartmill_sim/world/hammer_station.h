@@ -93,7 +93,7 @@ class HammerStation {
   std::array<double, 2> unseen_{{0, 0}};  // [m] by which x and y are off
   std::array<double, 3> stopped_{};
   std::array<double, 2> now_{{0, 0}};  // [m] the structure's displacement at the sensor
-  struct Seen {  // what the present surface shows at one gap
+  struct Seen {                        // what the present surface shows at one gap
     double gap = -1.0, clearance = 1.0, volt = 0.0;
   };
   std::array<Seen, 2> seen_;
