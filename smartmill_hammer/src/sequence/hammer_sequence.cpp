@@ -504,7 +504,7 @@ void HammerSequence::reached(double now) {
       return orient(now, result_.flute_hammer);
     case Stage::orient_flute:
       stage_ = Stage::calibrate;
-      say("calibrating the displacement sensor", 0.55);
+      say("calibrating the displacement sensor", surveyed_ ? 0.58 : 0.55);
       return average(now + parameters_.settle_time);
     case Stage::retract:
       return finish();
@@ -662,7 +662,7 @@ void HammerSequence::calibrated(double now, double volt, double volt_std) {
     if (stage_ != Stage::calibrate_again) addToProfile(calibratedAxis(), 0.0, volt);
     if (stage_ == Stage::calibrate && surveyDue(volt)) {
       stage_ = Stage::survey;
-      say("looking at the flanks that the sensor's face will meet", 0.52);
+      say("looking at the flanks that the sensor's face will meet", 0.56);
       return orient(now, result_.flute_hammer + survey_.back());
     }
     calibration_.emplace(calibrationOptions(calibratedAxis()));
@@ -690,7 +690,7 @@ void HammerSequence::sensorKnown(double now) {
   calibration_.reset();
   say(format("sensor calibrated: %.3f +- %.3f um/V", 1e6 * sensor.sensitivity, 1e6 * sensor.sensitivity_std) +
           (held_back ? format(" at %.2f V, held back by the tool's edges", sensor.volt) : std::string()),
-      stage_ == Stage::calibrate ? 0.62 : 0.7);
+      stage_ == Stage::calibrate ? 0.62 : stage_ == Stage::calibrate_cross ? 0.66 : 0.7);
   if (stage_ == Stage::calibrate && has_cross_) {
     stage_ = Stage::calibrate_cross;
     return average(now + parameters_.settle_time);
