@@ -158,7 +158,8 @@ void SensorCalibration::give(double volt, double volt_std) {
 }
 
 void SensorCalibration::approached(double change, double moved, double noise) {
-  const double slope = change / moved;  // eq. 4.8
+  if (std::abs(moved) < options_.least_jog) return plan();  // the last bit: too short to tell a sensitivity
+  const double slope = change / moved;                      // eq. 4.8
   const bool clear = std::abs(change) >= 5.0 * noise;
   // Far off, hardly sensitive.
   if (!clear && volt_ < -0.5 * options_.range_volt) return ask(options_.max_jog);
@@ -176,10 +177,10 @@ void SensorCalibration::approached(double change, double moved, double noise) {
 
 void SensorCalibration::plan() {
   const double remaining = -volt_ * sensitivity_;  // eq. 4.9
-  if (std::abs(volt_) <= options_.zero_volt || std::abs(remaining) <= 0.5 * options_.least_jog) {
-    return check();
-  }
-  const double size = std::clamp(0.5 * std::abs(remaining), options_.least_jog, options_.max_jog);
+  if (std::abs(volt_) < options_.zero_volt || std::abs(remaining) < options_.resolution) return check();
+  const double size = std::abs(remaining) <= options_.least_jog
+                          ? std::abs(remaining)
+                          : std::clamp(0.5 * std::abs(remaining), options_.least_jog, options_.max_jog);
   ask(std::copysign(size, remaining));
 }
 
