@@ -16,11 +16,11 @@ export function digits(value, count = 3, none = '–') {
   return value.toFixed(Math.min(places, 12));
 }
 
-// value ± standard deviation, to the deviation's second digit.
+// value ± standard deviation, to the deviation's first digit (a one and the next).
 export function withDeviation(value, deviation) {
   if (!Number.isFinite(value)) return '–';
   if (!(deviation > 0)) return digits(value, 4);
-  const places = Math.min(12, Math.max(0, 1 - Math.floor(Math.log10(deviation))));
+  const power = Math.floor(Math.log10(deviation)), places = Math.min(12, Math.max(0, (deviation < 2 * 10 ** power ? 1 : 0) - power));
   return `${value.toFixed(places)} ± ${deviation.toFixed(places)}`;
 }
 

@@ -206,7 +206,7 @@ export class Plot {
 
   drawMarks(c, g) {
     c.textBaseline = 'top'; c.textAlign = 'left';
-    let last = -1e9, row = 0;
+    const ends = [-1e9, -1e9, -1e9];  // of the labels in each row; one that has no room is left out
     for (const m of [...this.marks].sort((a, b) => (a.x ?? 0) - (b.x ?? 0))) {
       c.strokeStyle = c.fillStyle = m.color ?? colour('dim');
       c.lineWidth = m.width ?? 1;
@@ -215,9 +215,12 @@ export class Plot {
       if (m.x !== undefined) {
         const p = g.x.to(m.x);
         if (p < LEFT || p > g.width - RIGHT) continue;
-        row = p - last < 90 ? row + 1 : 0; last = p;
         c.moveTo(p, TOP); c.lineTo(p, g.height - BOTTOM);
-        if (m.label) c.fillText(m.label, p + 4, TOP + 2 + (row % 4) * (FONT + 2));
+        const row = m.label ? ends.findIndex(end => end < p) : -1;
+        if (row >= 0) {
+          ends[row] = p + 8 + c.measureText(m.label).width;
+          c.fillText(m.label, p + 4, TOP + 2 + row * (FONT + 2));
+        }
       } else {
         const p = g.y.to(m.y);
         c.moveTo(LEFT, p); c.lineTo(g.width - RIGHT, p);

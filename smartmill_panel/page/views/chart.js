@@ -50,9 +50,9 @@ export class ChartView {
 
   // How far the limit may lie off, from the deviations of what was measured.
   async askSpread() {
-    const answer = await fetch('api/what_if?spread=1&speeds=300').catch(() => null);
-    if (!answer?.ok) return;
-    const found = await answer.json();
+    const answer = await fetch('api/what_if?spread=1').catch(() => null);
+    const found = await answer?.json().catch(() => null);
+    if (!found?.limit_low) return;
     this.spread = { speed: toRpm(found.spindle_speed), low: toMm(found.limit_low), high: toMm(found.limit_high), limit: toMm(found.depth_limit) };
     this.draw();
   }

@@ -30,7 +30,7 @@ export class Dynamics {
     this.big = big;
     this.measured = make('span', { class: 'choice row' });
     this.parts = make('span', { class: 'choice row' }, ...Object.entries(PARTS).map(([key, p]) => make('button', { 'data-part': key, onclick: () => { this.part = key; this.draw(); } }, p.name)));
-    big.querySelector('h2').append(this.measured, this.parts);
+    big.append(make('div', { class: 'choices' }, this.measured, this.parts));
     this.plot = new Plot(big, { name: 'frf', group: 'frf', x: { label: 'Frequency [Hz]', low: 0 }, y: { label: '' }, empty: 'No FRF measured yet', read: (x, y) => [`${fixed(x, 1)} Hz`, digits(y)] });
     this.coherence = new Plot(small, { name: 'coherence', group: 'frf', x: { label: 'Frequency [Hz]', low: 0 }, y: { label: 'Coherence', low: 0, high: 1 }, empty: 'Coherence needs two hits', read: (x, y) => [`${fixed(x, 1)} Hz`, fixed(y, 3)] });
     this.list = make('div', { class: 'dim' }, 'No modes yet');

@@ -44,7 +44,7 @@ export class Revolution {
     }
     const newest = this.found[COMPENSATED] ?? this.found[MEASURED], teeth = this.link.message('cut/condition')?.teeth;
     if (newest) {
-      for (let k = 0; k < (teeth || 0); ++k) marks.push({ x: (360 - 360 * k / teeth) % 360, label: `tooth ${k + 1} at +y` });
+      for (let k = 0; k < (teeth || 0); ++k) marks.push({ x: (360 - 360 * k / teeth) % 360, label: `tooth ${k + 1}` });
       this.card.aside.textContent = `${newest.condition ? newest.condition + ', ' : ''}${fixed(rpm(newest.spindle_speed))} rpm, ${fixed(newest.revolutions, 1)} revolutions`;
     }
     this.plot.set({ series, marks });

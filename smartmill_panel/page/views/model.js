@@ -45,7 +45,7 @@ export class Report {
     const text = JSON.stringify(found);
     if (!found || text === this.told) return;
     this.told = text;
-    if (!answer.ok) { this.place.replaceChildren(make('p', { class: 'dim' }, found.message)); return; }
+    if (!found.report) { this.place.replaceChildren(make('p', { class: 'dim' }, found.message)); return; }
     this.show(found.report, found.folder);
   }
   show(report, folder) {
@@ -75,7 +75,8 @@ export class Database {
     if (this.asked === pair) return;
     this.asked = pair;
     const answer = await fetch(`api/coefficients?${new URLSearchParams({ tool, material })}`).catch(() => null);
-    if (answer?.ok && !this.found) this.show(await answer.json(), 'from the database');
+    const found = await answer?.json().catch(() => null);
+    if (found?.source && !this.found) this.show(found, 'from the database');
   }
   show(m, from = '') {
     this.found = from === '';

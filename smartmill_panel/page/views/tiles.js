@@ -14,11 +14,11 @@ class Tile {
     this.extra = extra;
     parent.append(this.element);
   }
-  set(value, unit, more, stale, kind = '') {
-    const text = JSON.stringify([value, unit, more, stale, kind]);
+  set(value, more, stale, kind = '') {
+    const text = JSON.stringify([value, more, stale, kind]);
     if (text === this.told) return;
     this.told = text;
-    this.value.replaceChildren(value, unit ? make('small', {}, unit) : '');
+    this.value.textContent = value;
     this.value.classList.toggle('stale', stale);
     this.more.textContent = more;
     this.more.classList.toggle('stale', stale);
@@ -41,15 +41,15 @@ export class Tiles {
     this.lamp = new Tile(place, 'Cut', 'lamp');
     this.history = make('div', { class: 'history', title: 'the last verdicts, the newest on the right' });
     this.lamp.element.append(this.history, this.lamp.more);
-    this.spindle = new Tile(place, 'Spindle');
+    this.spindle = new Tile(place, 'Spindle [rpm]');
     this.spindleBar = bar();
-    this.load = new Tile(place, 'Spindle load');
+    this.load = new Tile(place, 'Spindle load [%]');
     this.loadBar = bar();
-    this.feed = new Tile(place, 'Feed');
+    this.feed = new Tile(place, 'Feed [mm/min]');
     this.spindle.element.append(this.spindleBar, this.spindle.more);
     this.load.element.append(this.loadBar, this.load.more);
     this.feed.element.append(make('div', { style: 'height: 18px' }), this.feed.more);
-    this.places = new Tile(place, 'Position and distance to go [mm]', 'places');
+    this.places = new Tile(place, 'Position, to go [mm]', 'places');
     this.places.value.remove();
     this.axes = make('div', { class: 'axes' });
     this.places.element.append(this.axes);
@@ -71,16 +71,16 @@ export class Tiles {
     const condition = link.message('cut/condition'), cutting = condition?.kind === 2;
     this.showLamp(gone, cutting);
     const most = link.message('stability/chart')?.spindle_speed.at(-1);
-    this.spindle.set(state ? fixed(rpm(state.spindle_speed)) : '–', 'rpm',
+    this.spindle.set(state ? fixed(rpm(state.spindle_speed)) : '–',
       condition?.kind ? `commanded ${fixed(rpm(condition.spindle_speed))}` : most ? `up to ${fixed(rpm(most))}` : '', stale);
     this.spindle.setBar(this.spindleBar, stale ? 0 : state?.spindle_speed / most);
     const load = link.message('cnc/load'), load_stale = gone || link.age('cnc/load') > OLD;
-    this.load.set(load ? fixed(100 * load.spindle_load, 1) : '–', '%',
+    this.load.set(load ? fixed(100 * load.spindle_load, 1) : '–',
       load ? load.axes.map((axis, k) => `${axis} ${fixed(100 * load.axis_load[k])} %`).join('   ') : '', load_stale,
       load?.spindle_load > 1 ? 'bad' : '');
     this.load.setBar(this.loadBar, load_stale ? 0 : load?.spindle_load);
-    this.feed.set(state ? fixed(60e3 * state.feed) : '–', 'mm/min',
-      cutting ? `${fixed(1e3 * condition.feed_per_tooth, 3)} mm a tooth, ${fixed(1e3 * condition.axial_depth, 2)} mm deep` : '', stale);
+    this.feed.set(state ? fixed(60e3 * state.feed) : '–',
+      cutting ? `${fixed(1e3 * condition.feed_per_tooth, 3)} mm/tooth, ${fixed(1e3 * condition.axial_depth, 2)} mm deep` : '', stale);
     this.showPlaces(state, stale);
   }
 
@@ -89,13 +89,13 @@ export class Tiles {
     const old = gone || (last?.valid && link.age('chatter/state') > CUT_OLD);
     const name = link.message('cut/condition')?.name ?? '';
     if (!last || !last.valid) {
-      this.lamp.set(cutting ? 'Entering' : 'No cut', '', name, old, 'quiet');
+      this.lamp.set(cutting ? 'Entering' : 'No cut', name, old, 'quiet');
     } else if (last.chatter) {
       const speed = advice && advice.condition === last.condition ? advice.speeds[0]?.spindle_speed : undefined;
-      this.lamp.set('CHATTER', '', `${fixed(last.frequency)} Hz, ${fixed(last.severity)} N` +
+      this.lamp.set('CHATTER', `${fixed(last.frequency)} Hz, ${fixed(last.severity)} N` +
         (speed ? `, try ${fixed(rpm(speed))} rpm` : ''), old, 'bad');
     } else {
-      this.lamp.set('Stable', '', `${name || last.condition}, ${fixed(100 * last.energy_ratio, 1)} % beside the harmonics`, old, 'good');
+      this.lamp.set('Stable', `${name || last.condition}, ${fixed(100 * last.energy_ratio, 1)} % beside the harmonics`, old, 'good');
     }
     const shown = this.verdicts.filter(v => v.valid).slice(-HISTORY);
     const text = shown.map(v => v.chatter ? 'yes' : 'no').join();

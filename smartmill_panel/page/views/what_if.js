@@ -81,7 +81,7 @@ export class WhatIf {
     const answer = await fetch(`api/what_if?${this.query()}`).catch(() => null);
     const found = await answer?.json().catch(() => null);
     this.busy = false;
-    if (!answer?.ok) {
+    if (!found?.depth_limit) {
       this.answer.textContent = found?.message ?? 'The panel does not answer.';
     } else if (this.changed.size) {
       this.show(found, begin);

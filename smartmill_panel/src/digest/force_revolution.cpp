@@ -58,8 +58,8 @@ void RevolutionMaker::forget() {
 
 void RevolutionMaker::push(const ForceBlock& block, const AngleTrack& angle) {
   constexpr double LEAST_SPEED = 1.0;  // [rad/s] below it the spindle counts as standing
+  if (angle.speed() < LEAST_SPEED) return;
   speed_ = angle.speed();
-  if (speed_ < LEAST_SPEED) return;
   const std::size_t size = block.force[0].size();
   for (std::size_t i = 0; i < size; ++i) {
     const double time = block.stamp + static_cast<double>(i) / block.sample_rate;

@@ -66,7 +66,7 @@ PanelNode::PanelNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
       spectrum_(nh.advertise<smartmill_msgs::ForceSpectrum>(names::FORCE_SPECTRUM, 100)),
       server_(optionsOf(parameters_),
               {[this](std::uint32_t channel, bool wanted) {
-                 worker_.post([this, channel, wanted] { bridge_.want(channel, wanted); });
+                 discovery_.post([this, channel, wanted] { bridge_.want(channel, wanted); });
                },
                [this](Question question, const Server::Respond& respond) {
                  answer(std::move(question), respond);
@@ -74,8 +74,9 @@ PanelNode::PanelNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
       bridge_(nh, server_) {
   if (gate_.open()) commands_ = std::make_unique<Commands>(nh);
   listen();
-  bridge_.discover();
-  shell_.every(DISCOVER_PERIOD, [this] { bridge_.discover(); });
+  shell_.every(DISCOVER_PERIOD, [this] {
+    if (!discovery_.busy()) discovery_.post([this] { bridge_.discover(); });
+  });
   shell_.every(CLOCK_PERIOD, [this] { server_.tell(ros::WallTime::now().toNSec()); });
   shell_.every(parameters_.digest_period, [this] {
     for (Digests& digests : digests_) publish(digests);
@@ -85,6 +86,11 @@ PanelNode::PanelNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
   nh.setParam("panel_at", "http://" + host + ":" + std::to_string(server_.port()) + "/");
   ROS_INFO("panel: look at http://%s:%d/%s", host.c_str(), server_.port(),
            gate_.open() ? " (commands are allowed, with the token)" : "");
+}
+
+PanelNode::~PanelNode() {
+  discovery_.stop();
+  worker_.stop();
 }
 
 void PanelNode::listen() {

@@ -24,7 +24,7 @@ class PanelNode {
   using Parameters = PanelParameters;
   /// @throws Error on a wrong parameter or a port that is taken.
   PanelNode(ros::NodeHandle nh, ros::NodeHandle private_nh);
-  ~PanelNode() { worker_.stop(); }
+  ~PanelNode();
   PanelNode(const PanelNode&) = delete;
   PanelNode& operator=(const PanelNode&) = delete;
 
@@ -54,7 +54,7 @@ class PanelNode {
   std::array<Digests, 3> digests_;
   ros::Publisher strip_, revolution_, spectrum_;
   std::unique_ptr<Commands> commands_;
-  Worker worker_;
+  Worker worker_, discovery_;  // the latter waits for the master, should that be away
   Server server_;
   TopicBridge bridge_;
 };

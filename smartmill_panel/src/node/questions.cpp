@@ -19,7 +19,8 @@ namespace {
 
 using nlohmann::json;
 
-constexpr int BAD_REQUEST = 400, NOT_FOUND = 404, NOT_READY = 503;
+// Who asks for what is not there yet has done nothing wrong: an answer without the thing, and why.
+constexpr int BAD_REQUEST = 400, NOT_THERE = 200;
 constexpr double NONE = std::numeric_limits<double>::quiet_NaN();
 
 double numberOf(const Question& question, const std::string& key, double otherwise) {
@@ -70,10 +71,10 @@ Answer askWhatIf(ros::NodeHandle& nh, const Question& question) {
   request.speeds = countOf(question, "speeds", 1000.0);
   request.spread = countOf(question, "spread", 1.0) == 1;
   if (!nh.serviceClient<smartmill_msgs::WhatIf>(names::WHAT_IF).call(service))
-    return answerOf(NOT_READY, "the stability node does not answer");
+    return answerOf(NOT_THERE, "the stability node does not answer");
   const auto& found = service.response;
   if (found.code != found.OK)
-    return answerOf(found.code == found.BAD_REQUEST ? BAD_REQUEST : NOT_READY, found.message);
+    return answerOf(found.code == found.BAD_REQUEST ? BAD_REQUEST : NOT_THERE, found.message);
   const json answer = {{"spindle_speed", numbers(found.spindle_speed)},
                        {"depth_limit", numbers(found.depth_limit)},
                        {"chatter_frequency", numbers(found.chatter_frequency)},
@@ -97,9 +98,9 @@ Answer askCoefficients(ros::NodeHandle& nh, const Question& question) {
   service.request.tool = word("tool");
   service.request.material = word("material");
   if (!nh.serviceClient<smartmill_msgs::FindCoefficients>(names::FIND_COEFFICIENTS).call(service))
-    return answerOf(NOT_READY, "the load meter node does not answer");
+    return answerOf(NOT_THERE, "the load meter node does not answer");
   const auto& found = service.response;
-  if (found.code != found.OK) return answerOf(NOT_FOUND, found.message);
+  if (found.code != found.OK) return answerOf(NOT_THERE, found.message);
   const auto& c = found.coefficients;
   const json answer = {{"tool", c.tool},
                        {"material", c.material},
@@ -124,7 +125,7 @@ Answer askCoefficients(ros::NodeHandle& nh, const Question& question) {
 
 Answer newestReport(const std::string& folder) {
   namespace fs = std::filesystem;
-  if (folder.empty()) return answerOf(NOT_FOUND, "no folder of reports was given");
+  if (folder.empty()) return answerOf(NOT_THERE, "no folder of reports was given");
   fs::path newest;
   fs::file_time_type when;
   std::error_code failed;
@@ -141,10 +142,10 @@ Answer newestReport(const std::string& folder) {
       when = time;
     }
   }
-  if (newest.empty()) return answerOf(NOT_FOUND, "no report yet");
+  if (newest.empty()) return answerOf(NOT_THERE, "no report yet");
   std::ifstream in(newest);
   const json report = json::parse(in, nullptr, false);
-  if (!report.is_object()) return answerOf(NOT_READY, newest.string() + ": cannot be read");
+  if (!report.is_object()) return answerOf(NOT_THERE, newest.string() + ": cannot be read");
   return {200, json({{"folder", newest.parent_path().filename().string()}, {"report", report}}).dump()};
 }
 

@@ -29,15 +29,22 @@ bool Worker::post(std::function<void()> work) {
   return true;
 }
 
+bool Worker::busy() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return runs_ || !works_.empty();
+}
+
 void Worker::run() {
   for (;;) {
     std::function<void()> work;
     {
       std::unique_lock<std::mutex> lock(mutex_);
+      runs_ = false;
       news_.wait(lock, [this] { return end_ || !works_.empty(); });
       if (end_) return;
       work = std::move(works_.front());
       works_.pop_front();
+      runs_ = true;
     }
     try {
       work();

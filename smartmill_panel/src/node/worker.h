@@ -19,6 +19,7 @@ class Worker {
   static constexpr std::size_t MOST = 256;
   /// @return false: too much waits already, or it has ended
   bool post(std::function<void()> work);
+  bool busy();  ///< something runs or waits
   /// What runs is waited for, what waits is forgotten.
   void stop();
 
@@ -28,7 +29,7 @@ class Worker {
   std::mutex mutex_;
   std::condition_variable news_;
   std::deque<std::function<void()>> works_;
-  bool end_ = false;
+  bool end_ = false, runs_ = false;
   std::thread thread_;
 };
 

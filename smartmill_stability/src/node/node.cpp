@@ -25,7 +25,7 @@ NodeParameters read(const ros::NodeHandle& private_nh) {
   return parameters;
 }
 
-WhatIf fromMsg(const smartmill_msgs::WhatIf::Request& request) {
+WhatIf requestOf(const smartmill_msgs::WhatIf::Request& request) {
   constexpr std::uint32_t MOST = 1000000;
   WhatIf what_if;
   what_if.teeth = static_cast<int>(std::min(request.teeth, MOST));
@@ -173,7 +173,7 @@ bool StabilityNode::whatIf(smartmill_msgs::WhatIf::Request& request,
   }
   try {
     const ros::WallTime begin = ros::WallTime::now();
-    WhatIfChart chart = maker.whatIf(fromMsg(request));
+    WhatIfChart chart = maker.whatIf(requestOf(request));
     response.code = Response::OK;
     response.spindle_speed = std::move(chart.limit.spindle_speed);
     response.depth_limit = std::move(chart.limit.depth);
