@@ -89,21 +89,14 @@ class Page {
 
     place('forces', 'Forces, the last minute', 'wide', e => new Strips(e, link, store));
     place('forces', 'Spectrum', '', e => new Spectrum(e, link, store));
-    const halves = make('div', { class: 'view', style: 'grid-template-columns: 1fr 1fr' });
-    this.views.forces.append(halves);
-    for (const [title, build, extra] of [['Force over one revolution', e => new Revolution(e, link, store), ''],
-      ['Spectrum, the last minute', e => new SpectrumCourse(e, link, store), '']]) {
-      const element = card(title, extra);
-      halves.append(element);
-      this.add('forces', element, build(element));
-    }
+    place('forces', 'One revolution', '', e => new Revolution(e, link, store, false));
+    place('forces', 'The last minute', 'tools-free', e => new SpectrumCourse(e, link, store));
 
     let chart = null;
     place('stability', 'Stability', '', e => chart = new ChartView(e, link, 'stability'));
     place('stability', 'What if', 'side what-if tools-free', e => new WhatIf(e, link, chart));
     place('stability', 'Points to cut at', 'wide tools-free', e => new PointsTable(e, link));
 
-    this.views.dynamics.append();
     const dynamics = new Dynamics(this.views.dynamics, link, card);
     this.add('dynamics', null, dynamics);
 

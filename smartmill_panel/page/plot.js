@@ -1,15 +1,15 @@
 // Plots on a plain canvas: lines, bands, points and marks on two axes, a cursor, zoom, export.
 import { digits, make, save } from './format.js';
 
-const FONT = 12, LEFT = 56, RIGHT = 14, TOP = 10, BOTTOM = 38;
+const FONT = 12, LEFT = 56, RIGHT = 14, TOP = 10;
 
 export function colour(name) {
   return getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 }
 
 // Round values between low and high, about `count` of them.
-function ticks(low, high, count) {
-  const rough = (high - low) / Math.max(1, count);
+function ticks(low, high, count, least = 0) {
+  const rough = Math.max(least, (high - low) / Math.max(1, count));
   const power = 10 ** Math.floor(Math.log10(rough));
   const step = [1, 2, 2.5, 5, 10].map(f => f * power).find(s => s >= rough);
   const list = [];
@@ -37,6 +37,7 @@ export class Plot {
   constructor(parent, options) {
     this.options = options;
     this.series = []; this.marks = []; this.points = [];
+    this.bottom = options.x.hidden ? 8 : 38;
     this.zoom = null;       // [low, high] of x
     this.cursor = null;     // x, y in data
     this.canvas = make('canvas', { tabindex: '0', role: 'img', 'aria-label': options.name });
@@ -114,7 +115,7 @@ export class Plot {
       return { to: v => begin + (Math.log(Math.max(v, 1e-300)) - a) / (b - a) * (end - begin), back: p => Math.exp(a + (p - begin) / (end - begin) * (b - a)) };
     };
     return { width, height, x0, x1, y0, y1,
-      x: scale(this.options.x.log, x0, x1, LEFT, width - RIGHT), y: scale(this.options.y.log, y0, y1, height - BOTTOM, TOP) };
+      x: scale(this.options.x.log, x0, x1, LEFT, width - RIGHT), y: scale(this.options.y.log, y0, y1, height - this.bottom, TOP) };
   }
 
   // ------------------------------------------------------------------------------------------ drawing
@@ -135,7 +136,7 @@ export class Plot {
     if (!something) return this.showNote(g);
     c.save();
     c.beginPath();
-    c.rect(LEFT, TOP, g.width - LEFT - RIGHT, g.height - TOP - BOTTOM);
+    c.rect(LEFT, TOP, g.width - LEFT - RIGHT, g.height - TOP - this.bottom);
     c.clip();
     for (const s of this.series) s.kind === 'band' ? this.drawBand(c, g, s) : this.drawLine(c, g, s);
     this.drawMarks(c, g);
@@ -150,19 +151,21 @@ export class Plot {
     const { x, y } = this.options;
     c.strokeStyle = colour('grid'); c.fillStyle = colour('dim'); c.lineWidth = 1;
     c.textAlign = 'center'; c.textBaseline = 'top';
-    for (const t of x.log ? decades(g.x0, g.x1) : ticks(g.x0, g.x1, (g.width - LEFT) / 90)) {
+    for (const t of x.log ? decades(g.x0, g.x1) : ticks(g.x0, g.x1, (g.width - LEFT) / 90, x.least)) {
       const p = Math.round(g.x.to(t)) + 0.5;
-      c.beginPath(); c.moveTo(p, TOP); c.lineTo(p, g.height - BOTTOM); c.stroke();
-      c.fillText(x.text ? x.text(t) : tickText(t, x.log), p, g.height - BOTTOM + 5);
+      c.beginPath(); c.moveTo(p, TOP); c.lineTo(p, g.height - this.bottom); c.stroke();
+      if (x.hidden) continue;
+      const text = x.text ? x.text(t) : tickText(t, x.log), half = c.measureText(text).width / 2;
+      c.fillText(text, Math.min(p, g.width - 2 - half), g.height - this.bottom + 5);
     }
     c.textAlign = 'right'; c.textBaseline = 'middle';
-    for (const t of y.log ? decades(g.y0, g.y1) : ticks(g.y0, g.y1, (g.height - TOP - BOTTOM) / 45)) {
+    for (const t of y.log ? decades(g.y0, g.y1) : ticks(g.y0, g.y1, Math.max(2, (g.height - TOP - this.bottom) / 45))) {
       const p = Math.round(g.y.to(t)) + 0.5;
       c.beginPath(); c.moveTo(LEFT, p); c.lineTo(g.width - RIGHT, p); c.stroke();
       c.fillText(tickText(t, y.log), LEFT - 6, p);
     }
     c.textAlign = 'right'; c.textBaseline = 'bottom';
-    c.fillText(x.label, g.width - RIGHT, g.height - 2);
+    if (!x.hidden) c.fillText(x.label, g.width - RIGHT, g.height - 2);
     c.save();
     c.translate(11, TOP);
     c.rotate(-Math.PI / 2);
@@ -215,7 +218,7 @@ export class Plot {
       if (m.x !== undefined) {
         const p = g.x.to(m.x);
         if (p < LEFT || p > g.width - RIGHT) continue;
-        c.moveTo(p, TOP); c.lineTo(p, g.height - BOTTOM);
+        c.moveTo(p, TOP); c.lineTo(p, g.height - this.bottom);
         const row = m.label ? ends.findIndex(end => end < p) : -1;
         if (row >= 0) {
           ends[row] = p + 8 + c.measureText(m.label).width;
@@ -246,11 +249,12 @@ export class Plot {
     c.strokeStyle = colour('dim'); c.lineWidth = 1;
     c.beginPath();
     const px = g.x.to(this.cursor.x);
-    c.moveTo(px, TOP); c.lineTo(px, g.height - BOTTOM);
+    c.moveTo(px, TOP); c.lineTo(px, g.height - this.bottom);
     c.stroke();
   }
 
   drawLegend(c, g) {
+    if (this.options.x.hidden) return;
     const named = this.series.filter(s => s.label);
     c.textBaseline = 'middle'; c.textAlign = 'left';
     let at = LEFT;

@@ -19,16 +19,28 @@ function choice(card, store, key, values, changed) {
   card.querySelector('h2').append(make('span', { class: 'choice row' }, ...buttons));
 }
 
+// The newest of each source; while nothing cuts, that of the last steady cut.
+class Newest {
+  constructor() { this.all = {}; this.cut = {}; }
+  take(message) {
+    this.all[message.source] = message;
+    if (message.steady) this.cut[message.source] = message;
+    this.cutting = message.steady;
+  }
+  get(source) { return (this.cutting ? this.all : this.cut)[source] ?? this.all[source]; }
+}
+
 const axes = AXES.map(a => [a, a]);
 const cut = (list, axis, n) => list.subarray(AXES.indexOf(axis) * n, (AXES.indexOf(axis) + 1) * n);
 
 export class Revolution {
-  constructor(card, link, store) {
-    Object.assign(this, { card, link, store, found: {} });
-    choice(card, store, 'axis', axes, () => this.draw());
+  constructor(card, link, store, choices = true) {
+    Object.assign(this, { card, link, store, found: new Newest() });
+    if (choices) choice(card, store, 'axis', axes, () => this.draw());
+    else document.addEventListener('choice', () => this.draw());
     this.plot = new Plot(card, { name: 'revolution', x: { label: 'Spindle angle [°]', low: 0, high: 360 }, y: { label: 'Force [N]' },
       empty: 'No force yet: it comes with the first cut', read: (x, y) => [`${fixed(x)}°`, `${digits(y)} N`] });
-    link.on('panel/revolution', message => { this.found[message.source] = message; this.news = true; });
+    link.on('panel/revolution', message => { this.found.take(message); this.news = true; });
     link.on('cut/condition', () => {});
   }
 
@@ -36,16 +48,16 @@ export class Revolution {
     const { axis } = this.store, series = [], marks = [];
     const styles = { [MEASURED]: { color: colour('measured'), width: 1.3 }, [COMPENSATED]: { color: colour(axis), width: 2.4 }, [TWIN]: { color: colour('twin'), width: 1.8, dash: [6, 4] } };
     for (const source of [MEASURED, COMPENSATED, TWIN]) {
-      const m = this.found[source];
+      const m = this.found.get(source);
       if (!m) continue;
       const n = m.bins, x = Array.from({ length: n }, (_, k) => (k + 0.5) * 360 / n);
       if (source === COMPENSATED) series.push({ kind: 'band', x, y: cut(m.low, axis, n), y2: cut(m.high, axis, n), color: colour(axis), alpha: 0.22 });
       series.push({ x, y: cut(m.mean, axis, n), label: SOURCES[source], ...styles[source] });
     }
-    const newest = this.found[COMPENSATED] ?? this.found[MEASURED], teeth = this.link.message('cut/condition')?.teeth;
+    const newest = this.found.get(COMPENSATED) ?? this.found.get(MEASURED), teeth = this.link.message('cut/condition')?.teeth;
     if (newest) {
       for (let k = 0; k < (teeth || 0); ++k) marks.push({ x: (360 - 360 * k / teeth) % 360, label: `tooth ${k + 1}` });
-      this.card.aside.textContent = `${newest.condition ? newest.condition + ', ' : ''}${fixed(rpm(newest.spindle_speed))} rpm, ${fixed(newest.revolutions, 1)} revolutions`;
+      this.card.aside.textContent = `${newest.steady ? '' : 'not cutting, '}${newest.condition ? newest.condition + ', ' : ''}${fixed(rpm(newest.spindle_speed))} rpm`;
     }
     this.plot.set({ series, marks });
   }
@@ -55,12 +67,12 @@ export class Revolution {
 
 export class Spectrum {
   constructor(card, link, store) {
-    Object.assign(this, { card, link, store, found: {} });
+    Object.assign(this, { card, link, store, found: new Newest() });
     choice(card, store, 'axis', axes, () => this.draw());
     choice(card, store, 'source', [[MEASURED, 'raw'], [COMPENSATED, 'compensated']], () => this.draw());
     this.plot = new Plot(card, { name: 'spectrum', x: { label: 'Frequency [Hz]', low: 0 }, y: { label: 'Amplitude [N]', log: true },
       empty: 'No force yet: it comes with the first cut', read: (x, y) => this.read(x, y) });
-    link.on('panel/spectrum', message => { this.found[message.source] = message; this.news = true; });
+    link.on('panel/spectrum', message => { this.found.take(message); this.news = true; });
     link.on('tool/modes', message => { if (message.point === 'tool_tip') this.modes = { ...this.modes, [message.direction]: message.modes }; });
     link.on('chatter/state', () => {});
   }
@@ -79,17 +91,17 @@ export class Spectrum {
   }
 
   draw() {
-    const m = this.found[this.store.source] ?? this.found[MEASURED];
+    const m = this.found.get(this.store.source) ?? this.found.get(MEASURED);
     if (!m) return this.plot.set({});
     const y = m[`f${this.store.axis}`], x = Array.from(y, (_, k) => (k + 0.5) * m.step);
     let peak = 0;
     for (const v of y) peak = Math.max(peak, v);
     this.plot.options.y.low = Math.max(1e-4, peak / 2000);
     this.plot.set({ series: [{ x, y, color: colour(this.store.axis), width: 1.4 }], marks: this.marks(m) });
-    this.card.aside.textContent = `${SOURCES[m.source]}, lines ${fixed(m.resolution, 1)} Hz apart`;
+    this.card.aside.textContent = `${m.steady ? '' : 'not cutting, '}${m.condition}`;
   }
   read(x, y) {
-    const m = this.found[this.store.source] ?? this.found[MEASURED];
+    const m = this.found.get(this.store.source) ?? this.found.get(MEASURED);
     if (!m) return [];
     const line = m[`f${this.store.axis}`][Math.floor(x / m.step)], turn = m.spindle_speed / (2 * Math.PI);
     return [`${fixed(x, 1)} Hz: ${digits(line)} N`, turn > 0.5 ? `order ${fixed(x / turn, 2)}` : ''];
@@ -107,7 +119,7 @@ export class SpectrumCourse {
     });
   }
   refresh() { this.waterfall.draw(); }
-  shown() { this.waterfall.dirty = !this.waterfall.empty.hidden ? false : true; }
+  shown() { this.waterfall.dirty = this.waterfall.empty.hidden; }
 }
 
 // Bins of a strip joined until there are no more than columns of a picture.
@@ -131,9 +143,9 @@ export class Strips {
     choice(card, store, 'source', [[MEASURED, 'raw'], [COMPENSATED, 'compensated'], [TWIN, 'twin']], () => this.draw());
     const pause = make('button', { onclick: () => { this.paused = !this.paused; pause.textContent = this.paused ? 'Go on' : 'Pause'; this.draw(); } }, 'Pause');
     card.querySelector('h2').append(make('span', { class: 'choice row' }, pause));
-    this.plots = AXES.map(axis => new Plot(card, { name: `strip_${axis}`, group: 'strips', x: { label: axis === 'z' ? 'Time' : '', text: clock }, y: { label: `F${axis} [N]` },
+    this.plots = AXES.map(axis => new Plot(card, { name: `strip_${axis}`, group: 'strips', x: { label: 'Time', text: clock, least: 1, hidden: axis !== 'z' }, y: { label: `F${axis} [N]` },
       empty: 'No force yet: it comes with the first cut', read: (x, y) => [clock(x), `${digits(y)} N`] }));
-    for (const plot of this.plots) plot.frame.style.minHeight = '92px';
+    for (const plot of this.plots) plot.frame.style.minHeight = '76px';
     link.on('panel/strip', message => this.take(message));
   }
 

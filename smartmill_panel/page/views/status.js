@@ -25,7 +25,7 @@ export class StatusLine {
       if (old <= OLD) words.push(['good', 'Connected']);
       words.push(state.armed ? ['warn', 'Armed'] : ['plain', 'Disarmed']);
       words.push(['plain', MODES[state.mode] ?? `mode ${state.mode}`], ['plain', RUNS[state.run] ?? '']);
-      if (!state.alarm && !state.emergency) words.push(['plain', 'no alarm']);
+      if (!state.alarm && !state.emergency && old <= OLD) words.push(['plain', 'no alarm']);
     } else if (!words.length) {
       words.push(['good', RUNS[state.run]]);
     }

@@ -4,11 +4,11 @@ import { toMm, toRpm } from './chart.js';
 
 const SLIDERS = [
   { key: 'depth', name: 'Axial depth', unit: 'mm', low: 0.1, high: 20, step: 0.1, digits: 1 },
-  { key: 'width', name: 'Width of cut', unit: '% of the diameter', low: 2, high: 100, step: 1, digits: 0 },
+  { key: 'width', name: 'Width of cut', unit: '% of ⌀', low: 2, high: 100, step: 1, digits: 0 },
   { key: 'feed', name: 'Feed a tooth', unit: 'mm', low: 0.01, high: 0.4, step: 0.005, digits: 3 },
   { key: 'teeth', name: 'Teeth', unit: '', low: 1, high: 12, step: 1, digits: 0 },
   { key: 'helix', name: 'Helix', unit: '°', low: 0, high: 60, step: 1, digits: 0 },
-  { key: 'overhang', name: 'Overhang', unit: '% of the measured', low: 60, high: 160, step: 1, digits: 0 },
+  { key: 'overhang', name: 'Overhang, of the measured', unit: '%', low: 60, high: 160, step: 1, digits: 0 },
 ];
 
 export class WhatIf {

@@ -1,7 +1,9 @@
 #include "node/node.h"
 
+#include <cstdio>
 #include <sstream>
 
+#include <smartmill_msgs/ChatterState.h>
 #include <smartmill_msgs/ForceRevolution.h>
 #include <smartmill_msgs/ForceSpectrum.h>
 #include <smartmill_msgs/ForceStrip.h>
@@ -84,8 +86,9 @@ PanelNode::PanelNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
   shell_.diagnose("panel", [this](auto& status) { diagnose(status); });
   const std::string host = parameters_.address == "0.0.0.0" ? "localhost" : parameters_.address;
   nh.setParam("panel_at", "http://" + host + ":" + std::to_string(server_.port()) + "/");
-  ROS_INFO("panel: look at http://%s:%d/%s", host.c_str(), server_.port(),
-           gate_.open() ? " (commands are allowed, with the token)" : "");
+  std::printf("panel: look at http://%s:%d/%s\n", host.c_str(), server_.port(),
+              gate_.open() ? " (commands are allowed, with the token)" : "");
+  std::fflush(stdout);
 }
 
 PanelNode::~PanelNode() {
@@ -104,6 +107,9 @@ void PanelNode::listen() {
         condition_ = message.name;
         teeth_ = message.teeth;
       });
+  shell_.inputs().on<smartmill_msgs::ChatterState>(
+      names::CHATTER_STATE,
+      [this](const smartmill_msgs::ChatterState& message, double) { steady_ = message.valid; });
   listen(names::FORCE_MEASURED, StripMessage::MEASURED);
   listen(names::FORCE_COMPENSATED, StripMessage::COMPENSATED);
   listen(names::TWIN_FORCE, StripMessage::TWIN);
@@ -137,6 +143,7 @@ void PanelNode::publish(Digests& digests) {
     smartmill_msgs::ForceRevolution message;
     message.header.stamp = fromSec(found->stamp);
     message.condition = condition_;
+    message.steady = steady_;
     message.source = digests.source;
     message.spindle_speed = found->spindle_speed;
     message.revolutions = found->revolutions;
@@ -150,6 +157,7 @@ void PanelNode::publish(Digests& digests) {
     smartmill_msgs::ForceSpectrum message;
     message.header.stamp = fromSec(found->stamp);
     message.condition = condition_;
+    message.steady = steady_;
     message.source = digests.source;
     message.spindle_speed = angle_.speed();
     message.teeth = teeth_;

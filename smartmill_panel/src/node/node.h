@@ -51,6 +51,7 @@ class PanelNode {
   AngleTrack angle_;
   std::string condition_;
   std::uint32_t teeth_ = 0;
+  bool steady_ = false;
   std::array<Digests, 3> digests_;
   ros::Publisher strip_, revolution_, spectrum_;
   std::unique_ptr<Commands> commands_;

@@ -124,10 +124,14 @@ std::string TopicBridge::keyOf(const Topic& topic, const topic_tools::ShapeShift
     const auto modes = message.instantiate<smartmill_msgs::ModalModel>();
     return modes->point + modes->direction;
   }
+  // Of each source the newest, and the newest of a steady cut.
+  const auto digest = [](const auto& found) {
+    return std::to_string(found->source) + (found->steady ? " steady" : "");
+  };
   if (is<smartmill_msgs::ForceRevolution>(type))
-    return std::to_string(message.instantiate<smartmill_msgs::ForceRevolution>()->source);
+    return digest(message.instantiate<smartmill_msgs::ForceRevolution>());
   if (is<smartmill_msgs::ForceSpectrum>(type))
-    return std::to_string(message.instantiate<smartmill_msgs::ForceSpectrum>()->source);
+    return digest(message.instantiate<smartmill_msgs::ForceSpectrum>());
   if (is<smartmill_msgs::ForceStrip>(type)) return ring(topic.count, STRIPS_KEPT);
   if (is<smartmill_msgs::ChatterState>(type) || is<smartmill_msgs::DiscrepancyState>(type))
     return ring(topic.count, STATES_KEPT);
