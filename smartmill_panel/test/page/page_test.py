@@ -160,7 +160,11 @@ def values_are_the_topics(browser):
     equal(browser.js(row), ["11459", "2.200", "2.90", "1235", "3.21", "3.85", "480.0"])
     equal(browser.js("[...document.querySelectorAll('#coefficients td')].map(e => e.textContent)"),
           ["Ktc", "796 ± 4", "N/mm²", "Kte", "27.7 ± 0.8", "N/mm"])
+    browser.js("(location.hash = 'model', 1)")
+    browser.wait("document.querySelector('#gap td')")
     equal(browser.js("[...document.querySelectorAll('#gap td:nth-child(2)')].map(e => e.textContent)"), ["1.04", "3.21"])
+    browser.js("(location.hash = 'session', 1)")
+    browser.wait("document.querySelector('#steps td')")
     equal(browser.js("[...document.querySelectorAll('#steps tbody tr')].map(e => e.children[0].textContent + ' ' + e.children[1].textContent)"),
           ["done connect", "running slot test"])
 
@@ -168,6 +172,7 @@ def values_are_the_topics(browser):
 def messages_are_decoded_as_by_ros(browser, machine):
     import io
     for topic in ("stability/chart", "tool/frf", "tool/modes", "material/coefficients", "cut/condition", "session/state"):
+        browser.wait("window.smartmill.link.message(arguments[0]) !== undefined", topic)
         sent = machine.last[topic]
         wire = io.BytesIO()
         sent.serialize(wire)
@@ -202,7 +207,7 @@ def every_view_is_drawn(browser):
         for view in VIEWS:
             browser.js("(location.hash = arguments[0], 1)", view)
             browser.wait("[...document.querySelectorAll('.view:not([hidden]) canvas')].every(c => c.dataset.drawn == 'yes')")
-            time.sleep(0.3)
+            time.sleep(0.15)  # two redraws
             for name, count in browser.js(canvases):
                 assert count > 500, f"{view} at {size}: {name} is empty"
             wide = browser.js("document.documentElement.scrollWidth")
