@@ -7,7 +7,7 @@ import { ChartView, PointsTable } from './views/chart.js';
 import { WhatIf } from './views/what_if.js';
 import { Revolution, Spectrum, SpectrumCourse, Strips } from './views/forces.js';
 import { Dynamics } from './views/dynamics.js';
-import { Session, Progress, Notes } from './views/session.js';
+import { Session, Progress, Notes, Replay } from './views/session.js';
 import { Commands } from './views/commands.js';
 import { Discrepancy, Report, Database, Diagnostics } from './views/model.js';
 
@@ -108,6 +108,7 @@ class Page {
     const orders = new Commands(commands, link, this.config);
     this.add('session', commands, orders);
     this.add('session', notes, new Notes(notes, link, orders));
+    this.add(null, null, new Replay(document.querySelector('#replay'), link));
     this.add(null, null, new Progress(document.querySelector('#foot'), link));
 
     place('model', 'Does the model fit', 'tools-free', e => [new Discrepancy(e, link), new Report(e, link)]);

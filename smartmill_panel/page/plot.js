@@ -133,7 +133,10 @@ export class Plot {
     this.canvas.dataset.drawn = something ? 'yes' : 'no';
     c.font = `${FONT}px ${getComputedStyle(document.body).fontFamily}`;
     this.drawAxes(c, g);
-    if (!something) return this.showNote(g);
+    if (!something) {
+      this.labelX(c, g, 0);
+      return this.showNote(g);
+    }
     c.save();
     c.beginPath();
     c.rect(LEFT, TOP, g.width - LEFT - RIGHT, g.height - TOP - this.bottom);
@@ -165,7 +168,6 @@ export class Plot {
       c.fillText(tickText(t, y.log), LEFT - 6, p);
     }
     c.textAlign = 'right'; c.textBaseline = 'bottom';
-    if (!x.hidden) c.fillText(x.label, g.width - RIGHT, g.height - 2);
     c.save();
     c.translate(11, TOP);
     c.rotate(-Math.PI / 2);
@@ -265,6 +267,15 @@ export class Plot {
       c.fillText(s.label, at + 19, g.height - 10);
       at += 34 + c.measureText(s.label).width;
     }
+    this.labelX(c, g, at);
+  }
+
+  // Where the legend leaves room.
+  labelX(c, g, from) {
+    const { label, hidden } = this.options.x;
+    if (hidden || g.width - RIGHT - c.measureText(label).width < from) return;
+    c.textAlign = 'right'; c.textBaseline = 'bottom'; c.fillStyle = colour('dim');
+    c.fillText(label, g.width - RIGHT, g.height - 2);
   }
 
   showNote(g) {

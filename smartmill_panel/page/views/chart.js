@@ -86,10 +86,10 @@ export class ChartView {
       { x: chart.speed, y: capped(chart.torque), color: colour('dim'), dash: [7, 4], label: 'torque' },
       { x: chart.speed, y: capped(chart.power), color: colour('dim'), dash: [2, 4], label: 'power' });
     if (this.what_if) series.push(...this.whatIfSeries(top));
-    const points = message.recommended.map((p, k) => ({ x: rpm(p.spindle_speed), y: MM * p.axial_depth, color: colour('good'), radius: 5,
-      label: k === 0 ? `${fixed(rpm(p.spindle_speed))} rpm, ${fixed(MM * p.axial_depth, 2)} mm` : '' }));
-    points.push(...message.unstable.map(p => ({ x: rpm(p.spindle_speed), y: MM * p.axial_depth, color: colour('bad'), radius: 4, hollow: true })));
     const live = this.live();
+    const points = message.recommended.map((p, k) => ({ x: rpm(p.spindle_speed), y: MM * p.axial_depth, color: colour('good'), radius: 5,
+      label: k === 0 && !live ? `${fixed(rpm(p.spindle_speed))} rpm, ${fixed(MM * p.axial_depth, 2)} mm` : '' }));
+    points.push(...message.unstable.map(p => ({ x: rpm(p.spindle_speed), y: MM * p.axial_depth, color: colour('bad'), radius: 4, hollow: true })));
     if (live) {
       const chatter = this.link.message('chatter/state')?.chatter;
       points.push({ ...live, color: colour(chatter ? 'bad' : 'warn'), radius: 10, label: chatter ? 'now: chatter' : 'now' });

@@ -46,15 +46,15 @@ export class Revolution {
 
   draw() {
     const { axis } = this.store, series = [], marks = [];
+    const newest = this.found.get(COMPENSATED) ?? this.found.get(MEASURED), teeth = this.link.message('cut/condition')?.teeth;
     const styles = { [MEASURED]: { color: colour('measured'), width: 1.3 }, [COMPENSATED]: { color: colour(axis), width: 2.4 }, [TWIN]: { color: colour('twin'), width: 1.8, dash: [6, 4] } };
     for (const source of [MEASURED, COMPENSATED, TWIN]) {
       const m = this.found.get(source);
-      if (!m) continue;
+      if (!m || (source === TWIN && m.condition !== newest?.condition)) continue;
       const n = m.bins, x = Array.from({ length: n }, (_, k) => (k + 0.5) * 360 / n);
       if (source === COMPENSATED) series.push({ kind: 'band', x, y: cut(m.low, axis, n), y2: cut(m.high, axis, n), color: colour(axis), alpha: 0.22 });
       series.push({ x, y: cut(m.mean, axis, n), label: SOURCES[source], ...styles[source] });
     }
-    const newest = this.found.get(COMPENSATED) ?? this.found.get(MEASURED), teeth = this.link.message('cut/condition')?.teeth;
     if (newest) {
       for (let k = 0; k < (teeth || 0); ++k) marks.push({ x: (360 - 360 * k / teeth) % 360, label: `tooth ${k + 1}` });
       this.card.aside.textContent = `${newest.steady ? '' : 'not cutting, '}${newest.condition ? newest.condition + ', ' : ''}${fixed(rpm(newest.spindle_speed))} rpm`;

@@ -84,7 +84,7 @@ export class Database {
     const rows = [row('Ktc', m.ktc, m.ktc_std, 1e-6, 'N/mm²'), row('Krc', m.krc, m.krc_std, 1e-6, 'N/mm²'), row('Kac', m.kac, m.kac_std, 1e-6, 'N/mm²'),
       row('Kte', m.kte, m.kte_std, 1e-3, 'N/mm'), row('Kre', m.kre, m.kre_std, 1e-3, 'N/mm'), row('Kae', m.kae, m.kae_std, 1e-3, 'N/mm')].filter(Boolean);
     this.place.className = '';
-    this.place.replaceChildren(make('p', {}, `${m.tool} in ${m.material}`, make('span', { class: 'dim' }, ` ${from}, from ${m.test_count} cuts by the ${m.source.replaceAll('_', ' ')}`)), table(['Coefficient', 'Value', ''], rows, { id: 'coefficients' }));
+    this.place.replaceChildren(make('p', {}, `${m.tool} in ${m.material}`, make('span', { class: 'dim' }, `${from ? ` ${from}` : ''}, from ${m.test_count} cuts by the ${m.source.replaceAll('_', ' ')}`)), table(['Coefficient', 'Value', ''], rows, { id: 'coefficients' }));
   }
 }
 

@@ -61,3 +61,32 @@ export class Notes {
   csv() { return 'time,cut,note\n' + this.notes.map(n => `${new Date(1000 * n.time).toISOString()},${n.cut},"${n.text.replaceAll('"', '""')}"`).join('\n') + '\n'; }
   draw() { this.list.replaceChildren(table(['Time', 'Cut', 'Note'], this.notes.map(n => [clock(n.time), n.cut, n.text]))); }
 }
+
+// A recording that is played: how far, how fast. It commands no machine.
+export class Replay {
+  constructor(place, link) {
+    Object.assign(this, { link, place });
+    this.slider = make('input', { type: 'range', min: 0, max: 1, step: 'any', 'aria-label': 'Place in the recording', onchange: () => this.send({ position: this.slider.value }), oninput: () => { this.held = true; } });
+    this.told = make('span', { class: 'dim' });
+    this.pause = make('button', { onclick: () => this.send({ paused: this.message.paused ? 0 : 1 }) }, 'Pause');
+    this.speeds = [[0.2, '0.2×'], [1, '1×'], [5, '5×'], [0, 'as fast as it goes']].map(([speed, name]) => make('button', { 'data-speed': speed, onclick: () => this.send({ speed, paused: 0 }) }, name));
+    place.append(this.pause, this.slider, this.told, make('span', { class: 'choice row' }, ...this.speeds));
+    link.on('replay/state', message => { this.message = message; this.news = true; });
+  }
+  send(wish) {
+    this.held = false;
+    const query = new URLSearchParams({ paused: this.message.paused ? 1 : 0, ...wish });
+    fetch(`api/replay?${query}`, { method: 'POST' }).catch(() => null);
+  }
+  refresh() {
+    if (!this.news) return;
+    this.news = false;
+    const m = this.message;
+    this.place.hidden = false;
+    this.slider.max = m.length;
+    if (!this.held) this.slider.value = m.position;
+    this.pause.textContent = m.paused ? 'Play' : 'Pause';
+    this.told.textContent = `${m.name}  ${fixed(m.position, 1)} of ${fixed(m.length, 1)} s`;
+    for (const b of this.speeds) b.setAttribute('aria-pressed', String(+b.dataset.speed === m.speed));
+  }
+}

@@ -86,16 +86,16 @@ export class Tiles {
 
   showLamp(gone, cutting) {
     const { link } = this, last = this.verdicts.at(-1), advice = link.message('chatter/advice');
-    const old = gone || (last?.valid && link.age('chatter/state') > CUT_OLD);
+    const old = gone || (cutting && last?.valid && link.age('chatter/state') > CUT_OLD);
     const name = link.message('cut/condition')?.name ?? '';
-    if (!last || !last.valid) {
+    if (!last || !last.valid || !cutting) {
       this.lamp.set(cutting ? 'Entering' : 'No cut', name, old, 'quiet');
     } else if (last.chatter) {
       const speed = advice && advice.condition === last.condition ? advice.speeds[0]?.spindle_speed : undefined;
       this.lamp.set('CHATTER', `${fixed(last.frequency)} Hz, ${fixed(last.severity)} N` +
         (speed ? `, try ${fixed(rpm(speed))} rpm` : ''), old, 'bad');
     } else {
-      this.lamp.set('Stable', `${name || last.condition}, ${fixed(100 * last.energy_ratio, 1)} % beside the harmonics`, old, 'good');
+      this.lamp.set('Stable', `${fixed(100 * last.energy_ratio, 1)} % of the energy elsewhere`, old, 'good');
     }
     const shown = this.verdicts.filter(v => v.valid).slice(-HISTORY);
     const text = shown.map(v => v.chatter ? 'yes' : 'no').join();

@@ -189,6 +189,7 @@ Answer PanelNode::answerNow(const Question& question) {
   if (question.path == "what_if") return askWhatIf(nh_, question);
   if (question.path == "coefficients") return askCoefficients(nh_, question);
   if (question.path == "report") return newestReport(parameters_.reports);
+  if (question.path == "replay") return controlReplay(nh_, question);
   if (question.path == "command") {
     if (const auto refusal = gate_.refusal(question)) {
       ROS_WARN("panel: command from %s refused", question.from.c_str());

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include <smartmill_msgs/FindCoefficients.h>
+#include <smartmill_msgs/PlayControl.h>
 #include <smartmill_msgs/WhatIf.h>
 #include <nlohmann/json.hpp>
 
@@ -87,6 +88,18 @@ Answer askWhatIf(ros::NodeHandle& nh, const Question& question) {
                        {"stable_share", number(found.stable_share)},
                        {"seconds", found.seconds}};
   return {200, answer.dump()};
+}
+
+Answer controlReplay(ros::NodeHandle& nh, const Question& question) {
+  constexpr int NOT_ALLOWED = 405;
+  if (!question.post) return answerOf(NOT_ALLOWED, "a wish comes by POST");
+  smartmill_msgs::PlayControl service;
+  service.request.speed = numberOf(question, "speed", NONE);
+  service.request.paused = countOf(question, "paused", 1.0) == 1;
+  service.request.position = numberOf(question, "position", NONE);
+  if (!nh.serviceClient<smartmill_msgs::PlayControl>(names::REPLAY_CONTROL).call(service))
+    return answerOf(NOT_THERE, "no recording is played");
+  return answerOf(service.response.ok ? 200 : BAD_REQUEST, service.response.message);
 }
 
 Answer askCoefficients(ros::NodeHandle& nh, const Question& question) {

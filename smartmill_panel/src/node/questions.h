@@ -8,9 +8,11 @@
 
 namespace smartmill::panel {
 
-/// What the page asks the other nodes through this one. Nothing here changes anything.
+/// What the page asks the other nodes through this one. Nothing here changes the machine.
 /// @throws Error on a bad query.
 Answer askWhatIf(ros::NodeHandle& nh, const Question& question);
+/// Of a recording that is played: pause, speed and place.
+Answer controlReplay(ros::NodeHandle& nh, const Question& question);
 Answer askCoefficients(ros::NodeHandle& nh, const Question& question);
 
 /// The newest report.json below a folder, with its folder's name.

@@ -459,19 +459,24 @@ void ChartMaker::addSpread(const RegenerativeSystem& system, WhatIfChart& chart)
   constexpr int DRAWS = 40;
   constexpr unsigned SEED = 1;
   constexpr std::size_t LINES = 600;  // what they miss, mean and draws miss alike
-  constexpr double LOW = 0.1, HIGH = 0.9, NO_BETTER = 0.1;
+  constexpr double LOW = 0.1, HIGH = 0.9, UNKNOWN = 0.1, MOST = 0.5;
   std::vector<ModeUncertainty> modes;
   for (const char* direction : {"x", "y"}) {
-    for (const Mode& mode : modes_.at(direction).model.modes) {
-      const auto share = [](double deviation, double value) {
-        return std::isfinite(deviation) ? std::min(NO_BETTER * 5.0, std::abs(deviation / value)) : NO_BETTER;
+    const ModalModel& model = modes_.at(direction).model;
+    const std::size_t before = modes.size(), count = systemModes(model, 0).size();
+    for (const Mode& mode : model.modes) {
+      if (mode.gain == 0.0) continue;
+      const auto share = [&](double deviation, double value) {
+        return std::isfinite(deviation) ? std::min(MOST, std::abs(deviation / value)) : UNKNOWN;
       };
       modes.push_back({share(mode.frequency_std, mode.frequency),
                        share(mode.damping_ratio_std, mode.damping_ratio), share(mode.gain_std, mode.gain)});
     }
+    // What lies above the band counts as one mode more.
+    modes.resize(before + count, {UNKNOWN, UNKNOWN, UNKNOWN});
   }
   const CuttingCoefficients &value = coefficients_->value, &deviation = coefficients_->std_dev;
-  const double kt = std::isfinite(deviation.ktc) ? deviation.ktc / value.ktc : NO_BETTER;
+  const double kt = std::isfinite(deviation.ktc) ? deviation.ktc / value.ktc : UNKNOWN;
   const double kr = std::isfinite(deviation.krc) && value.krc > 0.0 ? deviation.krc / value.krc : kt;
   const UncertainSystem uncertain(system, modes, kt, kr);
   std::mt19937_64 random(SEED);

@@ -8,6 +8,8 @@ constexpr const char* FORCE_REVOLUTION = "panel/revolution";
 constexpr const char* FORCE_SPECTRUM = "panel/spectrum";
 constexpr const char* PANEL_LOG = "panel/log";
 constexpr const char* TWIN_FORCE = "discrepancy/force";
+constexpr const char* REPLAY_STATE = "replay/state";
+constexpr const char* REPLAY_CONTROL = "replay/control";
 constexpr const char* SESSION_STATE = "session/state";
 constexpr const char* WHAT_IF = "stability/what_if";
 
