@@ -147,9 +147,13 @@ export class Strips {
       empty: 'No force yet: it comes with the first cut', read: (x, y) => [clock(x), `${digits(y)} N`] }));
     for (const plot of this.plots) plot.frame.style.minHeight = '76px';
     link.on('panel/strip', message => this.take(message));
+    link.on('replay/state', message => {
+      if (message.position < this.position) this.strips = [];
+      this.position = message.position;
+    });
   }
 
-  // Kept ones may come in any order; time that goes back begins anew.
+  // Kept ones may come in any order.
   take(strip) {
     const begin = strip.header.stamp, last = this.strips.at(-1)?.header.stamp;
     this.strips.push(strip);

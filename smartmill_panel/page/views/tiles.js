@@ -55,6 +55,10 @@ export class Tiles {
     this.places.element.append(this.axes);
     for (const topic of ['cnc/load', 'cut/condition', 'chatter/advice', 'stability/chart']) link.on(topic, () => {});
     link.on('chatter/state', message => this.judged(message));
+    link.on('replay/state', message => {
+      if (message.position < this.position) this.verdicts = [];
+      this.position = message.position;
+    });
   }
 
   // Kept ones may come in any order.
