@@ -38,6 +38,7 @@ void Bridge::step(double now) {
     state_ = reading->state;
     state_.connected = true;
     load_ = reading->load;
+    alarms_ = reading->alarms;
     increment_ = reading->increment;
     notice(motion_.step(*reading, now));
   }
@@ -86,6 +87,9 @@ Answer<MacroCode> Bridge::setMacro(int number, double value) {
     return {MacroCode::not_connected, "no connection to the " + controller_->name()};
   }
   const std::string name = "#" + std::to_string(number);
+  if (motion_.readOnly()) {
+    return {MacroCode::refused, name + ": the bridge only reads (parameter read_only)"};
+  }
   if (!std::isfinite(value)) {
     return {MacroCode::refused, name + ": the value is not a finite number"};
   }

@@ -1,101 +1,17 @@
 // The bridge against a machine on the real wire; the machine's time is the test's own.
 #include "smartmill_cnc/bridge.h"
 
-#include <arpa/inet.h>
 #include <gtest/gtest.h>
-#include <netinet/in.h>
-#include <poll.h>
-#include <sys/socket.h>
-#include <unistd.h>
 
-#include <atomic>
-#include <chrono>
-#include <functional>
-#include <list>
-#include <thread>
+#include <cmath>
 
+#include "bridge_rig.h"
+#include "fault_proxy.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/units.h"
-#include "test_machine.h"
 
 namespace smartmill::cnc {
 namespace {
-
-constexpr double PERIOD = 0.02;  // [s]
-
-class BridgeTest : public ::testing::Test {
- protected:
-  BridgeTest() {
-    startServer(0);
-    connectBridge(port_);
-  }
-
-  void startServer(std::uint16_t port) {
-    focas::ServerOptions options;
-    options.port = port;
-    server_ = std::make_unique<focas::Server>(options, machine_);
-    port_ = server_->port();
-  }
-
-  void connectBridge(std::uint16_t port) {
-    FocasParameters focas;
-    focas.port = port;
-    focas.reply_timeout = 10.0;
-    MotionParameters motion;
-    motion.limits.travel = {{{-0.2, 0.2}, {-0.2, 0.2}, {-0.2, 0.2}}};
-    motion.limits.max_feed = 0.5;
-    motion.limits.max_spindle_speed = units::radPerSecFromRpm(12000.0);
-    bridge_ = std::make_unique<Bridge>(makeFocasController(focas), 1.0, motion);
-  }
-
-  void cycle() {
-    bridge_->fetch(now_);
-    bridge_->step(now_);
-    for (Note& note : bridge_->takeNotes()) {
-      notes_.push_back(note.text);
-    }
-    machine_.advance(PERIOD);
-    now_ += PERIOD;
-    // Text travels while the test's time stands: the server's thread gets the processor.
-    std::this_thread::sleep_for(std::chrono::microseconds(200));
-  }
-
-  bool cycleUntil(const std::function<bool()>& condition, int most = 20000) {
-    for (int i = 0; i < most; ++i) {
-      if (condition()) {
-        return true;
-      }
-      cycle();
-    }
-    return false;
-  }
-
-  Outcome finish() {
-    std::optional<Outcome> outcome;
-    EXPECT_TRUE(cycleUntil([&] { return (outcome = bridge_->takeOutcome()).has_value(); }));
-    return outcome.value_or(Outcome{MotionCode::busy, "no outcome"});
-  }
-
-  void arm() {
-    cycle();
-    ASSERT_TRUE(bridge_->state().connected);
-    const Answer<ArmCode> answer = bridge_->arm(true);
-    ASSERT_EQ(answer.code, ArmCode::ok) << answer.message;
-    ASSERT_TRUE(bridge_->state().armed);
-  }
-
-  bool noted(const std::string& part) const {
-    return std::any_of(notes_.begin(), notes_.end(),
-                       [&](const std::string& note) { return note.find(part) != std::string::npos; });
-  }
-
-  TestMachine machine_;
-  std::unique_ptr<focas::Server> server_;
-  std::uint16_t port_ = 0;
-  std::unique_ptr<Bridge> bridge_;
-  double now_ = 100.0;  // [s]
-  std::vector<std::string> notes_;
-};
 
 TEST_F(BridgeTest, StateAndLoadInSi) {
   machine_.change([](TestMachine& m) {
@@ -397,114 +313,24 @@ TEST_F(BridgeTest, StallEndsTheMotion) {
   EXPECT_NE(outcome.message.find("nothing has moved for 60 s"), std::string::npos) << outcome.message;
 }
 
-/// Stands between bridge and server and does not like large questions: refuses them, or hangs up.
-class NarrowController {
- public:
-  NarrowController(std::uint16_t target, std::size_t most, bool hang_up)
-      : target_(target), most_(most), hang_up_(hang_up) {
-    listener_ = ::socket(AF_INET, SOCK_STREAM, 0);
-    sockaddr_in address = loopback(0);
-    socklen_t size = sizeof address;
-    EXPECT_EQ(::bind(listener_, reinterpret_cast<sockaddr*>(&address), size), 0);
-    EXPECT_EQ(::listen(listener_, 8), 0);
-    ::getsockname(listener_, reinterpret_cast<sockaddr*>(&address), &size);
-    port = ntohs(address.sin_port);
-    thread_ = std::thread([this] { run(); });
-  }
-  ~NarrowController() {
-    done_ = true;
-    thread_.join();
-    ::close(listener_);
-  }
-  std::uint16_t port = 0;
-
- private:
-  struct Pair {
-    int client, server;
-    focas::FrameReader reader;
+/// Does not like large questions: refuses them, or hangs up.
+FaultProxy::Judge narrow(std::size_t most, bool hang_up) {
+  return [most, hang_up](const focas::Frame& frame) {
+    if (frame.type != focas::FRAME_DATA || focas::decodeRequests(frame.body).size() <= most) {
+      return FaultProxy::handOn(frame);
+    }
+    focas::ErrorBody error;
+    error.code = focas::EW_LENGTH;
+    const focas::Bytes refusal =
+        focas::encodeFrame(focas::FRAME_DATA, focas::DIR_ERROR, focas::encodeErrorBody(error), 3);
+    return FaultProxy::Verdict{{}, hang_up ? focas::Bytes() : refusal, hang_up};
   };
-  static sockaddr_in loopback(std::uint16_t port) {
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    address.sin_port = htons(port);
-    return address;
-  }
-  static bool move(int from, const std::function<void(const std::uint8_t*, std::size_t)>& take) {
-    pollfd wait{from, POLLIN, 0};
-    if (::poll(&wait, 1, 0) <= 0) {
-      return true;
-    }
-    std::uint8_t buffer[4096];
-    const ssize_t got = ::recv(from, buffer, sizeof buffer, 0);
-    if (got > 0) {
-      take(buffer, static_cast<std::size_t>(got));
-    }
-    return got > 0;
-  }
-  static void put(int to, const focas::Bytes& bytes) {
-    EXPECT_EQ(::send(to, bytes.data(), bytes.size(), MSG_NOSIGNAL), static_cast<ssize_t>(bytes.size()));
-  }
-  bool serve(Pair& pair) {
-    bool alive = move(pair.server, [&](const std::uint8_t* data, std::size_t size) {
-      put(pair.client, focas::Bytes(data, data + size));
-    });
-    alive = move(pair.client,
-                 [&](const std::uint8_t* data, std::size_t size) { pair.reader.append(data, size); }) &&
-            alive;
-    while (const std::optional<focas::Frame> frame = pair.reader.next()) {
-      if (frame->type == focas::FRAME_DATA && focas::decodeRequests(frame->body).size() > most_) {
-        if (hang_up_) {
-          return false;
-        }
-        focas::ErrorBody error;
-        error.code = focas::EW_LENGTH;
-        put(pair.client,
-            focas::encodeFrame(focas::FRAME_DATA, focas::DIR_ERROR, focas::encodeErrorBody(error), 3));
-      } else {
-        put(pair.server, focas::encodeFrame(frame->type, frame->direction, frame->body, frame->version));
-      }
-    }
-    return alive;
-  }
-  void run() {
-    std::list<Pair> pairs;
-    while (!done_) {
-      pollfd wait{listener_, POLLIN, 0};
-      if (::poll(&wait, 1, 0) > 0) {
-        const sockaddr_in address = loopback(target_);
-        pairs.push_back({::accept(listener_, nullptr, nullptr), ::socket(AF_INET, SOCK_STREAM, 0), {}});
-        EXPECT_EQ(::connect(pairs.back().server, reinterpret_cast<const sockaddr*>(&address), sizeof address),
-                  0);
-      }
-      pairs.remove_if([&](Pair& pair) {
-        if (serve(pair)) {
-          return false;
-        }
-        ::close(pair.client);
-        ::close(pair.server);
-        return true;
-      });
-      std::this_thread::sleep_for(std::chrono::microseconds(50));
-    }
-    for (const Pair& pair : pairs) {
-      ::close(pair.client);
-      ::close(pair.server);
-    }
-  }
-
-  std::uint16_t target_;
-  std::size_t most_;
-  bool hang_up_;
-  int listener_ = -1;
-  std::atomic<bool> done_{false};
-  std::thread thread_;
-};
+}
 
 TEST_F(BridgeTest, SmallQuestionsForANarrowController) {
   for (const bool hang_up : {false, true}) {
-    NarrowController narrow(port_, 5, hang_up);
-    connectBridge(narrow.port);
+    FaultProxy controller(port_, narrow(5, hang_up));
+    connectBridge(controller.port);
     ASSERT_TRUE(cycleUntil([&] { return bridge_->state().connected; }, 1000));
     ASSERT_TRUE(bridge_->load());
     EXPECT_DOUBLE_EQ(bridge_->load()->spindle_load, 0.1234);
@@ -513,8 +339,8 @@ TEST_F(BridgeTest, SmallQuestionsForANarrowController) {
     EXPECT_EQ(finish().code, MotionCode::ok);
   }
   // So narrow that the load meters are refused altogether: the rest works.
-  NarrowController narrow(port_, 3, false);
-  connectBridge(narrow.port);
+  FaultProxy controller(port_, narrow(3, false));
+  connectBridge(controller.port);
   ASSERT_TRUE(cycleUntil([&] { return bridge_->state().connected; }, 1000));
   EXPECT_FALSE(bridge_->load());
   EXPECT_EQ(bridge_->state().axes.size(), 3u);
@@ -554,8 +380,9 @@ TEST(BridgeConnect, ClosedPortIsOneLine) {
     }
   }
   ASSERT_EQ(notes.size(), 1u);
-  EXPECT_EQ(notes[0].text,
-            "cannot connect to the controller at 127.0.0.1:1: Connection refused; trying again every 1.0 s");
+  EXPECT_EQ(
+      notes[0].text,
+      "cannot connect to the controller at 127.0.0.1:1: Connection refused; trying again every 1.0 to 8.0 s");
 }
 
 }  // namespace

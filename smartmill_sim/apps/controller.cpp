@@ -52,7 +52,7 @@ int main(int argc, char** argv) {
                                          {"edit", focas::AUT_EDIT},     {"handle", focas::AUT_HANDLE},
                                          {"jog", focas::AUT_JOG},       {"inc", focas::AUT_INC},
                                          {"reference", focas::AUT_REF}, {"dnc", focas::AUT_REMOTE}};
-  std::string mode = "dnc", model_file;
+  std::string mode = "dnc", model_file, type = "30";
   focas::ServerOptions server_options;
   CommandLine line{
       "Simulated Fanuc controller of a three-axis mill: FOCAS2 over Ethernet, in wall-clock time, until "
@@ -66,6 +66,7 @@ int main(int argc, char** argv) {
               "at the panel: mdi, mem, edit, handle, jog, inc, reference, dnc (the one that runs programs)")
       .oneOf({"mdi", "mem", "edit", "handle", "jog", "inc", "reference", "dnc"})
       .showDefault();
+  line.option("--type", type, "which control it says it is").oneOf({"30", "31"}).showDefault();
   line.option("--model", model_file, "machine model file: its sections axes and spindle");
   return runProgram(line, argc, argv, [&] {
     std::signal(SIGINT, requestStop);
@@ -73,6 +74,7 @@ int main(int argc, char** argv) {
     sim::ControllerOptions options =
         sim::ControllerOptions::ofModel(model_file.empty() ? MachineModel{} : readMachineModel(model_file));
     options.mode = modes.at(mode);
+    options.info.cnc_type = type;
     sim::Controller controller(options);
     const focas::Server server(server_options, controller);
     std::printf("controller: listens on %s:%d, mode %s\n", server_options.bind_address.c_str(), server.port(),

@@ -14,61 +14,10 @@
 #include "smartmill_focas/server.h"
 #include "smartmill_sim/controller/nc_block.h"
 
+#include "controller_rig.h"
+
 namespace smartmill::sim {
 namespace {
-
-constexpr double DT = 1e-3;      // [s]
-constexpr double ROUND = 1e-12;  // rounding of numbers near 1
-constexpr double RPM = units::TWO_PI / 60.0;
-
-ControllerOptions testOptions() {
-  ControllerOptions options;
-  options.axes.travel = {{{-0.25, 0.25}, {-0.2, 0.2}, {-0.3, 0.0}}};
-  options.axes.rapid = 0.5;
-  options.axes.acceleration = 2.0;
-  options.spindle_max_speed = 20000.0 * RPM;
-  options.spindle_acceleration = 500.0;
-  return options;
-}
-
-/// A controller, and a client that is already in the room.
-struct Machine {
-  explicit Machine(const ControllerOptions& options = testOptions()) : controller(options) {}
-
-  void send(const std::string& text) { ASSERT_EQ(controller.dncData(text.data(), text.size()), text.size()); }
-  void start(const std::string& text) {
-    ASSERT_EQ(controller.dncStart(), focas::EW_OK);
-    send(text);
-  }
-  const std::vector<MotionState>& run(double seconds, double dt = DT) {
-    controller.advance(dt, static_cast<std::size_t>(std::lround(seconds / dt)), states);
-    return states;
-  }
-  std::optional<double> macro(int number) const {
-    std::optional<double> value;
-    EXPECT_EQ(controller.readMacro(number, &value), focas::EW_OK);
-    return value;
-  }
-  /// [s] until nothing runs any more, to one step.
-  double runToEnd(double dt = DT, double most = 60.0) {
-    for (double time = 0.0; time < most;) {
-      run(dt, dt);
-      time += dt;
-      if (controller.status().run != focas::RUN_START) {
-        return time;
-      }
-    }
-    ADD_FAILURE() << "still runs after " << most << " s";
-    return most;
-  }
-  std::string alarmText() const {
-    const auto alarms = controller.alarmMessages();
-    return alarms.empty() ? "" : alarms.front().text;
-  }
-
-  Controller controller;
-  std::vector<MotionState> states;
-};
 
 TEST(Axes, LongMoveTakesDistanceOverFeedAndFeedOverAcceleration) {
   Machine m;
@@ -365,9 +314,9 @@ TEST(Panel, OvertravelIsRefusedBeforeAnythingMoves) {
 
 TEST(Panel, UnknownWordsRaiseAProgramAlarmWithTheBlock) {
   for (const std::string block :
-       {"G17",   "G1 X1 Q2 F10", "M8",    "X",    "X1.2.3", "G0 G1 X1",      "X1 X2",     "S#101",
-        "P5",    "G4 X1 P2",     "G4",    "F-5",  "#100=",  "#100",          "#100=#101", "#99=1",
-        "O1234", "G1 X1",        "(open", "X1e3", "M119",   "X1234567890123"}) {
+       {"G18", "G1 X1 Q2 F10", "M8",    "X",    "X1.2.3", "G0 G1 X1",      "X1 X2",     "S#99",
+        "P5",  "G4 X1 P2",     "G4",    "F-5",  "#100=",  "#100",          "#100=#200", "#99=1",
+        "O-1", "G1 X1",        "(open", "X1e3", "M119",   "X1234567890123"}) {
     Machine m;
     m.start("#100=1\n" + block + "\n#100=2\n");
     m.run(0.01);

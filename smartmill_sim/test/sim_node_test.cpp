@@ -13,6 +13,7 @@
 #include <smartmill_msgs/ForceBlock.h>
 #include <smartmill_msgs/Frf.h>
 #include <smartmill_msgs/ModalModel.h>
+#include <smartmill_msgs/PanelKey.h>
 #include <smartmill_msgs/SampleBlock.h>
 #include <smartmill_msgs/SpindleAngle.h>
 #include <smartmill_msgs/Strike.h>
@@ -148,6 +149,42 @@ TEST_F(SimNode, anOperatorIsAskedAndHits) {
     }
     return false;
   }));
+}
+
+TEST_F(SimNode, servoStreamHasNoHolesAtOneKilohertz) {
+  const auto blocks = collect<smartmill_msgs::SampleBlock>(names::daq("servo"));
+  ASSERT_TRUE(until([&] { return blocks->size() > 100; }));
+  const std::lock_guard<std::mutex> lock(mutex);
+  EXPECT_EQ(blocks->front().channels, (std::vector<std::string>{"spindle_load", "current_x", "current_y",
+                                                                "current_z", "sequence", "trigger"}));
+  for (std::size_t i = 1; i < blocks->size(); ++i) {
+    const auto& b = (*blocks)[i];
+    ASSERT_EQ(b.sample_rate, 1000.0);
+    ASSERT_EQ(b.first_index, (*blocks)[i - 1].first_index + (*blocks)[i - 1].samples.size() / 6);
+  }
+}
+
+TEST_F(SimNode, thePanelsKeysAnswerAndRefuse) {
+  const auto press = [&](const std::string& key, const std::vector<double>& values) {
+    ros::ServiceClient client = nh.serviceClient<smartmill_msgs::PanelKey>("sim/panel/" + key);
+    EXPECT_TRUE(client.waitForExistence(ros::Duration(120.0)));
+    smartmill_msgs::PanelKey call;
+    call.request.values = values;
+    EXPECT_TRUE(client.call(call));
+    return call.response;
+  };
+  EXPECT_EQ(press("mode", {1.0}).message, "mode: done");
+  EXPECT_EQ(press("mode", {77.0}).code, smartmill_msgs::PanelKey::Response::REFUSED);
+  EXPECT_EQ(press("mode", {}).message, "mode: 0 values, 1 due");
+  EXPECT_EQ(press("emergency_stop", {1.0}).message, "emergency_stop: done");
+  EXPECT_EQ(press("cycle_start", {}).message, "cycle_start: EW_ALARM");
+  EXPECT_EQ(press("emergency_stop", {0.0}).message, "emergency_stop: done");
+  EXPECT_EQ(press("alarm", {1001.0}).message, "alarm: done");
+  EXPECT_EQ(press("cycle_start", {}).message, "cycle_start: EW_ALARM");
+  EXPECT_EQ(press("reset", {}).message, "reset: done");
+  EXPECT_EQ(press("overrides", {1.0, 0.5, 1.0}).message, "overrides: done");
+  EXPECT_EQ(press("feed_hold", {}).message, "feed_hold: done");
+  EXPECT_EQ(press("mode", {10.0}).message, "mode: done");
 }
 
 TEST_F(SimNode, lateSubscribersGetAllOfTheTruth) {

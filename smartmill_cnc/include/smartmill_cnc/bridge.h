@@ -39,6 +39,10 @@ class Bridge {
   const CncState& state() const { return state_; }
   /// Read in the last step, nothing when not connected.
   const std::optional<LoadSample>& load() const { return load_; }
+  /// Those that the controller shows; as of the last connection.
+  const std::vector<ControllerAlarm>& alarms() const { return alarms_; }
+  /// Connections that came about and that were lost, since the start.
+  Poller::Counts connections() const { return poller_.counts(); }
   /// [m] Increment of the controller's positions.
   double positionIncrement() const { return increment_; }
 
@@ -80,6 +84,7 @@ class Bridge {
   MotionMachine motion_;
   CncState state_;
   std::optional<LoadSample> load_;
+  std::vector<ControllerAlarm> alarms_;
   double increment_ = 1e-6;  // [m]
 };
 

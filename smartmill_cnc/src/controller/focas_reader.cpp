@@ -184,6 +184,7 @@ Reading FocasReader::read() {
   readState(replies, axes, reading);
   readPositions(replies, axes, reading);
   readAlarms(static_cast<std::uint32_t>(firstInteger(replies[q.alarm])), reading.state);
+  reading.alarms = alarms_;
   readLoad(replies, axes, reading);
   const std::vector<double> marker = focas::decodeValues(replies[q.marker], 1);
   marker_ = marker.empty() ? std::numeric_limits<double>::quiet_NaN() : marker.front();
@@ -232,12 +233,15 @@ void FocasReader::readPositions(const std::vector<SubReply>& replies, std::size_
 void FocasReader::readAlarms(std::uint32_t bits, CncState& state) {
   if (!state.alarm && bits == 0) {
     alarm_text_.clear();
+    alarms_.clear();
     alarm_bits_ = 0;
   } else if (bits != alarm_bits_ || alarm_text_.empty()) {
     alarm_bits_ = bits;
     alarm_text_.clear();
+    alarms_.clear();
     try {
       for (const focas::AlarmMessage& alarm : client_.alarmMessages()) {
+        alarms_.push_back({alarm.number, alarm.type, alarm.axis, alarm.text});
         alarm_text_ += (alarm_text_.empty() ? "" : "; ") + std::to_string(alarm.number) +
                        (alarm.text.empty() ? "" : " " + alarm.text);
       }

@@ -44,6 +44,7 @@ class FocasReader {
   bool asked_ = false, answered_ = false;
   std::uint32_t alarm_bits_ = 0;
   std::string alarm_text_;
+  std::vector<ControllerAlarm> alarms_;
   double marker_;
   int decimals_;
 };

@@ -1,22 +1,33 @@
 #include "smartmill_cnc/controller/poller.h"
 
+#include <algorithm>
+#include <cmath>
 #include <utility>
 
 namespace smartmill::cnc {
+namespace {
+
+constexpr double LONGEST_WAIT = 8.0;  // times the first
+constexpr int MANY_FAILURES = 10;
+
+}  // namespace
 
 Poller::Poller(Controller& controller, double reconnect_period, Log& log)
-    : controller_(controller), reconnect_period_(reconnect_period), log_(log) {
+    : controller_(controller), reconnect_period_(reconnect_period), wait_(reconnect_period), log_(log) {
 }
 
 void Poller::fetch(double now) {
   reading_.reset();
   if (!controller_.connected()) {
     // A time that jumps back must not put the next attempt off for ever.
-    if (now < next_connect_ && now >= next_connect_ - reconnect_period_) {
+    if (now < next_connect_ && now >= next_connect_ - wait_) {
       return;
     }
-    next_connect_ = now + reconnect_period_;
     connect();
+    const double times = controller_.connected() ? 1.0 : std::min(std::ldexp(1.0, failures_), LONGEST_WAIT);
+    failures_ = controller_.connected() ? 0 : std::min(failures_ + 1, MANY_FAILURES);
+    wait_ = times * reconnect_period_;
+    next_connect_ = now + wait_;
   }
   if (!controller_.connected()) {
     return;
@@ -30,6 +41,7 @@ void Poller::fetch(double now) {
 }
 
 void Poller::connect() {
+  ++counts_.attempts;
   const Result<std::string> identity = controller_.connect();
   if (identity) {
     identity_ = *identity;
@@ -44,6 +56,7 @@ std::optional<Reading> Poller::take() {
     return std::nullopt;
   }
   if (!std::exchange(connected_, true)) {
+    ++counts_.made;
     told_error_.clear();
     std::string axes;
     for (const std::string& axis : reading_->state.axes) {
@@ -56,10 +69,12 @@ std::optional<Reading> Poller::take() {
 
 void Poller::lost() {
   const bool was_connected = std::exchange(connected_, false);
+  counts_.lost += was_connected ? 1 : 0;
   // That nothing can be reached after a loss is no news; a refusal of another kind is.
   const bool expected = loss_told_ && !was_connected;
   if (was_connected || (last_error_ != told_error_ && !expected)) {
-    log_.error(last_error_ + "; trying again every " + fixedDecimals(reconnect_period_, 1) + " s");
+    log_.error(last_error_ + "; trying again every " + fixedDecimals(reconnect_period_, 1) + " to " +
+               fixedDecimals(LONGEST_WAIT * reconnect_period_, 1) + " s");
   }
   loss_told_ = was_connected || (loss_told_ && last_error_ == told_error_);
   told_error_ = last_error_;

@@ -10,6 +10,7 @@ namespace smartmill::cnc {
 namespace {
 
 constexpr const char* AXES = "XYZ";
+constexpr double CLOCK_JUMP = 5.0;  // [s] between two steps: the clock was set, or the computer slept
 
 MotionCode codeOf(const Failure& failure, MotionCode otherwise) {
   return failure.kind == Failure::Kind::alarm ? MotionCode::alarm : otherwise;
@@ -28,6 +29,7 @@ MotionMachine::MotionMachine(Controller& controller, const MotionParameters& par
 }
 
 Status MotionMachine::step(const Reading& reading, double now) {
+  followClock(now);
   reading_ = reading;
   now_ = now;
   const Status watched = watch();
@@ -50,6 +52,23 @@ Status MotionMachine::step(const Reading& reading, double now) {
   return {};
 }
 
+/// A clock that jumps takes the times kept here along: nothing runs out of time, or waits, by it.
+void MotionMachine::followClock(double now) {
+  const double jump = now - now_;
+  if (jump >= 0.0 && (jump <= CLOCK_JUMP || !reading_)) {
+    return;
+  }
+  if (busy()) {
+    log_.warning("the clock jumped by " + fixedDecimals(jump, 3) + " s in mid-motion");
+  }
+  for (double* time : {&entered_, &progressed_, &condition_from_, &condition_to_}) {
+    *time += jump;
+  }
+  if (still_since_) {
+    *still_since_ += jump;
+  }
+}
+
 std::string MotionMachine::lost(const std::string& why, double now) {
   now_ = now;
   reading_.reset();
@@ -66,6 +85,10 @@ std::string MotionMachine::lost(const std::string& why, double now) {
 
 Result<Answer<ArmCode>> MotionMachine::arm() {
   const CncState& state = reading_->state;
+  if (parameters_.read_only) {
+    return Answer<ArmCode>{ArmCode::wrong_mode,
+                           "motion is not armed: the bridge only reads (parameter read_only)"};
+  }
   if (armed_) {
     return Answer<ArmCode>{ArmCode::ok, "motion is armed already"};
   }
@@ -136,6 +159,11 @@ std::optional<Outcome> MotionMachine::jog(const std::string& axis, double distan
   if (!std::isfinite(distance) || !std::isfinite(feed) || feed < 0.0) {
     return Outcome{MotionCode::bad_goal,
                    "jog " + axis + ": a finite distance and a feed of 0 or more are due"};
+  }
+  if (std::abs(distance) > parameters_.limits.max_jog) {
+    return Outcome{MotionCode::limit, "jog " + axis + ": " + fixedDecimals(distance / units::MM, 3) +
+                                          " mm, at most " +
+                                          fixedDecimals(parameters_.limits.max_jog / units::MM, 3) + " mm"};
   }
   const int decimals = controller_.dialect().decimals;
   return start(motion, jogProgram(motion.axis, distance, feed, decimals));

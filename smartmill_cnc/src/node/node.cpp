@@ -10,6 +10,7 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/names.h"
+#include "smartmill_msgs/CncAlarms.h"
 #include "smartmill_msgs/CncState.h"
 #include "smartmill_msgs/CuttingCondition.h"
 #include "smartmill_msgs/LoadSample.h"
@@ -24,6 +25,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
+constexpr const char* ALARMS = "cnc/alarms";
 constexpr int FEEDBACK_EVERY = 5;  // periods
 constexpr std::chrono::seconds LONGEST_WAIT{4};
 
@@ -72,6 +74,7 @@ CncNode::CncNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
       servo_(stream_ ? std::make_unique<ServoPublisher>(nh, shell_, stream_, parameters_.load_input)
                      : nullptr) {
   state_publisher_ = nh.advertise<smartmill_msgs::CncState>(names::CNC_STATE, STREAM_QUEUE);
+  alarms_publisher_ = nh.advertise<smartmill_msgs::CncAlarms>(ALARMS, 1, true);
   load_publisher_ = nh.advertise<smartmill_msgs::LoadSample>(names::CNC_LOAD, STREAM_QUEUE);
   condition_publisher_ =
       nh.advertise<smartmill_msgs::CuttingCondition>(names::CUTTING_CONDITION, STREAM_QUEUE, true);
@@ -143,11 +146,14 @@ void CncNode::run() {
     for (const Job& job : jobs) {
       job();
     }
-    bridge_.fetch(steadySeconds());
+    const double asked = steadySeconds();
+    bridge_.fetch(asked);
+    round_trip_ = std::max(0.999 * round_trip_, steadySeconds() - asked);
     const ros::Time stamp = ros::Time::now();
     bridge_.step(stamp.toSec());
     publish(stamp);
     publishConditions();
+    publishAlarms(stamp);
     log();
     if (active_ && count % FEEDBACK_EVERY == 0) {
       active_->feedback();
@@ -249,12 +255,31 @@ void CncNode::publish(const ros::Time& stamp) {
   }
   const std::lock_guard<std::mutex> lock(mutex_);
   seen_ = state;
+  seen_connections_ = bridge_.connections();
 }
 
 void CncNode::publishConditions() {
   for (const CuttingCondition& condition : bridge_.takeConditions()) {
     condition_publisher_.publish(toMsg(condition));
   }
+}
+
+void CncNode::publishAlarms(const ros::Time& stamp) {
+  if (told_alarms_ == bridge_.alarms()) {
+    return;
+  }
+  told_alarms_ = bridge_.alarms();
+  smartmill_msgs::CncAlarms message;
+  message.header.stamp = stamp;
+  for (const ControllerAlarm& alarm : *told_alarms_) {
+    smartmill_msgs::CncAlarm entry;
+    entry.number = alarm.number;
+    entry.type = alarm.type;
+    entry.axis = alarm.axis;
+    entry.text = alarm.text;
+    message.alarms.push_back(entry);
+  }
+  alarms_publisher_.publish(message);
 }
 
 void CncNode::log() {
@@ -309,6 +334,11 @@ void CncNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
   }
   status.add("mode", static_cast<int>(seen_.mode));
   status.add("armed", seen_.armed);
+  status.add("read only", parameters_.motion.read_only);
+  status.add("connections made", seen_connections_.made);
+  status.add("connections lost", seen_connections_.lost);
+  status.add("attempts to connect", seen_connections_.attempts);
+  status.addf("longest poll of late [s]", "%.4f", round_trip_.load());
   status.add("alarm", seen_.alarm_text);
 }
 

@@ -56,18 +56,19 @@ class CncNode {
 
   void publish(const ros::Time& stamp);
   void publishConditions();
+  void publishAlarms(const ros::Time& stamp);
   void log();
   bool armMotion(smartmill_msgs::ArmMotion::Request& request, smartmill_msgs::ArmMotion::Response& response);
   bool setMacro(smartmill_msgs::SetMacro::Request& request, smartmill_msgs::SetMacro::Response& response);
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
   const NodeParameters parameters_;
-  const std::shared_ptr<linuxcnc::ServoStream> stream_;  // of a LinuxCNC
-  Bridge bridge_;                                        // the bridge's thread only
-  std::optional<Active> active_;                         // the bridge's thread only
-  std::string last_note_;                                // the bridge's thread only
+  const std::shared_ptr<linuxcnc::ServoStream> stream_;      // of a LinuxCNC
+  Bridge bridge_;                                            // the bridge's thread only
+  std::optional<Active> active_;                             // the bridge's thread only
+  std::optional<std::vector<ControllerAlarm>> told_alarms_;  // the bridge's thread only
 
-  ros::Publisher state_publisher_, load_publisher_, condition_publisher_;
+  ros::Publisher state_publisher_, load_publisher_, condition_publisher_, alarms_publisher_;
   tf2_ros::TransformBroadcaster broadcaster_;
   ros::ServiceServer arm_service_, macro_service_;
   std::unique_ptr<Server<smartmill_msgs::RunProgramAction>> run_program_;
@@ -80,7 +81,9 @@ class CncNode {
   std::vector<Job> jobs_;
   CncState seen_;  // for diagnostics
   std::string seen_note_;
+  Poller::Counts seen_connections_;
 
+  std::atomic<double> round_trip_{0.0};  // [s] decays
   std::atomic<bool> stopping_{false};
   std::thread thread_;
 };

@@ -33,15 +33,26 @@ TEST_F(PollerTest, ConnectsReadsAndSaysSoOnce) {
   EXPECT_FALSE(poller_.take());
 }
 
-TEST_F(PollerTest, AttemptsKeepTheirPeriodAndOneLine) {
+TEST_F(PollerTest, AttemptsGetRarerAndAreToldInOneLine) {
   controller_.connecting = Failure{Failure::Kind::lost, "nobody there"};
-  for (int i = 0; i < 500; ++i) EXPECT_FALSE(cycle(0.02 * i));
-  EXPECT_EQ(controller_.count("connect"), 10u);
-  EXPECT_EQ(notes_, std::vector<std::string>{"nobody there; trying again every 1.0 s"});
+  for (int i = 0; i < 1600; ++i) EXPECT_FALSE(cycle(0.02 * i));
+  // At 0, 1, 3, 7, 15, 23, 31 s.
+  EXPECT_EQ(controller_.count("connect"), 7u);
+  EXPECT_EQ(notes_, std::vector<std::string>{"nobody there; trying again every 1.0 to 8.0 s"});
   // A refusal of another kind is news.
   controller_.connecting = Failure{Failure::Kind::refused, "wrong password"};
-  for (int i = 500; i < 600; ++i) cycle(0.02 * i);
+  for (int i = 1600; i < 2100; ++i) cycle(0.02 * i);
   EXPECT_EQ(notes_.size(), 2u);
+  // A connection that came about begins anew.
+  controller_.connecting.reset();
+  cycle(50.0);
+  EXPECT_EQ(poller_.counts().made, 1);
+  controller_.is_connected = false;
+  controller_.connecting = Failure{Failure::Kind::lost, "nobody there"};
+  const std::size_t before = controller_.count("connect");
+  for (int i = 0; i < 101; ++i) cycle(51.0 + 0.02 * i);
+  EXPECT_EQ(controller_.count("connect"), before + 2);
+  EXPECT_EQ(poller_.counts().lost, 1);
 }
 
 TEST_F(PollerTest, TimeThatJumpsBackDoesNotPutTheNextAttemptOff) {
@@ -60,9 +71,9 @@ TEST_F(PollerTest, LossIsOneLineAndSoIsTheReturn) {
   for (int i = 0; i < 200; ++i) cycle(1.0 + 0.02 * i);
   EXPECT_EQ(log_.take().size(), 0u);
   ASSERT_EQ(notes_.size(), 2u);
-  EXPECT_EQ(notes_[1], "the wire is cut; trying again every 1.0 s");
+  EXPECT_EQ(notes_[1], "the wire is cut; trying again every 1.0 to 8.0 s");
   controller_.connecting.reset();
-  cycle(10.0);
+  cycle(20.0);
   EXPECT_EQ(notes_.size(), 3u);
 }
 

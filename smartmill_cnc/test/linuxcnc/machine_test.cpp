@@ -82,6 +82,7 @@ class LinuxCncMachine : public ::testing::Test {
     stream_ = std::make_shared<ServoStream>(folder_);
     MotionParameters motion;
     motion.condition_lead = 0.0;
+    motion.read_only = false;
     motion.limits.travel = {{{-0.25, 0.25}, {-0.2, 0.2}, {-0.3, 0.0}}};
     motion.limits.max_feed = 0.4;
     motion.limits.max_spindle_speed = 2100.0;

@@ -17,6 +17,7 @@ constexpr double PERIOD = 0.02;  // [s]
 
 MotionParameters someParameters() {
   MotionParameters p;
+  p.read_only = false;
   p.limits.travel = {{{-0.2, 0.2}, {-0.2, 0.2}, {-0.2, 0.2}}};
   p.limits.max_feed = 0.5;
   p.limits.max_spindle_speed = 1000.0;

@@ -2,15 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
+#include <ctime>
 #include <mutex>
 #include <utility>
 
+#include "controller/machine.h"
+#include "controller/machine_numbers.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/units.h"
-#include "smartmill_sim/controller/nc_block.h"
-#include "smartmill_sim/controller/spindle_motion.h"
-#include "smartmill_sim/controller/straight_move.h"
 
 namespace smartmill::sim {
 namespace {
@@ -18,22 +17,9 @@ namespace {
 using focas::EwCode;
 using Lock = std::lock_guard<std::mutex>;
 
-constexpr int ORIENT_MACRO = 1133;     // M119 reads its angle from it (Dunwoody 6.2)
-constexpr double ORIENT_STEPS = 4096;  // of one turn
-constexpr double ORIENT_SPEED = 20.0;  // [rad/s] about 190 rpm, as spindles orient
 constexpr double MM_PER_MIN = units::MM / 60.0;
-constexpr double TRAVEL_TOLERANCE = 1e-9;  // [m] rounding of decimal input
-
-constexpr int PS_FEED_ZERO = 11;
-constexpr int PS_ORIENTATION = 114;
-constexpr int PS_VARIABLE_NUMBER = 115;
-constexpr int PS_BLOCK_TOO_LONG = 3;
-constexpr int OT_PLUS = 500;
-constexpr int OT_MINUS = 501;
-
-bool macroExists(int number) {
-  return (number >= 100 && number <= 199) || (number >= 500 && number <= 999) || number == ORIENT_MACRO;
-}
+constexpr double SCREW_LEAD = 10.0 * units::MM;  // [m] a turn of an axis' motor
+constexpr double LOAD_METER_STEP_VOLT = 3.0e-4;  // [V] as the thesis saw the load meter (Dunwoody 3.2.1)
 
 std::vector<double> inMm(const std::array<double, 3>& v) {
   return {v[0] / units::MM, v[1] / units::MM, v[2] / units::MM};
@@ -41,6 +27,32 @@ std::vector<double> inMm(const std::array<double, 3>& v) {
 
 std::string numberText(double value) {
   return std::to_string(value);
+}
+
+focas::DateTime calendar(std::int64_t seconds) {
+  const std::time_t time = static_cast<std::time_t>(seconds);
+  std::tm parts{};
+  gmtime_r(&time, &parts);
+  return {parts.tm_year + 1900, parts.tm_mon + 1, parts.tm_mday, parts.tm_hour, parts.tm_min, parts.tm_sec};
+}
+
+std::int64_t secondsOf(const focas::DateTime& at) {
+  std::tm parts{};
+  parts.tm_year = at.year - 1900;
+  parts.tm_mon = at.month - 1;
+  parts.tm_mday = at.day;
+  parts.tm_hour = at.hour;
+  parts.tm_min = at.minute;
+  parts.tm_sec = at.second;
+  return timegm(&parts);
+}
+
+/// The computer's wall clock as its calendar shows it.
+std::int64_t localSeconds() {
+  const std::time_t now = std::time(nullptr);
+  std::tm parts{};
+  localtime_r(&now, &parts);
+  return timegm(&parts);
 }
 
 }  // namespace
@@ -54,12 +66,18 @@ ControllerOptions ControllerOptions::ofModel(const MachineModel& model) {
   const Spindle spindle = model.spindle.value_or(Spindle{});
   options.spindle_max_speed = spindle.max_speed.value_or(units::radPerSecFromRpm(20000.0));
   options.spindle_acceleration = spindle.acceleration.value_or(units::radPerSecFromRpm(10000.0));
+  options.spindle_torque = spindle.rated_torque.value_or(0.0);
+  if (spindle.load_meter_full_scale) {
+    options.load_step = 100.0 * LOAD_METER_STEP_VOLT / *spindle.load_meter_full_scale;
+  }
+  options.obstacles = CollisionWatch::ofModel(model);
   return options;
 }
 
 focas::SysInfo ControllerOptions::fineInfo() {
   focas::SysInfo info;
   info.position_decimals = 4;
+  info.load_decimals = 5;
   return info;
 }
 
@@ -87,302 +105,30 @@ void ControllerOptions::validate() const {
   positive("acceleration", axes.acceleration);
   positive("spindle_max_speed", spindle_max_speed);
   positive("spindle_acceleration", spindle_acceleration);
+  if (!(spindle_torque >= 0.0) || !(load_step >= 0.0)) {
+    throw Error("controller: spindle_torque and load_step must not be below 0");
+  }
   if (buffer_size == 0) {
     throw Error("controller: buffer_size is 0 bytes");
   }
 }
 
-/// Everything under one lock; the outer class locks, this one does not.
+/// Everything under one lock.
 class Controller::Impl {
  public:
-  explicit Impl(const ControllerOptions& o)
-      : options(o), mode(o.mode), move_(o.axes.home), spindle_(o.spindle_acceleration) {}
+  explicit Impl(const ControllerOptions& options) : machine(options) {}
 
   mutable std::mutex mutex;
-  const ControllerOptions options;
-  int mode;
-  bool emergency = false;
-  double spindle_load = 0.0;                    // [percent]
-  std::array<double, 3> servo_load{{0, 0, 0}};  // [percent]
-  std::vector<focas::AlarmMessage> alarms;
-  std::map<int, double> macros;  // those not vacant
-  int sequence = 0, blocks = 0;
-  std::string block_text;
+  ControlledMachine machine;
 
-  // Time.
-
-  void step(double dt) {
-    if (dt != dt_) {
-      base_ = now_;
-      dt_ = dt;
-      steps_ = 0;
-    }
-    // A product, not a sum: rounding does not add up.
-    const double end = base_ + static_cast<double>(++steps_) * dt_;
-    double time = now_;
-    while (running_ || takeBlock(time)) {
-      if (running_ && wait_until_ > end) {
-        break;
-      }
-      if (running_) {
-        time = std::max(time, wait_until_);
-        goOn(time);
-      }
-    }
-    now_ = end;
+  std::int64_t clock() const {
+    const std::function<std::int64_t()>& wall = machine.options.wall_clock;
+    return (wall ? wall() : localSeconds()) + machine.clock_offset;
   }
-
-  MotionState motion() const {
-    return {position(), move_.velocity(now_ - move_start_), spindle_.angle(now_), spindle_.speed(now_)};
+  double polled(double load) const {
+    const double step = machine.options.load_step;
+    return step > 0.0 ? step * std::round(load / step) : load;
   }
-
-  // What the screen shows.
-
-  std::array<double, 3> position() const { return move_.position(now_ - move_start_); }
-  double speed() const { return move_.speed(now_ - move_start_); }
-  double spindleSpeed() const { return spindle_.speed(now_); }
-  bool moving() const { return now_ < move_start_ + move_.duration(); }
-  std::array<double, 3> distanceToGo() const {
-    std::array<double, 3> left = move_.target();
-    const std::array<double, 3> at = position();
-    for (std::size_t i = 0; i < 3; ++i) {
-      left[i] -= at[i];
-    }
-    return left;
-  }
-
-  focas::Status status() const {
-    focas::Status status;
-    status.aut = static_cast<std::int16_t>(mode);
-    status.run = busy() ? focas::RUN_START : session_ ? focas::RUN_STOP : focas::RUN_RESET;
-    status.motion = moving()                                         ? focas::MOTION_MOVES
-                    : running_ && block_.dwell && now_ < wait_until_ ? focas::MOTION_DWELL
-                                                                     : focas::MOTION_NONE;
-    status.emergency = emergency ? 1 : 0;
-    status.alarm = alarms.empty() ? 0 : 1;
-    return status;
-  }
-
-  // The operator and the DNC session.
-
-  /// Blocks are running or waiting.
-  bool busy() const { return running_ || text_.find_first_of("\r\n") != std::string::npos; }
-
-  /// Stops everything from the end of the last step on.
-  void halt(EwCode why) { haltAt(now_, why); }
-
-  void alarm(const focas::AlarmMessage& message) {
-    alarms.push_back(message);
-    halt(focas::EW_ALARM);
-  }
-
-  void setMode(int aut) {
-    if (mode == focas::AUT_REMOTE && aut != mode && (busy() || session_)) {
-      halt(focas::EW_MODE);
-    }
-    mode = aut;
-  }
-
-  EwCode open() {
-    if (emergency || !alarms.empty()) {
-      return focas::EW_ALARM;
-    }
-    if (mode != focas::AUT_REMOTE) {
-      return focas::EW_MODE;
-    }
-    if (session_ || busy() || moving()) {
-      return focas::EW_BUSY;
-    }
-    session_ = true;
-    abort_ = focas::EW_OK;
-    beginProgram();
-    return focas::EW_OK;
-  }
-
-  std::size_t take(const char* data, std::size_t size) {
-    if (!session_) {
-      return size;  // of a session that has ended: thrown away
-    }
-    const std::size_t taken =
-        std::min(size, options.buffer_size - std::min(options.buffer_size, text_.size()));
-    text_.append(data, taken);
-    return taken;
-  }
-
-  EwCode end() {
-    if (abort_ != focas::EW_OK) {
-      return abort();
-    }
-    if (!session_) {
-      return focas::EW_FUNC;
-    }
-    session_ = false;
-    if (!text_.empty()) {
-      text_ += '\n';
-    }
-    return focas::EW_OK;
-  }
-
-  void cancel() {
-    session_ = false;
-    halt(focas::EW_OK);
-  }
-
-  EwCode abort() { return std::exchange(abort_, focas::EW_OK); }
-
- private:
-  void haltAt(double time, EwCode why) {
-    const double since = time - move_start_;
-    if (since < move_.duration()) {
-      move_ = StraightMove::brake(move_.position(since), move_.velocity(since), options.axes.acceleration);
-      move_start_ = time;
-    }
-    spindle_.ramp(time, 0.0);
-    spindle_on_ = false;
-    running_ = false;
-    text_.clear();
-    block_text.clear();
-    if (session_) {
-      session_ = false;
-      abort_ = why;
-    }
-  }
-
-  void beginProgram() {
-    relative_ = false;
-    rapid_ = false;
-    feed_ = 0.0;
-    commanded_speed_ = 0.0;
-  }
-
-  /// Starts the next block at a time. @return whether there was one (or an alarm).
-  bool takeBlock(double time) {
-    const std::size_t end = text_.find_first_of("\r\n");
-    if (end == std::string::npos && text_.size() < options.buffer_size) {
-      return false;
-    }
-    try {
-      if (end == std::string::npos) {
-        throw NcAlarm(PS_BLOCK_TOO_LONG, ALARM_PS, "BLOCK LONGER THAN THE BUFFER");
-      }
-      block_text = text_.substr(0, end);
-      text_.erase(0, end + 1);
-      if (block_text.empty()) {
-        return true;
-      }
-      start(time, parseBlock(block_text));
-    } catch (const NcAlarm& e) {
-      refuse(time, e);
-    }
-    return true;
-  }
-
-  void refuse(double time, const NcAlarm& e) {
-    alarms.push_back({e.number(), e.type(), e.axis(), std::string(e.what()) + ": " + block_text});
-    haltAt(time, focas::EW_ALARM);
-  }
-
-  void start(double time, const NcBlock& block) {
-    sequence = block.sequence.value_or(sequence);
-    relative_ = block.relative.value_or(relative_);
-    rapid_ = block.motion ? *block.motion == 0 : rapid_;
-    feed_ = block.feed.value_or(feed_);
-    if (block.macro) {
-      if (!macroExists(*block.macro)) {
-        throw NcAlarm(PS_VARIABLE_NUMBER, ALARM_PS, "VARIABLE NO. OUT OF RANGE");
-      }
-      macros[*block.macro] = block.macro_value;
-    }
-    const StraightMove next = block.moves() ? moveOf(block) : move_;
-    if (block.speed) {
-      commanded_speed_ = std::min(units::radPerSecFromRpm(*block.speed), options.spindle_max_speed);
-    }
-    spindle_on_ = spindle_on_ || block.m_code == 3;
-    if (spindle_on_ && (block.speed || block.m_code == 3)) {
-      spindle_.ramp(time, commanded_speed_);
-    }
-    wait_until_ = time + block.dwell.value_or(0.0);
-    if (block.moves()) {
-      move_ = next;
-      move_start_ = time;
-      wait_until_ = time + move_.duration();
-    }
-    block_ = block;
-    running_ = true;
-    ++blocks;
-  }
-
-  StraightMove moveOf(const NcBlock& block) const {
-    const std::array<double, 3> from = move_.target();
-    std::array<double, 3> to = from;
-    for (std::size_t i = 0; i < 3; ++i) {
-      if (!block.axis[i]) {
-        continue;
-      }
-      to[i] = *block.axis[i] * units::MM + (relative_ ? from[i] : options.work_offset[i]);
-      const auto& travel = options.axes.travel[i];
-      if (to[i] > travel[1] + TRAVEL_TOLERANCE || to[i] < travel[0] - TRAVEL_TOLERANCE) {
-        const bool plus = to[i] > travel[1];
-        throw NcAlarm(plus ? OT_PLUS : OT_MINUS, ALARM_OT,
-                      std::string(plus ? "(+)" : "(-)") + " OVERTRAVEL " + "XYZ"[i], static_cast<int>(i) + 1);
-      }
-    }
-    const double feed = rapid_ ? options.axes.rapid : std::min(feed_ * MM_PER_MIN, options.axes.rapid);
-    if (feed <= 0.0) {
-      throw NcAlarm(PS_FEED_ZERO, ALARM_PS, "FEED ZERO (COMMAND)");
-    }
-    return StraightMove(from, to, feed, options.axes.acceleration);
-  }
-
-  /// What the block waited for has come: its M word that comes after the motion, or its end.
-  void goOn(double time) {
-    const int m_code = block_.m_code.value_or(0);
-    block_.m_code.reset();
-    if (m_code == 5 || m_code == 30 || m_code == 2) {
-      spindle_.ramp(time, 0.0);
-      spindle_on_ = false;
-    } else if (m_code == 119) {
-      orient(time);
-    } else {
-      running_ = false;
-      block_text.clear();
-    }
-    if (m_code == 30 || m_code == 2) {
-      beginProgram();
-    }
-    wait_until_ = spindle_.settled();
-  }
-
-  void orient(double time) {
-    const auto found = macros.find(ORIENT_MACRO);
-    if (found == macros.end() || !(found->second >= 0.0 && found->second <= ORIENT_STEPS - 1)) {
-      refuse(time, NcAlarm(PS_ORIENTATION, ALARM_PS, "#1133 IS NOT 0 TO 4095"));
-      return;
-    }
-    spindle_on_ = false;
-    spindle_.orient(time, units::TWO_PI * found->second / ORIENT_STEPS, ORIENT_SPEED);
-  }
-
-  // Time is base_ + steps_ dt_ [s].
-  double now_ = 0.0, base_ = 0.0, dt_ = 0.0;
-  std::uint64_t steps_ = 0;
-
-  StraightMove move_;  // the last one, maybe over
-  double move_start_ = 0.0;
-  SpindleMotion spindle_;
-  bool spindle_on_ = false;
-
-  // Modal state of the program.
-  bool relative_ = false, rapid_ = false;
-  double feed_ = 0.0;             // [mm/min]
-  double commanded_speed_ = 0.0;  // [rad/s]
-
-  bool session_ = false;
-  EwCode abort_ = focas::EW_OK;  // why the session ended, not yet told
-  std::string text_;             // not yet run
-  bool running_ = false;
-  NcBlock block_;            // the running one
-  double wait_until_ = 0.0;  // [s] it goes on then
 };
 
 Controller::Controller(const ControllerOptions& options) {
@@ -396,65 +142,79 @@ void Controller::advance(double dt, std::size_t count, std::vector<MotionState>&
   const Lock lock(impl_->mutex);
   states.resize(count);
   for (MotionState& state : states) {
-    impl_->step(dt);
-    state = impl_->motion();
+    impl_->machine.step(dt);
+    state = impl_->machine.motion();
   }
 }
 
 MotionState Controller::motion() const {
   const Lock lock(impl_->mutex);
-  return impl_->motion();
+  return impl_->machine.motion();
 }
 
 void Controller::setSpindleLoad(double percent) {
   const Lock lock(impl_->mutex);
-  impl_->spindle_load = percent;
+  impl_->machine.spindle_load = percent;
 }
 
 void Controller::setServoLoad(const std::array<double, 3>& percent) {
   const Lock lock(impl_->mutex);
-  impl_->servo_load = percent;
+  impl_->machine.servo_load = percent;
+}
+
+void Controller::setServoCurrent(const std::array<double, 3>& amperes) {
+  const Lock lock(impl_->mutex);
+  impl_->machine.servo_current = amperes;
+}
+
+void Controller::setSpindleTorque(double torque) {
+  const Lock lock(impl_->mutex);
+  impl_->machine.setSpindleTorque(torque);
+}
+
+void Controller::feedHold() {
+  const Lock lock(impl_->mutex);
+  impl_->machine.feedHold();
+}
+
+void Controller::setOverrides(double feed, double rapid, double spindle) {
+  const Lock lock(impl_->mutex);
+  impl_->machine.setOverrides(std::clamp(feed, 0.0, 2.0), std::clamp(rapid, 0.0, 1.0),
+                              std::clamp(spindle, 0.5, 1.2));
 }
 
 void Controller::setMode(int aut) {
   const Lock lock(impl_->mutex);
-  impl_->setMode(aut);
+  impl_->machine.setMode(aut);
 }
 
 void Controller::raiseAlarm(int number, const std::string& text) {
   const Lock lock(impl_->mutex);
-  impl_->alarm({number, ALARM_EX, 0, text});
+  impl_->machine.alarm({number, ALARM_EX, 0, text});
 }
 
 void Controller::emergency(bool on) {
   const Lock lock(impl_->mutex);
-  impl_->emergency = on;
-  if (on) {
-    impl_->halt(focas::EW_ALARM);
-  }
+  impl_->machine.emergency(on);
 }
 
 focas::SysInfo Controller::sysInfo() const {
-  return impl_->options.info;
+  return impl_->machine.options.info;
 }
 
 focas::Status Controller::status() const {
   const Lock lock(impl_->mutex);
-  return impl_->status();
+  return impl_->machine.status();
 }
 
 std::vector<double> Controller::machinePosition() const {
   const Lock lock(impl_->mutex);
-  return inMm(impl_->position());
+  return inMm(impl_->machine.position());
 }
 
 std::vector<double> Controller::absolutePosition() const {
   const Lock lock(impl_->mutex);
-  std::array<double, 3> position = impl_->position();
-  for (std::size_t i = 0; i < 3; ++i) {
-    position[i] -= impl_->options.work_offset[i];
-  }
-  return inMm(position);
+  return inMm(impl_->machine.workPosition());
 }
 
 std::vector<double> Controller::relativePosition() const {
@@ -463,60 +223,72 @@ std::vector<double> Controller::relativePosition() const {
 
 std::vector<double> Controller::distanceToGo() const {
   const Lock lock(impl_->mutex);
-  return inMm(impl_->distanceToGo());
+  return inMm(impl_->machine.distanceToGo());
 }
 
 double Controller::actualFeed() const {
   const Lock lock(impl_->mutex);
-  return impl_->speed() / MM_PER_MIN;
+  return impl_->machine.pathSpeed() / MM_PER_MIN;
 }
 
 std::vector<double> Controller::spindleSpeed() const {
   const Lock lock(impl_->mutex);
-  return {units::rpmFromRadPerSec(impl_->spindleSpeed())};
+  return {std::abs(units::rpmFromRadPerSec(impl_->machine.spindleSpeed()))};
 }
 
 std::vector<double> Controller::spindleLoad() const {
   const Lock lock(impl_->mutex);
-  return {impl_->spindle_load};
+  return {impl_->polled(impl_->machine.spindle_load)};
 }
 
 std::vector<double> Controller::spindleMaxSpeed() const {
-  return {units::rpmFromRadPerSec(impl_->options.spindle_max_speed)};
+  return {units::rpmFromRadPerSec(impl_->machine.options.spindle_max_speed)};
 }
 
 std::vector<double> Controller::servoLoad() const {
   const Lock lock(impl_->mutex);
-  return {impl_->servo_load.begin(), impl_->servo_load.end()};
+  return {impl_->machine.servo_load.begin(), impl_->machine.servo_load.end()};
+}
+
+std::vector<double> Controller::servoCurrent() const {
+  const Lock lock(impl_->mutex);
+  return {impl_->machine.servo_current.begin(), impl_->machine.servo_current.end()};
+}
+
+std::vector<double> Controller::servoSpeed() const {
+  const Lock lock(impl_->mutex);
+  std::vector<double> speeds;
+  for (const double v : impl_->machine.velocity()) {
+    speeds.push_back(60.0 * v / SCREW_LEAD);
+  }
+  return speeds;
 }
 
 EwCode Controller::readMacro(int number, std::optional<double>* value) const {
-  if (!macroExists(number)) {
+  if (!Variables::exists(number)) {
     return focas::EW_NUMBER;
   }
   const Lock lock(impl_->mutex);
-  const auto found = impl_->macros.find(number);
-  *value = found == impl_->macros.end() ? std::nullopt : std::optional<double>(found->second);
+  *value = impl_->machine.readVariable(number);
   return focas::EW_OK;
 }
 
 EwCode Controller::writeMacro(int number, std::optional<double> value) {
-  if (!macroExists(number)) {
+  if (!Variables::exists(number)) {
     return focas::EW_NUMBER;
   }
-  const Lock lock(impl_->mutex);
-  if (value) {
-    impl_->macros[number] = *value;
-  } else {
-    impl_->macros.erase(number);
+  if (!Variables::writable(number)) {
+    return focas::EW_PROT;
   }
+  const Lock lock(impl_->mutex);
+  impl_->machine.variables.write(number, value);
   return focas::EW_OK;
 }
 
 std::uint32_t Controller::alarmBits() const {
   const Lock lock(impl_->mutex);
   std::uint32_t bits = 0;
-  for (const focas::AlarmMessage& alarm : impl_->alarms) {
+  for (const focas::AlarmMessage& alarm : impl_->machine.alarms) {
     bits |= 1U << static_cast<unsigned>(alarm.type);
   }
   return bits;
@@ -524,66 +296,160 @@ std::uint32_t Controller::alarmBits() const {
 
 std::vector<focas::AlarmMessage> Controller::alarmMessages() const {
   const Lock lock(impl_->mutex);
-  return impl_->alarms;
+  return impl_->machine.alarms;
 }
 
 int Controller::runningProgram() const {
-  return 0;
+  const Lock lock(impl_->mutex);
+  return impl_->machine.runningProgram();
 }
 
 int Controller::mainProgram() const {
-  return 0;
+  const Lock lock(impl_->mutex);
+  return impl_->machine.mainProgram();
 }
 
 int Controller::sequenceNumber() const {
   const Lock lock(impl_->mutex);
-  return impl_->sequence;
+  return impl_->machine.sequence;
 }
 
 int Controller::blockCount() const {
   const Lock lock(impl_->mutex);
-  return impl_->blocks;
+  return impl_->machine.blocks;
 }
 
 std::string Controller::programPath() const {
+  const Lock lock(impl_->mutex);
+  for (const focas::StoredProgram& program : impl_->machine.memory.list()) {
+    if (program.number == impl_->machine.mainProgram()) {
+      return programFolder() + program.name;
+    }
+  }
   return "";
 }
 
 std::string Controller::executingBlock() const {
   const Lock lock(impl_->mutex);
-  return impl_->block_text;
+  return impl_->machine.block_text;
+}
+
+std::string Controller::programText() const {
+  const Lock lock(impl_->mutex);
+  return impl_->machine.programText();
+}
+
+std::vector<focas::NumberedValue> Controller::parameters(int first, int last) const {
+  return within(machineParameters(impl_->machine.options), first, last);
+}
+
+std::vector<focas::NumberedValue> Controller::diagnoses(int first, int last) const {
+  const Lock lock(impl_->mutex);
+  const ControlledMachine& machine = impl_->machine;
+  const focas::Status status = machine.status();
+  DiagnosisState state;
+  state.waits_for_m = status.mstb != 0;
+  state.moves = status.motion == focas::MOTION_MOVES;
+  state.dwells = machine.dwells();
+  state.at_zero_feed =
+      status.run == focas::RUN_START && !state.moves && machine.distanceToGo() != Variables::Point{};
+  state.spindle_load = impl_->polled(machine.spindle_load);
+  state.spindle_angle = machine.motion().spindle_angle;
+  return within(machineDiagnoses(state), first, last);
+}
+
+std::optional<focas::DateTime> Controller::dateTime() const {
+  const Lock lock(impl_->mutex);
+  return calendar(impl_->clock());
+}
+
+EwCode Controller::setDateTime(const focas::DateTime& date_time) {
+  const Lock lock(impl_->mutex);
+  impl_->machine.clock_offset += secondsOf(date_time) - impl_->clock();
+  return focas::EW_OK;
+}
+
+EwCode Controller::readPmc(focas::PmcArea area, int first, int last, focas::Bytes* bytes) const {
+  const Lock lock(impl_->mutex);
+  impl_->machine.pmc.show(impl_->machine.signals());
+  return impl_->machine.pmc.read(area, first, last, bytes);
+}
+
+EwCode Controller::writePmc(focas::PmcArea area, int first, const focas::Bytes& bytes) {
+  const Lock lock(impl_->mutex);
+  return impl_->machine.pmc.write(area, first, bytes);
+}
+
+std::vector<focas::StoredProgram> Controller::programs() const {
+  const Lock lock(impl_->mutex);
+  return impl_->machine.memory.list();
+}
+
+EwCode Controller::selectProgram(int number) {
+  const Lock lock(impl_->mutex);
+  return impl_->machine.select(number);
+}
+
+EwCode Controller::deleteProgram(int number) {
+  const Lock lock(impl_->mutex);
+  return impl_->machine.erase(number);
+}
+
+EwCode Controller::rewindProgram() {
+  const Lock lock(impl_->mutex);
+  // Every start begins at the head of the program.
+  return impl_->machine.status().run == focas::RUN_START ? focas::EW_BUSY : focas::EW_OK;
+}
+
+EwCode Controller::storePrograms(const std::string& text) {
+  const Lock lock(impl_->mutex);
+  return impl_->machine.store(text, calendar(impl_->clock()));
+}
+
+EwCode Controller::fetchPrograms(int first, int last, std::string* text) const {
+  const Lock lock(impl_->mutex);
+  std::optional<std::string> programs = impl_->machine.memory.fetch(first, last);
+  if (!programs) {
+    return focas::EW_DATA;
+  }
+  *text = std::move(*programs);
+  return focas::EW_OK;
+}
+
+EwCode Controller::cycleStart() {
+  const Lock lock(impl_->mutex);
+  return impl_->machine.cycleStart();
 }
 
 EwCode Controller::reset() {
   const Lock lock(impl_->mutex);
-  impl_->halt(focas::EW_RESET);
-  impl_->alarms.clear();
+  impl_->machine.reset();
   return focas::EW_OK;
 }
 
 EwCode Controller::dncStart() {
   const Lock lock(impl_->mutex);
-  return impl_->open();
+  return impl_->machine.open();
 }
 
 std::size_t Controller::dncData(const char* data, std::size_t size) {
   const Lock lock(impl_->mutex);
-  return impl_->take(data, size);
+  return impl_->machine.take(data, size);
 }
 
 EwCode Controller::dncEnd() {
   const Lock lock(impl_->mutex);
-  return impl_->end();
+  return impl_->machine.end();
 }
 
 void Controller::dncCancel(int /*result*/) {
   const Lock lock(impl_->mutex);
-  impl_->cancel();
+  impl_->machine.cancel();
 }
 
 EwCode Controller::dncAbort() {
   const Lock lock(impl_->mutex);
-  return impl_->abort();
+  return impl_->machine.abort();
 }
 
 }  // namespace smartmill::sim

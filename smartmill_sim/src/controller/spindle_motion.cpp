@@ -8,24 +8,56 @@
 namespace smartmill::sim {
 
 SpindleMotion::SpindleMotion(double acceleration)
-    : acceleration_(acceleration), phases_{Phase{0.0, 0.0, 0.0, 0.0}} {
+    : drive_(acceleration), up_(acceleration), down_(acceleration), phases_{Phase{0.0, 0.0, 0.0, 0.0}} {
+}
+
+void SpindleMotion::setAccelerations(double time, double up, double down) {
+  if (up == up_ && down == down_) {
+    return;
+  }
+  const bool was_overloaded = overloaded();
+  up_ = up;
+  down_ = down;
+  if (!orienting_ && (was_overloaded || overloaded() || speed(time) != target_)) {
+    plan(time);
+  }
 }
 
 void SpindleMotion::ramp(double time, double speed) {
+  orienting_ = false;
+  target_ = speed;
+  plan(time);
+}
+
+void SpindleMotion::plan(double time) {
   begin(time);
-  const double change = speed - phases_.back().speed;
-  append(std::abs(change) / acceleration_, std::copysign(acceleration_, change), speed);
+  double now = phases_.back().speed;
+  const bool slower = std::abs(target_) < std::abs(now) || target_ * now < 0.0;
+  if (slower && now != 0.0) {
+    const double rest = target_ * now > 0.0 ? target_ : 0.0;
+    append(std::abs(now - rest) / down_, std::copysign(down_, rest - now), rest);
+    now = rest;
+  }
+  if (overloaded()) {
+    if (now != 0.0 && up_ < 0.0) {
+      append(std::abs(now / up_), std::copysign(up_, -now), 0.0);
+    }
+  } else if (now != target_) {
+    append(std::abs(target_ - now) / up_, std::copysign(up_, target_ - now), target_);
+  }
 }
 
 void SpindleMotion::orient(double time, double angle, double turn_speed) {
+  up_ = down_ = drive_;
   ramp(time, 0.0);
+  orienting_ = true;
   const double way = wrapped(angle - phases_.back().angle);
   if (way > 0.0) {
-    const double peak = std::min(turn_speed, std::sqrt(way * acceleration_));
-    const double ramp_time = peak / acceleration_;
-    append(ramp_time, acceleration_, peak);
+    const double peak = std::min(turn_speed, std::sqrt(way * drive_));
+    const double ramp_time = peak / drive_;
+    append(ramp_time, drive_, peak);
     append(std::max(0.0, way / peak - ramp_time), 0.0, peak);
-    append(ramp_time, -acceleration_, 0.0);
+    append(ramp_time, -drive_, 0.0);
   }
   phases_.back().angle = angle;
 }

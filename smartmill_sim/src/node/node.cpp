@@ -46,6 +46,7 @@ Node::Node(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
       dynamometer_(nh_.advertise<smartmill_msgs::SampleBlock>(names::DYNAMOMETER, STREAM_QUEUE)),
       force_(nh_.advertise<smartmill_msgs::ForceBlock>(names::TRUE_FORCE, STREAM_QUEUE)),
       vibration_(nh_.advertise<smartmill_msgs::SampleBlock>(names::TRUE_VIBRATION, STREAM_QUEUE)),
+      servo_(nh_.advertise<smartmill_msgs::SampleBlock>(names::daq("servo"), STREAM_QUEUE)),
       coefficients_(nh_.advertise<smartmill_msgs::CuttingCoefficients>(names::TRUE_COEFFICIENTS, 1, true)),
       frf_(nh_, names::TRUE_FRF),
       modes_(nh_, names::TRUE_MODES),
@@ -68,6 +69,7 @@ void Node::serve() {
   options.port = static_cast<std::uint16_t>(parameters_.port);
   options.bind_address = parameters_.bind;
   server_ = std::make_unique<focas::Server>(options, world_->controller());
+  offerPanel();
   angle_ = nh_.advertise<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE, STREAM_QUEUE);
   ROS_INFO("sim: controller listens on %s:%d", parameters_.bind.c_str(), server_->port());
 }
@@ -141,6 +143,7 @@ void Node::publish(const World::Block& block) {
   }
   force_.publish(toMsg(shifted(block.force), frames::MACHINE));
   vibration_.publish(toMsg(shifted(block.vibration)));
+  servo_.publish(toMsg(shifted(block.servo)));
 }
 
 void Node::run() {
@@ -215,6 +218,58 @@ bool Node::strike(smartmill_msgs::Strike::Request& request, smartmill_msgs::Stri
       break;
   }
   return true;
+}
+
+void Node::offer(const std::string& key, std::size_t values, Press press) {
+  using Request = smartmill_msgs::PanelKey::Request;
+  using Response = smartmill_msgs::PanelKey::Response;
+  const boost::function<bool(Request&, Response&)> answer = [key, values, press = std::move(press)](
+                                                                const Request& request, Response& response) {
+    response.message = request.values.size() == values ? press(request)
+                                                       : std::to_string(request.values.size()) + " values, " +
+                                                             std::to_string(values) + " due";
+    response.code = response.message.empty() ? Response::OK : Response::REFUSED;
+    response.message = key + ": " + (response.message.empty() ? "done" : response.message);
+    return true;
+  };
+  panel_.push_back(nh_.advertiseService("sim/panel/" + key, answer));
+}
+
+void Node::offerPanel() {
+  using Request = smartmill_msgs::PanelKey::Request;
+  Controller& controller = world_->controller();
+  offer("mode", 1, [&controller](const Request& request) -> std::string {
+    const int mode = static_cast<int>(request.values[0]);
+    if (mode != request.values[0] || mode < focas::AUT_MDI || mode > focas::AUT_REMOTE) {
+      return "one of MODE_* of CncState is due";
+    }
+    controller.setMode(mode);
+    return {};
+  });
+  offer("emergency_stop", 1, [&controller](const Request& request) -> std::string {
+    controller.emergency(request.values[0] != 0.0);
+    return {};
+  });
+  offer("reset", 0, [&controller](const Request&) -> std::string {
+    controller.reset();
+    return {};
+  });
+  offer("feed_hold", 0, [&controller](const Request&) -> std::string {
+    controller.feedHold();
+    return {};
+  });
+  offer("cycle_start", 0, [&controller](const Request&) -> std::string {
+    const focas::EwCode code = controller.cycleStart();
+    return code == focas::EW_OK ? std::string() : focas::ewName(code);
+  });
+  offer("overrides", 3, [&controller](const Request& request) -> std::string {
+    controller.setOverrides(request.values[0], request.values[1], request.values[2]);
+    return {};
+  });
+  offer("alarm", 1, [&controller](const Request& request) -> std::string {
+    controller.raiseAlarm(static_cast<int>(request.values[0]), request.text);
+    return {};
+  });
 }
 
 void Node::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <atomic>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -10,6 +11,7 @@
 #include <ros/ros.h>
 #include <smartmill_msgs/Frf.h>
 #include <smartmill_msgs/ModalModel.h>
+#include <smartmill_msgs/PanelKey.h>
 #include <smartmill_msgs/Strike.h>
 
 #include "node/parameters.h"
@@ -24,7 +26,7 @@
 namespace smartmill::sim {
 
 /// The simulated machine on ROS: the controller on its port, sensors on daq/* and spindle/angle, the hammers
-/// behind daq/strike, truth on sim/truth/*. Paced by the clock.
+/// behind daq/strike, truth on sim/truth/*, the operator's panel behind sim/panel/*. Paced by the clock.
 class Node {
  public:
   using Parameters = NodeParameters;
@@ -44,6 +46,10 @@ class Node {
   void publishTruth();
   bool strike(smartmill_msgs::Strike::Request& request, smartmill_msgs::Strike::Response& response);
   void addTruth(const std::string& point, const std::string& direction, const ModalModel& modes);
+  /// Offers a key of the panel. @param press returns why it refuses, empty: done
+  using Press = std::function<std::string(const smartmill_msgs::PanelKey::Request&)>;
+  void offer(const std::string& key, std::size_t values, Press press);
+  void offerPanel();
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
   ros::NodeHandle nh_;
@@ -53,10 +59,11 @@ class Node {
   std::unique_ptr<focas::Server> server_;
 
   double start_ = 0.0;  // [s] stamp of sample 0
-  ros::Publisher hammer_, dynamometer_, angle_, force_, vibration_, coefficients_, load_meter_;
+  ros::Publisher hammer_, dynamometer_, angle_, force_, vibration_, servo_, coefficients_, load_meter_;
   KeptTopic<smartmill_msgs::Frf> frf_;
   KeptTopic<smartmill_msgs::ModalModel> modes_;
   ros::ServiceServer strike_server_;
+  std::vector<ros::ServiceServer> panel_;
   NodeShell shell_;
   std::atomic<double> load_{0.0};  // [1] share of real time that the twin needs
   std::atomic<std::uint64_t> lost_{0};

@@ -9,6 +9,7 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/units.h"
+#include "smartmill_sim/controller/servo_recorder.h"
 #include "smartmill_sim/twin/cutting_machine.h"
 #include "smartmill_sim/world/hammer_station.h"
 #include "smartmill_sim/world/stock.h"
@@ -41,7 +42,8 @@ class World::Impl {
   Impl(const MachineModel& model, const WorldOptions& options)
       : options_(options),
         spindle_(model.needSpindle("simulate the machine")),
-        controller_(ControllerOptions::ofModel(model)),
+        controller_(controllerOptions(model, options)),
+        servo_(options.servo_trigger),
         machine_(model, 1.0 / (SAMPLE_RATE * options.substeps)),
         random_(options.seed) {
     const ToolGeometry& tool = model.needTool("simulate the machine");
@@ -95,7 +97,6 @@ class World::Impl {
     const std::lock_guard<std::mutex> lock(mutex_);
     controller_.advance(1.0 / SAMPLE_RATE, BLOCK, states_);
     follow(block, states_);
-    controller_.setSpindleLoad(100.0 * block.spindle_load);
   }
 
   void advance(Block& block, const std::vector<MotionState>& states) {
@@ -110,6 +111,14 @@ class World::Impl {
   }
 
  private:
+  static ControllerOptions controllerOptions(const MachineModel& model, const WorldOptions& options) {
+    ControllerOptions made = ControllerOptions::ofModel(model);
+    if (model.spindle->load_meter_full_scale) {
+      made.load_step = 100.0 * options.load_step / *model.spindle->load_meter_full_scale;
+    }
+    return made;
+  }
+
   double uniform() { return std::uniform_real_distribution<double>(0.0, 1.0)(random_); }
   double scattered(double peak) {
     return peak * std::clamp(1.0 + options_.force_scatter * normal_(random_), 0.5, 1.5);
@@ -130,6 +139,12 @@ class World::Impl {
     }
     index_ += BLOCK;
     block.spindle_load = machine_.rounded(load_meter_) / *spindle_.load_meter_full_scale;
+    block.servo = servo_.take();
+    controller_.setSpindleLoad(100.0 * load_meter_ / *spindle_.load_meter_full_scale);
+    controller_.setSpindleTorque(torque_ / BLOCK);
+    torque_ = 0.0;
+    controller_.setServoCurrent(servo_.current());
+    controller_.setServoLoad(servo_.load());
   }
 
   void begin(Block& block) const {
@@ -196,7 +211,7 @@ class World::Impl {
     const bool at_station = station_ && station_->facing(now.position).has_value();
     std::array<double, 3> sensor{}, force{};
     std::array<double, 2> displacement{};
-    double hammer = 0.0, volt = 0.0;
+    double hammer = 0.0, volt = 0.0, torque = 0.0;
     for (int s = 0; s < options_.substeps; ++s) {
       const double share = (s + 0.5) / options_.substeps;
       CuttingMachine::Input input;
@@ -212,9 +227,15 @@ class World::Impl {
       force[0] += out.force.fx;
       force[1] += out.force.fy;
       force[2] += out.force.fz;
+      torque += out.force.torque;
       load_meter_ = out.load_meter;
     }
     const double share = 1.0 / options_.substeps;
+    torque_ += share * torque;
+    servo_.push({time,
+                 now,
+                 load_meter_ / *spindle_.load_meter_full_scale,
+                 {share * force[0], share * force[1], share * force[2]}});
     block.hammer.samples.push_back(share * hammer + (hammer_ ? noise(hammer_->force_noise_rms) : 0.0));
     if (station_) {
       volt = at_station ? share * volt : -hammer_->range_volt;
@@ -241,6 +262,7 @@ class World::Impl {
   WorldOptions options_;
   Spindle spindle_;
   Controller controller_;
+  ServoRecorder servo_;
   CuttingMachine machine_;
   std::optional<Stock> stock_;
   std::optional<HammerStation> station_;
@@ -258,6 +280,7 @@ class World::Impl {
   bool blow_on_tool_ = false;
   std::size_t blow_axis_ = 0;
   double load_meter_ = 0.0;  // [V]
+  double torque_ = 0.0;      // [N m] of the cut, summed over the samples of a block
 };
 
 World::World(const MachineModel& model, const WorldOptions& options) {

@@ -27,8 +27,16 @@ int millisecondsUntil(Clock::time_point deadline) {
   return static_cast<int>(std::clamp<long long>(left + 1, 0, 3600000));
 }
 
+namespace {
+
+Clock::duration secondsAsDuration(double seconds) {
+  return std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
+}
+
+}  // namespace
+
 Clock::time_point deadlineIn(double seconds) {
-  return Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
+  return Clock::now() + secondsAsDuration(seconds);
 }
 
 void Connection::setTarget(const std::string& host, std::uint16_t port, double timeout) {
@@ -96,9 +104,6 @@ OpenReply Connection::open(Circuit& circuit) {
                            " (" + std::to_string(error.code) + ")",
                        error.code, error.detail1);
     }
-    if (frame.version < 1) {
-      throw WireError("reply with version 0");
-    }
     return decodeOpenReply(frame.body);
   }
 }
@@ -121,6 +126,7 @@ void Connection::connectSocket(Circuit& circuit, Clock::time_point deadline) {
   int error = circuit.socket.valid() ? 0 : errno;
   if (error == 0) {
     prepareSocket(circuit.socket.get());
+    keepAlive(circuit.socket.get());
     if (&circuit == &stream) {
       ::setsockopt(circuit.socket.get(), SOL_SOCKET, SO_SNDBUF, &STREAM_SEND_BUFFER,
                    sizeof STREAM_SEND_BUFFER);
@@ -200,6 +206,13 @@ std::optional<Frame> Connection::pollOrDrop(Circuit& circuit) {
 Frame Connection::receive(Circuit& circuit, Clock::time_point deadline) {
   for (;;) {
     if (std::optional<Frame> frame = poll(circuit)) {
+      // A peer that talks without end of other things does not answer either.
+      if (Clock::now() >= deadline + secondsAsDuration(timeout_)) {
+        lost("no answer in time");
+      }
+      if (frame->version < 1) {
+        throw WireError("reply with version 0");
+      }
       return std::move(*frame);
     }
     if (Clock::now() >= deadline) {

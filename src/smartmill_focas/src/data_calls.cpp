@@ -43,10 +43,12 @@ SubReply DataCalls::answer(const SubRequest& request) {
   Writer out;
   int code = EW_FUNC;
   try {
-    if (request.c1 != 1) {
+    if (request.c1 != 1 && request.c1 != 2) {
       code = EW_FUNC;
     } else if (request.c2 != 1) {
       code = EW_PATH;
+    } else if (const std::optional<int> kept = memory_.call(request, out)) {
+      code = *kept;
     } else {
       code = call(request, out);
     }
@@ -153,7 +155,7 @@ bool DataCalls::tellsProgram(const SubRequest& request, Writer& out) const {
       out.text(controller_.programPath(), PATH_WIDTH);
       return true;
     case OP_EXECUTING_BLOCK: {
-      const std::string text = controller_.executingBlock();
+      const std::string text = controller_.programText();
       const int room = std::clamp(request.v[0], 0, MAX_BLOCK_TEXT);
       out.i32(controller_.blockCount()).text(text, std::min(text.size(), static_cast<std::size_t>(room)));
       return true;
@@ -288,6 +290,10 @@ int DataCalls::servo(const SubRequest& request, Writer& out) const {
       break;
     case 2:
       values = controller_.servoSpeed();
+      break;
+    case 3:
+      values = controller_.servoCurrent();
+      decimals = info_.current_decimals;
       break;
     default:
       return EW_NUMBER;

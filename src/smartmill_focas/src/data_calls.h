@@ -1,5 +1,6 @@
 #pragma once
 
+#include "memory_calls.h"
 #include "smartmill_focas/server.h"
 
 namespace smartmill::focas {
@@ -8,7 +9,9 @@ namespace smartmill::focas {
 class DataCalls {
  public:
   explicit DataCalls(ControllerInterface& controller)
-      : controller_(controller), info_(controller.sysInfo()) {}
+      : controller_(controller), info_(controller.sysInfo()), memory_(controller, info_) {}
+  DataCalls(const DataCalls&) = delete;
+  DataCalls& operator=(const DataCalls&) = delete;
 
   const SysInfo& sysInfo() const { return info_; }
   /// Never throws: what the controller does not know is EW_FUNC, malformed arguments EW_LENGTH, EW_NUMBER,
@@ -35,6 +38,7 @@ class DataCalls {
 
   ControllerInterface& controller_;
   SysInfo info_;
+  MemoryCalls memory_;
 };
 
 }  // namespace smartmill::focas

@@ -8,6 +8,11 @@
 #include "smartmill_focas/client.h"
 
 namespace smartmill::focas {
+namespace {
+
+constexpr int MOST_UNASKED = 1000;  // frames that nobody asked for, one after the other
+
+}  // namespace
 
 void DncStream::needSession(const std::string& call) {
   connection_.need();
@@ -23,7 +28,10 @@ void DncStream::start() {
   const Clock::time_point deadline = deadlineIn(connection_.timeout());
   try {
     // What a former session left (an abort nobody asked for) must not answer this one.
-    while (connection_.poll(stream)) {
+    for (int count = 0; connection_.poll(stream); ++count) {
+      if (count > MOST_UNASKED) {
+        connection_.lost("it sends frames without end");
+      }
     }
     Connection::queue(stream, FRAME_DNC_START, DIR_REQUEST,
                       Writer().u32(1).zeros(STREAM_NAME_BODY - 4).data());
@@ -122,8 +130,12 @@ void DncStream::cancel(DncResult result) {
 
 void DncStream::check() {
   connection_.need();
+  int count = 0;
   while (const std::optional<Frame> frame = connection_.pollOrDrop(connection_.stream)) {
     throwIfAbort(*frame, "cnc_dnc2");
+    if (++count > MOST_UNASKED) {
+      connection_.lost("it sends frames without end");
+    }
   }
 }
 

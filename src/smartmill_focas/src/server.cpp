@@ -16,6 +16,7 @@
 #include <thread>
 
 #include "data_calls.h"
+#include "program_transfer.h"
 #include "socket.h"
 
 namespace smartmill::focas {
@@ -39,6 +40,7 @@ struct Connection {
   Bytes unsent;
   int circuit = 0;  // 0: not opened
   Dnc dnc = Dnc::none;
+  ProgramTransfer transfer;
   int abort_code = EW_OK;
   bool blocked = false;  // the machine's buffer is full
   bool peer_closed = false;
@@ -52,7 +54,7 @@ class Server::Impl {
  public:
   Impl(const ServerOptions& options, ControllerInterface& controller)
       : options_(options), controller_(controller), calls_(controller) {
-    listen();
+    listen(options_.port);
     int ends[2];
     if (::pipe(ends) != 0) {
       throw std::runtime_error("FOCAS server: no pipe: " + errorText(errno));
@@ -83,14 +85,14 @@ class Server::Impl {
   int connections() const { return open_count_; }
 
  private:
-  void listen() {
-    const std::string where = options_.bind_address + ":" + std::to_string(options_.port);
+  void listen(std::uint16_t port) {
+    const std::string where = options_.bind_address + ":" + std::to_string(port);
     const auto fail = [&](const std::string& why) {
       throw std::runtime_error("FOCAS server: cannot listen on " + where + ": " + why);
     };
     sockaddr_in address{};
     address.sin_family = AF_INET;
-    address.sin_port = htons(options_.port);
+    address.sin_port = htons(port);
     if (::inet_pton(AF_INET, options_.bind_address.c_str(), &address.sin_addr) != 1) {
       fail("not an IPv4 address");
     }
@@ -118,7 +120,8 @@ class Server::Impl {
     while (!stopping_) {
       waits.clear();
       waits.push_back({wake_read_.get(), POLLIN, 0});
-      waits.push_back({listener_.get(), POLLIN, 0});
+      watchListener();
+      waits.push_back({listener_.get(), POLLIN, 0});  // -1 is passed over
       int timeout = IDLE_POLL_MS;
       for (const Connection& c : connections_) {
         short events = 0;
@@ -133,6 +136,9 @@ class Server::Impl {
         }
         // A closed peer would end every poll at once.
         waits.push_back({c.peer_closed ? -1 : c.socket.get(), events, 0});
+        if (c.transfer.uploading()) {
+          timeout = std::min(timeout, SESSION_POLL_MS);
+        }
         if (c.blocked) {
           timeout = std::min(timeout, BLOCKED_POLL_MS);
         } else if (c.dnc == Dnc::open) {
@@ -159,13 +165,28 @@ class Server::Impl {
     open_count_ = 0;
   }
 
+  /// With all connections taken nothing listens: the next one is refused by TCP itself.
+  void watchListener() {
+    const bool full = connections_.size() >= static_cast<std::size_t>(options_.max_connections);
+    if (full) {
+      listener_.reset();
+    } else if (!listener_.valid()) {
+      try {
+        listen(port_);
+      } catch (const std::runtime_error&) {
+        listener_.reset();  // somebody took the port meanwhile: again at the next turn
+      }
+    }
+  }
+
   void accept() {
-    for (;;) {
+    while (connections_.size() < static_cast<std::size_t>(options_.max_connections)) {
       Descriptor socket(::accept(listener_.get(), nullptr, nullptr));
       if (!socket.valid()) {
         return;
       }
       prepareSocket(socket.get());
+      keepAlive(socket.get());
       connections_.emplace_back();
       connections_.back().socket = std::move(socket);
     }
@@ -209,6 +230,9 @@ class Server::Impl {
         return;
       }
       serveFrames(c);
+      if (c.unsent.empty()) {
+        c.transfer.push(sender(c));
+      }
       if (!c.unsent.empty() && writeSome(c.socket.get(), c.unsent) == Transfer::closed) {
         drop(c);
         return;
@@ -259,6 +283,8 @@ class Server::Impl {
       }
     } else if (frame.is(FRAME_DATA, DIR_REQUEST)) {
       data(c, frame);
+    } else if (c.circuit == STREAM_CIRCUIT && transferred(c, frame)) {
+      return true;
     } else if (frame.is(FRAME_DNC_START, DIR_REQUEST)) {
       dncStart(c);
     } else if (frame.is(FRAME_DNC_DATA, DIR_STREAM)) {
@@ -318,6 +344,15 @@ class Server::Impl {
       return;
     }
     send(c, FRAME_DATA, DIR_REPLY, body);
+  }
+
+  bool transferred(Connection& c, const Frame& frame) {
+    return c.transfer.handle(frame, controller_, sender(c));
+  }
+
+  static ProgramTransfer::Send sender(Connection& c) {
+    return
+        [&c](std::uint8_t type, Direction direction, const Bytes& body) { send(c, type, direction, body); };
   }
 
   void dncStart(Connection& c) {

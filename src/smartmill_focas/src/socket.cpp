@@ -27,6 +27,15 @@ void prepareSocket(int fd) {
   ::setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
 }
 
+void keepAlive(int fd) {
+  const int on = 1;
+  const int idle = 1, interval = 1, probes = 2;  // [s], [s], [1]
+  ::setsockopt(fd, SOL_SOCKET, SO_KEEPALIVE, &on, sizeof on);
+  ::setsockopt(fd, IPPROTO_TCP, TCP_KEEPIDLE, &idle, sizeof idle);
+  ::setsockopt(fd, IPPROTO_TCP, TCP_KEEPINTVL, &interval, sizeof interval);
+  ::setsockopt(fd, IPPROTO_TCP, TCP_KEEPCNT, &probes, sizeof probes);
+}
+
 Transfer readSome(int fd, FrameReader& reader, std::size_t max_bytes) {
   std::array<std::uint8_t, 16384> chunk;  // NOLINT(cppcoreguidelines-pro-type-member-init): recv fills it
   std::size_t total = 0;

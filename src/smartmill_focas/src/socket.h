@@ -37,6 +37,10 @@ enum class Transfer { done, would_block, closed };
 /// No blocking, no Nagle, not inherited by child processes.
 void prepareSocket(int fd);
 
+/// A peer that has gone without a word is an error of an idle socket after three seconds; one lost packet is
+/// none.
+void keepAlive(int fd);
+
 /// Reads at most max_bytes into the reader.
 Transfer readSome(int fd, FrameReader& reader, std::size_t max_bytes);
 

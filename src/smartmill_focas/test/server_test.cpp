@@ -5,44 +5,10 @@
 
 #include <random>
 
-#include "test_controller.h"
-#include "test_wire.h"
+#include "server_rig.h"
 
 namespace smartmill::focas {
 namespace {
-
-class ServerTest : public ::testing::Test {
- protected:
-  ServerTest() : server_(options(), controller_) {
-    controller_.change([](TestController& c) { c.state.aut = AUT_REMOTE; });
-  }
-  static ServerOptions options() {
-    ServerOptions o;
-    o.port = 0;
-    return o;
-  }
-  std::unique_ptr<RawSocket> open(int circuit) {
-    auto socket = std::make_unique<RawSocket>(RawSocket::connectTo(server_.port()));
-    socket->send(hex("a0a0a0a0 0001 0101 0002 000" + std::to_string(circuit)));
-    const Bytes reply = socket->receive(82);
-    EXPECT_EQ(show(Bytes(reply.begin(), reply.begin() + 10)), show(hex("a0a0a0a0 0003 0102 0048")));
-    return socket;
-  }
-  /// Sends one data PDU, checks the reply's body.
-  void expectReply(RawSocket& socket, const std::string& request, const std::string& due) {
-    const Bytes out = hex("a0a0a0a0 0001 2101" + request);
-    socket.send(out);
-    const Bytes reply = hex("a0a0a0a0 0003 2102" + due);
-    EXPECT_EQ(show(socket.receive(reply.size())), show(reply)) << request;
-  }
-  static std::string dncStartFrame() { return "a0a0a0a0 0001 1901 0204 00000001 Z512"; }
-  static Bytes dncText(const std::string& text) {
-    return encodeFrame(FRAME_DNC_DATA, DIR_STREAM, Bytes(text.begin(), text.end()), 1);
-  }
-
-  TestController controller_;
-  Server server_;
-};
 
 TEST_F(ServerTest, PrintedBytes) {
   const auto stream = open(1);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <map>
 #include <mutex>
 #include <string>
@@ -22,6 +23,9 @@ class TestController : public ControllerInterface {
   std::map<int, std::optional<double>> macros{
       {100, std::nullopt}, {500, 2.5}, {501, std::nullopt}, {502, -7.0}};
   std::uint32_t alarm_bits = 0;
+  DateTime clock{2026, 5, 14, 13, 37, 59};
+  Bytes pmc = Bytes(200, 0);
+  std::string stored;  ///< last download
   std::vector<AlarmMessage> alarms;
   bool session = false;
   std::size_t room = 1 << 30;  ///< [byte] that the buffer still takes
@@ -66,6 +70,53 @@ class TestController : public ControllerInterface {
   int blockCount() const override { return 88; }
   std::string programPath() const override { return "//CNC_MEM/USER/O4321"; }
   std::string executingBlock() const override { return "N77 G1 X10 F600"; }
+  std::vector<double> servoCurrent() const override { return {1.5, -0.25, 0.0}; }
+  std::vector<NumberedValue> parameters(int first, int last) const override {
+    return between({{1020, NumberedType::byte, {88, 89, 90}, true, 0},
+                    {1320, NumberedType::real, {250.0, 200.5, -0.001}, true, 3},
+                    {3741, NumberedType::double_word, {20000.0}, false, 0}},
+                   first, last);
+  }
+  std::vector<NumberedValue> diagnoses(int first, int last) const override {
+    return between({{308, NumberedType::byte, {28, 28, 44}, true, 0}}, first, last);
+  }
+  std::optional<DateTime> dateTime() const override { return locked(clock); }
+  EwCode setDateTime(const DateTime& at) override {
+    const std::lock_guard<std::mutex> lock(mutex);
+    clock = at;
+    return EW_OK;
+  }
+  EwCode readPmc(PmcArea area, int first, int last, Bytes* bytes) const override {
+    if (area != PmcArea::d || last >= 200) {
+      return EW_NUMBER;
+    }
+    const std::lock_guard<std::mutex> lock(mutex);
+    bytes->assign(pmc.begin() + first, pmc.begin() + last + 1);
+    return EW_OK;
+  }
+  EwCode writePmc(PmcArea, int first, const Bytes& bytes) override {
+    const std::lock_guard<std::mutex> lock(mutex);
+    std::copy(bytes.begin(), bytes.end(), pmc.begin() + first);
+    return EW_OK;
+  }
+  std::vector<StoredProgram> programs() const override {
+    return {{1, "O0001", "(PARK)", 40, {2026, 5, 14, 8, 30, 1}}, {1234, "O1234", "(SLOT)", 100, {}}};
+  }
+  EwCode selectProgram(int number) override { return number == 1234 ? EW_OK : EW_DATA; }
+  EwCode deleteProgram(int number) override { return number == 1234 ? EW_OK : EW_DATA; }
+  EwCode rewindProgram() override { return EW_OK; }
+  EwCode storePrograms(const std::string& program) override {
+    const std::lock_guard<std::mutex> lock(mutex);
+    stored = program;
+    return program.find('O') == std::string::npos ? EW_DATA : EW_OK;
+  }
+  EwCode fetchPrograms(int first, int last, std::string* program) const override {
+    if (first > 1234 || last < 1234) {
+      return EW_DATA;
+    }
+    *program = "%\nO1234\n" + std::string(3000, 'X') + "\n%\n";
+    return EW_OK;
+  }
   EwCode dncStart() override {
     const std::lock_guard<std::mutex> lock(mutex);
     if (refuse_start != EW_OK) {
@@ -112,6 +163,13 @@ class TestController : public ControllerInterface {
       session = false;
     }
     return abort_code;
+  }
+
+  static std::vector<NumberedValue> between(std::vector<NumberedValue> all, int first, int last) {
+    all.erase(std::remove_if(all.begin(), all.end(),
+                             [&](const NumberedValue& n) { return n.number < first || n.number > last; }),
+              all.end());
+    return all;
   }
 
   template <class T>

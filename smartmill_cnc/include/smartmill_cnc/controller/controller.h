@@ -53,14 +53,27 @@ class [[nodiscard]] Result {
   std::variant<Value, Failure> content_;
 };
 
+/// An alarm as the controller shows it.
+struct ControllerAlarm {
+  int number = 0;
+  int type = 0;  ///< the controller's own kind of alarm
+  int axis = 0;  ///< 1-based, 0: none
+  std::string text;
+};
+
+inline bool operator==(const ControllerAlarm& a, const ControllerAlarm& b) {
+  return a.number == b.number && a.type == b.type && a.axis == b.axis && a.text == b.text;
+}
+
 /// What a controller tells at one moment.
 struct Reading {
   CncState state;                  ///< stamp, connected and armed are the bridge's to fill in
   std::optional<LoadSample> load;  ///< stamp as well; nothing when the controller does not tell loads
-  std::vector<double> absolute;    ///< [m] positions in workpiece coordinates, order of state.axes
-  double increment = 1e-6;         ///< [m] of its positions
-  bool at_rest = true;             ///< neither axes move nor a dwell runs
-  bool program_done = false;       ///< every block of the program begun last has been executed
+  std::vector<ControllerAlarm> alarms;
+  std::vector<double> absolute;  ///< [m] positions in workpiece coordinates, order of state.axes
+  double increment = 1e-6;       ///< [m] of its positions
+  bool at_rest = true;           ///< neither axes move nor a dwell runs
+  bool program_done = false;     ///< every block of the program begun last has been executed
 };
 
 /// How much of a program is with the controller.

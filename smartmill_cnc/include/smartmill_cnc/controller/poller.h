@@ -13,7 +13,12 @@ namespace smartmill::cnc {
 /// about, is told in one line, not in one a period.
 class Poller {
  public:
-  /// @param reconnect_period [s] between two attempts
+  struct Counts {
+    int made = 0, lost = 0, attempts = 0;
+  };
+
+  /// @param reconnect_period [s] between the first two attempts; each further one waits twice as long, at
+  /// most eight times
   Poller(Controller& controller, double reconnect_period, Log& log);
 
   /// Connects when it is time to, reads. @param now [s] any steady time.
@@ -26,12 +31,16 @@ class Poller {
   const std::string& lastError() const { return last_error_; }
   /// There is no connection in this period. Tells of it, when that is news.
   void lost();
+  const Counts& counts() const { return counts_; }
 
  private:
   void connect();
 
   Controller& controller_;
   double reconnect_period_;
+  double wait_;       // [s] from the last attempt to the next
+  int failures_ = 0;  // one after the other
+  Counts counts_;
   Log& log_;
   std::optional<Reading> reading_;
   std::string identity_;

@@ -15,6 +15,7 @@
 namespace smartmill::cnc {
 
 struct MotionParameters {
+  bool read_only = true;
   double condition_lead = 0.3;
   double settle_time = 0.1;
   double standstill_speed = 0.2;
@@ -25,6 +26,7 @@ struct MotionParameters {
 
   /// Without the limits, which declare themselves.
   void declare(ParameterTable& table) {
+    table.flag("read_only", read_only, "true: motion cannot be armed, nothing is written to the controller");
     table.number("condition_lead", condition_lead, "s", Range::closed(0.0, 10.0),
                  "by which a cutting condition is told before it begins or ends");
     table.number("settle_time", settle_time, "s", Range::positive(), "of standstill that ends a motion");
@@ -88,6 +90,7 @@ class MotionMachine {
   std::string lost(const std::string& why, double now);
 
   bool armed() const { return armed_; }
+  bool readOnly() const { return parameters_.read_only; }
   Result<Answer<ArmCode>> arm();
   Status disarm();
 
@@ -126,6 +129,7 @@ class MotionMachine {
   std::string lineOf(const Failure& failure) const;
   void setArmed(bool armed);
   void enter(Phase phase);
+  void followClock(double now);
   Status watch();
   Status giveUp(MotionCode code, const std::string& why);
   Status stop(Outcome outcome);

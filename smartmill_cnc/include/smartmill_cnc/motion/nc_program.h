@@ -13,12 +13,14 @@ struct MotionLimits {
   double max_feed = 0.0;
   double max_spindle_speed = 0.0;
   double max_dwell = 60.0;
+  double max_jog = 0.1;
 
   /// Without the travel.
   void declare(ParameterTable& table) {
     table.number("max_feed", max_feed, "m/s", Range::notNegative(), "0: the model's");
     table.number("max_spindle_speed", max_spindle_speed, "rad/s", Range::notNegative(), "0: the model's");
     table.number("max_dwell", max_dwell, "s", Range::positive(), "of one G4");
+    table.number("max_jog", max_jog, "m", Range::positive(), "of one jog");
   }
   /// @throws Error naming key and value.
   void validate() const;

@@ -2,6 +2,8 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -9,22 +11,31 @@
 
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_focas/server.h"
+#include "smartmill_sim/controller/collision_watch.h"
 
 namespace smartmill::sim {
 
 struct ControllerOptions {
   MachineAxes axes;                              ///< travel, rapid, acceleration, home (where it starts)
   double spindle_max_speed = 0.0;                ///< [rad/s] a higher S is taken as this
-  double spindle_acceleration = 0.0;             ///< [rad/s2]
-  std::array<double, 3> work_offset{{0, 0, 0}};  ///< [m] machine minus absolute position
+  double spindle_acceleration = 0.0;             ///< [rad/s2] without load
+  double spindle_torque = 0.0;                   ///< [N m] limit of the drive; 0: no load slows it
+  std::array<double, 3> work_offset{{0, 0, 0}};  ///< [m] machine minus absolute position, of G54
   focas::SysInfo info = fineInfo();              ///< of the controller
   int mode = focas::AUT_REMOTE;                  ///< focas::Aut, at its panel
   std::size_t buffer_size = 1024;                ///< [byte] of DNC text not yet run
+  double load_step = 0.0;                        ///< [percent] polled loads are rounded to it; 0: are not
+  CollisionWatch obstacles;
+  std::function<std::int64_t()> wall_clock;  ///< [s] since 1970, of its calendar; empty: the computer's
 
   /// @throws Error naming key and value.
   void validate() const;
 
-  /// Of a model's sections axes and spindle. What it leaves out: travel x -250..250, y -200..200, z -300..0
+  /// [N m s2] of the spindle: what its drive accelerates so.
+  double spindleInertia() const { return spindle_torque / spindle_acceleration; }
+
+  /// Of a model's sections axes, spindle, hammer, tool and workpiece. Loads are rounded to 0.3 mV of the load
+  /// meter's scale. What it leaves out: travel x -250..250, y -200..200, z -300..0
   /// mm, home 0 0 0, rapid 30 m/min, 5 m/s2; spindle to 20000 rpm, 10000 rpm/s.
   static ControllerOptions ofModel(const MachineModel& model);
   /// Positions in 0.1 um.
@@ -36,17 +47,20 @@ struct MotionState {
   std::array<double, 3> position{{0, 0, 0}};  ///< [m] machine position of x, y, z
   std::array<double, 3> velocity{{0, 0, 0}};  ///< [m/s]
   double spindle_angle = 0.0;                 ///< [rad] of tooth 1, 0..2 pi
-  double spindle_speed = 0.0;                 ///< [rad/s]
+  double spindle_speed = 0.0;                 ///< [rad/s] negative: backwards
+  int sequence = 0;                           ///< N word of the block that runs or ran last
 };
 
 /// The simulated controller and the axes and the spindle that obey it exactly: blocks with trapezoidal speed
-/// and an exact stop at the end of each, spindle with a constant acceleration. Time comes in through
-/// advance(). Every method may be called from any thread.
+/// and an exact stop at the end of each, a spindle whose drive has a torque to accelerate its inertia and to
+/// carry the cut. Time comes in through advance(). Every method may be called from any thread.
 ///
-/// Dialect of the program text: see nc_block.h. A program begins in G90 and G1 without F. `#n=value` is done
-/// when all blocks before it are, M3 is not waited for, M5, M119, M30 and M2 are. A block that is not
-/// understood, would leave the travel or lacks F raises an alarm, which stops everything and ends the
-/// session.
+/// Dialect of the program text: see nc_block.h. A program begins in G90, G21, G94, G54 and G1 without F.
+/// `#n=` is done when all blocks before it are, M3 and M4 are not waited for, M5, M19, M119, M30 and M2 are;
+/// M0 waits for cycle start. A block that is not understood, would leave the travel or lacks F raises an
+/// alarm, which stops everything and ends the session; so does a tool that touches an obstacle.
+///
+/// Programs come by DNC, or from its memory: mode MEM, cycle start.
 class Controller : public focas::ControllerInterface {
  public:
   /// @throws Error of ControllerOptions::validate().
@@ -63,6 +77,10 @@ class Controller : public focas::ControllerInterface {
   /// What the load meters show. [percent]
   void setSpindleLoad(double percent);
   void setServoLoad(const std::array<double, 3>& percent);
+  /// Currents of the axes' motors. [A]
+  void setServoCurrent(const std::array<double, 3>& amperes);
+  /// The cut's torque on the spindle. [N m]
+  void setSpindleTorque(double torque);
 
   /// The panel. Leaving DNC (focas::AUT_REMOTE) while blocks run or a session is open stops everything and
   /// ends the session (EW_MODE). @param aut focas::Aut
@@ -70,6 +88,10 @@ class Controller : public focas::ControllerInterface {
   /// An alarm from outside (type EX); reset() clears it.
   void raiseAlarm(int number, const std::string& text);
   void emergency(bool on);
+  /// On: axes brake on their path and stay; cycle start lets them go on.
+  void feedHold();
+  /// Factors on feed (0..2), rapid (0..1) and spindle speed (0.5..1.2).
+  void setOverrides(double feed, double rapid, double spindle);
 
   focas::SysInfo sysInfo() const override;
   focas::Status status() const override;
@@ -82,7 +104,10 @@ class Controller : public focas::ControllerInterface {
   std::vector<double> spindleLoad() const override;
   std::vector<double> spindleMaxSpeed() const override;
   std::vector<double> servoLoad() const override;
-  /// Variables 100..199, 500..999 and 1133, vacant in the beginning.
+  std::vector<double> servoCurrent() const override;
+  std::vector<double> servoSpeed() const override;
+  /// Variables 1..33, 100..199, 500..999 and 1133, vacant in the beginning; work offsets 5221..5323,
+  /// positions 5001.., 5021.., 5041.., which cannot be written.
   focas::EwCode readMacro(int number, std::optional<double>* value) const override;
   focas::EwCode writeMacro(int number, std::optional<double> value) override;
   std::uint32_t alarmBits() const override;
@@ -93,6 +118,21 @@ class Controller : public focas::ControllerInterface {
   int blockCount() const override;
   std::string programPath() const override;
   std::string executingBlock() const override;
+  std::string programText() const override;
+  std::vector<focas::NumberedValue> parameters(int first, int last) const override;
+  std::vector<focas::NumberedValue> diagnoses(int first, int last) const override;
+  std::optional<focas::DateTime> dateTime() const override;
+  focas::EwCode setDateTime(const focas::DateTime& date_time) override;
+  focas::EwCode readPmc(focas::PmcArea area, int first, int last, focas::Bytes* bytes) const override;
+  focas::EwCode writePmc(focas::PmcArea area, int first, const focas::Bytes& bytes) override;
+  std::vector<focas::StoredProgram> programs() const override;
+  focas::EwCode selectProgram(int number) override;
+  focas::EwCode deleteProgram(int number) override;
+  focas::EwCode rewindProgram() override;
+  focas::EwCode storePrograms(const std::string& text) override;
+  focas::EwCode fetchPrograms(int first, int last, std::string* text) const override;
+  /// In MEM runs the main program; goes on after M0 and feed hold.
+  focas::EwCode cycleStart() override;
   /// Stops axes and spindle, drops the program, ends the session (EW_RESET), clears alarms.
   focas::EwCode reset() override;
   focas::EwCode dncStart() override;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -27,23 +28,38 @@ enum AlarmType { ALARM_PS = 3, ALARM_OT = 4, ALARM_EX = 15 };
 
 /// What one block says, in the units of the text; what it leaves out is empty.
 struct NcBlock {
-  std::optional<int> sequence;                ///< N
-  std::optional<int> motion;                  ///< 0 G0, 1 G1
-  std::optional<bool> relative;               ///< G91, G90
-  std::optional<double> dwell;                ///< [s] G4
-  std::array<std::optional<double>, 3> axis;  ///< [mm] X, Y, Z
-  std::optional<double> feed;                 ///< [mm/min] F
-  std::optional<double> speed;                ///< [rpm] S
-  std::optional<int> m_code;                  ///< 2, 3, 5, 30 or 119
-  std::optional<int> macro;                   ///< n of #n=value
-  double macro_value = 0.0;
+  std::optional<int> program;                   ///< O
+  std::optional<int> sequence;                  ///< N
+  std::optional<int> motion;                    ///< 0 G0, 1 G1, 2 G2, 3 G3
+  std::optional<bool> relative;                 ///< G91, G90
+  std::optional<bool> inch;                     ///< G20, G21
+  std::optional<bool> per_turn;                 ///< G95, G94
+  std::optional<int> work;                      ///< 0..5 for G54..G59
+  bool machine = false;                         ///< G53
+  bool reference = false;                       ///< G28
+  std::optional<double> dwell;                  ///< [s] G4
+  std::array<std::optional<double>, 3> axis;    ///< X, Y, Z
+  std::array<std::optional<double>, 2> centre;  ///< I, J from the start
+  std::optional<double> radius;                 ///< R
+  std::optional<double> feed;                   ///< F
+  std::optional<double> speed;                  ///< [rpm] S
+  std::optional<int> m_code;
+  std::optional<int> macro;  ///< n of #n=value
+  std::optional<double> macro_value;
 
   bool moves() const { return axis[0] || axis[1] || axis[2]; }
+  bool arc() const { return motion && *motion >= 2; }
 };
 
-/// Reads one line. Dialect: N; G0 G1 G4 (P in ms or X in s) G90 G91; X Y Z [mm] F [mm/min] S [rpm]; M2 M3 M5
-/// M30 M119; or #n=value. Blanks, comments in parentheses and lines that begin with % mean nothing; a number
-/// needs no decimal point. @throws NcAlarm (PS) for all else.
-NcBlock parseBlock(const std::string& line);
+/// Value of a variable #n, nothing: vacant. @throws NcAlarm when there is no such variable.
+using NcVariables = std::function<std::optional<double>(int)>;
+
+/// Reads one line. Dialect: O and N; G0 G1 G2 G3 (I J or R, plane G17) G4 (P in ms or X in s) G20 G21 G28 G53
+/// G54..G59 G90 G91 G94 G95; X Y Z F S; M0 M2 M3 M4 M5 M19 M30 M119; or #n=value. A value is a number, which
+/// needs no decimal point, #n, or an expression in brackets with + - * / SIN COS SQRT (degrees); a word with
+/// a vacant #n counts as not written. Blanks, comments in parentheses and lines that begin with % mean
+/// nothing.
+/// @throws NcAlarm (PS) for all else; IF, WHILE and GOTO are refused by name.
+NcBlock parseBlock(const std::string& line, const NcVariables& variables = {});
 
 }  // namespace smartmill::sim

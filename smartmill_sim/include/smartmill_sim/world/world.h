@@ -20,6 +20,8 @@ struct WorldOptions {
   double tap_contact = 4.0e-4;
   double operator_delay = 0.0;
   double force_scatter = 0.05;
+  double load_step = 3.0e-4;
+  int servo_trigger = 0;
 
   void declare(ParameterTable& table) {
     table.number("seed", seed, "1", Range::notNegative(), "of noise and scatter");
@@ -30,6 +32,10 @@ struct WorldOptions {
                  "above 0 a person hits the workpiece, so long after being asked; 0: automatic");
     table.number("force_scatter", force_scatter, "1", Range::closed(0.0, 0.5),
                  "standard deviation of a blow's peak over its nominal value");
+    table.number("load_step", load_step, "V", Range::closed(0.0, 1.0),
+                 "of the load meter's scale, to which the controller rounds the loads that it tells; 0: not");
+    table.number("servo_trigger", servo_trigger, "1", Range::notNegative(),
+                 "N word of the block that starts the trigger in daq/servo; 0: none");
   }
   /// @throws Error naming key and value.
   void validate() const;
@@ -51,6 +57,7 @@ class World {
     std::array<SpindleAngle, ANGLES> angle;
     ForceBlock force;           ///< true force of the cut on the tool
     SampleBlock vibration;      ///< true displacement of the tip, x, y [m]
+    SampleBlock servo;          ///< ServoRecorder's: spindle load and axis currents at 1 kHz
     double spindle_load = 0.0;  ///< [1] what the load meter shows at the end, 1 is full scale
   };
   enum class StrikeAnswer { ok, by_hand, failed };

@@ -21,10 +21,38 @@ struct SysInfo {
   std::vector<std::string> axes{"X", "Y", "Z"};  ///< names of the controlled axes
   std::vector<std::string> spindles{"S1"};       ///< names
   int position_decimals = 3;                     ///< of positions in mm, 0..6 (4: 0.1 um)
-  int feed_decimals = 0;                         ///< of servo and feed values
   int load_decimals = 2;                         ///< of the spindle and servo load in percent
+  int current_decimals = 3;                      ///< of servo currents in A
   std::array<std::uint32_t, 4> cnc_id{{0, 0, 0, 0}};
 };
+
+/// How a parameter or a diagnosis number is kept.
+enum class NumberedType : std::uint8_t { bits = 0, byte = 1, word = 2, double_word = 3, real = 4 };
+
+/// A parameter or a diagnosis number.
+struct NumberedValue {
+  int number = 0;
+  NumberedType type = NumberedType::double_word;
+  std::vector<double> values;  ///< one, or one an axis
+  bool of_axis = false;
+  int decimals = 0;  ///< of a real
+};
+
+struct DateTime {
+  int year = 2000, month = 1, day = 1, hour = 0, minute = 0, second = 0;
+};
+
+/// A program in the controller's memory.
+struct StoredProgram {
+  int number = 0;
+  std::string name;      ///< of its file, for example O0001
+  std::string comment;   ///< of its first line
+  std::size_t size = 0;  ///< [byte]
+  DateTime changed;
+};
+
+/// Kinds of PMC addresses, as pmc_rdpmcrng numbers them.
+enum class PmcArea : std::uint8_t { g = 0, f = 1, y = 2, x = 3, a = 4, r = 5, t = 6, k = 7, c = 8, d = 9 };
 
 /// Raw values of cnc_statinfo.
 struct Status {
@@ -84,6 +112,36 @@ class ControllerInterface {
   virtual int blockCount() const = 0;
   virtual std::string programPath() const = 0;     ///< of the main program, e.g. //CNC_MEM/O0001
   virtual std::string executingBlock() const = 0;  ///< text of the running block
+  /// From the running block on, what is known of the program.
+  virtual std::string programText() const { return executingBlock(); }
+
+  /// Parameters with their numbers from first to last, in order.
+  virtual std::vector<NumberedValue> parameters(int /*first*/, int /*last*/) const { return {}; }
+  /// The same of diagnosis numbers.
+  virtual std::vector<NumberedValue> diagnoses(int /*first*/, int /*last*/) const { return {}; }
+  virtual std::vector<double> servoCurrent() const { return {}; }  ///< [A] of each axis; empty: EW_FUNC
+  /// Nothing: EW_FUNC.
+  virtual std::optional<DateTime> dateTime() const { return std::nullopt; }
+  virtual EwCode setDateTime(const DateTime& /*date_time*/) { return EW_FUNC; }
+  /// Bytes first..last of an area: EW_OK, EW_NUMBER (no such address), EW_FUNC (no PMC).
+  virtual EwCode readPmc(PmcArea /*area*/, int /*first*/, int /*last*/, Bytes* /*bytes*/) const {
+    return EW_FUNC;
+  }
+  virtual EwCode writePmc(PmcArea /*area*/, int /*first*/, const Bytes& /*bytes*/) { return EW_FUNC; }
+
+  /// Programs in memory, by number.
+  virtual std::vector<StoredProgram> programs() const { return {}; }
+  /// The folder that holds them, ends with a slash.
+  virtual std::string programFolder() const { return "//CNC_MEM/USER/PATH1/"; }
+  /// Makes it the main program: EW_OK, EW_DATA (there is none), EW_BUSY, EW_MODE.
+  virtual EwCode selectProgram(int /*number*/) { return EW_FUNC; }
+  virtual EwCode deleteProgram(int /*number*/) { return EW_FUNC; }
+  virtual EwCode rewindProgram() { return EW_FUNC; }
+  /// Text as it was downloaded, one or several programs. EW_OK, EW_DATA (no program number), EW_OVRFLOW (no
+  /// room), EW_BUSY (it runs).
+  virtual EwCode storePrograms(const std::string& /*text*/) { return EW_FUNC; }
+  /// Text of programs first..last as it is uploaded. EW_OK, EW_DATA (there is none).
+  virtual EwCode fetchPrograms(int /*first*/, int /*last*/, std::string* /*text*/) const { return EW_FUNC; }
 
   virtual EwCode cycleStart() { return EW_FUNC; }  ///< opcode 01
   /// Opcode 02, also what an operator's RESET does: stops motion, ends a DNC session (dncAbort then says
@@ -112,6 +170,7 @@ struct ServerOptions {
   std::string bind_address = "127.0.0.1";
   std::uint16_t port = DEFAULT_PORT;  ///< 0: any free one
   int max_sessions = 5;               ///< per kind of circuit; one more is refused with 0103
+  int max_connections = 30;           ///< TCP; one more gets ECONNREFUSED, as seen on a live 31i
   int receive_buffer = 4096;  ///< [byte] SO_RCVBUF: how much the wire may hold beyond the machine's buffer
 };
 

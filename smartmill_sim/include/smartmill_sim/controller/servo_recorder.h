@@ -1,0 +1,57 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "smartmill_core/signal/streams.h"
+#include "smartmill_sim/controller/controller.h"
+
+namespace smartmill::sim {
+
+/// An axis' drive: what its motor has to carry and how much current that takes. Typical of a machine of this
+/// size: 400 kg on a screw of 10 mm lead, a motor of 1.0 N m/A.
+struct AxisDrive {
+  double mass = 400.0;              ///< [kg] moved, the motor's inertia included
+  double viscous = 600.0;           ///< [N s/m]
+  double coulomb = 150.0;           ///< [N]
+  double force_per_ampere = 628.0;  ///< [N/A]
+  double rated_current = 12.0;      ///< [A] 100 % of the load meter
+};
+
+/// What Fanuc's Servo Guide records: load of the spindle and currents of the axes' motors at 1 kHz, with the
+/// block that runs and a trigger that begins with a block (N word).
+class ServoRecorder {
+ public:
+  static constexpr double SAMPLE_RATE = 1000.0;  ///< [Hz]
+
+  /// @param trigger N word of the block whose start sets the channel trigger; 0: none
+  explicit ServoRecorder(int trigger) : trigger_(trigger) {}
+
+  struct Input {
+    double time = 0.0;  ///< [s]
+    MotionState motion;
+    double spindle_load = 0.0;               ///< [1] of full scale, not rounded
+    std::array<double, 3> force{{0, 0, 0}};  ///< [N] of the cut on the tool
+  };
+  /// Inputs come at a rate of at least SAMPLE_RATE; a sample is taken of the first at or after its time.
+  void push(const Input& input);
+
+  /// Samples since the last call: channels spindle_load [1], current_x, current_y, current_z [A], sequence
+  /// [1], trigger [1].
+  SampleBlock take();
+  const std::array<double, 3>& current() const { return current_; }  ///< [A] now
+  std::array<double, 3> load() const;                                ///< [percent] of the axes
+
+ private:
+  AxisDrive drive_;
+  int trigger_;
+  bool triggered_ = false, any_ = false;
+  std::uint64_t index_ = 0, block_index_ = 0;
+  double last_time_ = 0.0;
+  std::array<double, 3> last_velocity_{{0, 0, 0}}, current_{{0, 0, 0}}, cut_{{0, 0, 0}};
+  std::uint64_t cut_count_ = 0;
+  int sequence_ = 0;
+  std::vector<double> samples_;
+};
+
+}  // namespace smartmill::sim

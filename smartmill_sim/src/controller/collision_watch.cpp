@@ -1,0 +1,76 @@
+#include "smartmill_sim/controller/collision_watch.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace smartmill::sim {
+namespace {
+
+// Room that sensor and hammer take, as in Dunwoody fig. 4.1: a probe of 10 mm and a solenoid of 20 mm, 60 mm
+// long; the hammer rests as far behind the sensor's face as its plunger goes.
+constexpr double SENSOR_HALF_WIDTH = 5e-3, SENSOR_ABOVE_TIP = 5e-3;  // [m]
+constexpr double HAMMER_HALF_WIDTH = 10e-3, PLUNGER = 3e-3;          // [m]
+constexpr double BODY_LENGTH = 60e-3;                                // [m]
+constexpr double FACE_GAPS = 2.0;  // the sensor faces the tool at about twice its gap at zero volt
+constexpr double FAR = 10.0;       // [m]
+
+}  // namespace
+
+CollisionWatch CollisionWatch::ofModel(const MachineModel& model) {
+  CollisionWatch watch;
+  if (!model.tool) {
+    return watch;
+  }
+  watch.tool_radius = model.tool->radius();
+  watch.core_radius = watch.tool_radius;
+  if (model.hammer) {
+    watch.core_radius = std::max(0.0, watch.tool_radius - model.hammer->flute_depth);
+    const HammerStation& station = *model.hammer;
+    for (const auto& entry : station.position) {
+      const std::string& direction = entry.first;
+      const Axes3& place = entry.second;
+      const std::size_t along = direction == "y" ? 1 : 0;
+      const std::size_t across = 1 - along;
+      const auto body = [&](const std::string& name, double behind, double half_width, double low,
+                            double high) {
+        Body b{name + " " + direction, place, place};
+        b.low[along] = place[along] + watch.tool_radius + behind;
+        b.high[along] = b.low[along] + BODY_LENGTH;
+        b.low[across] = place[across] - half_width;
+        b.high[across] = place[across] + half_width;
+        b.low[2] = low;
+        b.high[2] = high;
+        watch.add(b);
+      };
+      const double face = FACE_GAPS * station.gap_at_zero_volt;
+      // Nearer than the face there may be nothing: the tool's flutes turn there.
+      body("SENSOR", face, SENSOR_HALF_WIDTH, -FAR, place[2] + SENSOR_ABOVE_TIP);
+      body("HAMMER", face + PLUNGER, HAMMER_HALF_WIDTH, place[2] + SENSOR_ABOVE_TIP,
+           place[2] + station.offset + HAMMER_HALF_WIDTH);
+    }
+  }
+  if (model.workpiece) {
+    watch.add({"TABLE", {-FAR, -FAR, -FAR}, {FAR, FAR, model.workpiece->low[2]}});
+  }
+  return watch;
+}
+
+const CollisionWatch::Body* CollisionWatch::touched(const Axes3& position, bool turning) const {
+  const double radius = turning ? tool_radius : core_radius;
+  for (const Body& body : bodies_) {
+    if (position[2] >= body.high[2]) {
+      continue;  // the tip is above it, so is all of the tool
+    }
+    double square = 0.0;
+    for (std::size_t i = 0; i < 2; ++i) {
+      const double nearest = std::clamp(position[i], body.low[i], body.high[i]);
+      square += (position[i] - nearest) * (position[i] - nearest);
+    }
+    if (square < radius * radius) {
+      return &body;
+    }
+  }
+  return nullptr;
+}
+
+}  // namespace smartmill::sim

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <vector>
+
+#include "smartmill_sim/controller/controller.h"
+
+namespace smartmill::sim {
+
+/// What the diagnosis numbers tell of now.
+struct DiagnosisState {
+  bool waits_for_m = false, moves = false, dwells = false, at_zero_feed = false;
+  double spindle_load = 0.0;   ///< [percent]
+  double spindle_angle = 0.0;  ///< [rad]
+};
+
+/// Parameters of a 30i that follow from how the machine is made.
+std::vector<focas::NumberedValue> machineParameters(const ControllerOptions& options);
+/// Diagnosis numbers of a 30i.
+std::vector<focas::NumberedValue> machineDiagnoses(const DiagnosisState& state);
+
+/// Those with numbers from first to last.
+std::vector<focas::NumberedValue> within(std::vector<focas::NumberedValue> numbers, int first, int last);
+
+}  // namespace smartmill::sim

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "smartmill_sim/controller/nc_block.h"
+
+namespace smartmill::sim {
+
+// Numbers of program alarms, as a 30i has them.
+constexpr int PS_TOO_MANY_DIGITS = 3;
+constexpr int PS_ILLEGAL_ADDRESS = 9;
+constexpr int PS_IMPROPER_G = 10;
+constexpr int PS_DIVIDED_BY_ZERO = 112;
+constexpr int PS_MACRO_FORMAT = 114;
+constexpr int PS_ILLEGAL_ARGUMENT = 119;
+
+[[noreturn]] void illegalAddress(const std::string& what);
+
+/// Walks over the significant characters of a block and reads values. A value is empty when it is a vacant
+/// variable alone; within an expression a vacant variable is 0.
+class NcReader {
+ public:
+  NcReader(const std::string& text, const NcVariables& variables) : text_(text), variables_(variables) {}
+
+  bool done() const { return at_ == text_.size(); }
+  char peek() const { return done() ? '\0' : text_[at_]; }
+  char next() { return done() ? '\0' : text_[at_++]; }
+  /// Takes the word when it stands here.
+  bool take(const std::string& word);
+  /// What is left.
+  std::string rest() const { return text_.substr(at_); }
+
+  /// Behind an address: a number, #n or [expression], with a sign.
+  std::optional<double> value(const std::string& address);
+  /// A whole number from 0 on; at most 99999999.
+  std::optional<int> whole(const std::string& address);
+  /// The same that must not be vacant.
+  int number(const std::string& address);
+  /// Sum of products behind "#n=".
+  std::optional<double> expression();
+
+ private:
+  std::optional<double> product();
+  std::optional<double> term();
+  std::optional<double> variable();
+  double bracket();
+  double literal(const std::string& address);
+
+  const std::string& text_;
+  const NcVariables& variables_;
+  std::size_t at_ = 0;
+  int depth_ = 0;
+};
+
+}  // namespace smartmill::sim

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "smartmill_focas/server.h"
+
+namespace smartmill::sim {
+
+/// What the control and its panel tell the PMC now.
+struct PmcSignals {
+  int mode = focas::AUT_MDI;
+  bool operating = false, started = false, held = false, alarm = false, emergency = false;
+  bool at_speed = false, at_rest = true, oriented = false;
+  int m_code = 0;
+  int s_code = 0;              ///< [rpm] commanded
+  double spindle_speed = 0.0;  ///< [rpm] actual
+  double feed_override = 1.0, spindle_override = 1.0;
+};
+
+/// Addresses of the PMC of a 30i (sizes of its first path). Signals of the control (F) and of the panel (G,
+/// X) stand for themselves: what is written there the ladder overwrites at once.
+class PmcMemory {
+ public:
+  PmcMemory();
+  /// Brings the signals' bytes up to date.
+  void show(const PmcSignals& signals);
+  focas::EwCode read(focas::PmcArea area, int first, int last, focas::Bytes* bytes) const;
+  focas::EwCode write(focas::PmcArea area, int first, const focas::Bytes& bytes);
+
+ private:
+  std::uint8_t& at(focas::PmcArea area, std::size_t address);
+  void put(focas::PmcArea area, std::size_t address, std::uint32_t value, std::size_t bytes);
+
+  std::array<std::vector<std::uint8_t>, 10> areas_;
+};
+
+}  // namespace smartmill::sim

@@ -1,0 +1,62 @@
+#include "smartmill_sim/controller/servo_recorder.h"
+
+#include <cmath>
+#include <utility>
+
+namespace smartmill::sim {
+
+void ServoRecorder::push(const Input& input) {
+  for (std::size_t i = 0; i < 3; ++i) {
+    cut_[i] += input.force[i];
+  }
+  ++cut_count_;
+  const std::uint64_t due = static_cast<std::uint64_t>(std::floor(input.time * SAMPLE_RATE + 1e-9));
+  if (any_ && due < index_) {
+    return;
+  }
+  const double step = any_ ? input.time - last_time_ : 0.0;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const double v = input.motion.velocity[i];
+    const double acceleration = step > 0.0 ? (v - last_velocity_[i]) / step : 0.0;
+    const double friction = v == 0.0 ? 0.0 : drive_.viscous * v + std::copysign(drive_.coulomb, v);
+    // The cut pushes the tool; the drive holds against it.
+    const double cut = cut_[i] / static_cast<double>(cut_count_);
+    current_[i] = (drive_.mass * acceleration + friction - cut) / drive_.force_per_ampere;
+    last_velocity_[i] = v;
+    cut_[i] = 0.0;
+  }
+  cut_count_ = 0;
+  last_time_ = input.time;
+  triggered_ = triggered_ || (trigger_ > 0 && input.motion.sequence == trigger_ && sequence_ != trigger_);
+  sequence_ = input.motion.sequence;
+  if (samples_.empty()) {
+    block_index_ = due;
+  }
+  index_ = due + 1;
+  any_ = true;
+  samples_.push_back(input.spindle_load);
+  samples_.insert(samples_.end(), current_.begin(), current_.end());
+  samples_.push_back(sequence_);
+  samples_.push_back(triggered_ ? 1.0 : 0.0);
+}
+
+SampleBlock ServoRecorder::take() {
+  SampleBlock block;
+  block.stamp = static_cast<double>(block_index_) / SAMPLE_RATE;
+  block.sample_rate = SAMPLE_RATE;
+  block.first_index = block_index_;
+  block.channels = {"spindle_load", "current_x", "current_y", "current_z", "sequence", "trigger"};
+  block.units = {"1", "A", "A", "A", "1", "1"};
+  block.samples = std::exchange(samples_, {});
+  return block;
+}
+
+std::array<double, 3> ServoRecorder::load() const {
+  std::array<double, 3> percent{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    percent[i] = 100.0 * std::abs(current_[i]) / drive_.rated_current;
+  }
+  return percent;
+}
+
+}  // namespace smartmill::sim

@@ -1,0 +1,362 @@
+// The whole program subset, the operator's panel, the memory and the watch over obstacles.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "controller_rig.h"
+#include "smartmill_focas/server.h"
+#include "smartmill_sim/controller/nc_block.h"
+#include "smartmill_sim/controller/servo_recorder.h"
+
+namespace smartmill::sim {
+namespace {
+
+std::array<double, 3> mm(double x, double y, double z) {
+  return {x * 1e-3, y * 1e-3, z * 1e-3};
+}
+
+void expectAt(const Machine& m, const std::array<double, 3>& due, const std::string& what) {
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_NEAR(m.controller.motion().position[i], due[i], 1e-9) << what << " axis " << i;
+  }
+}
+
+TEST(Program, EveryWordOfTheSubsetGoesWhereItSays) {
+  struct Case {
+    std::string text;
+    std::array<double, 3> end;
+  };
+  ControllerOptions options = testOptions();
+  options.work_offset = {0.01, 0.0, -0.1};
+  for (const Case& c : std::vector<Case>{
+           {"G53 G0 X12 Y-3 Z-20\n", mm(12, -3, -20)},
+           {"G54 G0 X5\n", mm(15, 0, 0)},
+           {"#5241=30\nG55 G0 X5 Y1\n", mm(35, 1, 0)},  // G55's x
+           {"G59 G0 X5\n", mm(5, 0, 0)},
+           {"G20 G91 G1 X1 F20\nG21 X1 F500\n", mm(26.4, 0, 0)},
+           {"G53 G0 X50 Z-50\nG91 G28 Z0\n", mm(50, 0, 0)},
+           {"G53 G0 X50 Z-50\nG90 G28 X-10 Y0\n", mm(0, 0, -50)},
+           {"S600 M3\nG95 G91 G1 X2 F0.1\nM5\n", mm(2, 0, 0)},
+           {"G91 G2 X10 Y-10 I0 J-10 F6000\n", mm(10, -10, 0)},
+           {"G91 G3 X10 Y10 R10 F6000\n", mm(10, 10, 0)},
+           {"G91 G2 X10 Y-10 Z-5 R-10 F6000\n", mm(10, -10, -5)},
+           {"G2 I5 F6000\n", mm(0, 0, 0)},
+           {"#1=3\n#2=[#1+4]*2\nG91 G0 X#2 Y-#1 Z-[SQRT[#1*3]/2]\n", mm(14, -3, -1.5)},
+           {"#101=10*SIN[30]\nG91 G0 X#101 Y[10*COS[60]]\n", mm(5, 5, 0)},
+           {"#1=1\n#[100+#1]=7\nG91 G0 X##1\n", mm(1, 0, 0)},  // ##1 is #1, which is 1
+           {"G91 G0 X#33 Y2\n", mm(0, 2, 0)},                  // a vacant variable is no word
+           {"O0042(SLOT)\nN7 G94 G21 G17 G90\nG91 G0 X1 (COMMENT)\n%\n", mm(1, 0, 0)},
+       }) {
+    Machine m(options);
+    m.start(c.text);
+    m.runToEnd();
+    EXPECT_EQ(m.alarmText(), "") << c.text;
+    expectAt(m, c.end, c.text);
+  }
+}
+
+TEST(Program, ArcKeepsItsRadiusAndItsAcceleration) {
+  Machine m;
+  m.start("G91 G3 X0 Y20 I0 J10 F60000\n");  // half a circle of 10 mm
+  double most = 0.0;
+  for (int i = 0; i < 2000; ++i) {
+    m.run(DT);
+    const MotionState& s = m.states.back();
+    EXPECT_NEAR(std::hypot(s.position[0], s.position[1] - 0.01), 0.01, 1e-12);
+    most = std::max(most, std::hypot(s.velocity[0], s.velocity[1]));
+  }
+  // v^2 / r may be as much as the axes' 2 m/s2.
+  EXPECT_LE(most, std::sqrt(2.0 * 0.01) + 1e-12);
+  EXPECT_GT(most, 0.9 * std::sqrt(2.0 * 0.01));
+  expectAt(m, mm(0, 20, 0), "half circle");
+}
+
+TEST(Program, ArcThatBulgesOutOfTheTravelIsRefused) {
+  Machine m;
+  m.start("G90 G0 X245\nG3 X245 Y20 I0 J10 F6000\n");
+  m.runToEnd();
+  EXPECT_NE(m.alarmText().find("OVERTRAVEL X"), std::string::npos) << m.alarmText();
+}
+
+TEST(Program, FlowAndOtherUnknownThingsAreRefusedByName) {
+  for (const std::string word : {"IF", "WHILE", "GOTO"}) {
+    Machine m;
+    m.start(word + "[#1EQ1]10\n");
+    m.run(DT);
+    EXPECT_EQ(m.alarmText().substr(0, word.size() + 13), word + " IS NOT KNOWN") << m.alarmText();
+  }
+  for (const std::string block :
+       {"G2 X1 R0.1 F100", "G2 X1 Y1 F100", "G3 X9 I1 F100", "#1=1/0", "#1=SQRT[-1]", "#1=[[[[[[1]]]]]]",
+        "#1=[1", "#1=1]", "#5021=1", "#1=--1", "M6", "G41", "T1"}) {
+    Machine m;
+    m.start(block + "\n");
+    m.run(DT);
+    EXPECT_EQ(m.controller.alarmBits(), 1u << ALARM_PS) << block << ": " << m.alarmText();
+  }
+}
+
+TEST(Panel, FeedHoldStopsOnThePathAndCycleStartGoesOn) {
+  Machine m;
+  m.start("G3 X0 Y40 I0 J20 F3000\nG4 X1.\n#100=1\n");
+  m.run(0.5);
+  m.controller.feedHold();
+  EXPECT_EQ(m.controller.status().run, focas::RUN_HOLD);
+  m.run(2.0);
+  const std::array<double, 3> held = m.controller.motion().position;
+  EXPECT_EQ(m.controller.actualFeed(), 0.0);
+  EXPECT_NEAR(std::hypot(held[0], held[1] - 0.02), 0.02, 1e-12);
+  EXPECT_GT(std::abs(m.controller.distanceToGo()[1]), 1.0);
+  m.run(1.0);
+  EXPECT_EQ(m.controller.motion().position, held);
+  EXPECT_EQ(m.controller.cycleStart(), focas::EW_OK);
+  m.run(1.3);  // 62.8 mm at 50 mm/s
+  EXPECT_EQ(m.controller.status().motion, focas::MOTION_DWELL);
+  m.controller.feedHold();
+  m.run(5.0);
+  EXPECT_FALSE(m.macro(100)) << "the dwell waits too";
+  EXPECT_EQ(m.controller.cycleStart(), focas::EW_OK);
+  m.runToEnd();
+  EXPECT_EQ(m.macro(100), 1.0);
+  expectAt(m, mm(0, 40, 0), "end");
+  // RESET in hold drops the rest.
+  m.send("G90 G1 X100 F3000\n");
+  m.run(0.5);
+  m.controller.feedHold();
+  m.run(0.5);
+  const double x = m.controller.motion().position[0];
+  m.controller.reset();
+  m.run(1.0);
+  EXPECT_EQ(m.controller.motion().position[0], x);
+  EXPECT_EQ(m.controller.status().run, focas::RUN_RESET);
+}
+
+TEST(Panel, OverridesActAtOnce) {
+  Machine m;
+  m.start("S1000 M3\nG1 X200 F3000\n");
+  m.run(1.0);
+  EXPECT_NEAR(m.controller.actualFeed(), 3000.0, 1e-6);
+  m.controller.setOverrides(0.5, 1.0, 0.8);
+  m.run(1.0);
+  EXPECT_NEAR(m.controller.actualFeed(), 1500.0, 1e-6);
+  EXPECT_NEAR(m.controller.spindleSpeed()[0], 800.0, 1e-6);
+  m.controller.setOverrides(0.0, 1.0, 1.0);
+  m.run(1.0);
+  EXPECT_EQ(m.controller.actualFeed(), 0.0);
+  EXPECT_EQ(m.controller.status().run, focas::RUN_START);
+  m.controller.setOverrides(1.0, 1.0, 1.0);
+  m.runToEnd();
+  expectAt(m, mm(200, 0, 0), "end");
+}
+
+TEST(Panel, M0WaitsForCycleStart) {
+  Machine m;
+  m.start("G91 G0 X1\nM0\nX1\n");
+  m.run(1.0);
+  expectAt(m, mm(1, 0, 0), "before M0");
+  EXPECT_EQ(m.controller.status().run, focas::RUN_STOP);
+  EXPECT_EQ(m.controller.cycleStart(), focas::EW_OK);
+  m.run(1.0);
+  expectAt(m, mm(2, 0, 0), "after M0");
+}
+
+TEST(Panel, BackwardsAndOrientationByM19) {
+  Machine m;
+  m.start("S600 M4\nG4 X1.\n");
+  m.run(0.9);
+  EXPECT_NEAR(m.controller.motion().spindle_speed, -600.0 * RPM, 1e-9);
+  EXPECT_NEAR(m.controller.spindleSpeed()[0], 600.0, 1e-9);
+  m.send("M19\n#100=1\n");
+  m.run(3.0);
+  EXPECT_EQ(m.macro(100), 1.0);
+  EXPECT_EQ(m.controller.motion().spindle_speed, 0.0);
+  EXPECT_EQ(m.controller.motion().spindle_angle, 0.0);
+}
+
+TEST(Spindle, LoadSlowsTheRampAndStallsBeyondTheDrivesTorque) {
+  ControllerOptions options = testOptions();
+  options.spindle_torque = 20.0;  // 500 rad/s2: 0.04 kg m2
+  EXPECT_NEAR(options.spindleInertia(), 0.04, ROUND);
+  Machine m(options);
+  m.controller.setSpindleTorque(5.0);
+  m.start("S12000 M3\nG4 X60.\n");
+  m.run(1.0);
+  EXPECT_NEAR(m.states.back().spindle_speed, (20.0 - 5.0) / 0.04, 1e-6);
+  m.run(4.0);
+  EXPECT_NEAR(m.states.back().spindle_speed, 12000.0 * RPM, 1e-9);
+  m.controller.setSpindleTorque(24.0);  // 4 N m more than it has
+  m.run(1.0);
+  EXPECT_NEAR(m.states.back().spindle_speed, 12000.0 * RPM - 4.0 / 0.04, 1e-6);
+  m.controller.setSpindleTorque(0.0);
+  m.run(1.0);
+  EXPECT_NEAR(m.states.back().spindle_speed, 12000.0 * RPM, 1e-9);
+}
+
+TEST(Memory, ProgramsAreStoredRunAndGivenBack) {
+  Machine m;
+  m.controller.setMode(focas::AUT_MEM);
+  EXPECT_EQ(m.controller.storePrograms("\nO1234(SLOT 1)\nG91 G0 X1\nM30\n%"), focas::EW_OK);
+  EXPECT_EQ(m.controller.storePrograms("G0 X1\n%"), focas::EW_DATA);
+  EXPECT_EQ(m.controller.storePrograms("O7\n" + std::string(600000, ' ') + "\n%"), focas::EW_OVRFLOW);
+  std::string text;
+  EXPECT_EQ(m.controller.fetchPrograms(1234, 1234, &text), focas::EW_OK);
+  EXPECT_EQ(text, "%\nO1234(SLOT 1)\nG91 G0 X1\nM30\n%\n");
+  EXPECT_EQ(m.controller.fetchPrograms(9, 9, &text), focas::EW_DATA);
+  EXPECT_EQ(m.controller.selectProgram(9), focas::EW_DATA);
+  EXPECT_EQ(m.controller.selectProgram(1234), focas::EW_OK);
+  EXPECT_EQ(m.controller.programPath(), "//CNC_MEM/USER/PATH1/O1234");
+  EXPECT_EQ(m.controller.cycleStart(), focas::EW_OK);
+  m.run(DT);
+  EXPECT_EQ(m.controller.runningProgram(), 1234);
+  EXPECT_EQ(m.controller.deleteProgram(1234), focas::EW_BUSY);
+  EXPECT_EQ(m.controller.storePrograms("O1234\nM30\n%"), focas::EW_BUSY);
+  m.runToEnd();
+  expectAt(m, mm(1, 0, 0), "run from memory");
+  EXPECT_EQ(m.controller.cycleStart(), focas::EW_OK);
+  m.runToEnd();
+  expectAt(m, mm(2, 0, 0), "run again from its head");
+  EXPECT_EQ(m.controller.deleteProgram(1234), focas::EW_OK);
+  EXPECT_EQ(m.controller.programs().size(), 1u);  // the resident one
+  EXPECT_EQ(m.controller.cycleStart(), focas::EW_DATA);
+}
+
+TEST(Memory, PmcShowsTheSignalsOfTheConnectionManual) {
+  Machine m;
+  const auto byte = [&](focas::PmcArea area, int address) {
+    focas::Bytes bytes;
+    EXPECT_EQ(m.controller.readPmc(area, address, address, &bytes), focas::EW_OK);
+    return static_cast<int>(bytes.at(0));
+  };
+  EXPECT_EQ(byte(focas::PmcArea::f, 3), 0x10);  // MRMT
+  m.start("S1500 M3\nG1 X100 F600\n");
+  m.run(2.0);
+  EXPECT_EQ(byte(focas::PmcArea::f, 0), 0xe0);  // OP SA STL
+  EXPECT_EQ(byte(focas::PmcArea::f, 40) + 256 * byte(focas::PmcArea::f, 41), 1500);
+  EXPECT_EQ(byte(focas::PmcArea::f, 45), 0x08);         // SAR
+  EXPECT_EQ(byte(focas::PmcArea::g, 12), 0xff & ~100);  // *FV
+  EXPECT_EQ(m.controller.writePmc(focas::PmcArea::g, 12, {0}), focas::EW_OK);
+  EXPECT_EQ(byte(focas::PmcArea::g, 12), 0xff & ~100) << "the ladder writes it anew";
+  EXPECT_EQ(m.controller.writePmc(focas::PmcArea::d, 100, {1, 2}), focas::EW_OK);
+  EXPECT_EQ(byte(focas::PmcArea::d, 101), 2);
+  m.controller.emergency(true);
+  EXPECT_EQ(byte(focas::PmcArea::x, 8) & 0x10, 0);
+  focas::Bytes bytes;
+  EXPECT_EQ(m.controller.readPmc(focas::PmcArea::d, 9999, 10000, &bytes), focas::EW_NUMBER);
+}
+
+TEST(Memory, ClockIsSetAndGoesOn) {
+  ControllerOptions options = testOptions();
+  std::int64_t now = 1000000000;  // 2001-09-09 01:46:40
+  options.wall_clock = [&] { return now; };
+  Machine m(options);
+  EXPECT_EQ(m.controller.dateTime()->year, 2001);
+  EXPECT_EQ(m.controller.dateTime()->second, 40);
+  focas::DateTime at = *m.controller.dateTime();
+  at.hour = 23;
+  EXPECT_EQ(m.controller.setDateTime(at), focas::EW_OK);
+  now += 3600;
+  EXPECT_EQ(m.controller.dateTime()->day, 10);
+  EXPECT_EQ(m.controller.dateTime()->hour, 0);
+}
+
+TEST(Memory, ParametersFollowTheMachine) {
+  Machine m;
+  const std::vector<focas::NumberedValue> limits = m.controller.parameters(1320, 1321);
+  ASSERT_EQ(limits.size(), 2u);
+  EXPECT_EQ(limits[0].values, (std::vector<double>{250.0, 200.0, 0.0}));
+  EXPECT_EQ(limits[1].values, (std::vector<double>{-250.0, -200.0, -300.0}));
+  EXPECT_TRUE(m.controller.parameters(9999, 9999).empty());
+  EXPECT_EQ(m.controller.diagnoses(445, 445).size(), 1u);
+}
+
+TEST(Load, PolledLoadsAreRoundedToTheControllersStep) {
+  ControllerOptions options = testOptions();
+  options.load_step = 100.0 * 3.0e-4 / 8.0;  // 0.3 mV of 8 V
+  Machine m(options);
+  for (const double volt : {0.0, 1e-4, 2e-4, 0.12345, 3.1}) {
+    m.controller.setSpindleLoad(100.0 * volt / 8.0);
+    const double read = m.controller.spindleLoad()[0] * 8.0 / 100.0;
+    EXPECT_NEAR(read, 3.0e-4 * std::round(volt / 3.0e-4), 1e-12);
+  }
+}
+
+TEST(Collision, ToolThatMeetsAnObstacleStopsWithAnAlarm) {
+  MachineModel model;
+  model.tool.emplace();
+  model.tool->diameter = 0.02;
+  model.hammer.emplace();
+  model.hammer->gap_at_zero_volt = 250e-6;
+  model.hammer->offset = 15e-3;
+  model.hammer->position["x"] = {0.1, 0.0, -0.12};
+  model.workpiece.emplace();
+  model.workpiece->low = {-0.14, -0.08, -0.2};
+  ControllerOptions options = testOptions();
+  options.obstacles = CollisionWatch::ofModel(model);
+  const struct {
+    const char* text;
+    const char* met;
+  } cases[] = {{"G90 G0 X100\nG1 Z-120 F3000\nX102 F300\n", "SENSOR x"},
+               {"G90 G0 X50\nZ-110\nX150\n", "HAMMER x"},
+               {"G90 G0 X150\nZ-150\n", "HAMMER x"},
+               {"G90 G0 X-100 Y-100\nZ-201\n", "TABLE"},
+               {"G90 G0 X100\nG1 Z-120 F3000\nG91 X0.2 F300\nZ50\nG0 X0\n", nullptr}};
+  for (const auto& c : cases) {
+    Machine m(options);
+    m.start(c.text);
+    m.runToEnd();
+    EXPECT_EQ(m.alarmText(), c.met != nullptr ? std::string("TOOL MET ") + c.met : "") << c.text;
+    if (c.met != nullptr) {
+      EXPECT_EQ(m.controller.dncAbort(), focas::EW_ALARM);
+      m.run(1.0);
+      EXPECT_EQ(m.controller.motion().velocity, (std::array<double, 3>{0, 0, 0}));
+    }
+  }
+}
+
+// The room between two flutes lets a standing tool nearer; then it may not turn.
+TEST(Collision, TheSpindleMayNotTurnWhereOnlyTheCoreHasRoom) {
+  ControllerOptions options = testOptions();
+  options.obstacles.tool_radius = 0.010;
+  options.obstacles.core_radius = 0.009;
+  options.obstacles.add({"SENSOR", {0.02, -0.005, -1.0}, {0.08, 0.005, 1.0}});
+  Machine m(options);
+  m.start("G1 X10.5 F600\n");
+  m.runToEnd();
+  EXPECT_EQ(m.alarmText(), "");
+  m.send("#1133=2048\nM119\n");
+  m.run(0.1);
+  EXPECT_EQ(m.alarmText(), "TOOL MET SENSOR");
+}
+
+TEST(ServoGuide, CurrentsLoadAndTriggerAtABlock) {
+  Machine m;
+  ServoRecorder recorder(20);
+  m.start("N10 G91 G1 X60 F6000\nN20 X-60\n");
+  const double dt = 1.0 / 25600.0;
+  m.run(2.5, dt);
+  double time = 0.0;
+  for (const MotionState& state : m.states) {
+    recorder.push({time, state, 0.25, {0.0, 0.0, 0.0}});
+    time += dt;
+  }
+  const SampleBlock block = recorder.take();
+  EXPECT_EQ(block.sample_rate, 1000.0);
+  ASSERT_EQ(block.samples.size(), 6u * 2500u);
+  const auto at = [&](std::size_t k, std::size_t channel) { return block.samples[6 * k + channel]; };
+  const AxisDrive drive;
+  // At 0.1 m/s friction alone; while it speeds up with 2 m/s2 the mass as well.
+  const double friction = (drive.viscous * 0.1 + drive.coulomb) / drive.force_per_ampere;
+  EXPECT_NEAR(at(300, 1), friction, 1e-9);
+  EXPECT_NEAR(at(25, 1), (drive.mass * 2.0 + drive.viscous * 0.05 + drive.coulomb) / drive.force_per_ampere,
+              0.01);
+  EXPECT_EQ(at(300, 0), 0.25);
+  EXPECT_EQ(at(300, 4), 10.0);
+  EXPECT_EQ(at(300, 5), 0.0);
+  // The second block begins after 0.6 s + 0.05 s.
+  EXPECT_EQ(at(649, 5), 0.0);
+  EXPECT_EQ(at(651, 5), 1.0);
+  EXPECT_EQ(at(2400, 5), 1.0);
+  EXPECT_EQ(at(900, 4), 20.0);
+}
+
+}  // namespace
+}  // namespace smartmill::sim

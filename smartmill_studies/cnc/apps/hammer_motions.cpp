@@ -1,0 +1,351 @@
+// rosrun smartmill_studies cnc_hammer_motions: the automatic hammer's motions on the simulated machine, over
+// and over with drawn tools, places, errors of belief and troubles. What may never happen: that the tool
+// meets sensor, hammer or table, that a motion goes beyond the travel, that anything moves after the motion
+// was taken away. What is refused is refused with a line, and counted.
+
+#include <cmath>
+#include <cstdio>
+#include <map>
+#include <optional>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "smartmill_cnc/motion/nc_program.h"
+#include "smartmill_core/program.h"
+#include "smartmill_core/units.h"
+#include "smartmill_hammer/sequence/hammer_sequence.h"
+#include "smartmill_sim/world/world.h"
+
+namespace {
+
+using namespace smartmill;
+
+constexpr double BLOCK_TIME = sim::World::BLOCK / sim::World::SAMPLE_RATE;  // [s]
+constexpr double MOST_TIME = 240.0;                                         // [s] of a run
+constexpr double STATE_PERIOD = 0.02;                                       // [s]
+constexpr int COLLISION = 3003;                                             // alarm of the simulated machine
+constexpr double NARROW_SHARE = 0.1;
+constexpr double MM = units::MM;
+
+enum class Trouble { none, cancel, alarm, emergency, reset, hold, mode };
+constexpr const char* TROUBLES[] = {"none",  "cancel",    "alarm", "emergency stop",
+                                    "reset", "feed hold", "mode"};
+constexpr const char* CODES[] = {"ok",       "cancelled", "no flute",  "no hit", "motion failed",
+                                 "bad goal", "bad data",  "fit failed"};
+
+struct Draw {
+  MachineModel truth, believed;
+  MeasureFrfGoal goal;
+  Trouble trouble = Trouble::none;
+  double trouble_time = 0.0;  // [s]
+  double start_angle = 0.0;   // [rad]
+  Axes3 start{{0, 0, 0}};     // [m]
+};
+
+struct Counts {
+  int runs = 0, collisions = 0, beyond_limits = 0, moved_unasked = 0, unfinished = 0;
+  int refused_by_limits = 0, refused_by_state = 0;
+  std::map<std::string, int> results, by_trouble;
+};
+
+double uniform(std::mt19937_64& random, double low, double high) {
+  return std::uniform_real_distribution<double>(low, high)(random);
+}
+
+Draw drawRun(const MachineModel& model, std::mt19937_64& random, double trouble_share) {
+  Draw d;
+  d.truth = model;
+  d.truth.tool->teeth = std::uniform_int_distribution<int>(2, 6)(random);
+  d.truth.tool->diameter = uniform(random, 10.0, 25.0) * MM;
+  d.truth.tool->helix = units::radFromDeg(uniform(random, 0.0, 40.0));
+  d.believed = d.truth;
+  // The place of the station is set up by hand, the tool measured with a gauge.
+  for (auto& [direction, place] : d.believed.hammer->position) {
+    for (double& at : place) at += uniform(random, -0.1, 0.1) * MM;
+  }
+  d.believed.tool->diameter += uniform(random, -0.05, 0.05) * MM;
+  d.goal.tool = "drawn";
+  d.goal.point = POINT_TOOL_TIP;
+  d.goal.direction = uniform(random, 0.0, 1.0) < 0.5 ? "x" : "y";
+  d.goal.hits = 1;
+  d.goal.modes = 1;
+  d.goal.teeth = d.truth.tool->teeth;
+  if (d.truth.stickout) d.goal.stickout = *d.truth.stickout;
+  if (uniform(random, 0.0, 1.0) < trouble_share) {
+    d.trouble = static_cast<Trouble>(std::uniform_int_distribution<int>(1, 6)(random));
+    d.trouble_time = uniform(random, 0.5, 40.0);
+  }
+  if (uniform(random, 0.0, 1.0) < NARROW_SHARE) {
+    // Limits that do not reach the station: a motion there is to be refused before it is sent.
+    d.believed.axes->travel[0][1] = d.believed.hammer->position.at("x")[0] - 5.0 * MM;
+  }
+  const auto& travel = d.believed.axes->travel;
+  d.start = {uniform(random, travel[0][0], travel[0][1]), uniform(random, travel[1][0], travel[1][1]),
+             uniform(random, -20.0 * MM, travel[2][1])};
+  return d;
+}
+
+/// Obeys the sequence as the bridge would: armed once, every program checked, one at a time.
+class Driver {
+ public:
+  Driver(const Draw& draw, std::uint64_t seed, Counts& counts)
+      : draw_(draw),
+        counts_(counts),
+        world_(started(draw), worldOptions(seed)),
+        sequence_({}, draw.believed) {
+    limits_.travel = draw.believed.axes->travel;
+    limits_.max_feed = draw.believed.axes->rapid;
+    limits_.max_spindle_speed = draw.believed.spindle->max_speed.value_or(2000.0);
+  }
+
+  void run() {
+    sequence_.handle(draw_.goal);
+    std::optional<hammer::MeasureFrfResult> result;
+    while (!result && time_ < MOST_TIME) {
+      meddle();
+      advance();
+      result = sequence_.takeResult();
+    }
+    counts_.unfinished += result ? 0 : 1;
+    ++counts_.results[result ? CODES[static_cast<std::size_t>(result->code)] : "no end"];
+    if (result && result->code != FrfCode::ok && result->message.empty()) ++counts_.results["without a line"];
+    standStill();
+    judge();
+  }
+
+ private:
+  static MachineModel started(const Draw& draw) {
+    MachineModel model = draw.truth;
+    model.axes->home = draw.start;
+    return model;
+  }
+  static sim::WorldOptions worldOptions(std::uint64_t seed) {
+    sim::WorldOptions options;
+    options.seed = seed;
+    options.substeps = 1;
+    return options;
+  }
+  sim::Controller& controller() { return world_.controller(); }
+
+  void meddle() {
+    if (draw_.trouble == Trouble::hold && held_ && time_ > draw_.trouble_time + 2.0) {
+      controller().cycleStart();
+      held_ = false;
+    }
+    if (troubled_ || draw_.trouble == Trouble::none || time_ < draw_.trouble_time) return;
+    troubled_ = true;
+    switch (draw_.trouble) {
+      case Trouble::cancel:
+        sequence_.cancel(time_);
+        break;
+      case Trouble::alarm:
+        controller().raiseAlarm(1001, "DRAWN");
+        break;
+      case Trouble::emergency:
+        controller().emergency(true);
+        break;
+      case Trouble::reset:
+        controller().reset();
+        break;
+      case Trouble::hold:
+        controller().feedHold();
+        held_ = true;
+        break;
+      case Trouble::mode:
+        controller().setMode(focas::AUT_JOG);
+        break;
+      case Trouble::none:
+        break;
+    }
+  }
+
+  void advance() {
+    feed();
+    sim::World::Block block;
+    world_.advance(block);
+    time_ += BLOCK_TIME;
+    watch();
+    sequence_.handle(block.hammer);
+    if (time_ - last_state_ >= STATE_PERIOD) {
+      last_state_ = time_;
+      sequence_.handle(state());
+    }
+    for (const SpindleAngle& angle : block.angle) sequence_.handle(angle);
+    for (const hammer::Command& command : sequence_.takeCommands()) obey(command);
+  }
+
+  /// Text that the controller did not take yet.
+  void feed() {
+    if (!session_ || text_.empty()) return;
+    text_.erase(0, controller().dncData(text_.data(), text_.size()));
+  }
+
+  /// What the bridge sees of the machine's own end.
+  void watch() {
+    const focas::Status status = controller().status();
+    const focas::EwCode code = controller().dncAbort();
+    const bool taken =
+        code != focas::EW_OK || status.alarm != 0 || status.emergency != 0 || status.aut != focas::AUT_REMOTE;
+    if (taken && armed_) {
+      armed_ = session_ = false;
+      text_.clear();
+      sequence_.commandFailed(time_, "the controller ended it: " + focas::ewName(code));
+    }
+    const sim::MotionState motion = controller().motion();
+    for (std::size_t i = 0; i < 3; ++i) {
+      const auto& travel = draw_.truth.axes->travel[i];
+      beyond_ = beyond_ || motion.position[i] < travel[0] - 1e-9 || motion.position[i] > travel[1] + 1e-9;
+    }
+  }
+
+  CncState state() {
+    const focas::Status status = controller().status();
+    CncState s;
+    s.stamp = time_;
+    s.connected = true;
+    s.armed = armed_;
+    s.mode = static_cast<CncMode>(status.aut);
+    s.run = static_cast<CncRun>(status.run);
+    s.motion = status.motion == focas::MOTION_MOVES;
+    s.emergency = status.emergency != 0;
+    s.alarm = status.alarm != 0;
+    s.axes = {"X", "Y", "Z"};
+    for (const double mm : controller().machinePosition()) s.position.push_back(mm * MM);
+    for (const double mm : controller().distanceToGo()) s.distance_to_go.push_back(mm * MM);
+    s.spindle_speed = controller().motion().spindle_speed;
+    return s;
+  }
+
+  void obey(const hammer::Command& command) {
+    using Kind = hammer::Command::Kind;
+    std::string message;
+    if (command.kind == Kind::stop) {
+      controller().dncCancel(focas::DNC_CANCEL);
+      session_ = false;
+      text_.clear();
+    } else if (command.kind == Kind::strike) {
+      if (world_.strike("tool", command.direction, message) != sim::World::StrikeAnswer::ok) {
+        sequence_.commandFailed(time_, message);
+      }
+    } else if (command.kind == Kind::orient) {
+      start(cnc::orientProgram(command.angle, 1133));
+    } else if (command.kind == Kind::jog) {
+      start(cnc::jogProgram(command.axis == "x"   ? 0
+                            : command.axis == "y" ? 1
+                                                  : 2,
+                            command.distance, command.feed, 4));
+    } else {
+      start(hammer::moveProgram(command.from, command.path));
+    }
+  }
+
+  void start(const std::string& program) {
+    if (!armed_) {
+      ++counts_.refused_by_state;
+      sequence_.commandFailed(time_, "motion is not armed");
+      return;
+    }
+    cnc::StartPosition from;
+    const CncState now = state();
+    for (std::size_t i = 0; i < 3; ++i) from.machine[i] = from.absolute[i] = now.position[i];
+    cnc::DialectOptions dialect;
+    dialect.decimals = 4;
+    const cnc::NcCheck check = cnc::checkProgram(program, from, limits_, dialect);
+    if (check.verdict != cnc::NcVerdict::good) {
+      ++counts_.refused_by_limits;
+      sequence_.commandFailed(time_, check.message);
+      return;
+    }
+    if (!session_ && controller().dncStart() != focas::EW_OK) {
+      ++counts_.refused_by_state;
+      sequence_.commandFailed(time_, "the controller takes no program");
+      return;
+    }
+    session_ = true;
+    text_ += check.text;
+  }
+
+  /// Nothing moves once the measurement is over and its last command done.
+  void standStill() {
+    sim::World::Block block;
+    for (int i = 0; i < 100; ++i) world_.advance(block);
+    const auto before = controller().motion().position;
+    for (int i = 0; i < 200; ++i) world_.advance(block);
+    moved_ = controller().motion().position != before;
+  }
+
+  void judge() {
+    bool collision = false, overtravel = beyond_;
+    for (const focas::AlarmMessage& alarm : controller().alarmMessages()) {
+      collision = collision || alarm.number == COLLISION;
+      overtravel = overtravel || alarm.type == 4;
+      if (alarm.number == COLLISION || alarm.type == 4) {
+        std::printf("run %d: %s at %.1f s\n", counts_.runs, alarm.text.c_str(), time_);
+      }
+    }
+    ++counts_.runs;
+    counts_.collisions += collision ? 1 : 0;
+    counts_.beyond_limits += overtravel ? 1 : 0;
+    counts_.moved_unasked += moved_ ? 1 : 0;
+    ++counts_.by_trouble[TROUBLES[static_cast<std::size_t>(draw_.trouble)]];
+  }
+
+  const Draw& draw_;
+  Counts& counts_;
+  sim::World world_;
+  hammer::HammerSequence sequence_;
+  cnc::MotionLimits limits_;
+  std::string text_;
+  double time_ = 0.0, last_state_ = -1.0;
+  bool armed_ = true, session_ = false, troubled_ = false, held_ = false, beyond_ = false, moved_ = false;
+};
+
+void print(const Counts& c) {
+  std::printf("%d runs: %d collisions, %d beyond limits, %d moved unasked, %d without an end\n", c.runs,
+              c.collisions, c.beyond_limits, c.moved_unasked, c.unfinished);
+  std::printf("refused before anything was sent: %d by limits, %d by state\nresults:", c.refused_by_limits,
+              c.refused_by_state);
+  for (const auto& [name, count] : c.results) std::printf(" %s %d,", name.c_str(), count);
+  std::printf("\ntroubles:");
+  for (const auto& [name, count] : c.by_trouble) std::printf(" %s %d,", name.c_str(), count);
+  std::printf("\n");
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  std::string model_file;
+  int runs = 1000;
+  std::uint64_t seed = 1;
+  double trouble_share = 0.4;
+  CommandLine line{
+      "The automatic hammer's motions on the simulated machine with drawn tools, starts, errors of belief "
+      "(station "
+      "0.1 mm, diameter 0.05 mm) and troubles; exit code 1 when the tool met anything, went beyond its "
+      "limits or "
+      "moved unasked."};
+  line.option("MODEL", model_file, "machine model with a hammer station").required();
+  line.option("--runs", runs, "how many").positive().showDefault();
+  line.option("--seed", seed, "of the first run; each further one takes the next").showDefault();
+  line.option("--troubles", trouble_share,
+              "share of runs with an alarm, stop, reset, hold, cancel or change of mode")
+      .within(0.0, 1.0)
+      .showDefault();
+  return runProgram(line, argc, argv, [&] {
+    const MachineModel model = readMachineModel(model_file);
+    Counts counts;
+    for (int i = 0; i < runs; ++i) {
+      std::seed_seq mix{seed, static_cast<std::uint64_t>(i)};
+      std::mt19937_64 random(mix);
+      const Draw draw = drawRun(model, random, trouble_share);
+      Driver(draw, seed + static_cast<std::uint64_t>(i), counts).run();
+      if ((i + 1) % 10 == 0) {
+        print(counts);
+        std::fflush(stdout);
+      }
+    }
+    print(counts);
+    return counts.collisions + counts.beyond_limits + counts.moved_unasked + counts.unfinished > 0 ? 1 : 0;
+  });
+}

@@ -1,0 +1,113 @@
+// rosrun smartmill_studies cnc_latency: how long questions to a controller take on loopback, how many
+// sessions it serves at once, and what polling costs.
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <ctime>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "smartmill_cnc/controller/focas_controller.h"
+#include "smartmill_core/error.h"
+#include "smartmill_core/program.h"
+#include "smartmill_focas/client.h"
+#include "smartmill_focas/server.h"
+#include "smartmill_sim/controller/controller.h"
+
+namespace {
+
+using namespace smartmill;
+using Clock = std::chrono::steady_clock;
+
+constexpr double RATE = 50.0;  // [Hz]
+
+double processSeconds() {
+  std::timespec now{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+template <class Ask>
+void timed(const char* name, int count, const Ask& ask) {
+  std::vector<double> took;
+  for (int i = 0; i < count; ++i) {
+    const Clock::time_point before = Clock::now();
+    ask();
+    took.push_back(std::chrono::duration<double>(Clock::now() - before).count());
+  }
+  std::sort(took.begin(), took.end());
+  std::printf("%-28s median %.3f ms, 99 %% %.3f ms, longest %.3f ms (%d)\n", name,
+              1e3 * took[took.size() / 2], 1e3 * took[took.size() * 99 / 100], 1e3 * took.back(), count);
+}
+
+/// Whole readings of the bridge at its rate: their time and the share of one core of both sides.
+void polled(cnc::Controller& controller, double seconds) {
+  const double cpu = processSeconds();
+  const Clock::time_point began = Clock::now();
+  std::vector<double> took;
+  for (int i = 0; i < static_cast<int>(seconds * RATE); ++i) {
+    std::this_thread::sleep_until(began + std::chrono::duration_cast<Clock::duration>(
+                                              std::chrono::duration<double>(static_cast<double>(i) / RATE)));
+    const Clock::time_point before = Clock::now();
+    if (!controller.read()) {
+      throw Error("a reading failed");
+    }
+    took.push_back(std::chrono::duration<double>(Clock::now() - before).count());
+  }
+  std::sort(took.begin(), took.end());
+  std::printf(
+      "bridge's reading at %.0f Hz    median %.3f ms, 99 %% %.3f ms; %.2f %% of a core, server included\n",
+      RATE, 1e3 * took[took.size() / 2], 1e3 * took[took.size() * 99 / 100],
+      100.0 * (processSeconds() - cpu) / seconds);
+}
+
+int sessions(std::uint16_t port) {
+  std::vector<std::unique_ptr<focas::Client>> clients;
+  for (;;) {
+    clients.push_back(std::make_unique<focas::Client>());
+    try {
+      clients.back()->connect("127.0.0.1", port, 2.0);
+      clients.back()->statusInfo();
+    } catch (const focas::FocasError&) {
+      return static_cast<int>(clients.size()) - 1;
+    }
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  int count = 5000;
+  double seconds = 20.0;
+  CommandLine line{
+      "Latency of the simulated controller on loopback, sessions, and the cost of polling at 50 Hz."};
+  line.option("--count", count, "questions of each kind").positive().showDefault();
+  line.option("--seconds", seconds, "[s] of polling").positive().showDefault();
+  return runProgram(line, argc, argv, [&] {
+    sim::Controller machine(sim::ControllerOptions::ofModel(MachineModel{}));
+    focas::ServerOptions options;
+    options.port = 0;
+    focas::Server server(options, machine);
+    focas::Client client;
+    client.connect("127.0.0.1", server.port(), 2.0);
+    timed("cnc_acts", count, [&] { client.actualSpeed(); });
+    timed("cnc_statinfo (3 requests)", count, [&] { client.statusInfo(); });
+    timed("cnc_rdspmeter (5 requests)", count, [&] { client.spindleMeter(); });
+    client.close();
+    std::printf("sessions at once: %d\n", sessions(server.port()));
+    cnc::FocasParameters parameters;
+    parameters.port = server.port();
+    const std::unique_ptr<cnc::Controller> controller = cnc::makeFocasController(parameters);
+    const Clock::time_point until = Clock::now() + std::chrono::seconds(5);
+    while (!controller->connect() && Clock::now() < until) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));  // the sessions above are being closed
+    }
+    timed("bridge's whole reading", count, [&] {
+      if (!controller->read()) throw Error("a reading failed");
+    });
+    polled(*controller, seconds);
+  });
+}

@@ -1,0 +1,117 @@
+// rosrun smartmill_studies cnc_load_rounding: what the rounding of polled loads costs the cutting
+// coefficients. Air cuts at four speeds give the friction, slots at one speed and several feeds the
+// coefficients (Dunwoody chapter 3); each voltage is the mean of what a controller tells at 50 Hz while the
+// tooth passing, behind the load meter's first-order lag, still ripples it.
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <random>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "smartmill_core/cutting/mechanistic.h"
+#include "smartmill_core/math/linear_algebra.h"
+#include "smartmill_core/model/machine_model.h"
+#include "smartmill_core/program.h"
+#include "smartmill_core/units.h"
+
+namespace {
+
+using namespace smartmill;
+
+constexpr double POLL = 0.02;                        // [s]
+constexpr int POLLS = 75;                            // of a cut of 1.5 s
+constexpr double JITTER = 0.002;                     // [s] of the time at which a reply was made
+constexpr std::size_t KTC = 0, KTE = 3, TORQUE = 3;  // of meanForceMatrix()
+
+struct Cell {
+  Spindle spindle;
+  ToolGeometry tool;
+  double ktc = 0.0, kte = 0.0;
+  double step = 0.0;  // [V]
+  std::mt19937_64 random;
+
+  double rounded(double volt) const { return step > 0.0 ? step * std::round(volt / step) : volt; }
+
+  /// Mean voltage that is polled in a cut with a mean torque [N m], at a speed [rad/s].
+  double polled(double torque, double speed) {
+    const double mean =
+        spindle.load_meter_gain * (torque + spindle.viscous * speed + spindle.coulomb) * speed;
+    const double passing = tool.teeth * speed / units::TWO_PI;  // [Hz]
+    // A slot's torque ripples by about its own mean at two teeth, less at more; the lag leaves a trace.
+    const double ripple = spindle.load_meter_gain * torque * speed / tool.teeth /
+                          std::hypot(1.0, passing / spindle.load_meter_bandwidth);
+    std::uniform_real_distribution<double> phase(0.0, units::TWO_PI), late(0.0, JITTER);
+    const double begin = phase(random);
+    double sum = 0.0;
+    for (int i = 0; i < POLLS; ++i) {
+      const double time = i * POLL + late(random);
+      sum += rounded(mean + ripple * std::sin(begin + units::TWO_PI * passing * time));
+    }
+    return sum / POLLS;
+  }
+
+  /// Relative error of Ktc.
+  double identify() {
+    const std::vector<double> speeds{105.0, 420.0, 840.0, 1260.0};
+    Eigen::MatrixXd friction(4, 2), torque(4, 1);
+    for (int i = 0; i < 4; ++i) {
+      const double w = speeds[static_cast<std::size_t>(i)];
+      friction(i, 0) = w;
+      friction(i, 1) = 1.0;
+      torque(i, 0) = polled(0.0, w) / (spindle.load_meter_gain * w);
+    }
+    const Eigen::MatrixXd air = linear::leastSquares(friction, torque).x;
+    const double speed = 470.0;  // about 4500 rpm
+    const std::vector<double> feeds{30e-6, 60e-6, 100e-6, 150e-6};
+    Eigen::MatrixXd a(4, 2), b(4, 1);
+    for (int i = 0; i < 4; ++i) {
+      const auto map = meanForceMatrix(tool, {0.0, units::PI, 1.0e-3, feeds[static_cast<std::size_t>(i)]});
+      a(i, 0) = map[TORQUE][KTC];
+      a(i, 1) = map[TORQUE][KTE];
+      const double volt = polled(a(i, 0) * ktc + a(i, 1) * kte, speed);
+      b(i, 0) = volt / (spindle.load_meter_gain * speed) - air(0, 0) * speed - air(1, 0);
+    }
+    // In units near 1 for both unknowns.
+    Eigen::MatrixXd scaled = a;
+    scaled.col(0) *= ktc;
+    scaled.col(1) *= kte;
+    return std::abs(linear::leastSquares(scaled, b).x(0, 0) - 1.0);
+  }
+};
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  std::string model_file;
+  int machines = 500;
+  std::uint64_t seed = 1;
+  CommandLine line{
+      "Error of Ktc from polled loads over their rounding: drawn coefficients on a model's machine."};
+  line.option("MODEL", model_file, "machine model with tool and spindle").required();
+  line.option("--machines", machines, "drawn machines for each step").positive().showDefault();
+  line.option("--seed", seed, "of the draws").showDefault();
+  return runProgram(line, argc, argv, [&] {
+    const MachineModel model = readMachineModel(model_file);
+    for (const double step : {0.0, 3.0e-4, 8.0e-4, 8.0e-3, 8.0e-2}) {
+      std::vector<double> errors;
+      Cell cell{model.needSpindle("draw machines"),
+                model.needTool("draw machines"),
+                0.0,
+                0.0,
+                step,
+                std::mt19937_64(seed)};
+      std::uniform_real_distribution<double> ktc(600e6, 2200e6), kte(10e3, 40e3);
+      for (int i = 0; i < machines; ++i) {
+        cell.ktc = ktc(cell.random);
+        cell.kte = kte(cell.random);
+        errors.push_back(cell.identify());
+      }
+      std::sort(errors.begin(), errors.end());
+      std::printf("step %6.1f mV: Ktc off by %.3f %% (median), %.3f %% (95 %%)\n", 1e3 * step,
+                  100.0 * errors[errors.size() / 2], 100.0 * errors[errors.size() * 95 / 100]);
+    }
+  });
+}

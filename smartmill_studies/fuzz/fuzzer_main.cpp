@@ -1,0 +1,7 @@
+// libFuzzer's entry; which target it is says the macro FUZZ_TARGET (.ci/fuzz).
+#include "fuzz/targets.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  smartmill::fuzz::FUZZ_TARGET(data, size);
+  return 0;
+}

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <string>
+
+namespace smartmill::fuzz {
+
+/// Takes any bytes; what they break throws something else than the readers' own errors, or the sanitizers
+/// find it.
+using Target = std::function<void(const std::uint8_t* data, std::size_t size)>;
+
+void replies(const std::uint8_t* data, std::size_t size);   ///< frames as a client reads them
+void requests(const std::uint8_t* data, std::size_t size);  ///< frames as a server answers them
+void gateway(const std::uint8_t* data, std::size_t size);   ///< frames of LinuxCNC's gateway and stream
+void nc(const std::uint8_t* data, std::size_t size);  ///< NC text: the bridge's check, the control's run
+void recording(const std::uint8_t* data, std::size_t size);  ///< file of a FOCAS session
+void model(const std::uint8_t* data, std::size_t size);      ///< machine model file
+void campaign(const std::uint8_t* data, std::size_t size);   ///< campaign file
+void dynoware(const std::uint8_t* data, std::size_t size);   ///< Kistler DynoWare's text
+void uff(const std::uint8_t* data, std::size_t size);        ///< universal files 58 and 58b
+
+/// By name; the corpus of each is the folder corpus/NAME.
+inline const std::map<std::string, Target>& targets() {
+  static const std::map<std::string, Target> TARGETS{
+      {"replies", replies},     {"requests", requests}, {"nc", nc},
+      {"recording", recording}, {"model", model},       {"campaign", campaign},
+      {"dynoware", dynoware},   {"uff", uff},           {"gateway", gateway}};
+  return TARGETS;
+}
+
+}  // namespace smartmill::fuzz

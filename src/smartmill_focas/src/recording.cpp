@@ -1,0 +1,164 @@
+#include "smartmill_focas/recording.h"
+
+#include <cstdio>
+#include <fstream>
+#include <ostream>
+#include <sstream>
+
+#include "smartmill_focas/describe.h"
+
+namespace smartmill::focas {
+namespace {
+
+constexpr const char* FORMAT = "# smartmill-focas-session/1";
+
+int digitOf(char c) {
+  if (c >= '0' && c <= '9') {
+    return c - '0';
+  }
+  return c >= 'a' && c <= 'f' ? c - 'a' + 10 : -1;
+}
+
+RecordedFrame parseLine(const std::string& line) {
+  RecordedFrame recorded;
+  std::istringstream words(line);
+  std::string way, digits, more;
+  if (!(words >> recorded.time >> recorded.connection >> way >> digits) || words >> more ||
+      (way != ">" && way != "<") || digits.size() % 2 != 0) {
+    throw WireError("TIME CONNECTION > HEX is due");
+  }
+  recorded.from_client = way == ">";
+  Bytes bytes;
+  for (std::size_t i = 0; i < digits.size(); i += 2) {
+    const int high = digitOf(digits[i]), low = digitOf(digits[i + 1]);
+    if (high < 0 || low < 0) {
+      throw WireError("'" + digits.substr(i, 2) + "' is no byte");
+    }
+    bytes.push_back(static_cast<std::uint8_t>(16 * high + low));
+  }
+  FrameReader reader;
+  reader.append(bytes.data(), bytes.size());
+  std::optional<Frame> frame = reader.next();
+  if (!frame || reader.buffered() != 0) {
+    throw WireError("not one whole frame");
+  }
+  recorded.frame = std::move(*frame);
+  return recorded;
+}
+
+/// What it refuses is no reason to stop.
+template <class Ask>
+void tried(const Ask& ask) {
+  try {
+    ask();
+  } catch (const ConnectionError&) {
+    throw;
+  } catch (const FocasError&) {
+    // Recorded as it is.
+  }
+}
+
+Bytes path(const std::string& folder) {
+  return Writer().text(folder, 256).data();
+}
+
+SubRequest pmcRead(int first, int last, int area) {
+  SubRequest request(OP_PMC_READ, first, last, area, 0);
+  request.c1 = 2;
+  return request;
+}
+
+}  // namespace
+
+std::string describe(const RecordedFrame& recorded) {
+  char head[48];
+  std::snprintf(head, sizeof head, "%9.4f %d %s ", recorded.time, recorded.connection,
+                recorded.from_client ? ">" : "<");
+  return head + describe(recorded.frame);
+}
+
+void beginRecording(std::ostream& out) {
+  out << FORMAT << "\n";
+}
+
+void append(std::ostream& out, const RecordedFrame& recorded) {
+  const Frame& f = recorded.frame;
+  out << "# " << describe(recorded) << "\n";
+  char head[48];
+  std::snprintf(head, sizeof head, "%.6f %d %s ", recorded.time, recorded.connection,
+                recorded.from_client ? ">" : "<");
+  out << head;
+  for (const std::uint8_t byte : encodeFrame(f.type, f.direction, f.body, f.version)) {
+    static const char* const DIGITS = "0123456789abcdef";
+    out << DIGITS[byte >> 4] << DIGITS[byte & 15];
+  }
+  out << "\n";
+}
+
+std::vector<RecordedFrame> readRecording(const std::string& file) {
+  std::ifstream in(file);
+  std::string line;
+  if (!std::getline(in, line) || line != FORMAT) {
+    throw WireError(file + ": not a file of format smartmill-focas-session/1");
+  }
+  std::vector<RecordedFrame> frames;
+  for (int number = 2; std::getline(in, line); ++number) {
+    if (line.empty() || line[0] == '#') {
+      continue;
+    }
+    try {
+      frames.push_back(parseLine(line));
+    } catch (const WireError& e) {
+      throw WireError(file + ":" + std::to_string(number) + ": " + e.what());
+    }
+  }
+  return frames;
+}
+
+void askEverything(Client& client) {
+  tried([&] { client.statusInfo(); });
+  tried([&] { client.exchange({SubRequest(OP_STATUS2), SubRequest(OP_HDCK), SubRequest(OP_TMMODE)}); });
+  for (const PositionKind kind :
+       {POSITION_MACHINE, POSITION_ABSOLUTE, POSITION_RELATIVE, POSITION_DISTANCE}) {
+    tried([&] { client.position(kind); });
+  }
+  tried([&] { client.actualFeed(); });
+  tried([&] { client.actualSpeed(); });
+  tried([&] { client.actualSpeeds(); });
+  tried([&] { client.spindleLoad(); });
+  tried([&] { client.spindleMeter(); });
+  tried([&] { client.servoMeter(); });
+  tried([&] { client.exchange({SubRequest(OP_SERVO, 3)}); });
+  tried([&] { client.readMacro(100); });
+  tried([&] { client.readMacros(500, 10); });
+  tried([&] { client.alarmBits(); });
+  tried([&] { client.alarmMessages(); });
+  tried([&] {
+    int running = 0, main_program = 0;
+    client.programNumber(&running, &main_program);
+  });
+  tried([&] { client.sequenceNumber(); });
+  tried([&] { client.executingBlock(); });
+  tried([&] {
+    client.exchange({SubRequest(OP_MAIN_PROGRAM), SubRequest(OP_EXECUTING_PROGRAM), SubRequest(OP_FOLDER, 1),
+                     SubRequest(OP_CLOCK, 0), SubRequest(OP_CLOCK, 1), SubRequest(OP_CNC_ID)});
+  });
+  tried([&] {
+    const Bytes folder = path("//CNC_MEM/USER/PATH1/");
+    client.exchange({SubRequest(OP_FOLDER_COUNT, 0, 0, 0, 0, folder)});
+    client.exchange({SubRequest(OP_FOLDER_LIST, 0, 10, 0, 1, folder)});
+  });
+  for (const int number : {1020, 1320, 1321, 1420, 3741}) {
+    const int axis = number < 3000 ? -1 : 0;
+    tried([&] { client.exchange({SubRequest(OP_PARAMETER, number, number, axis)}); });
+  }
+  for (const int number : {300, 308, 410, 445}) {
+    const int axis = number < 400 ? -1 : 0;
+    tried([&] { client.exchange({SubRequest(OP_DIAGNOSIS, number, number, axis)}); });
+  }
+  for (const int area : {0, 1, 3}) {
+    tried([&] { client.exchange({pmcRead(0, 49, area)}); });
+  }
+}
+
+}  // namespace smartmill::focas
