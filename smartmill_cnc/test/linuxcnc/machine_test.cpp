@@ -300,7 +300,8 @@ TEST_F(LinuxCncMachine, AnAbortStopsAxesAndSpindleAndTheNextProgramRuns) {
   EXPECT_LT(now() - begin, soon());
   expectStanding();
   EXPECT_TRUE(bridge_->state().armed);
-  EXPECT_EQ(run("G90 G0 X0\n").code, MotionCode::ok);
+  const Outcome next = run("G90 G0 X0\n");
+  EXPECT_EQ(next.code, MotionCode::ok) << next.message;
 }
 
 TEST_F(LinuxCncMachine, AnEmergencyStopDisarmsUntilThePanelIsReady) {
@@ -315,7 +316,8 @@ TEST_F(LinuxCncMachine, AnEmergencyStopDisarmsUntilThePanelIsReady) {
   EXPECT_FALSE(bridge_->state().armed);
   const Answer<ArmCode> again = bridge_->arm(true);
   ASSERT_EQ(again.code, ArmCode::ok) << again.message;
-  EXPECT_EQ(run("G90 G0 X0\n").code, MotionCode::ok);
+  const Outcome next = run("G90 G0 X0\n");
+  EXPECT_EQ(next.code, MotionCode::ok) << next.message;
 }
 
 TEST_F(LinuxCncMachine, WithoutItsGatewayTheMachineStops) {
@@ -333,7 +335,8 @@ TEST_F(LinuxCncMachine, WithoutItsGatewayTheMachineStops) {
   until([] { return false; }, 0.1);
   const Answer<ArmCode> again = bridge_->arm(true);
   ASSERT_EQ(again.code, ArmCode::ok) << again.message;
-  EXPECT_EQ(run("G90 G0 X0\n").code, MotionCode::ok);
+  const Outcome next = run("G90 G0 X0\n");
+  EXPECT_EQ(next.code, MotionCode::ok) << next.message;
 }
 
 TEST_F(LinuxCncMachine, WithoutItsBridgeTheMachineStops) {
