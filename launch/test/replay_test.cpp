@@ -1,56 +1,20 @@
 // A short session is recorded from the simulated machine; its replay must give the same results to the last
 // digit. A browser looks at both.
 
-#include <arpa/inet.h>
-#include <sys/socket.h>
-#include <unistd.h>
-
-#include <cstdint>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
-#include <optional>
-#include <sstream>
 #include <string>
 #include <thread>
 
 #include <gtest/gtest.h>
 
+#include "launched.h"
 #include "smartmill_core/testing/temporary_folder.h"
 
 namespace {
 
 using smartmill::TemporaryFolder;
-
-/// Beneath the ports that the system gives away by itself, so that it is still free when it is used.
-std::string freePort() {
-  static int next = getpid() % 12000;
-  for (int i = 0; i < 12000; ++i) {
-    const int port = 20000 + next++ % 12000;
-    const int s = socket(AF_INET, SOCK_STREAM, 0);
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    address.sin_port = htons(static_cast<std::uint16_t>(port));
-    const bool free = bind(s, reinterpret_cast<sockaddr*>(&address), sizeof address) == 0;
-    close(s);
-    if (free) return std::to_string(port);
-  }
-  ADD_FAILURE() << "no free port";
-  return "0";
-}
-
-std::string contentOf(const std::string& file) {
-  std::ifstream in(file);
-  std::stringstream text;
-  text << in.rdbuf();
-  return text.str();
-}
-
-/// Exit code of a command; what it said goes to a file.
-int run(const std::string& command, const std::string& log) {
-  return std::system(("timeout --signal=INT 400 " + command + " >'" + log + "' 2>&1").c_str());
-}
+using namespace smartmill::testing;
 
 /// A page in the browser that looks on (watch.py) while a command runs.
 class Onlooker {

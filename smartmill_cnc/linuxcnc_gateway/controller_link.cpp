@@ -21,7 +21,7 @@ namespace {
 using Code = Reply::Code;
 
 constexpr std::chrono::milliseconds LOOK{1};
-constexpr double STILL = 0.3;                       // [s] a task whose heartbeat stands so long is gone
+constexpr double STILL = 0.4;                       // [s] a task whose heartbeat stands so long is gone
 constexpr std::chrono::milliseconds REATTACH{500};  // between two attempts to find it
 constexpr double ANSWER = 1.0, HOMING = 3.0, COMES_TO_REST = 0.3;  // [s]
 constexpr std::uint32_t SETTLED = 4;  // servo cycles of an idle task after a program

@@ -14,6 +14,7 @@ using Target = std::function<void(const std::uint8_t* data, std::size_t size)>;
 
 void replies(const std::uint8_t* data, std::size_t size);   ///< frames as a client reads them
 void requests(const std::uint8_t* data, std::size_t size);  ///< frames as a server answers them
+void gateway(const std::uint8_t* data, std::size_t size);   ///< frames of LinuxCNC's gateway and stream
 void nc(const std::uint8_t* data, std::size_t size);  ///< NC text: the bridge's check, the control's run
 void recording(const std::uint8_t* data, std::size_t size);  ///< file of a FOCAS session
 void model(const std::uint8_t* data, std::size_t size);      ///< machine model file
@@ -24,8 +25,9 @@ void uff(const std::uint8_t* data, std::size_t size);        ///< universal file
 /// By name; the corpus of each is the folder corpus/NAME.
 inline const std::map<std::string, Target>& targets() {
   static const std::map<std::string, Target> TARGETS{
-      {"replies", replies},   {"requests", requests}, {"nc", nc},  {"recording", recording}, {"model", model},
-      {"campaign", campaign}, {"dynoware", dynoware}, {"uff", uff}};
+      {"replies", replies},     {"requests", requests}, {"nc", nc},
+      {"recording", recording}, {"model", model},       {"campaign", campaign},
+      {"dynoware", dynoware},   {"uff", uff},           {"gateway", gateway}};
   return TARGETS;
 }
 

@@ -10,8 +10,9 @@
 namespace smartmill::cnc::linuxcnc {
 namespace {
 
-constexpr double SPINDLE_NEAR = 10.0;      // [rpm] counts as at speed, besides 1 %
-constexpr double STANDING = 0.5;           // [rpm]
+constexpr double SPINDLE_NEAR = 10.0;  // [rpm] counts as at speed, besides 1 %
+constexpr double BESIDE = 1e-3;   // [mm] limits beyond the travel: a home at its end rounds to either side
+constexpr double STANDING = 0.5;  // [rpm]
 constexpr double ORIENT_GAIN = 20.0;       // [1/s]
 constexpr double ORIENT_MOST = 5.0;        // [rev/s]
 constexpr double ORIENT_TOLERANCE = 0.02;  // [deg]
@@ -27,8 +28,8 @@ std::string jointSection(const MachineAxes& axes, std::size_t axis) {
   const double mm = 1.0 / units::MM;
   std::string common = "MAX_VELOCITY = " + number(axes.rapid * mm) +
                        "\nMAX_ACCELERATION = " + number(axes.acceleration * mm) +
-                       "\nMIN_LIMIT = " + number(axes.travel[axis][0] * mm) +
-                       "\nMAX_LIMIT = " + number(axes.travel[axis][1] * mm) + "\n";
+                       "\nMIN_LIMIT = " + number(axes.travel[axis][0] * mm - BESIDE) +
+                       "\nMAX_LIMIT = " + number(axes.travel[axis][1] * mm + BESIDE) + "\n";
   const std::string home = number(axes.home[axis] * mm);
   return std::string("[AXIS_") + "XYZ"[axis] + "]\n" + common + "[JOINT_" + std::to_string(axis) + "]\n" +
          common + "TYPE = LINEAR\nFERROR = 1\nMIN_FERROR = 0.2\nHOME = " + home + "\nHOME_OFFSET = " + home +

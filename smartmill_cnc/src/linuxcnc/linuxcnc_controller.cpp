@@ -211,6 +211,9 @@ class LinuxCncController : public Controller {
     state.emergency = status_.state == MachineStatus::State::emergency;
     state.alarm = !status_.errors.empty() || (!on && !state.emergency);
     state.alarm_text = status_.errors.empty() && state.alarm ? "the machine is off" : status_.errors;
+    if (!status_.errors.empty()) {
+      reading.alarms.push_back({0, 0, 0, status_.errors});
+    }
     state.sequence = status_.line;
     state.axes = {"X", "Y", "Z"};
     state.position.assign(status_.position.begin(), status_.position.end());

@@ -59,7 +59,7 @@ TEST(LinuxCncConfiguration, HasTheModelsLimits) {
   const std::string& ini = files.at("mill.ini");
   for (const char* line :
        {"NML_FILE = /somewhere/mill.nml\n", "MAX_LINEAR_VELOCITY = 400\n", "MAX_LINEAR_ACCELERATION = 5000\n",
-        "[AXIS_Z]\nMAX_VELOCITY = 400\nMAX_ACCELERATION = 5000\nMIN_LIMIT = -300\nMAX_LIMIT = 0\n",
+        "[AXIS_Z]\nMAX_VELOCITY = 400\nMAX_ACCELERATION = 5000\nMIN_LIMIT = -300.001\nMAX_LIMIT = 0.001\n",
         "SERVO_PERIOD = 1000000\n", "MAX_FORWARD_VELOCITY = 20000\n"}) {
     EXPECT_NE(ini.find(line), std::string::npos) << line;
   }

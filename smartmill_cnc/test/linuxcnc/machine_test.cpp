@@ -83,6 +83,7 @@ class LinuxCncMachine : public ::testing::Test {
     MotionParameters motion;
     motion.read_only = false;
     motion.condition_lead = 0.0;
+    motion.read_only = false;
     motion.limits.travel = {{{-0.25, 0.25}, {-0.2, 0.2}, {-0.3, 0.0}}};
     motion.limits.max_feed = 0.4;
     motion.limits.max_spindle_speed = 2100.0;
@@ -300,7 +301,8 @@ TEST_F(LinuxCncMachine, AnAbortStopsAxesAndSpindleAndTheNextProgramRuns) {
   EXPECT_LT(now() - begin, soon());
   expectStanding();
   EXPECT_TRUE(bridge_->state().armed);
-  EXPECT_EQ(run("G90 G0 X0\n").code, MotionCode::ok);
+  const Outcome next = run("G90 G0 X0\n");
+  EXPECT_EQ(next.code, MotionCode::ok) << next.message;
 }
 
 TEST_F(LinuxCncMachine, AnEmergencyStopDisarmsUntilThePanelIsReady) {
@@ -315,7 +317,8 @@ TEST_F(LinuxCncMachine, AnEmergencyStopDisarmsUntilThePanelIsReady) {
   EXPECT_FALSE(bridge_->state().armed);
   const Answer<ArmCode> again = bridge_->arm(true);
   ASSERT_EQ(again.code, ArmCode::ok) << again.message;
-  EXPECT_EQ(run("G90 G0 X0\n").code, MotionCode::ok);
+  const Outcome next = run("G90 G0 X0\n");
+  EXPECT_EQ(next.code, MotionCode::ok) << next.message;
 }
 
 TEST_F(LinuxCncMachine, WithoutItsGatewayTheMachineStops) {
@@ -333,7 +336,8 @@ TEST_F(LinuxCncMachine, WithoutItsGatewayTheMachineStops) {
   until([] { return false; }, 0.1);
   const Answer<ArmCode> again = bridge_->arm(true);
   ASSERT_EQ(again.code, ArmCode::ok) << again.message;
-  EXPECT_EQ(run("G90 G0 X0\n").code, MotionCode::ok);
+  const Outcome next = run("G90 G0 X0\n");
+  EXPECT_EQ(next.code, MotionCode::ok) << next.message;
 }
 
 TEST_F(LinuxCncMachine, WithoutItsBridgeTheMachineStops) {

@@ -60,7 +60,6 @@ Node::Node(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
   start_ = toSec(ros::Time::now());
   publishTruth();
   strike_server_ = nh_.advertiseService(names::STRIKE, &Node::strike, this);
-  offerPanel();
   shell_.diagnose("simulated machine", [this](auto& status) { diagnose(status); });
   thread_ = std::thread([this] { run(); });
 }
@@ -70,6 +69,7 @@ void Node::serve() {
   options.port = static_cast<std::uint16_t>(parameters_.port);
   options.bind_address = parameters_.bind;
   server_ = std::make_unique<focas::Server>(options, world_->controller());
+  offerPanel();
   angle_ = nh_.advertise<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE, STREAM_QUEUE);
   ROS_INFO("sim: controller listens on %s:%d", parameters_.bind.c_str(), server_->port());
 }

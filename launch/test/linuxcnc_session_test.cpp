@@ -1,0 +1,41 @@
+// A short session through a real LinuxCNC, headless, in namespaces of its own, which leads the twin's axes.
+// Skipped where it is not installed (./setup --with-linuxcnc) or where no such namespaces can be made.
+
+#include <unistd.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <regex>
+#include <string>
+
+#include <gtest/gtest.h>
+
+#include "launched.h"
+#include "smartmill_core/model/machine_model.h"
+#include "smartmill_core/testing/temporary_folder.h"
+
+namespace {
+
+using smartmill::TemporaryFolder;
+using namespace smartmill::testing;
+
+TEST(LinuxCncMachine, AShortSessionFindsTheTwinsCoefficients) {
+  if (::access("/usr/bin/linuxcnc", X_OK) != 0) GTEST_SKIP() << "LinuxCNC is not installed";
+  if (::geteuid() != 0) GTEST_SKIP() << "namespaces for a LinuxCNC of its own need root";
+  const TemporaryFolder folder;
+  setenv("ROS_HOSTNAME", "localhost", 1);
+  setenv("ROS_HOME", folder.file("ros_home").c_str(), 1);
+  const std::string machine = "/dev/shm/smartmill_session_" + std::to_string(::getpid());
+  const std::string summary = folder.file("session.json"), log = folder.file("log.txt");
+  run("roslaunch -p " + freePort() + " " SESSION " folder:=" + machine + " summary:=" + summary, log);
+  std::filesystem::remove_all(machine);
+  const std::string said = contentOf(summary);
+  ASSERT_NE(said.find("\"completed\": true"), std::string::npos) << contentOf(log);
+  std::smatch ktc;
+  ASSERT_TRUE(std::regex_search(said, ktc, std::regex("Ktc ([0-9.]+)"))) << said;
+  // N/mm2; three percent as for a whole session (docs/pipeline.md).
+  const double truth = 1e-6 * smartmill::readMachineModel("models/mill_twin.yaml").cutting->ktc;
+  EXPECT_NEAR(std::stod(ktc[1]), truth, 0.03 * truth);
+}
+
+}  // namespace
