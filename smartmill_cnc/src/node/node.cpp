@@ -81,7 +81,14 @@ CncNode::CncNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
   CuttingCondition none;
   none.stamp = ros::Time::now().toSec();
   condition_publisher_.publish(toMsg(none));
+  serveActions(nh);
+  arm_service_ = nh.advertiseService(names::ARM_MOTION, &CncNode::armMotion, this);
+  macro_service_ = nh.advertiseService(names::SET_MACRO, &CncNode::setMacro, this);
+  shell_.diagnose("controller", [this](auto& status) { diagnose(status); });
+  thread_ = std::thread([this] { run(); });
+}
 
+void CncNode::serveActions(ros::NodeHandle& nh) {
   run_program_ = serve<smartmill_msgs::RunProgramAction>(
       nh, names::RUN_PROGRAM,
       [this](const smartmill_msgs::RunProgramGoal& goal) -> std::optional<Outcome> {
@@ -121,11 +128,6 @@ CncNode::CncNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
         feedback.spindle_speed = bridge_.state().spindle_speed;
         return feedback;
       });
-
-  arm_service_ = nh.advertiseService(names::ARM_MOTION, &CncNode::armMotion, this);
-  macro_service_ = nh.advertiseService(names::SET_MACRO, &CncNode::setMacro, this);
-  shell_.diagnose("controller", [this](auto& status) { diagnose(status); });
-  thread_ = std::thread([this] { run(); });
 }
 
 CncNode::~CncNode() {

@@ -44,6 +44,7 @@ class CncNode {
     std::function<void()> feedback;
   };
 
+  void serveActions(ros::NodeHandle& nh);
   void run();
   void post(Job job);
   /// Runs in the bridge's thread; nothing when that takes longer than a caller should wait.

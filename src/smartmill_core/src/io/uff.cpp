@@ -110,6 +110,7 @@ Head readHead(Bytes& bytes) {
   std::replace(lines[6].begin(), lines[6].end(), 'D', 'E');
   const std::vector<double> form = numbersOf(lines[6]);
   if (form.size() < 5) bytes.fail("its seventh line is no form of data");
+  if (!(std::abs(form[0]) < 1e6)) bytes.fail("its seventh line tells no data type");
   head.data_type = static_cast<int>(form[0]);
   if (head.data_type != REAL_SINGLE && head.data_type != REAL_DOUBLE && !head.complex())
     bytes.fail("data type " + std::to_string(head.data_type) + " is not known");
@@ -166,6 +167,7 @@ UffFunction readBinary58(Bytes& bytes, const std::string& first) {
   if (form.size() < 4 || form[1] != 2.0) bytes.fail("its first line does not name IEEE numbers");
   Head head = readHead(bytes);
   const std::size_t size = head.isDouble() ? 8 : 4;
+  if (!(form[3] >= 0.0 && form[3] < 1e12)) bytes.fail("its first line tells no length");
   const auto length = static_cast<std::size_t>(form[3]);
   const char* data = bytes.take(length);
   const bool swap = form[0] == 2.0;

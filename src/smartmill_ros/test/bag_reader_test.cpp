@@ -1,0 +1,84 @@
+// Bags with damaged bytes: every one is read, or refused with a line that names the file; none takes memory
+// for a length that it does not have.
+#include "smartmill_ros/bag_reader.h"
+
+#include <gtest/gtest.h>
+#include <smartmill_msgs/CncState.h>
+#include <smartmill_msgs/SampleBlock.h>
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <random>
+#include <vector>
+
+#include "smartmill_core/names.h"
+#include "smartmill_ros/conversions.h"
+
+namespace smartmill {
+namespace {
+
+class DamagedBag : public ::testing::Test {
+ protected:
+  DamagedBag() : file_((std::filesystem::temp_directory_path() / "smartmill_damaged.bag").string()) {
+    rosbag::Bag bag(file_, rosbag::bagmode::Write);
+    smartmill_msgs::SampleBlock block;
+    block.sample_rate = 100.0;
+    block.channels = {"fx", "fy"};
+    block.units = {"N", "N"};
+    block.samples = {1.0, 2.0, 3.0, 4.0};
+    bag.write(names::absolute(names::DYNAMOMETER), ros::Time(1.0), block);
+    bag.write(names::absolute(names::CNC_STATE), ros::Time(2.0), smartmill_msgs::CncState());
+    bag.close();
+    std::ifstream in(file_, std::ios::binary);
+    bytes_.assign(std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>());
+  }
+  ~DamagedBag() override { std::filesystem::remove(file_); }
+
+  /// What a reader says of these bytes; empty: it reads them.
+  std::string fault(const std::vector<char>& bytes) const {
+    std::ofstream(file_, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    try {
+      BagReader reader(file_);
+      reader.on<smartmill_msgs::SampleBlock>(names::DYNAMOMETER, [](const auto& m, double) { fromMsg(m); });
+      reader.on<smartmill_msgs::CncState>(names::CNC_STATE, [](const auto& m, double) { fromMsg(m); });
+      reader.run();
+    } catch (const Error& e) {
+      return e.what();
+    }
+    return {};
+  }
+
+  std::string file_;
+  std::vector<char> bytes_;
+};
+
+TEST_F(DamagedBag, ALengthBeyondTheFileIsRefusedBeforeMemoryIsTaken) {
+  EXPECT_EQ(fault(bytes_), "");
+  std::vector<char> bytes = bytes_;
+  for (std::size_t i = 13; i < 17; ++i) {
+    bytes[i] = '\x7f';
+  }
+  EXPECT_EQ(fault(bytes), file_ + ": is no bag, or damaged: a record tells of 2139062143 bytes");
+}
+
+TEST_F(DamagedBag, AnyDamagedByteIsReadOrRefusedWithTheFilesName) {
+  std::mt19937 random(5);
+  int refused = 0;
+  for (int i = 0; i < 300; ++i) {
+    std::vector<char> bytes = bytes_;
+    for (unsigned k = 0; k < 1 + random() % 3; ++k) {
+      bytes[random() % bytes.size()] = static_cast<char>(random());
+    }
+    if (i % 5 == 0) {
+      bytes.resize(random() % bytes.size());
+    }
+    const std::string line = fault(bytes);
+    refused += line.empty() ? 0 : 1;
+    EXPECT_TRUE(line.empty() || line.find(file_) != std::string::npos) << line;
+  }
+  EXPECT_GT(refused, 50);
+}
+
+}  // namespace
+}  // namespace smartmill
