@@ -7,8 +7,10 @@
 #include <utility>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/modal/hit_judge.h"
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/units.h"
+#include "smartmill_hammer/analysis/hits_needed.h"
 #include "smartmill_hammer/analysis/offset_factor.h"
 
 namespace smartmill {
@@ -26,6 +28,7 @@ constexpr int MAX_BAD_AVERAGES = 3;
 constexpr double STOP_TIMEOUT = 10.0;
 /// Two tips of a fit band: share of the sensor's range that counts as its end.
 constexpr double RANGE_SHARE = 0.98;
+constexpr std::size_t LEAST_HITS = 3;
 
 int axisIndex(const std::string& name) {
   if (name.size() != 1) return -1;
@@ -545,13 +548,19 @@ void HammerSequence::recorded(double now, HitCollector::Record record) {
   HitFault fault{record.fault, true};
   if (fault.text.empty()) {
     fault = hitFault(record.hit, {parameters_.weak_force, parameters_.second_hit_share,
-                                  RANGE_SHARE * station_.range_volt});
+                                  RANGE_SHARE * station_.range_volt, parameters_.force_high});
   }
   if (!fault.text.empty()) return badHit(now, fault.text, fault.bad_data);
   hits_.push_back(std::move(record.hit));
+  const std::vector<HitFault> beside = faultsBeside(hits_, std::vector<bool>(hits_.size(), true));
+  for (std::size_t h = 0; h < hits_.size(); ++h) {
+    if (beside[h].text.empty()) continue;
+    hits_.erase(hits_.begin() + static_cast<std::ptrdiff_t>(h));
+    return badHit(now, beside[h].text, beside[h].bad_data);
+  }
   say("hit " + std::to_string(hits_.size()) + " of " + std::to_string(goal_.hits),
       0.7 + 0.25 * static_cast<double>(hits_.size()) / goal_.hits);
-  if (static_cast<int>(hits_.size()) >= goal_.hits) {
+  if (static_cast<int>(hits_.size()) >= goal_.hits || enough()) {
     evaluate();
     return retract(now);
   }
@@ -569,13 +578,30 @@ void HammerSequence::badHit(double now, const std::string& why, bool bad_data) {
   rest_until_ = now + parameters_.rest_time;
 }
 
-void HammerSequence::evaluate() {
+double HammerSequence::offsetCorrection() const {
+  return goal_.stickout > 0.0 ? offsetFactor(goal_.stickout, station_.offset) : 1.0;
+}
+
+// Three at least: of fewer none can be told to be odd.
+bool HammerSequence::enough() const {
+  if (!(parameters_.asked_std > 0.0) || hits_.size() < LEAST_HITS) return false;
+  ImpactAnalysis analysis(impactOptions());
+  for (const Hit& hit : hits_) analysis.add(hit);
+  return hitsNeeded(analysis.frf(), parameters_.fit_low, parameters_.fit_high, parameters_.asked_std)
+      .enough();
+}
+
+ImpactOptions HammerSequence::impactOptions() const {
   ImpactOptions options;
   options.exponential_time = parameters_.exponential_time;
   // The blow drives the tool away from the sensor: the voltage falls.
-  const double factor = goal_.stickout > 0.0 ? offsetFactor(goal_.stickout, station_.offset) : 1.0;
-  options.response_scale = -result_.sensitivity * factor;
+  options.response_scale = -result_.sensitivity * offsetCorrection();
   if (parameters_.straighten_sensor != 0) options.sensor_gain = station_.gain_volt;
+  return options;
+}
+
+void HammerSequence::evaluate() {
+  const ImpactOptions options = impactOptions();
   const double relative = result_.sensitivity_std / result_.sensitivity;
   result_.frf.stamp = result_.modes.stamp = hits_.back().stamp;
   result_.frf.tool = result_.modes.tool = goal_.tool;
@@ -606,9 +632,10 @@ void HammerSequence::evaluate() {
     result_.modes.model.direct_std =
         std::hypot(result_.modes.model.direct_std, relative * result_.modes.model.direct);
     analysis.removeWindowDamping(result_.modes.model);
-    result_.message = std::to_string(hits_.size()) + " hits, " +
-                      std::to_string(result_.modes.model.modes.size()) + " modes" +
-                      (goal_.stickout > 0.0 ? format(", offset correction %.3f", factor) : std::string());
+    result_.message =
+        std::to_string(hits_.size()) + " hits, " + std::to_string(result_.modes.model.modes.size()) +
+        " modes" +
+        (goal_.stickout > 0.0 ? format(", offset correction %.3f", offsetCorrection()) : std::string());
   } catch (const Error& error) {
     result_.code = FrfCode::fit_failed;
     result_.message = error.what();

@@ -1,4 +1,5 @@
 #include "smartmill_core/modal/impact_analysis.h"
+#include "smartmill_core/modal/hit_judge.h"
 
 #include <cmath>
 #include <random>
@@ -133,7 +134,7 @@ TEST(ImpactAnalysis, ExponentialWindowAddsKnownDamping) {
 
 TEST(HitFaults, AreNamed) {
   std::mt19937 random(4);
-  const HitLimits limits{20.0, 0.1, 1.0};
+  const HitJudgeOptions limits{20.0, 0.1, 1.0, 0.0};
   const Hit good = blow(oneMode(), 200.0, 0.2, random);
   EXPECT_EQ(hitFault(good, limits).text, "");
   EXPECT_NE(hitFault(blow(oneMode(), 10.0, 0.2, random), limits).text.find("weak"), std::string::npos);

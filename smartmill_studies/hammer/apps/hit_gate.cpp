@@ -22,12 +22,13 @@ struct Request {
 
 /// Word of a reason that names the class's fault.
 const std::map<HitClass, std::string> WORD = {
-    {HitClass::double_hit, "double"},    {HitClass::clipping, "clipped"},  {HitClass::dropout, "dropout"},
-    {HitClass::drift, "baseline"},       {HitClass::stuck, "stuck"},       {HitClass::late_bump, "late bump"},
-    {HitClass::weak, "weak"},            {HitClass::dull, "dull"},         {HitClass::trigger_skew, "skew"},
+    {HitClass::double_hit, "double"},  {HitClass::clipping, "clipped"}, {HitClass::dropout, "dropout"},
+    {HitClass::drift, "baseline"},     {HitClass::stuck, "stuck"},      {HitClass::late_bump, "late bump"},
+    {HitClass::weak, "weak"},          {HitClass::dull, "dull"},        {HitClass::trigger_skew, "skew"},
     {HitClass::gain_jump, "gain jump"}};
 
-/// Of a class: hits looked at, refused, refused by the class's own name, and clean ones beside that were refused.
+/// Of a class: hits looked at, refused, refused by the class's own name, and clean ones beside that were
+/// refused.
 struct Tally {
   int hits = 0, refused = 0, named = 0, beside = 0, beside_refused = 0;
 };
@@ -62,14 +63,15 @@ Tally count(HitClass kind, const Request& request) {
 
 int run(const Request& request) {
   bool good = true;
-  std::printf("%-20s %6s %9s %9s %7s  %s\n", "class", "hits", "accepted", "refused", "named", "clean beside it refused");
+  std::printf("%-20s %6s %9s %9s %7s  %s\n", "class", "hits", "accepted", "refused", "named",
+              "clean beside it refused");
   for (int k = 0; k < hammer::HIT_CLASSES; ++k) {
     const auto kind = static_cast<HitClass>(k);
     const bool clean = WORD.count(kind) == 0;
     const Tally t = count(kind, request);
     const double refused = 100.0 * t.refused / t.hits;
-    std::printf("%-20s %6d %7.1f %% %7.1f %% %5.1f %%", nameOf(kind).c_str(), t.hits, 100.0 - refused, refused,
-                100.0 * t.named / t.hits);
+    std::printf("%-20s %6d %7.1f %% %7.1f %% %5.1f %%", nameOf(kind).c_str(), t.hits, 100.0 - refused,
+                refused, 100.0 * t.named / t.hits);
     if (t.beside > 0) std::printf("  %d of %d", t.beside_refused, t.beside);
     std::printf("\n");
     std::fflush(stdout);

@@ -54,6 +54,8 @@ struct HammerParameters : HitTestParameters {
   double min_gap_share = 0.4;
   double max_approach = 1.0e-3;
   // Hits.
+  double force_high = 3000.0;
+  double asked_std = 0.0;
   double exponential_time = 0.0;
   int straighten_sensor = 1;
 
@@ -177,6 +179,9 @@ class HammerSequence {
   void search(double now);
   void recorded(double now, HitCollector::Record record);
   void badHit(double now, const std::string& why, bool bad_data);
+  bool enough() const;
+  double offsetCorrection() const;
+  ImpactOptions impactOptions() const;
   void evaluate();
 
   void abort(double now, FrfCode code, const std::string& why);
