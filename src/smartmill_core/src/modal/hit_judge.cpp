@@ -27,7 +27,7 @@ constexpr double CLEAR_HIT = 10.0;
 constexpr double ABOVE_NOISE = 8.0;
 /// A second hit comes no sooner [s].
 constexpr double SOONEST_SECOND = 0.4e-3;
-constexpr std::size_t CLIPPED = 3, STUCK_RUN = 8;
+constexpr std::size_t CLIPPED = 3, STUCK_RUN = 8, CROWD = 8, CROWDED = 3;
 constexpr double FLAT = 3.0;
 /// Width of the bands in which samples at the top are counted: in noise, and of the largest.
 constexpr double ROUND = 1.35, SHARP = 2.5, VERY_SHARP = 6.0;
@@ -132,6 +132,21 @@ bool cornered(const Channel& c, double sign) {
   return true;
 }
 
+/// Many crests that end at one height: a crest alone has no more than 1.4 times as many samples in a band at
+/// its top as in the two below it.
+bool crowded(const Channel& c, double sign) {
+  const double width = std::max(FLAT_NOISE * c.noise, FLAT_SHARE * c.largest);
+  double top = 0.0;
+  for (const double v : c.values) top = std::max(top, sign * v);
+  std::size_t first = 0, next = 0;
+  for (const double v : c.values) {
+    const double depth = top - sign * v;
+    first += depth < width;
+    next += depth >= width && depth < 3.0 * width;
+  }
+  return top > 0.2 * c.largest && first >= CROWD && first >= CROWDED * next;
+}
+
 /// Samples that share the largest value, the crests they stand on, and others near it.
 struct Top {
   std::size_t equal = 0, below = 0, crests = 0;
@@ -172,7 +187,8 @@ bool clipped(const Channel& c, bool both_ways) {
         (top.crests >= 2 && top.equal >= top.below))
       return true;
   }
-  return (up.equal >= 2 && down.equal >= 2) || cornered(c, 1.0) || (both_ways && cornered(c, -1.0));
+  if ((up.equal >= 2 && down.equal >= 2) || cornered(c, 1.0)) return true;
+  return both_ways && (cornered(c, -1.0) || crowded(c, 1.0) || crowded(c, -1.0));
 }
 
 /// A rise of the force after it had fallen from the main peak, or before it.

@@ -21,7 +21,10 @@ struct ModalLines {
   double low = 0.0, high = 0.0;  // [Hz]
 
   std::size_t lines() const { return frequency.size(); }
-  int parameters(int modes) const { return 3 * modes + (direct ? 1 : 0); }
+  int parameters(int modes) const { return 3 * modes + (direct ? 2 : 0); }
+  int linear(int modes) const { return modes + (direct ? 1 : 0); }  // of the parameters
+  /// What a share that is even far below `pole` [Hz] makes at f [Hz]: modes above the band bend upwards inside it.
+  static double bent(double f, double pole) { return 1.0 / (1.0 - f * f / (pole * pole)); }
   double reference() const;
 };
 
@@ -30,7 +33,7 @@ struct ModalLines {
 std::vector<double> smoothedDeviation(const std::vector<double>& deviation);
 
 /// Weighted (fit - measured), real and imaginary part line by line, over log f0, log zeta, gain / scale of
-/// each mode, then direct / scale.
+/// each mode, then direct / scale and the logarithm of the one frequency that stands for all modes above.
 class ModalResiduals : public fit::Residuals {
  public:
   /// The lines must outlive this.
