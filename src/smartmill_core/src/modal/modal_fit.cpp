@@ -21,8 +21,8 @@ constexpr double MIN_DAMPING = 1e-6;
 constexpr double MAX_DAMPING = 0.5;
 // A gain below this share of the tallest line is none.
 constexpr double LEAST_GAIN = 1e-6;
-// Where the modes above the band may stand together, over the last line's frequency.
-constexpr double NEAREST_ABOVE = 1.03, START_ABOVE = 2.0, FARTHEST_ABOVE = 30.0;
+// The modes above the band stand together no nearer than some percent above the last line.
+constexpr double MOST_BENT = 0.94;
 // A deviation that the lines do not tell is stated as this many times the value.
 constexpr double NOT_TOLD = 10.0;
 
@@ -53,7 +53,7 @@ void solveLinear(const ModalLines& problem, Solution& solution) {
       set(column++, problem.scale * (problem.unit_static_gain ? h - 1.0 : h));
     }
     if (problem.direct)
-      set(column, problem.scale * ModalLines::bent(problem.frequency[i], std::exp(solution.parameters.back())));
+      set(column, problem.scale * problem.bent(problem.frequency[i], solution.parameters.back()));
     const Complex due = problem.value[i] - (problem.unit_static_gain ? 1.0 : 0.0);
     b(row) = w * due.real();
     b(row + 1) = w * due.imag();
@@ -83,8 +83,9 @@ void solve(const ModalLines& problem, Solution& solution) {
     }
   }
   if (problem.direct) {
-    parameters.back().low = std::log(NEAREST_ABOVE * problem.frequency.back());
-    parameters.back().high = std::log(FARTHEST_ABOVE * problem.frequency.back());
+    parameters.back().low = 0.0;
+    parameters.back().high = MOST_BENT;
+    parameters.back().scale = 0.1;
   }
   fit::Options options;
   options.name = "modal fit";
@@ -153,7 +154,6 @@ Solution fitTogether(const ModalLines& problem, const std::vector<EstimatedMode>
     solution.parameters.insert(solution.parameters.end(),
                                {std::log(m.frequency), std::log(m.damping_ratio), 0.0});
   solution.parameters.resize(static_cast<std::size_t>(problem.parameters(solution.modes)), 0.0);
-  if (problem.direct) solution.parameters.back() = std::log(START_ABOVE * problem.frequency.back());
   solve(problem, solution);
   for (int k = solution.modes - 1; problem.positive && !fixed && k >= 0 && solution.modes > 1; --k) {
     if (solution.parameters[static_cast<std::size_t>(3 * k + 2)] > LEAST_GAIN) continue;

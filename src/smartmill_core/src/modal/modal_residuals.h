@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <complex>
 #include <vector>
 
@@ -23,8 +24,9 @@ struct ModalLines {
   std::size_t lines() const { return frequency.size(); }
   int parameters(int modes) const { return 3 * modes + (direct ? 2 : 0); }
   int linear(int modes) const { return modes + (direct ? 1 : 0); }  // of the parameters
-  /// What a share that is even far below `pole` [Hz] makes at f [Hz]: modes above the band bend upwards inside it.
-  static double bent(double f, double pole) { return 1.0 / (1.0 - f * f / (pole * pole)); }
+  /// What an even share makes at f [Hz] where modes above the band bend it: as one mode whose frequency is
+  /// the last line's over the root of `bend`; 0: not bent.
+  double bent(double f, double bend) const { return 1.0 / (1.0 - bend * std::pow(f / frequency.back(), 2)); }
   double reference() const;
 };
 
@@ -33,7 +35,7 @@ struct ModalLines {
 std::vector<double> smoothedDeviation(const std::vector<double>& deviation);
 
 /// Weighted (fit - measured), real and imaginary part line by line, over log f0, log zeta, gain / scale of
-/// each mode, then direct / scale and the logarithm of the one frequency that stands for all modes above.
+/// each mode, then direct / scale and its bend.
 class ModalResiduals : public fit::Residuals {
  public:
   /// The lines must outlive this.
