@@ -71,7 +71,8 @@ bool retracted(const ClosedFormMachine& machine) {
   return machine.position[2] > 0.05 + 0.049;
 }
 
-// An asked uncertainty that three hits reach ends the measurement there; one that none reach takes the goal's hits.
+// An asked uncertainty that three hits reach ends the measurement there; one that none reach takes the goal's
+// hits.
 TEST(HammerSequence, StrikesAsOftenAsTheAskedUncertaintyNeeds) {
   for (const double asked : {0.5, 1e-6}) {
     ClosedFormMachine machine(1);
