@@ -16,7 +16,9 @@
 #include "smartmill_core/units.h"
 #include "smartmill_hammer/analysis/frf_files.h"
 #include "smartmill_hammer/analysis/frf_pictures.h"
+#include "smartmill_hammer/analysis/hits_needed.h"
 #include "smartmill_hammer/analysis/tap_records.h"
+#include "smartmill_hammer/analysis/tip_correction.h"
 #include "smartmill_ros/parameter_options.h"
 
 namespace smartmill {
@@ -26,6 +28,13 @@ namespace {
 /// FRFs drawn of many.
 constexpr std::size_t MOST_PICTURES = 12;
 
+/// Struck above the tip: the tool between, for the direct FRF there. [mm], and a standard deviation of each.
+struct TipOptions {
+  double stickout = 0.0, stickout_std = 0.5, diameter = 0.0, fluted = 0.0, fluted_std = 1.0;
+  double flute_ratio = 0.8, flute_ratio_std = 0.03, struck = 15.0, read = 0.0;
+  std::string material = "carbide";
+};
+
 struct Options {
   std::vector<std::string> inputs;
   std::string out = "frf", format = "auto", model, average = "h1";
@@ -34,6 +43,7 @@ struct Options {
   double low = 0.0, high = 0.0, weak_force = 0.0;
   int modes = 0, max_modes = 100;
   bool real_modes = false, binary = false, no_picture = false;
+  TipOptions tip;
 };
 
 const std::map<std::string, TapFormat> FORMATS = {
@@ -71,6 +81,17 @@ void printEstimate(const ModalEstimate& estimate, bool receptance) {
   if (estimate.doubts.empty()) return;
   std::printf("doubts, seen but not proven:\n");
   printModes(estimate.doubts, receptance);
+}
+
+/// How well the average is known over the asked band, and how many hits would have been enough.
+void printUncertainty(const Options& options, const FrequencyResponse& frf) {
+  const double high = options.high > 0.0 ? options.high : frf.frequency.back();
+  const double asked = options.parameters.measurement.asked_std;
+  const HitsNeeded needed = hitsNeeded(frf, options.low, high, asked > 0.0 ? asked : 1.0);
+  std::printf("relative standard deviation over %.0f..%.0f Hz: %.2f %% by %d hits", options.low, high,
+              100.0 * needed.relative_std, needed.hits);
+  if (asked > 0.0) std::printf("; for %.2f %% %d are enough", 100.0 * asked, needed.needed);
+  std::printf("\n");
 }
 
 /// @param suffix of a measurement among several
@@ -119,6 +140,7 @@ std::vector<NamedFrf> readFrfs(const Options& options, const std::vector<TapForm
     for (const TapVerdict& v : verdicts)
       std::printf("%s: %s\n", v.file.c_str(), v.accepted() ? "accepted" : ("refused: " + v.reason).c_str());
     const int hits = frf.receptance.averages;
+    if (hits > 0) printUncertainty(options, frf.receptance);
     if (hits > 0) frfs.push_back({std::to_string(hits) + (hits == 1 ? " hit" : " hits"), frf.receptance});
     if (!options.no_picture) drawHits(taps, verdicts, options.out + "/hits.png");
   }
@@ -138,6 +160,42 @@ void keep(ModalEstimate& estimate, std::size_t count) {
   estimate.doubts.assign(end, all.end());
   std::sort(estimate.modes.begin(), estimate.modes.end(),
             [](const EstimatedMode& a, const EstimatedMode& b) { return a.frequency < b.frequency; });
+}
+
+ToolBeam beamOf(const TipOptions& tip) {
+  const bool carbide = tip.material == "carbide";
+  ToolBeam tool;
+  tool.stickout = {tip.stickout * units::MM, tip.stickout_std * units::MM};
+  tool.diameter = {tip.diameter * units::MM, 0.02 * units::MM};
+  tool.fluted_length = {tip.fluted * units::MM, tip.fluted_std * units::MM};
+  tool.flute_ratio = {tip.flute_ratio, tip.flute_ratio_std};
+  tool.young = carbide ? Known{5.8e11, 1.5e10} : Known{2.1e11, 5e9};
+  tool.density = carbide ? Known{14300.0, 200.0} : Known{7850.0, 50.0};
+  return tool;
+}
+
+/// The direct FRF at the tip beside the measured one: frf_tip.csv, modes_tip.yaml.
+void writeTip(const Options& options, const FrequencyResponse& frf, const ModalEstimate& estimate) {
+  OffsetMeasurement at{options.tip.struck * units::MM, options.tip.read * units::MM, {}};
+  for (const EstimatedMode& m : estimate.modes) {
+    const Gain gain = gainOf(m, 0);
+    at.modes.modes.push_back(
+        {m.frequency, m.damping_ratio, gain.value, m.frequency_std, m.damping_ratio_std, gain.std});
+  }
+  at.modes.direct = estimate.flanks.front().upper.real();
+  const double high = options.high > 0.0 ? options.high : std::min(5000.0, frf.frequency.back());
+  const TipCorrection tip = correctToTip({at}, beamOf(options.tip), {}, high);
+  std::printf("at the tip (struck %.1f mm above it, read %.1f mm):\n", options.tip.struck, options.tip.read);
+  for (const TipMode& m : tip.modes) {
+    std::printf("  %9.2f Hz  %-26s ", m.direct.frequency,
+                pm("%.4g +- %.2g N/um", 1.0 / m.direct.gain / units::N_PER_UM,
+                   m.direct.gain_std / std::pow(m.direct.gain, 2) / units::N_PER_UM)
+                    .c_str());
+    std::printf("%s\n", m.seen ? pm("gain x %.3f +- %.3f", m.factor, m.factor_std).c_str()
+                               : "told by the beam alone");
+  }
+  writeFrfCsv(tipResponse(frf, tip), options.out + "/frf_tip.csv");
+  writeModesYaml(estimateOf(tip.model()), frf.unit, {"tool tip"}, options.out + "/modes_tip.yaml");
 }
 
 void runFiles(const Options& options, const std::vector<TapFormat>& formats) {
@@ -166,6 +224,10 @@ void runFiles(const Options& options, const std::vector<TapFormat>& formats) {
   }
   printEstimate(estimate, receptance);
   write(options, "", frfs, estimate);
+  if (options.tip.stickout > 0.0) {
+    if (!receptance || frfs.size() > 1) throw Error("--stickout-mm: one receptance is due");
+    writeTip(options, frfs.front().frf, estimate);
+  }
 }
 
 void runBag(const Options& options) {
@@ -248,12 +310,30 @@ int main(int argc, char** argv) {
   line.option("--force-channel", o.channels.force,
               "column or channel of the hammer, where it is not named so");
   line.option("--response-channel", o.channels.response, "column or channel of the response");
+  line.option("--stickout-mm", o.tip.stickout,
+              "tool out of the holder: the direct FRF at the tip, of one struck above it")
+      .notNegative();
+  line.option("--stickout-std-mm", o.tip.stickout_std, "standard deviation").notNegative().showDefault();
+  line.option("--diameter-mm", o.tip.diameter, "of the shank").notNegative();
+  line.option("--fluted-mm", o.tip.fluted, "fluted length from the tip").notNegative();
+  line.option("--fluted-std-mm", o.tip.fluted_std, "standard deviation").notNegative().showDefault();
+  line.option("--flute-ratio", o.tip.flute_ratio,
+              "diameter of a round bar as stiff as the fluted part, over the shank's")
+      .within(0.1, 1.0)
+      .showDefault();
+  line.option("--flute-ratio-std", o.tip.flute_ratio_std, "standard deviation").notNegative().showDefault();
+  line.option("--material", o.tip.material, "of the tool: carbide or steel")
+      .oneOf({"carbide", "steel"})
+      .showDefault();
+  line.option("--struck-mm", o.tip.struck, "above the tip").notNegative().showDefault();
+  line.option("--read-mm", o.tip.read, "above the tip").notNegative().showDefault();
   line.flag("--binary", o.binary, "frf.uff with binary values (58b)");
   line.option("--model", o.model, "machine model (bags)");
   const smartmill::ParameterTable table = smartmill::tableOf(o.parameters);
   smartmill::ParameterOptions parameters(line, table, "launch/config/hammer.yaml");
   parameters.add("--second-hit-share", "second_hit_share");
   parameters.add("--exponential-time", "exponential_time");
+  parameters.add("--asked-std", "asked_std");
   line.flag("--no-picture", o.no_picture, "no PNG");
   return runProgram(line, argc, argv, [&] {
     parameters.apply();

@@ -1,6 +1,7 @@
 #include "plant/beam.h"
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
 
 #include "smartmill_core/math/linear_algebra.h"
@@ -26,13 +27,25 @@ void addElement(double length, double bending, double mass_per_length, int at, E
 
 }  // namespace
 
-std::vector<PointMode> tipModes(const ToolInSpindle& t, double below) {
-  const int size = 2 * (ELEMENTS + 1);
+namespace {
+
+constexpr int SIZE = 2 * (ELEMENTS + 1);
+
+/// Squares of the angular frequencies, and shapes normalised to the mass.
+struct Shapes {
+  Eigen::VectorXd squares;
+  Eigen::MatrixXd shapes;
+};
+
+Shapes shapesOf(const ToolInSpindle& t) {
+  const int size = SIZE;
   Eigen::MatrixXd mass = Eigen::MatrixXd::Zero(size, size), stiffness = mass;
   mass(0, 0) = t.spindle_mass;
-  mass(1, 1) = t.spindle_inertia;
+  mass(0, 1) = mass(1, 0) = -t.spindle_mass * t.mass_behind;
+  mass(1, 1) = t.spindle_inertia + t.spindle_mass * t.mass_behind * t.mass_behind;
   stiffness(0, 0) = t.stiffness_across;
-  stiffness(1, 1) = t.stiffness_tilting;
+  stiffness(0, 1) = stiffness(1, 0) = -t.stiffness_across * t.spring_behind;
+  stiffness(1, 1) = t.stiffness_tilting + t.stiffness_across * t.spring_behind * t.spring_behind;
   const double length = t.stickout / ELEMENTS;
   for (int e = 0; e < ELEMENTS; ++e) {
     const double middle = (e + 0.5) * length;
@@ -46,12 +59,37 @@ std::vector<PointMode> tipModes(const ToolInSpindle& t, double below) {
       of_mass.vectors * of_mass.values.cwiseSqrt().cwiseInverse().asDiagonal();  // root' M root = 1
   const linear::SymmetricEigensystem modes =
       linear::symmetricEigensystem(root.transpose() * stiffness * root);
+  return {modes.values, root * modes.vectors};
+}
+
+/// Deflection of every mode at a height above the tip, by the element's cubics.
+Eigen::VectorXd deflections(const Shapes& modes, const ToolInSpindle& t, double height) {
+  const double l = t.stickout / ELEMENTS, x = t.stickout - height;
+  const int e = std::min(ELEMENTS - 1, static_cast<int>(x / l));
+  const double u = x / l - e;
+  return (1.0 - 3.0 * u * u + 2.0 * u * u * u) * modes.shapes.row(2 * e).transpose() +
+         l * (u - 2.0 * u * u + u * u * u) * modes.shapes.row(2 * e + 1).transpose() +
+         (3.0 * u * u - 2.0 * u * u * u) * modes.shapes.row(2 * e + 2).transpose() +
+         l * (u * u * u - u * u) * modes.shapes.row(2 * e + 3).transpose();
+}
+
+}  // namespace
+
+std::vector<PointMode> tipModes(const ToolInSpindle& tool, double below) {
   std::vector<PointMode> found;
-  for (Eigen::Index m = 0; m < modes.values.size(); ++m) {
-    const double square = modes.values[m], frequency = std::sqrt(square) / units::TWO_PI;
+  for (const CrossMode& m : crossModes(tool, 0.0, 0.0, below))
+    found.push_back({m.frequency, tool.damping_ratio, m.gain});
+  return found;
+}
+
+std::vector<CrossMode> crossModes(const ToolInSpindle& tool, double struck, double read, double below) {
+  const Shapes modes = shapesOf(tool);
+  const Eigen::VectorXd a = deflections(modes, tool, struck), b = deflections(modes, tool, read);
+  std::vector<CrossMode> found;
+  for (Eigen::Index m = 0; m < modes.squares.size(); ++m) {
+    const double square = modes.squares[m], frequency = std::sqrt(square) / units::TWO_PI;
     if (frequency > below) break;
-    const double at_tip = (root * modes.vectors.col(m))[size - 2];
-    found.push_back({frequency, t.damping_ratio, at_tip * at_tip / square});
+    found.push_back({frequency, a[m] * b[m] / square});
   }
   return found;
 }

@@ -11,6 +11,12 @@ struct PointMode {
   double compliance = 0.0;     ///< [m/N] share of the static compliance at that point
 };
 
+/// The same as seen at one point while it is struck at another.
+struct CrossMode {
+  double frequency = 0.0;  ///< [Hz] undamped
+  double gain = 0.0;       ///< [m/N] share of the static compliance between both points
+};
+
 /// An end mill as a round beam (Euler and Bernoulli) that stands in a spindle: a rigid body on a spring
 /// across and one against tilting.
 struct ToolInSpindle {
@@ -25,9 +31,13 @@ struct ToolInSpindle {
   double stiffness_across = 0.0;   ///< [N/m]
   double stiffness_tilting = 0.0;  ///< [N m/rad]
   double damping_ratio = 0.0;      ///< [1] of every mode
+  double mass_behind = 0.0;        ///< [m] the spindle's centre of mass behind the tool's seat
+  double spring_behind = 0.0;      ///< [m] the spring across behind the tool's seat
 };
 
 /// Modes at the tool's tip below a frequency [Hz], lowest first; twelve elements along the stick-out.
 std::vector<PointMode> tipModes(const ToolInSpindle& tool, double below);
+/// The same struck and read at heights above the tip [m].
+std::vector<CrossMode> crossModes(const ToolInSpindle& tool, double struck, double read, double below);
 
 }  // namespace smartmill::plant

@@ -381,23 +381,20 @@ TapFrf averageTaps(const std::vector<TapRecord>& taps, const TapFrfOptions& opti
   if (taps.empty()) throw Error("no hit was given");
   TapFrf result;
   std::vector<Hit> hits;
-  std::vector<bool> usable;
   for (const TapRecord& tap : taps) {
     if (tap.kind != taps.front().kind) {
       throw Error(tap.file + ": " + NAME[index(tap.kind)] + ", but " + taps.front().file + " holds " +
                   NAME[index(taps.front().kind)]);
     }
-    result.hits.push_back({tap.file, hitReason(tap.hit, options.judge)});
     hits.push_back(tap.hit);
-    usable.push_back(result.hits.back().accepted());
   }
-  const std::vector<std::string> beside = reasonsBeside(hits, usable);
+  const std::vector<HitFault> faults = judgeHits(hits, options.judge);
   ImpactOptions impact;
   impact.exponential_time = options.exponential_time;
   impact.unit = UNIT[index(taps.front().kind)];
   ImpactAnalysis analysis(impact);
   for (std::size_t i = 0; i < taps.size(); ++i) {
-    if (usable[i]) result.hits[i].reason = beside[i];
+    result.hits.push_back({taps[i].file, faults[i].text});
     if (!result.hits[i].accepted()) continue;
     try {
       analysis.add(hits[i]);

@@ -6,6 +6,7 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/names.h"
+#include "smartmill_hammer/analysis/health.h"
 #include "smartmill_ros/node_main.h"
 #include "smartmill_ros/parameter_reader.h"
 #include "smartmill_ros/run_node.h"
@@ -53,6 +54,12 @@ HammerServer::HammerServer(ros::NodeHandle nh, ros::NodeHandle private_nh)
 }
 
 void HammerServer::finish(const MeasureFrfResult& result) {
+  if (result.code == FrfCode::ok) {
+    const std::string key = result.modes.tool + " " + result.modes.direction;
+    if (const auto before = last_good_.find(key); before != last_good_.end())
+      drift_ = driftOf(modeChanges(before->second, result.modes));
+    last_good_[key] = result.modes;
+  }
   server_.finish({result.code, result.message, result.frf, result.modes, result.cross, result.sensitivity,
                   result.sensitivity_std, result.flute_sure, result.spindle_moves});
 }
@@ -77,6 +84,7 @@ void HammerServer::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status)
   status.summary(Level::OK, sorted_.measuring() ? "measuring" : "ready");
   if (const InputHealth* dead = shell_.inputs().dead({names::HAMMER, names::CNC_STATE, names::SPINDLE_ANGLE}))
     status.mergeSummary(Level::WARN, dead->topic() + " is silent");
+  if (!drift_.empty()) status.mergeSummary(Level::WARN, "differs from the last good measurement: " + drift_);
   status.add("late messages", sorted_.late());
   status.add("waiting for", sorted_.waitingFor());
   status.add("last measurement", server_.lastMessage());

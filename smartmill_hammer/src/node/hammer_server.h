@@ -1,6 +1,8 @@
 #pragma once
 
+#include <map>
 #include <optional>
+#include <string>
 
 #include <ros/node_handle.h>
 
@@ -31,6 +33,8 @@ class HammerServer {
   std::optional<MachineCommands> machine_;  // none in a replay
   SortedSequence sorted_;
   FrfServer server_;
+  std::map<std::string, MeasuredModes> last_good_;  // by tool and direction
+  std::string drift_;  // of the newest measurement against the one before; empty: none
 };
 
 }  // namespace hammer

@@ -81,6 +81,12 @@ void HammerParameters::declare(ParameterTable& table) {
   declareCalibration(*this, table);
   table.section("Hits.");
   declareHits(table);
+  table.number("force_high", force_high, "Hz", Range::notNegative(),
+               "the blow must have power up to here, a dull one is repeated; 0: not asked");
+  table.number(
+      "asked_std", asked_std, "1", Range::notNegative(),
+      "of the FRF over the fit's band, relative: fewer hits than the goal's when they reach it, three at "
+      "least; 0: as many as the goal says");
   table.number("exponential_time", exponential_time, "s", Range::notNegative(),
                "time constant of an exponential window; 0: none");
   table.number("straighten_sensor", straighten_sensor, "1", Range::closed(0, 1),

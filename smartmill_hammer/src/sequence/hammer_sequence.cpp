@@ -8,8 +8,10 @@
 #include <utility>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/modal/hit_judge.h"
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/units.h"
+#include "smartmill_hammer/analysis/hits_needed.h"
 #include "smartmill_hammer/analysis/offset_factor.h"
 
 namespace smartmill {
@@ -35,6 +37,7 @@ constexpr double TRUSTED_DEPTH = 1.0;
 constexpr int FACE_STEPS = 24;
 /// Two tips of a fit band: share of the sensor's range that counts as its end.
 constexpr double RANGE_SHARE = 0.98;
+constexpr std::size_t LEAST_HITS = 3;
 
 int axisIndex(const std::string& name) {
   if (name.size() != 1) return -1;
@@ -690,7 +693,9 @@ void HammerSequence::sensorKnown(double now) {
   calibration_.reset();
   say(format("sensor calibrated: %.3f +- %.3f um/V", 1e6 * sensor.sensitivity, 1e6 * sensor.sensitivity_std) +
           (held_back ? format(" at %.2f V, held back by the tool's edges", sensor.volt) : std::string()),
-      stage_ == Stage::calibrate ? 0.62 : stage_ == Stage::calibrate_cross ? 0.66 : 0.7);
+      stage_ == Stage::calibrate         ? 0.62
+      : stage_ == Stage::calibrate_cross ? 0.66
+                                         : 0.7);
   if (stage_ == Stage::calibrate && has_cross_) {
     stage_ = Stage::calibrate_cross;
     return average(now + parameters_.settle_time);
@@ -745,14 +750,21 @@ void HammerSequence::recorded(double now, HitCollector::Record record,
   if (fault.text.empty() && cross) fault.text = cross->fault;
   if (fault.text.empty()) {
     fault = hitFault(record.hit, {parameters_.weak_force, parameters_.second_hit_share,
-                                  RANGE_SHARE * station_.range_volt});
+                                  RANGE_SHARE * station_.range_volt, parameters_.force_high});
   }
   if (!fault.text.empty()) return badHit(now, fault.text, fault.bad_data);
   hits_.push_back(std::move(record.hit));
   if (cross) cross_hits_.push_back(std::move(cross->hit));
+  const std::vector<HitFault> beside = faultsBeside(hits_, std::vector<bool>(hits_.size(), true));
+  for (std::size_t h = 0; h < hits_.size(); ++h) {
+    if (beside[h].text.empty()) continue;
+    hits_.erase(hits_.begin() + static_cast<std::ptrdiff_t>(h));
+    if (h < cross_hits_.size()) cross_hits_.erase(cross_hits_.begin() + static_cast<std::ptrdiff_t>(h));
+    return badHit(now, beside[h].text, beside[h].bad_data);
+  }
   say("hit " + std::to_string(hits_.size()) + " of " + std::to_string(goal_.hits),
       0.7 + 0.25 * static_cast<double>(hits_.size()) / goal_.hits);
-  if (static_cast<int>(hits_.size()) >= goal_.hits) {
+  if (static_cast<int>(hits_.size()) >= goal_.hits || enough()) {
     evaluate();
     return retract(now);
   }
@@ -770,11 +782,24 @@ void HammerSequence::badHit(double now, const std::string& why, bool bad_data) {
   rest_until_ = now + parameters_.rest_time;
 }
 
-ImpactOptions HammerSequence::impactOptions(const SensorState& sensor, double factor) const {
+double HammerSequence::offsetCorrection() const {
+  return goal_.stickout > 0.0 ? offsetFactor(goal_.stickout, station_.offset) : 1.0;
+}
+
+// Three at least: of fewer none can be told to be odd.
+bool HammerSequence::enough() const {
+  if (!(parameters_.asked_std > 0.0) || hits_.size() < LEAST_HITS) return false;
+  ImpactAnalysis analysis(impactOptions(sensor_));
+  for (const Hit& hit : hits_) analysis.add(hit);
+  return hitsNeeded(analysis.frf(), parameters_.fit_low, parameters_.fit_high, parameters_.asked_std)
+      .enough();
+}
+
+ImpactOptions HammerSequence::impactOptions(const SensorState& sensor) const {
   ImpactOptions options;
   options.exponential_time = parameters_.exponential_time;
   // The blow drives the tool away from the sensor: the voltage falls. Across, the blow's sense is turned too.
-  options.response_scale = -sensor.sensitivity * factor;
+  options.response_scale = -sensor.sensitivity * offsetCorrection();
   if (parameters_.straighten_sensor == 0) return options;
   options.sensor_gain = std::isfinite(sensor.bend_gap) ? sensor.bend_gap / sensor.sensitivity - sensor.volt
                                                        : station_.gain_volt;
@@ -782,9 +807,9 @@ ImpactOptions HammerSequence::impactOptions(const SensorState& sensor, double fa
 }
 
 /// Struck along the goal's direction, read across it.
-void HammerSequence::evaluateCross(double factor) {
+void HammerSequence::evaluateCross() {
   if (cross_hits_.size() != hits_.size() || !std::isfinite(cross_sensor_.sensitivity)) return;
-  ImpactAnalysis analysis(impactOptions(cross_sensor_, factor));
+  ImpactAnalysis analysis(impactOptions(cross_sensor_));
   for (const Hit& hit : cross_hits_) analysis.add(hit);
   const double relative = cross_sensor_.sensitivity_std / cross_sensor_.sensitivity;
   MeasuredFrf& cross = result_.cross;
@@ -798,8 +823,7 @@ void HammerSequence::evaluateCross(double factor) {
 }
 
 void HammerSequence::evaluate() {
-  const double factor = goal_.stickout > 0.0 ? offsetFactor(goal_.stickout, station_.offset) : 1.0;
-  const ImpactOptions options = impactOptions(sensor_, factor);
+  const ImpactOptions options = impactOptions(sensor_);
   const double relative = result_.sensitivity_std / result_.sensitivity;
   result_.frf.stamp = result_.modes.stamp = hits_.back().stamp;
   result_.frf.tool = result_.modes.tool = goal_.tool;
@@ -830,11 +854,12 @@ void HammerSequence::evaluate() {
     result_.modes.model.direct_std =
         std::hypot(result_.modes.model.direct_std, relative * result_.modes.model.direct);
     analysis.removeWindowDamping(result_.modes.model);
-    evaluateCross(factor);
-    result_.message = std::to_string(hits_.size()) + " hits, " +
-                      std::to_string(result_.modes.model.modes.size()) + " modes" +
-                      (goal_.stickout > 0.0 ? format(", offset correction %.3f", factor) : std::string()) +
-                      (no_cross_.empty() ? std::string() : ", no cross FRF: " + no_cross_);
+    evaluateCross();
+    result_.message =
+        std::to_string(hits_.size()) + " hits, " + std::to_string(result_.modes.model.modes.size()) +
+        " modes" +
+        (goal_.stickout > 0.0 ? format(", offset correction %.3f", offsetCorrection()) : std::string()) +
+        (no_cross_.empty() ? std::string() : ", no cross FRF: " + no_cross_);
   } catch (const Error& error) {
     result_.code = FrfCode::fit_failed;
     result_.message = error.what();

@@ -1,4 +1,5 @@
 #include "smartmill_core/modal/impact_analysis.h"
+#include "smartmill_core/modal/hit_judge.h"
 
 #include <cmath>
 #include <random>
@@ -9,6 +10,7 @@
 #include "smartmill_core/modal/modal_filter.h"
 #include "smartmill_core/signal/hit_collector.h"
 #include "smartmill_core/units.h"
+#include "smartmill_hammer/analysis/hits_needed.h"
 #include "smartmill_hammer/analysis/offset_factor.h"
 
 namespace smartmill {
@@ -101,6 +103,41 @@ TEST(ImpactAnalysis, StandardDeviationIsHonest) {
   }
 }
 
+// As many hits as asked, and no more: the error that is then seen, against the noise-free blow, is the one
+// asked for.
+TEST(HitsNeeded, ReachTheAskedUncertainty) {
+  std::mt19937 unused(1);
+  ImpactAnalysis clean{ImpactOptions()};
+  clean.add(blow(oneMode(), 200.0, 0.0, unused));
+  const FrequencyResponse exact = clean.frf();
+  const double low = 200.0, high = 2000.0, asked = 0.01;
+  double squares = 0.0, hits = 0.0;
+  constexpr int RUNS = 20;
+  for (std::uint32_t run = 0; run < RUNS; ++run) {
+    std::mt19937 random(900u + run);
+    ImpactAnalysis analysis{ImpactOptions()};
+    HitsNeeded needed;
+    while (analysis.hits() < 3 || !needed.enough()) {
+      ASSERT_LT(analysis.hits(), 60);
+      analysis.add(blow(oneMode(), 200.0, 3.0, random));
+      if (analysis.hits() > 1) needed = hitsNeeded(analysis.frf(), low, high, asked);
+    }
+    double off = 0.0, all = 0.0;
+    const FrequencyResponse h = analysis.frf();
+    for (std::size_t k = 0; k < h.size(); ++k) {
+      if (h.frequency[k] < low || h.frequency[k] > high) continue;
+      off += std::norm(h.value[k] - exact.value[k]);
+      all += std::norm(exact.value[k]);
+    }
+    squares += off / all / RUNS;
+    hits += analysis.hits() / static_cast<double>(RUNS);
+  }
+  EXPECT_GT(hits, 3.5);  // the rule was what ended it
+  EXPECT_LT(std::sqrt(squares), 1.15 * asked);
+  EXPECT_GT(std::sqrt(squares), 0.75 * asked);
+  EXPECT_THROW(hitsNeeded(exact, 1e6, 2e6, asked), Error);
+}
+
 // Noise of the force pulls H1 down, noise of the response pulls H2 up; Hv lies between, |H1| = C |H2|.
 TEST(ImpactAnalysis, AveragesStandInOrder) {
   std::mt19937 random(9);
@@ -133,7 +170,7 @@ TEST(ImpactAnalysis, ExponentialWindowAddsKnownDamping) {
 
 TEST(HitFaults, AreNamed) {
   std::mt19937 random(4);
-  const HitLimits limits{20.0, 0.1, 1.0};
+  const HitJudgeOptions limits{20.0, 0.1, 1.0, 0.0};
   const Hit good = blow(oneMode(), 200.0, 0.2, random);
   EXPECT_EQ(hitFault(good, limits).text, "");
   EXPECT_NE(hitFault(blow(oneMode(), 10.0, 0.2, random), limits).text.find("weak"), std::string::npos);

@@ -71,6 +71,20 @@ bool retracted(const ClosedFormMachine& machine) {
   return machine.position[2] > 0.05 + 0.049;
 }
 
+// An asked uncertainty that three hits reach ends the measurement there; one that none reach takes the goal's
+// hits.
+TEST(HammerSequence, StrikesAsOftenAsTheAskedUncertaintyNeeds) {
+  for (const double asked : {0.5, 1e-6}) {
+    ClosedFormMachine machine(1);
+    HammerParameters parameters;
+    parameters.asked_std = asked;
+    HammerSequence sequence(parameters, machine.model);
+    const auto result = measure(machine, sequence, goalFor("x", machine.time));
+    ASSERT_EQ(result.code, FrfCode::ok) << result.message;
+    EXPECT_EQ(result.frf.frf.averages, asked > 0.1 ? 3 : 5);
+  }
+}
+
 // The contract's accuracy: modes within 0.5 % in frequency and 5 % in stiffness, through a sensor whose curve
 // bends by 5 % over the vibration, 2 mV of noise, an unknown mounting angle and a hammer 15 mm above the
 // sensor.

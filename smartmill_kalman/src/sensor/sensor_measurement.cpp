@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/modal/hit_judge.h"
 #include "smartmill_core/modal/impact_analysis.h"
 #include "smartmill_core/modal/modal_fit.h"
 #include "smartmill_core/signal/statistics.h"
@@ -15,8 +16,6 @@ namespace {
 
 /// Stamps are rounded to nanoseconds; equal times must compare equal however a stream is cut into blocks.
 constexpr double SAME_TIME = 1e-6;  // [s]
-/// Equal readings in a row at the extreme of a noisy signal that mean clipping.
-constexpr std::size_t CLIPPED_RUN = 4;
 /// Lines at the lower end that tell the static gain at least.
 constexpr std::size_t LEAST_STATIC_LINES = 4;
 /// Share of the time before the trigger that is free of the foot of the hit.
@@ -155,10 +154,7 @@ void SensorMeasurement::recorded(double now, HitCollector::Record record) {
   HitFault fault{record.fault, true};
   if (fault.text.empty()) {
     fault = hitFault(record.hit,
-                     {parameters_.weak_force, parameters_.second_hit_share, parameters_.response_range});
-  }
-  if (fault.text.empty() && longestRunAtExtreme(record.hit.response) >= CLIPPED_RUN) {
-    fault = {"the sensor is clipped: equal readings at its extreme", true};
+                     {parameters_.weak_force, parameters_.second_hit_share, parameters_.response_range, 0.0});
   }
   if (!fault.text.empty()) return badHit(now, fault.text, fault.bad_data);
   hits_.push_back(std::move(record.hit));

@@ -3,9 +3,9 @@
 #include <string>
 #include <vector>
 
+#include "smartmill_core/modal/hit_judge.h"
 #include "smartmill_core/modal/impact_analysis.h"
 #include "smartmill_core/signal/frequency_response.h"
-#include "smartmill_hammer/analysis/hit_judge.h"
 
 namespace smartmill {
 namespace hammer {

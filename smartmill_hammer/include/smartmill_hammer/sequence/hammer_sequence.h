@@ -57,6 +57,8 @@ struct HammerParameters : HitTestParameters {
   double sensor_face = 8.0e-3;
   double max_approach = 1.0e-3;
   // Hits.
+  double force_high = 3000.0;
+  double asked_std = 0.0;
   double exponential_time = 0.0;
   int straighten_sensor = 1;
   int cross_frf = 1;
@@ -209,8 +211,10 @@ class HammerSequence {
   void search(double now);
   void recorded(double now, HitCollector::Record record, std::optional<HitCollector::Record> cross);
   void badHit(double now, const std::string& why, bool bad_data);
-  ImpactOptions impactOptions(const SensorState& sensor, double factor) const;
-  void evaluateCross(double factor);
+  bool enough() const;
+  double offsetCorrection() const;
+  ImpactOptions impactOptions(const SensorState& sensor) const;
+  void evaluateCross();
   void evaluate();
 
   void abort(double now, FrfCode code, const std::string& why);

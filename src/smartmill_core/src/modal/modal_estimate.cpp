@@ -25,6 +25,9 @@ constexpr int PART_ORDER = 16, PART_ORDER_STEP = 2, PART_WORTH = 3;
 constexpr int STEADY_SHARE = 5;
 /// A start value is held to no more accuracy than this share of the FRF: real ones carry repeatable misfit.
 constexpr double START_MISFIT = 0.01;
+/// First lines begin near zero when the last of them is so many times as high; their acceleration is one to
+/// this.
+constexpr double FROM_ZERO = 2.0, MASS_LINE = 0.3;
 /// How far the sense of rotation must stand out of its noise, in standard deviations.
 constexpr double CLEARLY = 3.0;
 /// Noise of a line is at least this share of the tallest: what digits of a file and of the solver leave.
@@ -75,6 +78,24 @@ WeightedLines tempered(const WeightedLines& lines) {
       const double noise = 1.0 / lines.weight[o][i], misfit = START_MISFIT * std::abs(lines.value[o][i]);
       result.weight[o][i] = 1.0 / std::hypot(noise, misfit);
     }
+  }
+  return result;
+}
+
+/// Without the mass line of a structure that hangs free: over its lowest narrow modes it bends more than the
+/// parabola under them. Seen where the first lines, from near zero on, all show one acceleration.
+WeightedLines withoutMassLine(const WeightedLines& lines) {
+  WeightedLines result = lines;
+  if (lines.frequency[LEAST_LINES - 1] < FROM_ZERO * lines.frequency[0]) return result;
+  for (std::size_t o = 0; o < lines.frfs(); ++o) {
+    std::vector<double> accelerance, off;
+    for (std::size_t i = 0; i < LEAST_LINES; ++i)
+      accelerance.push_back(lines.value[o][i].real() * std::pow(units::TWO_PI * lines.frequency[i], 2));
+    const double level = median(accelerance);
+    for (const double a : accelerance) off.push_back(std::abs(a - level));
+    if (median(off) > MASS_LINE * std::abs(level)) continue;
+    for (std::size_t i = 0; i < lines.size(); ++i)
+      result.value[o][i] -= level / std::pow(units::TWO_PI * lines.frequency[i], 2);
   }
   return result;
 }
@@ -208,7 +229,8 @@ ModalEstimate estimateModes(const std::vector<FrequencyResponse>& frfs, const Mo
   const PoleSearch whole{0, lines.size(), std::max(2, std::min(options.largest_order, most)), 1};
   result.diagram = polesByOrder(start, whole);
   std::vector<Pole> candidates = persistentPoles(result.diagram, whole);
-  ModalSearch search(lines, options);
+  const WeightedLines searched = withoutMassLine(lines);
+  ModalSearch search(searched, options);
   const auto steady = [&] {
     std::vector<Pole> chosen;
     for (const Pole& p : candidates) {

@@ -21,6 +21,8 @@ constexpr double MIN_DAMPING = 1e-6;
 constexpr double MAX_DAMPING = 0.5;
 // A gain below this share of the tallest line is none.
 constexpr double LEAST_GAIN = 1e-6;
+// The modes above the band stand together no nearer than some percent above the last line.
+constexpr double MOST_BENT = 0.94;
 // A deviation that the lines do not tell is stated as this many times the value.
 constexpr double NOT_TOLD = 10.0;
 
@@ -32,7 +34,7 @@ struct Solution {
 
 // Gains and direct share that fit best for given frequencies and damping ratios.
 void solveLinear(const ModalLines& problem, Solution& solution) {
-  const int free = problem.parameters(solution.modes) - 2 * solution.modes;
+  const int free = problem.linear(solution.modes);
   if (free == 0) return;
   const auto rows = static_cast<Eigen::Index>(2 * problem.lines());
   Eigen::MatrixXd a(rows, free);
@@ -50,7 +52,8 @@ void solveLinear(const ModalLines& problem, Solution& solution) {
                                  std::exp(solution.parameters[3 * k + 1]));
       set(column++, problem.scale * (problem.unit_static_gain ? h - 1.0 : h));
     }
-    if (problem.direct) set(column, problem.scale);
+    if (problem.direct)
+      set(column, problem.scale * problem.bent(problem.frequency[i], solution.parameters.back()));
     const Complex due = problem.value[i] - (problem.unit_static_gain ? 1.0 : 0.0);
     b(row) = w * due.real();
     b(row + 1) = w * due.imag();
@@ -78,6 +81,11 @@ void solve(const ModalLines& problem, Solution& solution) {
       parameters[k + 2].start = std::max(parameters[k + 2].start, 1e-3);
       parameters[k + 2].low = 0.0;
     }
+  }
+  if (problem.direct) {
+    parameters.back().low = 0.0;
+    parameters.back().high = MOST_BENT;
+    parameters.back().scale = 0.1;
   }
   fit::Options options;
   options.name = "modal fit";

@@ -48,8 +48,10 @@ bool ModalResiduals::evaluate(const Eigen::VectorXd& at, Eigen::VectorXd* residu
     }
     const Index next = 3 * modes_;
     if (lines_.direct) {
-      model += s * at[next];
-      set(next, s);
+      const double share = lines_.bent(f, at[next + 1]);
+      model += s * at[next] * share;
+      set(next, s * share);
+      set(next + 1, s * at[next] * share * share * std::pow(f / lines_.frequency.back(), 2));
     }
     (*residual)[row] = w * (model.real() - lines_.value[i].real());
     (*residual)[row + 1] = w * (model.imag() - lines_.value[i].imag());

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <complex>
 #include <vector>
 
@@ -21,7 +22,11 @@ struct ModalLines {
   double low = 0.0, high = 0.0;  // [Hz]
 
   std::size_t lines() const { return frequency.size(); }
-  int parameters(int modes) const { return 3 * modes + (direct ? 1 : 0); }
+  int parameters(int modes) const { return 3 * modes + (direct ? 2 : 0); }
+  int linear(int modes) const { return modes + (direct ? 1 : 0); }  // of the parameters
+  /// What an even share makes at f [Hz] where modes above the band bend it: as one mode whose frequency is
+  /// the last line's over the root of `bend`; 0: not bent.
+  double bent(double f, double bend) const { return 1.0 / (1.0 - bend * std::pow(f / frequency.back(), 2)); }
   double reference() const;
 };
 
@@ -30,7 +35,7 @@ struct ModalLines {
 std::vector<double> smoothedDeviation(const std::vector<double>& deviation);
 
 /// Weighted (fit - measured), real and imaginary part line by line, over log f0, log zeta, gain / scale of
-/// each mode, then direct / scale.
+/// each mode, then direct / scale and its bend.
 class ModalResiduals : public fit::Residuals {
  public:
   /// The lines must outlive this.

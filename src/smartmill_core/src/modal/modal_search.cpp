@@ -26,6 +26,8 @@ constexpr std::size_t MOST_TRIES = 20;
 /// phase.
 constexpr double CLEAR_PEAK = 12.0;
 constexpr std::size_t ABOUT = 50;
+/// Damping ratios that are weighed where a magnitude tells them.
+constexpr int DAMPINGS = 120;
 /// Evidence from which a mode is proven, more than one because the misfit of real records is no even noise;
 /// above the second it stays in the fit as a doubt, so that what it explains does not stand against the
 /// others.
@@ -259,8 +261,10 @@ bool ModalSearch::startWith(std::vector<Pole> candidates) {
     std::vector<Pole> cluster;
     for (const Pole& p : candidates) {
       if (!inBand(p.frequency, 0.0) || p.damping_ratio > WIDEST_DAMPING || taken(p)) continue;
+      // A window holds a number of lines at least, however narrow its modes: what stands in it belongs to it.
+      const auto width = [&](const Pole& q) { return std::max(q.halfWidth(), 2.0 * lines_.step()); };
       const bool apart = !cluster.empty() && p.frequency - cluster.back().frequency >
-                                                 TOGETHER * (p.halfWidth() + cluster.back().halfWidth());
+                                                 TOGETHER * (width(p) + width(cluster.back()));
       if (apart || cluster.size() >= MOST_AT_START) {
         if (!goOn(0.1 + 0.05 * pass)) return false;
         fitCluster(cluster);
@@ -415,12 +419,12 @@ bool ModalSearch::fitMagnitude(const std::vector<double>& magnitude, std::size_t
     left.array() -= left.mean();
   });
   const double line = lines_.step() / m.frequency, at = std::log(m.frequency);
+  const double narrowest = std::log(0.02 * line), widest = std::log(0.1);
   fit::Options options;
   options.name = "mode by magnitude";
-  const fit::Result found = fit::minimise(residuals,
-                                          {{at, at - 2.0 * line, at + 2.0 * line, line},
-                                           {std::log(0.5 * line), std::log(0.02 * line), std::log(0.1), 0.3}},
-                                          options);
+  const fit::Parameter place{at, at - 2.0 * line, at + 2.0 * line, line};
+  fit::Result found =
+      fit::minimise(residuals, {place, {std::log(0.5 * line), narrowest, widest, 0.3}}, options);
   if (!found.usable()) return false;
   Eigen::VectorXd plain(count);
   for (Index i = 0; i < count; ++i) plain[i] = std::log(magnitude[first + static_cast<std::size_t>(i)]);
@@ -429,15 +433,25 @@ bool ModalSearch::fitMagnitude(const std::vector<double>& magnitude, std::size_t
   const double height = plain[static_cast<Index>(peak - first)];
   const double evidence = (plain.squaredNorm() - height * height - found.squares) / variance / w.limit(2);
   if (!(evidence >= PROVEN)) return false;
-  const WindowFit fit = w.judged(PoleList{found.value});
-  m = describe(w, fit, 0);
+  // A peak narrower than the lines bounds the damping from above only: its mean over all that the misfit
+  // allows.
+  double weights = 0.0, mean = 0.0, square = 0.0;
+  for (int i = 0; i <= DAMPINGS; ++i) {
+    const double damping = narrowest + (widest - narrowest) * i / DAMPINGS;
+    const double squares =
+        fit::minimise(residuals, {place, {damping, damping, damping, 1.0}}, options).squares - found.squares;
+    const double zeta = std::exp(damping), weight = zeta * std::exp(-0.5 * std::max(squares, 0.0) / variance);
+    weights += weight;
+    mean += weight * zeta;
+    square += weight * zeta * zeta;
+  }
+  mean /= weights;
   const fit::Covariance covariance = fit::covarianceOf(found.jacobian);
-  const auto deviation = [&](Index i, double most) {
-    const double d = std::sqrt(variance) * covariance.deviation(i);
-    return std::isfinite(d) && d > 0.0 ? std::min(d, most) : most;
-  };
-  m.frequency_std = m.frequency * deviation(0, line);
-  m.damping_ratio_std = m.damping_ratio * deviation(1, 2.0);
+  found.value[1] = std::log(mean);
+  m = describe(w, w.judged(PoleList{found.value}), 0);
+  const double place_std = std::sqrt(variance) * covariance.deviation(0);
+  m.frequency_std = m.frequency * (place_std > 0.0 ? std::min(place_std, line) : line);
+  m.damping_ratio_std = std::sqrt(std::max(square / weights - mean * mean, std::pow(0.01 * mean, 2)));
   m.evidence = evidence;
   modes_.push_back(m);
   return true;

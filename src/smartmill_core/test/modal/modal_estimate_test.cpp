@@ -9,6 +9,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/fit/derivative_check.h"
 #include "smartmill_core/testing/coverage.h"
+#include "smartmill_core/units.h"
 
 namespace smartmill {
 namespace {
@@ -74,6 +75,46 @@ TEST(ModalEstimate, TakesAnyDamping) {
                1e-3},
               1e-5, 0.02);
   expectModes({{{700.0, 0.1, 1e-8}, {2000.0, 0.1, 1e-8}}, 0.8, 4000.0, 0.01}, 1e-3, 0.01);
+}
+
+// Lines so wide that each mode's window holds the other.
+TEST(ModalEstimate, SeesNeighboursOnFewLines) {
+  expectModes({{{331.88, 0.0198, 1.09e-8}, {393.25, 0.0198, 1.2e-8}}, 10.0, 5500.0, 2e-3}, 5e-4, 0.02);
+}
+
+// A beam that hangs free, struck and read at its end: f_n = f_1 (b_n / b_1)^2 with cos b cosh b = 1, every
+// mode four times the mean accelerance there, and the rigid body's (Blevins, table 8.1). Damping 5e-5 ..
+// 1e-4, lines of 1 Hz, the first mode on one of them; noise of an accelerometer.
+TEST(ModalEstimate, FindsEveryModeOfAFreeBeam) {
+  for (const double damping : {1e-4, 5e-5}) {
+    std::mt19937 random(3);
+    std::normal_distribution<double> normal;
+    std::vector<double> due;
+    for (int n = 1; n <= 16; ++n) {
+      double b = (n + 0.5) * units::PI;
+      for (int i = 0; i < 30; ++i)
+        b -= (std::cos(b) - 1.0 / std::cosh(b)) / (-std::sin(b) + std::tanh(b) / std::cosh(b));
+      due.push_back(60.0 * std::pow(b / 4.730040744862704, 2));
+    }
+    FrequencyResponse frf;
+    frf.unit = "m/N";
+    const double mass = 2.0;
+    for (double f = 1.0; f <= 6400.0; f += 1.0) {
+      std::complex<double> accelerance = 4.0 / mass;
+      for (const double at : due)
+        accelerance -= 4.0 / mass * f * f / std::complex<double>(at * at - f * f, 2.0 * damping * at * f);
+      accelerance += 0.02 * std::complex<double>(normal(random), normal(random));
+      frf.frequency.push_back(f);
+      frf.value.push_back(-accelerance / std::pow(units::TWO_PI * f, 2));
+    }
+    const ModalEstimate estimate = estimateModes({frf}, {});
+    due.pop_back();  // above the lines
+    ASSERT_EQ(estimate.modes.size(), due.size());
+    for (std::size_t k = 0; k < due.size(); ++k) {
+      EXPECT_NEAR(estimate.modes[k].frequency, due[k], 1e-5 * due[k]);
+      if (k > 0) EXPECT_NEAR(estimate.modes[k].damping_ratio, damping, 0.05 * damping) << due[k];
+    }
+  }
 }
 
 TEST(ModalEstimate, ProvesNothingInNoise) {

@@ -124,6 +124,22 @@ TEST(ModalFit, refusesWhatCannotBeFitted) {
   EXPECT_THROW(fitModes(bad, options), Error);
 }
 
+// A strong mode above the band bends what it leaves inside: 1.6 at the end of what it is at rest.
+TEST(ModalFit, aStrongModeAboveTheBandDoesNotPullAtTheOthers) {
+  ModalModel tool;
+  tool.modes = {{900.0, 0.03, 0.1}, {2000.0, 0.02, 0.05}, {6500.0, 0.02, 1.0}};
+  ModalFitOptions options;
+  options.low = 100.0;
+  options.high = 4000.0;
+  const ModalFit fit = fitModes(measured(tool, 0.0, 1), options);
+  ASSERT_EQ(fit.model.modes.size(), 2u);
+  for (std::size_t k = 0; k < 2; ++k) {
+    EXPECT_NEAR(fit.model.modes[k].damping_ratio / tool.modes[k].damping_ratio, 1.0, 0.005);
+    EXPECT_NEAR(fit.model.modes[k].gain / tool.modes[k].gain, 1.0, 0.005);
+  }
+  EXPECT_NEAR(fit.model.direct, 1.0, 0.02);
+}
+
 TEST(ModalFit, derivativesAgreeWithDifferences) {
   const FrequencyResponse frf = measured(sensor(), 0.05, 1);
   ModalLines lines;
@@ -138,6 +154,7 @@ TEST(ModalFit, derivativesAgreeWithDifferences) {
     Eigen::VectorXd at(lines.parameters(2));
     at.head(6) << std::log(900.0), std::log(0.04), 0.3, std::log(2000.0), std::log(0.01), -0.1;
     at.tail(at.size() - 6).setConstant(0.05);
+    if (lines.direct) at[7] = 0.4;
     const fit::DerivativeGap gap = fit::checkDerivatives(ModalResiduals(lines, 2), at);
     EXPECT_LT(gap.relative, 1e-8) << gap.row << " " << gap.column << " " << gap.given << " " << gap.numeric;
   }

@@ -15,19 +15,10 @@ struct Hit {
   std::vector<double> response;  ///< [V], [m] or [m/s2]
 };
 
-/// What makes a hit useless.
-struct HitLimits {
-  double weak_force = 20.0;  ///< [N] a peak below this is a weak hit, > 0
-  double second_hit_share =
-      0.1;                      ///< [1] a second peak above this share of the main one is a double hit, 0..1
-  double response_range = 0.0;  ///< [unit of the response] a response reaching this is clipped; 0: unknown
-};
-
-/// Why a hit cannot be used.
+/// Why a hit cannot be used (smartmill_core/modal/hit_judge.h).
 struct HitFault {
   std::string text;       ///< one line; empty: the hit can be used
-  bool bad_data = false;  ///< clipped, NaN, lost samples; otherwise the blow itself was weak or double
+  bool bad_data = false;  ///< clipped, NaN, lost samples; otherwise the blow itself was weak, dull or double
 };
-HitFault hitFault(const Hit& hit, const HitLimits& limits);
 
 }  // namespace smartmill

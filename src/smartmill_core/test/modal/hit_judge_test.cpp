@@ -1,4 +1,4 @@
-#include "smartmill_hammer/analysis/hit_judge.h"
+#include "smartmill_core/modal/hit_judge.h"
 
 #include <algorithm>
 #include <cmath>
@@ -12,7 +12,6 @@
 #include "smartmill_core/units.h"
 
 namespace smartmill {
-namespace hammer {
 namespace {
 
 constexpr double RATE = 25600.0;
@@ -42,7 +41,7 @@ Hit blow(unsigned seed, const std::function<double(double)>& second = {}) {
 }
 
 TEST(HitJudge, TakesCleanHits) {
-  for (unsigned seed = 1; seed <= 100; ++seed) EXPECT_EQ(hitReason(blow(seed), {}), "") << seed;
+  for (unsigned seed = 1; seed <= 100; ++seed) EXPECT_EQ(hitFault(blow(seed), {}).text, "") << seed;
 }
 
 // A structure that hardly decays within the record, which begins with the hit: its ringing is no noise.
@@ -59,7 +58,7 @@ TEST(HitJudge, TakesHitsThatRingOn) {
     hit.response.push_back((t > 0.0 ? 20.0 * std::exp(-0.2 * t) * std::sin(units::TWO_PI * 320.0 * t) : 0.0) +
                            0.02 * normal(random));
   }
-  EXPECT_EQ(hitReason(hit, {}), "");
+  EXPECT_EQ(hitFault(hit, {}).text, "");
   EXPECT_NEAR(noiseUnderRinging({hit.response.end() - 2560, hit.response.end()}), 0.02, 0.004);
 }
 
@@ -71,7 +70,8 @@ TEST(HitJudge, RefusesDoubleHits) {
     const Hit hit = blow(seed, [&](double t) {
       return t > gap && t < gap + 0.3e-3 ? size * std::sin(units::PI * (t - gap) / 0.3e-3) : 0.0;
     });
-    EXPECT_NE(hitReason(hit, {}).find("double hit"), std::string::npos) << seed << " " << size << " " << gap;
+    EXPECT_NE(hitFault(hit, {}).text.find("double hit"), std::string::npos)
+        << seed << " " << size << " " << gap;
   }
 }
 
@@ -79,7 +79,7 @@ TEST(HitJudge, NamesEachFault) {
   const auto reason = [](const std::function<void(Hit&)>& spoil, HitJudgeOptions options = {}) {
     Hit hit = blow(7);
     spoil(hit);
-    return hitReason(hit, options);
+    return hitFault(hit, options).text;
   };
   const auto holds = [](const std::string& text, const char* word) {
     return text.find(word) != std::string::npos;
@@ -130,14 +130,13 @@ TEST(HitJudge, ComparesHits) {
   std::vector<Hit> hits;
   for (unsigned seed = 1; seed <= 5; ++seed) hits.push_back(blow(seed));
   const std::vector<bool> all(5, true);
-  for (const std::string& reason : reasonsBeside(hits, all)) EXPECT_EQ(reason, "");
+  for (const HitFault& fault : faultsBeside(hits, all)) EXPECT_EQ(fault.text, "");
   for (double& r : hits[3].response) r *= 1.3;
-  EXPECT_NE(reasonsBeside(hits, all)[3].find("gain jump"), std::string::npos);
+  EXPECT_NE(faultsBeside(hits, all)[3].text.find("gain jump"), std::string::npos);
   for (double& r : hits[3].response) r /= 1.3;
   std::rotate(hits[1].response.begin(), hits[1].response.end() - 2, hits[1].response.end());
-  EXPECT_NE(reasonsBeside(hits, all)[1].find("skew"), std::string::npos);
+  EXPECT_NE(faultsBeside(hits, all)[1].text.find("skew"), std::string::npos);
 }
 
 }  // namespace
-}  // namespace hammer
 }  // namespace smartmill

@@ -1,0 +1,133 @@
+// rosrun smartmill_hammer health BAGS... : drift of modes and friction over recorded sessions.
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <map>
+#include <string>
+#include <vector>
+
+#include <smartmill_msgs/CuttingCoefficients.h>
+#include <smartmill_msgs/ModalModel.h>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/io/csv.h"
+#include "smartmill_core/names.h"
+#include "smartmill_core/program.h"
+#include "smartmill_hammer/analysis/health.h"
+#include "smartmill_ros/bag_reader.h"
+#include "smartmill_ros/conversions.h"
+
+namespace smartmill {
+namespace hammer {
+namespace {
+
+struct Options {
+  std::vector<std::string> bags;
+  std::string out;
+  HealthAllowance allowance;
+};
+
+struct Seen {
+  std::string bag;
+  MeasuredModes modes;
+};
+struct Friction {
+  std::string bag;
+  double stamp = 0.0, viscous = 0.0, coulomb = 0.0;
+};
+
+/// All of the bags, in the order of their stamps; modes by tool, point and direction.
+struct History {
+  std::map<std::string, std::vector<Seen>> modes;
+  std::vector<Friction> friction;
+};
+
+History read(const std::vector<std::string>& bags) {
+  History history;
+  for (const std::string& bag : bags) {
+    std::fprintf(stderr, "reading %s\n", bag.c_str());
+    BagReader reader(bag);
+    reader.on<smartmill_msgs::ModalModel>(
+        names::TOOL_MODES, [&](const smartmill_msgs::ModalModel& message, double) {
+          const MeasuredModes modes = fromMsg(message);
+          const std::string name =
+              (modes.tool.empty() ? std::string() : modes.tool + " ") + modes.point + " " + modes.direction;
+          history.modes[name].push_back({bag, modes});
+        });
+    reader.on<smartmill_msgs::CuttingCoefficients>(
+        names::COEFFICIENTS, [&](const smartmill_msgs::CuttingCoefficients& m, double) {
+          if (std::isfinite(m.friction_viscous) && std::isfinite(m.friction_coulomb))
+            history.friction.push_back({bag, m.header.stamp.toSec(), m.friction_viscous, m.friction_coulomb});
+        });
+    reader.run();
+  }
+  for (auto& [name, list] : history.modes)
+    std::stable_sort(list.begin(), list.end(),
+                     [](const Seen& a, const Seen& b) { return a.modes.stamp < b.modes.stamp; });
+  std::stable_sort(history.friction.begin(), history.friction.end(),
+                   [](const Friction& a, const Friction& b) { return a.stamp < b.stamp; });
+  return history;
+}
+
+/// Table and CSV rows of one measurement against the first. @return how many drifted
+int report(const std::string& name, const std::string& bag, double days,
+           const std::vector<HealthChange>& changes, CsvWriter& csv) {
+  std::printf("%s, %s, %.2f days after the first\n", name.c_str(), bag.c_str(), days);
+  int drifted = 0;
+  for (const HealthChange& c : changes) {
+    std::printf("  %-40s %12.5g -> %12.5g  %+8.2f %%  %7.1f deviations%s\n", c.what.c_str(), c.before, c.now,
+                100.0 * c.relative, c.sigmas, c.drifted() ? "  DRIFT" : "");
+    csv.row(name, bag, days, c.what, c.before, c.now, c.sigmas, c.drifted() ? "true" : "false");
+    drifted += c.drifted();
+  }
+  return drifted;
+}
+
+int run(const Options& options) {
+  constexpr double DAY = 86400.0;
+  const History history = read(options.bags);
+  CsvWriter csv("measured,bag,days,quantity,first,now,deviations,drifted", 8);
+  int compared = 0, drifted = 0;
+  for (const auto& [name, list] : history.modes) {
+    for (std::size_t i = 1; i < list.size(); ++i, ++compared)
+      drifted += report(name, list[i].bag, (list[i].modes.stamp - list[0].modes.stamp) / DAY,
+                        modeChanges(list[0].modes, list[i].modes, options.allowance), csv);
+  }
+  for (std::size_t i = 1; i < history.friction.size(); ++i, ++compared) {
+    const Friction &first = history.friction[0], &now = history.friction[i];
+    drifted +=
+        report("spindle", now.bag, (now.stamp - first.stamp) / DAY,
+               {valueChange("viscous friction", first.viscous, now.viscous, options.allowance.friction),
+                valueChange("Coulomb friction", first.coulomb, now.coulomb, options.allowance.friction)},
+               csv);
+  }
+  if (compared == 0)
+    throw Error(options.bags.front() +
+                ": nothing was measured twice (topics tool/modes, material/coefficients)");
+  if (!options.out.empty()) csv.save(options.out);
+  std::printf("%d measurements compared with the first of their kind, %d quantities drifted\n", compared,
+              drifted);
+  return 0;
+}
+
+}  // namespace
+}  // namespace hammer
+}  // namespace smartmill
+
+int main(int argc, char** argv) {
+  smartmill::hammer::Options o;
+  smartmill::CommandLine line(
+      "Health of a spindle over recorded sessions: modes of each tool, point and direction, and friction, "
+      "against the "
+      "first measurement of their kind.");
+  line.option("bags", o.bags, "recorded sessions").required();
+  line.option("-o,--out", o.out, "CSV of every comparison");
+  line.option("--frequency", o.allowance.frequency, "what may change from day to day, relative")
+      .notNegative()
+      .showDefault();
+  line.option("--damping", o.allowance.damping, "the same").notNegative().showDefault();
+  line.option("--gain", o.allowance.gain, "the same").notNegative().showDefault();
+  line.option("--friction", o.allowance.friction, "the same").notNegative().showDefault();
+  return runProgram(line, argc, argv, [&] { return smartmill::hammer::run(o); });
+}

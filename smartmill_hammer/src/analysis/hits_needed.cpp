@@ -1,0 +1,33 @@
+#include "smartmill_hammer/analysis/hits_needed.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/parameters/parameter_table.h"
+
+namespace smartmill {
+namespace hammer {
+
+HitsNeeded hitsNeeded(const FrequencyResponse& frf, double low, double high, double asked) {
+  double variance = 0.0, power = 0.0;
+  for (std::size_t k = 0; k < frf.std_dev.size(); ++k) {
+    if (frf.frequency[k] < low || frf.frequency[k] > high || !std::isfinite(frf.std_dev[k])) continue;
+    variance += frf.std_dev[k] * frf.std_dev[k];
+    power += std::norm(frf.value[k]);
+  }
+  if (!(power > 0.0))
+    throw Error("hits needed: no line with a standard deviation between " + shortNumber(low) + " and " +
+                shortNumber(high) + " Hz");
+  HitsNeeded result;
+  result.relative_std = std::sqrt(variance / power);
+  result.hits = frf.averages;
+  result.needed = std::max(
+      1,
+      static_cast<int>(std::ceil(frf.averages * std::pow(result.relative_std / asked, 2) * (1.0 - 1e-12))));
+  return result;
+}
+
+}  // namespace hammer
+}  // namespace smartmill

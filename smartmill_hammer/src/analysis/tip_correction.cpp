@@ -1,0 +1,446 @@
+#include "smartmill_hammer/analysis/tip_correction.h"
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <numeric>
+#include <set>
+#include <string>
+
+#include <Eigen/Core>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/fit/least_squares.h"
+#include "smartmill_core/parameters/parameter_table.h"
+#include "smartmill_core/signal/statistics.h"
+#include "tool_in_holder.h"
+
+namespace smartmill {
+namespace hammer {
+namespace {
+
+using Complex = std::complex<double>;
+using Eigen::Index;
+using Eigen::VectorXd;
+
+/// The beam is a model: to this it tells a frequency, and a gain (of its own, and of the largest).
+constexpr double MODEL_RATIO = 0.005, MODEL_FACTOR = 0.025;  // of what changes from height to height
+constexpr double MODEL_FREQUENCY = 0.01, MODEL_GAIN = 0.03, MODEL_SMALL = 0.003;
+/// A mode of the model that no measurement shows must be smaller than this share of the largest.
+constexpr double UNSEEN = 0.03;
+/// Bounds of an unknown, in standard deviations.
+constexpr double FAR = 6.0;
+/// A measured mode may be the tool's own when it lies within these factors of the clamped tool's.
+constexpr double TOOL_LOW = 0.35, TOOL_HIGH = 1.5;
+constexpr std::size_t MOST_TOOL_MODES = 2;
+/// A seat as hard as that is rigid; the diameter [m] that the prior's is meant for.
+constexpr double HARD = 0.01, SEAT_START = 0.3, SEAT_DIAMETER = 0.012;
+constexpr int ROUNDS = 3, ITERATIONS = 40;
+/// Damping of a mode that is not seen is known to this share.
+constexpr double UNSEEN_DAMPING = 0.5;
+
+enum Unknown : Index { YOUNG, DENSITY, STICKOUT, DIAMETER, FLUTED, RATIO, ACROSS, TURNING, SHARED };
+
+/// Which of the measured modes are the tool's; the others stand for one spindle mode each.
+using ToolModes = std::set<std::size_t>;
+
+struct Problem {
+  const std::vector<OffsetMeasurement>& measurements;
+  const ToolBeam& tool;
+  const HolderPrior& prior;
+  double high;
+  ToolModes of_tool;
+
+  const std::vector<Mode>& modes() const { return measurements.front().modes.modes; }
+  std::size_t spindleModes() const { return modes().size() - of_tool.size(); }
+  Index unknowns() const { return SHARED + 3 * static_cast<Index>(spindleModes()); }
+  double largestGain() const {
+    double largest = 0.0;
+    for (const Mode& m : modes()) largest = std::max(largest, std::abs(m.gain));
+    return largest;
+  }
+};
+
+double scaled(const Known& known, double z) {
+  return known.value * std::exp(z * known.std / known.value);
+}
+
+/// Unknowns in standard deviations of their priors; frequencies and gains of the spindle modes as logarithms
+/// over their starts.
+ToolInHolder built(const Problem& problem, const VectorXd& z) {
+  ToolInHolder t;
+  t.young = scaled(problem.tool.young, z[YOUNG]);
+  t.density = scaled(problem.tool.density, z[DENSITY]);
+  t.stickout = scaled(problem.tool.stickout, z[STICKOUT]);
+  t.diameter = scaled(problem.tool.diameter, z[DIAMETER]);
+  t.fluted_length = std::min(scaled(problem.tool.fluted_length, z[FLUTED]), t.stickout);
+  t.fluted_diameter = t.diameter * std::min(1.0, scaled(problem.tool.flute_ratio, z[RATIO]));
+  t.across = problem.prior.across / std::max(z[ACROSS], HARD);
+  t.turning = problem.prior.turning * std::pow(t.diameter / SEAT_DIAMETER, 3) / std::max(z[TURNING], HARD);
+  Index at = SHARED;
+  for (std::size_t r = 0; r < problem.modes().size(); ++r) {
+    if (problem.of_tool.count(r) > 0) continue;
+    const Mode& measured = problem.modes()[r];
+    const double tilt = problem.prior.tilt.value + problem.prior.tilt.std * z[at + 2];
+    t.spindle.push_back(
+        {measured.frequency * std::exp(z[at]), std::abs(measured.gain) * std::exp(z[at + 1]), tilt});
+    at += 3;
+  }
+  return t;
+}
+
+/// Of each measured mode the model's mode that stands for it; the others of the model stand for none.
+std::vector<std::size_t> matched(const Problem& problem, const std::vector<HeldMode>& held) {
+  std::vector<std::size_t> order(problem.modes().size()), match(problem.modes().size(), held.size());
+  std::iota(order.begin(), order.end(), 0u);
+  const auto& modes = problem.modes();
+  std::sort(order.begin(), order.end(),
+            [&](std::size_t a, std::size_t b) { return std::abs(modes[a].gain) > std::abs(modes[b].gain); });
+  std::vector<bool> used(held.size(), false);
+  const OffsetMeasurement& first = problem.measurements.front();
+  for (const std::size_t r : order) {
+    double least = INFINITY;
+    for (std::size_t k = 0; k < held.size(); ++k) {
+      if (used[k]) continue;
+      const double gain =
+          std::max(std::abs(held[k].gain(first.struck, first.read)), 1e-3 * std::abs(modes[r].gain));
+      const double far = std::abs(std::log(held[k].frequency / modes[r].frequency)) / 0.05 +
+                         0.3 * std::abs(std::log(gain / std::abs(modes[r].gain)));
+      if (far < least) least = far, match[r] = k;
+    }
+    if (match[r] < held.size()) used[match[r]] = true;
+  }
+  return match;
+}
+
+const Mode* nearestMode(const ModalModel& model, double frequency) {
+  const Mode* found = nullptr;
+  for (const Mode& m : model.modes) {
+    if (std::abs(m.frequency - frequency) > 0.02 * frequency) continue;
+    if (!found || std::abs(m.frequency - frequency) < std::abs(found->frequency - frequency)) found = &m;
+  }
+  return found;
+}
+
+double orZero(double std) {
+  return std::isfinite(std) ? std : 0.0;
+}
+
+/// What the model leaves of the measured, with the priors; `match` held.
+class TipResiduals : public fit::Residuals {
+ public:
+  TipResiduals(const Problem& problem, std::vector<std::size_t> match, std::size_t held_modes)
+      : problem_(problem), match_(std::move(match)), held_modes_(held_modes) {}
+
+  Index count() const override {
+    const auto modes = static_cast<Index>(problem_.modes().size());
+    return SHARED + static_cast<Index>(problem_.spindleModes()) +
+           modes * (1 + static_cast<Index>(problem_.measurements.size())) + static_cast<Index>(held_modes_);
+  }
+  bool hasJacobian() const override { return false; }
+
+  bool evaluate(const VectorXd& z, VectorXd* residual, Eigen::MatrixXd*) const override {
+    const std::vector<HeldMode> held = heldModes(built(problem_, z));
+    if (held.size() < held_modes_) return false;
+    Index row = 0;
+    const auto add = [&](double value) { (*residual)[row++] = value; };
+    for (Index k = 0; k < SHARED; ++k) add(z[k]);
+    for (std::size_t i = 0; i < problem_.spindleModes(); ++i) add(z[SHARED + 3 * static_cast<Index>(i) + 2]);
+    const double small = MODEL_SMALL * problem_.largestGain();
+    for (std::size_t r = 0; r < match_.size(); ++r) {
+      const Mode& m = problem_.modes()[r];
+      const HeldMode& h = held[match_[r]];
+      add(std::log(h.frequency / m.frequency) /
+          std::hypot(MODEL_FREQUENCY, orZero(m.frequency_std) / m.frequency));
+      const OffsetMeasurement& first = problem_.measurements.front();
+      const double here = h.gain(first.struck, first.read);
+      add((here - m.gain) / std::hypot(MODEL_GAIN * m.gain, small, orZero(m.gain_std)));
+      for (std::size_t i = 1; i < problem_.measurements.size(); ++i) {
+        // From height to height the beam is told more closely than itself.
+        const OffsetMeasurement& at = problem_.measurements[i];
+        const Mode* seen = nearestMode(at.modes, m.frequency);
+        const double ratio = seen ? seen->gain / m.gain : 1.0;
+        add(seen
+                ? (h.gain(at.struck, at.read) - here * ratio) /
+                      std::hypot(MODEL_RATIO * seen->gain, orZero(seen->gain_std), ratio * orZero(m.gain_std))
+                : 0.0);
+      }
+    }
+    for (std::size_t k = 0; k < held_modes_; ++k) {
+      const bool stands = std::find(match_.begin(), match_.end(), k) != match_.end();
+      const OffsetMeasurement& at = problem_.measurements.front();
+      const bool due = !stands && held[k].frequency < problem_.high;
+      add(due ? held[k].gain(at.struck, at.read) / (UNSEEN * problem_.largestGain()) : 0.0);
+    }
+    return residual->allFinite();
+  }
+
+ private:
+  const Problem& problem_;
+  std::vector<std::size_t> match_;
+  std::size_t held_modes_;
+};
+
+struct Fitted {
+  VectorXd z;
+  Eigen::MatrixXd covariance;
+  std::vector<std::size_t> match;
+  double squares = INFINITY;
+};
+
+std::size_t modesBelow(const std::vector<HeldMode>& held, double high) {
+  return static_cast<std::size_t>(
+      std::count_if(held.begin(), held.end(), [&](const HeldMode& h) { return h.frequency < 1.5 * high; }));
+}
+
+Fitted fitted(const Problem& problem) {
+  Fitted best;
+  best.z = VectorXd::Zero(problem.unknowns());
+  best.z[ACROSS] = best.z[TURNING] = SEAT_START;
+  std::vector<fit::Parameter> unknowns(static_cast<std::size_t>(problem.unknowns()), {0.0, -FAR, FAR, 1.0});
+  unknowns[ACROSS].low = unknowns[TURNING].low = HARD;
+  for (std::size_t i = 0; i < problem.spindleModes(); ++i) {
+    unknowns[SHARED + 3 * i] = {0.0, -0.7, 0.7, 0.05};
+    unknowns[SHARED + 3 * i + 1] = {0.0, -3.0, 3.0, 0.1};
+  }
+  fit::Options options;
+  options.name = "tip correction";
+  options.iterations = ITERATIONS;
+  options.function_tolerance = 1e-8;
+  for (int round = 0; round < ROUNDS; ++round) {
+    const std::vector<HeldMode> held = heldModes(built(problem, best.z));
+    const std::vector<std::size_t> match = matched(problem, held);
+    if (std::count(match.begin(), match.end(), held.size()) > 0) return {};
+    const TipResiduals residuals(problem, match, modesBelow(held, problem.high));
+    for (std::size_t k = 0; k < unknowns.size(); ++k) unknowns[k].start = best.z[static_cast<Index>(k)];
+    const fit::Result result = fit::minimise(residuals, unknowns, options);
+    if (!result.usable()) return {};
+    const bool again = round > 0 && match == best.match && result.squares > 0.999 * best.squares;
+    best = {result.value, result.covariance().matrix, match, result.squares};
+    if (again) break;
+  }
+  return best;
+}
+
+/// What is asked of a fit: of each measured mode direct and measured gain, of unseen modes frequency and
+/// direct gain, and the static share above the band.
+struct Answers {
+  std::vector<double> direct, factor;                        // of measured modes
+  std::vector<double> frequency, unseen_gain, unseen_added;  // of those not seen
+};
+
+Answers answersOf(const Problem& problem, const Fitted& fit, const VectorXd& z) {
+  Answers a;
+  const std::vector<HeldMode> held = heldModes(built(problem, z));
+  const OffsetMeasurement& at = problem.measurements.front();
+  for (const std::size_t k : fit.match) {
+    a.direct.push_back(held[k].gain(0.0, 0.0));
+    a.factor.push_back(held[k].gain(0.0, 0.0) / held[k].gain(at.struck, at.read));
+  }
+  for (std::size_t k = 0; k < held.size(); ++k) {
+    if (std::find(fit.match.begin(), fit.match.end(), k) != fit.match.end()) continue;
+    a.frequency.push_back(held[k].frequency);
+    a.unseen_gain.push_back(held[k].gain(0.0, 0.0));
+    a.unseen_added.push_back(held[k].gain(0.0, 0.0) - held[k].gain(at.struck, at.read));
+  }
+  return a;
+}
+
+VectorXd flat(const Answers& a) {
+  std::vector<double> all;
+  for (const auto* list : {&a.direct, &a.factor, &a.frequency, &a.unseen_gain, &a.unseen_added})
+    all.insert(all.end(), list->begin(), list->end());
+  return Eigen::Map<const VectorXd>(all.data(), static_cast<Index>(all.size()));
+}
+
+/// Standard deviations of the answers, by those of the unknowns.
+VectorXd deviations(const Problem& problem, const Fitted& fit) {
+  constexpr double STEP = 1e-4;
+  const Index n = fit.z.size();
+  Eigen::MatrixXd map(flat(answersOf(problem, fit, fit.z)).size(), n);
+  for (Index k = 0; k < n; ++k) {
+    VectorXd up = fit.z, down = fit.z;
+    up[k] += STEP;
+    down[k] -= STEP;
+    map.col(k) = (flat(answersOf(problem, fit, up)) - flat(answersOf(problem, fit, down))) / (2.0 * STEP);
+  }
+  return (map * fit.covariance * map.transpose()).diagonal().cwiseMax(0.0).cwiseSqrt();
+}
+
+TipMode seenMode(const Mode& measured, double direct, double direct_std, double factor, double factor_std) {
+  TipMode tip;
+  tip.direct = measured;
+  tip.factor = factor;
+  tip.factor_std = std::hypot(factor_std, MODEL_FACTOR * (factor - 1.0));
+  // By the factor, or, where the hammer stands near a node and the factor says little, by the beam.
+  const double by_factor = std::hypot(factor * orZero(measured.gain_std), measured.gain * tip.factor_std);
+  const double by_beam = std::hypot(direct_std, MODEL_GAIN * direct);
+  tip.direct.gain = by_factor <= by_beam ? measured.gain * factor : direct;
+  tip.direct.gain_std = std::min(by_factor, by_beam);
+  tip.added = tip.direct.gain - measured.gain;
+  return tip;
+}
+
+TipCorrection corrected(const Problem& problem, const Fitted& fit) {
+  const Answers a = answersOf(problem, fit, fit.z);
+  const VectorXd std = deviations(problem, fit);
+  const std::size_t seen = a.direct.size();
+  const auto deviation = [&](std::size_t i) { return std[static_cast<Index>(i)]; };
+  TipCorrection result;
+  std::vector<double> damping;
+  for (std::size_t r = 0; r < seen; ++r) {
+    result.modes.push_back(
+        seenMode(problem.modes()[r], a.direct[r], deviation(r), a.factor[r], deviation(seen + r)));
+    damping.push_back(problem.modes()[r].damping_ratio);
+  }
+  const std::size_t unseen = a.frequency.size();
+  double variance = 0.0;
+  for (std::size_t k = 0; k < unseen; ++k) {
+    TipMode tip;
+    tip.seen = false;
+    tip.direct = {a.frequency[k], median(damping), a.unseen_gain[k]};
+    tip.direct.frequency_std = std::hypot(deviation(2 * seen + k), MODEL_FREQUENCY * a.frequency[k]);
+    tip.direct.damping_ratio_std = UNSEEN_DAMPING * tip.direct.damping_ratio;
+    tip.direct.gain_std = std::hypot(deviation(2 * seen + unseen + k), MODEL_GAIN * a.unseen_gain[k]);
+    tip.added = a.unseen_added[k];
+    tip.factor = tip.factor_std = INFINITY;
+    if (a.frequency[k] < problem.high) {
+      result.modes.push_back(tip);
+      continue;
+    }
+    tip.direct.gain_std = std::hypot(deviation(2 * seen + 2 * unseen + k), MODEL_GAIN * tip.added);
+    result.beyond.push_back(tip);
+    result.direct += tip.added;
+    variance += tip.direct.gain_std * tip.direct.gain_std;
+  }
+  std::sort(result.modes.begin(), result.modes.end(),
+            [](const TipMode& x, const TipMode& y) { return x.direct.frequency < y.direct.frequency; });
+  result.direct_std = std::sqrt(variance);
+  return result;
+}
+
+/// Which measured modes may be the tool's own: by the clamped tool's frequencies.
+std::vector<ToolModes> hypotheses(const Problem& problem) {
+  ToolInHolder clamped = built(problem, VectorXd::Zero(problem.unknowns()));
+  clamped.spindle.clear();
+  std::vector<double> own;
+  for (const HeldMode& h : heldModes(clamped)) own.push_back(h.frequency);
+  std::vector<ToolModes> all = {{}};
+  const std::size_t n = problem.modes().size();
+  const auto near = [&](std::size_t r, std::size_t k) {
+    const double f = problem.modes()[r].frequency;
+    return k < own.size() && f > TOOL_LOW * own[k] && f < TOOL_HIGH * own[k];
+  };
+  for (std::size_t r = 0; r < n; ++r) {
+    if (near(r, 0)) all.push_back({r});
+    for (std::size_t s = r + 1; s < n && MOST_TOOL_MODES > 1; ++s) {
+      if (near(r, 0) && near(s, 1)) all.push_back({r, s});
+    }
+  }
+  return all;
+}
+
+void check(const std::vector<OffsetMeasurement>& measurements, const ToolBeam& tool) {
+  if (measurements.empty() || measurements.front().modes.modes.empty())
+    throw Error("tip correction: no measured mode");
+  for (const Known& k :
+       {tool.stickout, tool.diameter, tool.fluted_length, tool.flute_ratio, tool.young, tool.density}) {
+    if (!(k.value > 0.0 && std::isfinite(k.value) && k.std >= 0.0 && std::isfinite(k.std)))
+      throw Error(
+          "tip correction: the tool's stick-out, diameter, fluted length, flute ratio, Young's modulus and "
+          "density must be positive and have deviations, got " +
+          shortNumber(k.value) + " +- " + shortNumber(k.std));
+  }
+  for (const OffsetMeasurement& m : measurements) {
+    for (const double height : {m.struck, m.read}) {
+      if (!(height >= 0.0 && height < tool.stickout.value))
+        throw Error("tip correction: a height of " + shortNumber(1e3 * height) +
+                    " mm must lie in 0..stickout (" + shortNumber(1e3 * tool.stickout.value) + " mm)");
+    }
+  }
+}
+
+/// Several explanations as one: means by their weight, and their scatter in the deviations.
+TipCorrection together(const std::vector<TipCorrection>& all, const std::vector<double>& weights) {
+  const auto best =
+      static_cast<std::size_t>(std::max_element(weights.begin(), weights.end()) - weights.begin());
+  TipCorrection result = all[best];
+  const double sum = std::accumulate(weights.begin(), weights.end(), 0.0);
+  for (TipMode& tip : result.modes) {
+    if (!tip.seen) continue;
+    double mean = 0.0, square = 0.0, factor = 0.0;
+    for (std::size_t k = 0; k < all.size(); ++k) {
+      for (const TipMode& other : all[k].modes) {
+        if (!other.seen || other.direct.frequency != tip.direct.frequency) continue;
+        const double share = weights[k] / sum;
+        mean += share * other.direct.gain;
+        square += share * (std::pow(other.direct.gain, 2) + std::pow(other.direct.gain_std, 2));
+        factor += share * other.factor;
+      }
+    }
+    tip.added += mean - tip.direct.gain;
+    tip.direct.gain = mean;
+    tip.direct.gain_std = std::sqrt(std::max(square - mean * mean, 0.0));
+    tip.factor = factor;
+  }
+  return result;
+}
+
+}  // namespace
+
+ModalModel TipCorrection::model() const {
+  ModalModel model;
+  for (const TipMode& tip : modes) model.modes.push_back(tip.direct);
+  model.direct = direct;
+  model.direct_std = direct_std;
+  return model;
+}
+
+TipCorrection correctToTip(const std::vector<OffsetMeasurement>& measurements, const ToolBeam& tool,
+                           const HolderPrior& prior, double high) {
+  check(measurements, tool);
+  Problem problem{measurements, tool, prior, high, {}};
+  std::vector<TipCorrection> found;
+  std::vector<double> squares;
+  for (const ToolModes& of_tool : hypotheses(problem)) {
+    problem.of_tool = of_tool;
+    const Fitted fit = fitted(problem);
+    if (!std::isfinite(fit.squares)) continue;
+    found.push_back(corrected(problem, fit));
+    squares.push_back(fit.squares);
+  }
+  if (found.empty()) throw Error("tip correction: no beam in a spindle explains the measured modes");
+  const double least = *std::min_element(squares.begin(), squares.end());
+  std::vector<double> weights;
+  for (const double s : squares) weights.push_back(std::exp(-0.5 * std::min(s - least, 700.0)));
+  TipCorrection result = together(found, weights);
+  result.direct += measurements.front().modes.direct;
+  result.direct_std = std::hypot(result.direct_std, orZero(measurements.front().modes.direct_std));
+  return result;
+}
+
+FrequencyResponse tipResponse(const FrequencyResponse& measured, const TipCorrection& correction) {
+  FrequencyResponse frf = measured;
+  frf.std_dev.resize(frf.size(), 0.0);
+  for (std::size_t i = 0; i < frf.size(); ++i) {
+    const double f = frf.frequency[i];
+    double variance = std::pow(orZero(frf.std_dev[i]), 2);
+    for (const std::vector<TipMode>* modes : {&correction.modes, &correction.beyond}) {
+      for (const TipMode& tip : *modes) {
+        Mode one = tip.direct;
+        one.gain = 1.0;
+        const Complex u = one.response(f);
+        frf.value[i] += tip.added * u;
+        variance += std::norm(u) * std::pow(tip.direct.gain_std, 2);
+        if (tip.seen) continue;
+        one.frequency += tip.direct.frequency_std;
+        variance += std::pow(tip.added, 2) * std::norm(one.response(f) - u);
+      }
+    }
+    frf.std_dev[i] = std::sqrt(variance);
+  }
+  return frf;
+}
+
+}  // namespace hammer
+}  // namespace smartmill

@@ -1,0 +1,112 @@
+#include "tool_in_holder.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Core>
+
+#include "smartmill_core/math/linear_algebra.h"
+#include "smartmill_core/units.h"
+
+namespace smartmill {
+namespace hammer {
+namespace {
+
+using Eigen::Index;
+using Eigen::Matrix4d;
+using Eigen::MatrixXd;
+
+constexpr int ELEMENTS = 7;
+constexpr Index TOOL = 2 * (ELEMENTS + 1);
+constexpr double POISSON = 0.25, SHEAR_SHARE = 0.89;  // of a round section
+
+/// Bending and mass of an element from its bending stiffness, flexibility in shear and mass.
+void add(double l, double bending, double shear, double mass, double inertia, Index at, MatrixXd& m,
+         MatrixXd& k) {
+  const double phi = 12.0 * bending / (shear * l * l), l2 = l * l;
+  Matrix4d stiffness, line, turn;
+  stiffness << 12, 6 * l, -12, 6 * l, 6 * l, (4 + phi) * l2, -6 * l, (2 - phi) * l2, -12, -6 * l, 12, -6 * l,
+      6 * l, (2 - phi) * l2, -6 * l, (4 + phi) * l2;
+  line << 156, 22 * l, 54, -13 * l, 22 * l, 4 * l2, 13 * l, -3 * l2, 54, 13 * l, 156, -22 * l, -13 * l,
+      -3 * l2, -22 * l, 4 * l2;
+  turn << 36, 3 * l, -36, 3 * l, 3 * l, 4 * l2, -3 * l, -l2, -36, -3 * l, 36, -3 * l, 3 * l, -l2, -3 * l,
+      4 * l2;
+  k.block<4, 4>(at, at) += bending / (l2 * l * (1.0 + phi)) * stiffness;
+  m.block<4, 4>(at, at) += mass * l / 420.0 * line + inertia / (30.0 * l) * turn;
+}
+
+/// Share of an element, from x on, that is fluted: averages of the section's powers.
+struct Section {
+  double bending, shear, mass, inertia;
+};
+Section sectionOf(const ToolInHolder& t, double x, double l) {
+  const double fluted = std::clamp((t.fluted_length - x) / l, 0.0, 1.0);
+  const auto power = [&](int n) {
+    return fluted * std::pow(t.fluted_diameter, n) + (1.0 - fluted) * std::pow(t.diameter, n);
+  };
+  // In bending what is soft counts: the mean of 1 / d^4.
+  const double soft =
+      1.0 / (fluted / std::pow(t.fluted_diameter, 4) + (1.0 - fluted) / std::pow(t.diameter, 4));
+  const double area = 0.25 * units::PI * power(2), second = units::PI / 64.0;
+  return {t.young * second * soft, SHEAR_SHARE * area * t.young / (2.0 * (1.0 + POISSON)), t.density * area,
+          t.density * second * power(4)};
+}
+
+}  // namespace
+
+double HeldMode::at(double height) const {
+  const auto last = shape.size() / 2 - 2;
+  const std::size_t e = std::min(last, static_cast<std::size_t>(std::max(0.0, height / element)));
+  const double u = height / element - static_cast<double>(e);
+  const double *left = &shape[2 * e], *right = &shape[2 * e + 2];
+  return left[0] * (1.0 - 3.0 * u * u + 2.0 * u * u * u) + element * left[1] * (u - 2.0 * u * u + u * u * u) +
+         right[0] * (3.0 * u * u - 2.0 * u * u * u) + element * right[1] * (u * u * u - u * u);
+}
+
+double HeldMode::gain(double struck, double read) const {
+  return at(struck) * at(read) / std::pow(units::TWO_PI * frequency, 2);
+}
+
+std::vector<HeldMode> heldModes(const ToolInHolder& t) {
+  const auto spindle = static_cast<Index>(t.spindle.size());
+  const Index size = TOOL + spindle;
+  MatrixXd mass = MatrixXd::Zero(size, size), stiffness = mass;
+  const double l = t.stickout / ELEMENTS;
+  for (int e = 0; e < ELEMENTS; ++e) {
+    const Section s = sectionOf(t, e * l, l);
+    add(l, s.bending, s.shear, s.mass, s.inertia, 2 * e, mass, stiffness);
+  }
+  // Springs between the beam's end and what the spindle's modes (of mass 1) move there: x runs from the tip,
+  // so a mode that tilts towards the spindle has its end's deflection less.
+  MatrixXd across = MatrixXd::Zero(1, size), turning = across;
+  across(0, TOOL - 2) = turning(0, TOOL - 1) = 1.0;
+  for (Index i = 0; i < spindle; ++i) {
+    const SpindleMode& m = t.spindle[static_cast<std::size_t>(i)];
+    const double omega = units::TWO_PI * m.frequency, tip = omega * std::sqrt(m.gain);
+    across(0, TOOL + i) = -tip * (1.0 - m.tilt * t.stickout);
+    turning(0, TOOL + i) = tip * m.tilt;
+    mass(TOOL + i, TOOL + i) = 1.0;
+    stiffness(TOOL + i, TOOL + i) = omega * omega;
+  }
+  stiffness += t.across * across.transpose() * across + t.turning * turning.transpose() * turning;
+  // K v = w^2 M v with M = S S', S from M's own eigenvectors.
+  const linear::SymmetricEigensystem of_mass = linear::symmetricEigensystem(mass);
+  if (!(of_mass.values.minCoeff() > 0.0)) return {};
+  const MatrixXd root = of_mass.vectors * of_mass.values.cwiseSqrt().cwiseInverse().asDiagonal();
+  const linear::SymmetricEigensystem modes =
+      linear::symmetricEigensystem(root.transpose() * stiffness * root);
+  std::vector<HeldMode> found;
+  for (Index k = 0; k < size; ++k) {
+    if (!(modes.values[k] > 0.0)) continue;
+    const Eigen::VectorXd v = root * modes.vectors.col(k);
+    HeldMode h;
+    h.frequency = std::sqrt(modes.values[k]) / units::TWO_PI;
+    h.shape.assign(v.data(), v.data() + TOOL);
+    h.element = l;
+    found.push_back(h);
+  }
+  return found;
+}
+
+}  // namespace hammer
+}  // namespace smartmill

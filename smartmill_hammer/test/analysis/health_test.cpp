@@ -1,0 +1,50 @@
+#include "smartmill_hammer/analysis/health.h"
+
+#include <cmath>
+#include <random>
+
+#include <gtest/gtest.h>
+
+namespace smartmill {
+namespace hammer {
+namespace {
+
+constexpr HealthAllowance NONE{0.0, 0.0, 0.0, 0.0};
+
+MeasuredModes measured(std::mt19937& random, double stiffer = 1.0) {
+  std::normal_distribution<double> normal;
+  MeasuredModes m;
+  for (const double f : {700.0, 1900.0, 3100.0})
+    m.model.modes.push_back({f + 0.5 * normal(random), 0.03 * (1.0 + 0.02 * normal(random)),
+                             1e-8 / stiffer * (1.0 + 0.01 * normal(random)), 0.5, 6e-4, 1e-10 / stiffer});
+  return m;
+}
+
+// By their stated deviations alone: a thousand healthy comparisons of nine quantities, and one that is 10 %
+// stiffer (seven deviations of a difference).
+TEST(Health, TellsDriftFromChance) {
+  std::mt19937 random(5);
+  int false_alarms = 0, found = 0;
+  for (int i = 0; i < 1000; ++i) {
+    const MeasuredModes first = measured(random);
+    false_alarms += !driftOf(modeChanges(first, measured(random), NONE)).empty();
+    found += driftOf(modeChanges(first, measured(random, 1.1), NONE)).find("gain") != std::string::npos;
+  }
+  EXPECT_LE(false_alarms, 5);
+  EXPECT_GE(found, 990);
+}
+
+TEST(Health, SeesModesComeAndGo) {
+  std::mt19937 random(6);
+  const MeasuredModes first = measured(random);
+  MeasuredModes less = measured(random);
+  less.model.modes.pop_back();
+  EXPECT_NE(driftOf(modeChanges(first, less)).find("gone"), std::string::npos);
+  EXPECT_NE(driftOf(modeChanges(less, first)).find("new"), std::string::npos);
+  EXPECT_TRUE(valueChange("friction", 1.0, 1.3, 0.05).drifted());
+  EXPECT_FALSE(valueChange("friction", 1.0, 1.1, 0.05).drifted());
+}
+
+}  // namespace
+}  // namespace hammer
+}  // namespace smartmill

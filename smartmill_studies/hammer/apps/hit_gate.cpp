@@ -1,0 +1,95 @@
+// rosrun smartmill_studies hammer_hit_gate [--records N] [--seed N]
+
+#include <cstdint>
+#include <cstdio>
+#include <map>
+#include <string>
+
+#include "smartmill_core/modal/hit_judge.h"
+#include "smartmill_core/program.h"
+#include "smartmill_hammer_testing/hit_records.h"
+
+namespace {
+
+using namespace smartmill;
+using hammer::HitClass;
+
+struct Request {
+  int records = 1000;
+  std::uint64_t seed = 14;
+  bool list = false;
+};
+
+/// Word of a reason that names the class's fault.
+const std::map<HitClass, std::string> WORD = {
+    {HitClass::double_hit, "double"},  {HitClass::clipping, "clipped"}, {HitClass::dropout, "dropout"},
+    {HitClass::drift, "baseline"},     {HitClass::stuck, "stuck"},      {HitClass::late_bump, "late bump"},
+    {HitClass::weak, "weak"},          {HitClass::dull, "dull"},        {HitClass::trigger_skew, "skew"},
+    {HitClass::gain_jump, "gain jump"}};
+
+/// Of a class: hits looked at, refused, refused by the class's own name, and clean ones beside that were
+/// refused.
+struct Tally {
+  int hits = 0, refused = 0, named = 0, beside = 0, beside_refused = 0;
+};
+
+Tally count(HitClass kind, const Request& request) {
+  Tally tally;
+  const bool clean = WORD.count(kind) == 0;
+  for (int i = 0; i < request.records; ++i) {
+    const std::uint64_t seed = request.seed * 1000000 + static_cast<std::uint64_t>(i);
+    const hammer::HitCase drawn = hammer::drawHitCase(kind, seed);
+    HitJudgeOptions options;
+    options.weak_force = drawn.weak_force;
+    options.high = drawn.high;
+    const std::vector<HitFault> faults = judgeHits(drawn.hits, options);
+    for (std::size_t h = 0; h < faults.size(); ++h) {
+      const std::string& text = faults[h].text;
+      if (!clean && h != drawn.at_fault) {
+        ++tally.beside;
+        tally.beside_refused += !text.empty();
+        continue;
+      }
+      ++tally.hits;
+      tally.refused += !text.empty();
+      tally.named += !clean && text.find(WORD.at(kind)) != std::string::npos;
+      if (request.list && text.empty() != clean)
+        std::printf("  %s, seed %llu: %s\n", nameOf(kind).c_str(), static_cast<unsigned long long>(seed),
+                    text.empty() ? "accepted" : text.c_str());
+    }
+  }
+  return tally;
+}
+
+int run(const Request& request) {
+  bool good = true;
+  std::printf("%-20s %6s %9s %9s %7s  %s\n", "class", "hits", "accepted", "refused", "named",
+              "clean beside it refused");
+  for (int k = 0; k < hammer::HIT_CLASSES; ++k) {
+    const auto kind = static_cast<HitClass>(k);
+    const bool clean = WORD.count(kind) == 0;
+    const Tally t = count(kind, request);
+    const double refused = 100.0 * t.refused / t.hits;
+    std::printf("%-20s %6d %7.1f %% %7.1f %% %5.1f %%", nameOf(kind).c_str(), t.hits, 100.0 - refused,
+                refused, 100.0 * t.named / t.hits);
+    if (t.beside > 0) std::printf("  %d of %d", t.beside_refused, t.beside);
+    std::printf("\n");
+    std::fflush(stdout);
+    good = good && (clean ? refused <= 1.0 : refused >= 98.0);
+  }
+  std::printf("due: clean accepted 99 %%, each fault refused 98 %%: %s\n", good ? "met" : "missed");
+  return good ? 0 : 1;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Request request;
+  CommandLine line(
+      "Counts the judge of hits over drawn records: clean ones accepted, each kind of fault refused "
+      "(smartmill_hammer_testing/hit_records.h).");
+  line.option("--records", request.records, "of each class").positive().showDefault();
+  line.option("--seed", request.seed, "of the records").showDefault();
+  line.flag("--list", request.list, "every record judged wrongly, with its seed");
+  return runProgram(line, argc, argv, [&] { return run(request); });
+}

@@ -1,0 +1,123 @@
+// rosrun smartmill_studies hammer_offset [--machines N] [--seed N] [-o DIR]
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <cstdio>
+#include <filesystem>
+#include <string>
+
+#include "hammer/offset_cases.h"
+#include "smartmill_core/error.h"
+#include "smartmill_core/io/csv.h"
+#include "smartmill_core/program.h"
+#include "smartmill_core/signal/statistics.h"
+
+namespace {
+
+using namespace smartmill;
+using namespace smartmill::studies;
+
+struct Request {
+  int machines = 100;
+  unsigned seed = 14;
+  double noise = 0.005;
+  std::string out;
+};
+
+/// Modes below this share of the largest gain show in no chart.
+constexpr double COUNTS = 0.03;
+
+struct Tally {
+  std::vector<double> gains, frfs;
+  int stated = 0, inside = 0;
+
+  void add(const OffsetOutcome& outcome, int way) {
+    frfs.push_back(outcome.frf_error[way]);
+    for (const GainError& e : outcome.modes[way]) {
+      if (e.share < COUNTS) continue;
+      gains.push_back(std::abs(e.error));
+      stated += e.std > 0.0;
+      inside += e.std > 0.0 && std::abs(e.error) < 1.96 * e.std;
+    }
+  }
+};
+
+/// Depth [1/N-ish, relative] that a slot is limited to is -1 / (2 Re H) at its most negative: what figure 4.8
+/// compares.
+double softest(const FrequencyResponse& frf) {
+  double least = 0.0;
+  for (std::size_t i = 0; i < frf.size(); ++i) {
+    if (frf.frequency[i] >= 100.0 && frf.frequency[i] <= 5000.0) least = std::min(least, frf.value[i].real());
+  }
+  return -least;
+}
+
+void save(const OffsetOutcome& outcome, const std::string& folder, int machine) {
+  std::filesystem::create_directories(folder);
+  CsvWriter csv(
+      "frequency_hz,truth_real,truth_imag,none_real,none_imag,eq_4_44_real,eq_4_44_imag,apart_real,apart_"
+      "imag,"
+      "apart_std,two_heights_real,two_heights_imag",
+      8);
+  for (std::size_t i = 0; i < outcome.truth.size(); ++i) {
+    const auto at = [&](int w) { return outcome.frf[w].value[i]; };
+    csv.row(outcome.truth.frequency[i], outcome.truth.value[i].real(), outcome.truth.value[i].imag(),
+            at(0).real(), at(0).imag(), at(1).real(), at(1).imag(), at(2).real(), at(2).imag(),
+            outcome.frf[2].std_dev[i], at(3).real(), at(3).imag());
+  }
+  csv.save(folder + "/machine_" + std::to_string(machine) + ".csv");
+}
+
+void run(const Request& request) {
+  std::mt19937_64 random(request.seed);
+  Tally tallies[WAYS];
+  std::vector<double> depths[WAYS];
+  int failed = 0;
+  for (int i = 0; i < request.machines; ++i) {
+    const OffsetCase drawn = drawOffsetCase(random);
+    try {
+      const OffsetOutcome outcome = judgeOffset(drawn, request.noise, random);
+      for (int w = 0; w < WAYS; ++w) {
+        tallies[w].add(outcome, w);
+        depths[w].push_back(std::abs(softest(outcome.truth) / softest(outcome.frf[w]) - 1.0));
+      }
+      if (!request.out.empty() && i < 10) save(outcome, request.out, i);
+    } catch (const Error& error) {
+      ++failed;
+      std::printf("machine %d: %s\n", i, error.what());
+    }
+    if (i % 10 == 9) std::fprintf(stderr, "%d of %d\n", i + 1, request.machines);
+  }
+  std::printf("%d machines, %d failed; modes below 5 kHz with %.0f %% of the largest gain and more\n",
+              request.machines, failed, 100.0 * COUNTS);
+  std::printf("%-24s %-22s %-22s %-26s %s\n", "", "gain: median, 95 %", "FRF: median, 95 %",
+              "least depth: median, 95 %", "within 1.96 deviations");
+  for (int w = 0; w < WAYS; ++w) {
+    const Tally& t = tallies[w];
+    const auto show = [](const std::vector<double>& x) {
+      char text[40];
+      std::snprintf(text, sizeof text, "%.1f %%, %.1f %%", 100.0 * percentile(x, 0.5),
+                    100.0 * percentile(x, 0.95));
+      return std::string(text);
+    };
+    std::printf("%-24s %-22s %-22s %-26s", nameOf(static_cast<Way>(w)).c_str(), show(t.gains).c_str(),
+                show(t.frfs).c_str(), show(depths[w]).c_str());
+    if (w >= 2 && t.stated > 0)
+      std::printf(" %d of %d (%.0f %%)", t.inside, t.stated, 100.0 * t.inside / t.stated);
+    std::printf("\n");
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Request request;
+  CommandLine line(
+      "The tip's FRF from one struck above it: no correction, Dunwoody's eq. 4.44, spindle and tool apart.");
+  line.option("--machines", request.machines, "drawn tools and spindles").positive().showDefault();
+  line.option("--seed", request.seed).showDefault();
+  line.option("--noise", request.noise, "of the FRF, a share of its rms").notNegative().showDefault();
+  line.option("-o,--out", request.out, "folder for the FRFs of the first ten as CSV");
+  return runProgram(line, argc, argv, [&] { run(request); });
+}

@@ -1,0 +1,140 @@
+#include "free_decay.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/Core>
+
+#include "smartmill_core/math/linear_algebra.h"
+#include "smartmill_core/signal/statistics.h"
+
+namespace smartmill {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr std::size_t ORDER = 32, ROWS_A_COEFFICIENT = 3;
+/// Samples of a stretch.
+constexpr std::size_t STRETCH = 8;
+/// What is unforeseen must be so many times the usual, and this share of the largest: of a sample, of a
+/// stretch.
+constexpr double SUDDEN = 12.0, SUDDEN_SHARE = 0.08;
+constexpr double STRANGE = 6.0, STRANGE_SHARE = 0.004;
+
+std::vector<double> averaged(const std::vector<double>& values, std::size_t from, std::size_t group) {
+  std::vector<double> result((values.size() - from) / group);
+  for (std::size_t i = 0; i < result.size(); ++i) {
+    for (std::size_t k = 0; k < group; ++k)
+      result[i] += values[from + i * group + k] / static_cast<double>(group);
+  }
+  return result;
+}
+
+/// Coefficients of y[n] = sum a[k] y[n - 1 - k] over the rows that take part.
+VectorXd prediction(const std::vector<double>& y, std::size_t order, const std::vector<bool>& rows,
+                    double noise) {
+  const auto p = static_cast<Index>(order);
+  const Index count =
+      static_cast<Index>(std::count(rows.begin() + static_cast<std::ptrdiff_t>(order), rows.end(), true));
+  MatrixXd past(count, p);
+  VectorXd now(count);
+  Index row = 0;
+  for (std::size_t n = order; n < y.size(); ++n) {
+    if (!rows[n]) continue;
+    for (Index k = 0; k < p; ++k) past(row, k) = y[n - 1 - static_cast<std::size_t>(k)];
+    now[row++] = y[n];
+  }
+  MatrixXd normal = past.transpose() * past;
+  const VectorXd along = past.transpose() * now;
+  normal.diagonal().array() += 1e-12 * normal.diagonal().maxCoeff() + noise * noise;
+  return linear::solveSymmetric(normal, along);
+}
+
+std::vector<double> unforeseen(const std::vector<double>& y, std::size_t order, const VectorXd& a) {
+  std::vector<double> left(y.size(), 0.0);
+  for (std::size_t n = order; n < y.size(); ++n) {
+    left[n] = y[n];
+    for (std::size_t k = 0; k < order; ++k) left[n] -= a[static_cast<Index>(k)] * y[n - 1 - k];
+  }
+  return left;
+}
+
+double usual(const std::vector<double>& left, std::size_t order) {
+  std::vector<double> sizes;
+  for (std::size_t n = order; n < left.size(); ++n) sizes.push_back(std::abs(left[n]));
+  return median(sizes) / 0.6745;
+}
+
+FreeDecayBreak breakAt(const std::vector<double>& y, std::size_t group, double largest, double noise) {
+  const std::size_t order = std::min(ORDER, y.size() / (ROWS_A_COEFFICIENT + 1));
+  if (order < 8) return {};
+  std::vector<bool> rows(y.size(), true);
+  std::vector<double> left = unforeseen(y, order, prediction(y, order, rows, noise));
+  // Once more without what stood out: it bends the prediction.
+  const double first = usual(left, order);
+  for (std::size_t n = order; n < y.size(); ++n) rows[n] = std::abs(left[n]) < SUDDEN * first;
+  left = unforeseen(y, order, prediction(y, order, rows, noise));
+  const double even = std::max(usual(left, order), noise);
+  FreeDecayBreak found;
+  for (std::size_t n = order; group == 1 && n < left.size(); ++n) {
+    if (std::abs(left[n]) > std::max({SUDDEN * even, SUDDEN_SHARE * largest, found.size}))
+      found = {n, std::abs(left[n]), true};
+  }
+  if (found.sample > 0) return found;
+  double calmest = INFINITY;
+  for (std::size_t n = order; n + STRETCH <= left.size(); n += STRETCH / 2) {
+    double sum = 0.0;
+    for (std::size_t i = n; i < n + STRETCH; ++i) sum += left[i] * left[i];
+    const double size = std::sqrt(sum / static_cast<double>(STRETCH));
+    // What is not foretold (a curved sensor) fades with the ringing and does not come again.
+    if (size > std::max({STRANGE * std::max(even, std::isfinite(calmest) ? calmest : size),
+                         STRANGE_SHARE * largest, found.size}))
+      found = {n, size, false};
+    calmest = std::min(calmest, size);
+  }
+  return found;
+}
+
+}  // namespace
+
+double unforeseenRise(const std::vector<double>& response, std::size_t from, std::size_t begin,
+                      std::size_t end, double noise) {
+  double most = 0.0;
+  for (const std::size_t group : {1, 4, 16}) {
+    const std::vector<double> y = averaged(response, from, group);
+    const std::size_t first = (begin - from) / group, last = std::min(y.size(), (end - from) / group + 1);
+    const std::size_t order = std::min(ORDER, first / (ROWS_A_COEFFICIENT + 1));
+    if (order < 8 || first >= last) continue;
+    std::vector<bool> rows(y.size(), false);
+    std::fill(rows.begin() + static_cast<std::ptrdiff_t>(order),
+              rows.begin() + static_cast<std::ptrdiff_t>(first), true);
+    const double even = noise / std::sqrt(static_cast<double>(group));
+    const std::vector<double> left = unforeseen(y, order, prediction(y, order, rows, even));
+    const auto power = [&](std::size_t a, std::size_t b) {
+      double sum = 0.0;
+      for (std::size_t i = a; i < b; ++i) sum += left[i] * left[i] / static_cast<double>(b - a);
+      return std::sqrt(sum);
+    };
+    // The later half of what was learned from: the early ringing leaves more.
+    most = std::max(most, power(first, last) / std::max(power((order + first) / 2, first), even));
+  }
+  return most;
+}
+
+FreeDecayBreak freeDecayBreak(const std::vector<double>& response, std::size_t from, double noise) {
+  double largest = 0.0;
+  for (const double v : response) largest = std::max(largest, std::abs(v));
+  for (const std::size_t group : {1, 4, 16}) {
+    if (from >= response.size()) break;
+    FreeDecayBreak found = breakAt(averaged(response, from, group), group, largest,
+                                   noise / std::sqrt(static_cast<double>(group)));
+    if (found.sample == 0) continue;
+    found.sample = from + found.sample * group;
+    return found;
+  }
+  return {};
+}
+
+}  // namespace smartmill
