@@ -903,12 +903,15 @@ void HammerSequence::retract(double now) {
   double to_go = 0.0;
   readPosition(*state_, here, to_go);
   const auto d = static_cast<std::size_t>(direction_);
-  Axes3 beside = here;
+  // Away from a second sensor first: sideways another part of the tool would pass it.
+  Axes3 off = here;
+  off[1 - d] = roundTo(std::min(here[1 - d], stationPosition()[1 - d]), parameters_.resolution);
+  Axes3 beside = off;
   // Away from the sensor only, never towards it.
   beside[d] = roundTo(std::min(here[d], stationPosition()[d] - parameters_.standoff), parameters_.resolution);
   Axes3 up = beside;
   up[2] = std::max(here[2], safeHeight());
-  move(now, here, {{beside, parameters_.approach_feed}, {up, 0.0}});
+  move(now, here, {{off, parameters_.approach_feed}, {beside, parameters_.approach_feed}, {up, 0.0}});
 }
 
 void HammerSequence::finish() {
