@@ -33,6 +33,8 @@ constexpr double SECOND_STEP = 0.5;
 /// Of a depth read from the sensor's nominal curve, which a round and fluted tool does not quite follow.
 constexpr double TRUSTED_DEPTH = 1.0;
 constexpr int FACE_STEPS = 24;
+/// Of the trial blow's swing: no later one's is larger.
+constexpr double LARGEST_SWING = 1.5;
 /// Two tips of a fit band: share of the sensor's range that counts as its end.
 constexpr double RANGE_SHARE = 0.98;
 
@@ -128,6 +130,7 @@ bool HammerSequence::handle(const MeasureFrfGoal& goal) {
   calibration_.reset();
   sensor_ = cross_sensor_ = SensorState();
   has_cross_ = surveyed_ = false;
+  swing_.reset();
   no_cross_.clear();
   collector_.reset();
   cross_collector_.reset();
@@ -597,7 +600,8 @@ double HammerSequence::safeTravel(std::size_t axis) const {
     behind = std::min(behind, radius * (1.0 - std::cos(a)) + leastRetreat(turned - a) * std::cos(a));
   }
   const double moved = target_[axis] - stationPosition()[axis];
-  return flute_gap_ - parameters_.min_gap_share * station_.gap_at_zero_volt + behind - moved;
+  return flute_gap_ - parameters_.min_gap_share * station_.gap_at_zero_volt + behind - moved -
+         swing_.value_or(0.0);
 }
 
 SensorCalibrationOptions HammerSequence::calibrationOptions(std::size_t axis) const {
@@ -613,6 +617,7 @@ SensorCalibrationOptions HammerSequence::calibrationOptions(std::size_t axis) co
   o.gain_volt = station_.gain_volt;
   o.gap_at_zero_volt = station_.gap_at_zero_volt;
   o.min_gap = parameters_.min_gap_share * station_.gap_at_zero_volt;
+  o.swing = swing_.value_or(0.0);
   // The flute faces the hammer, so the sensor may look between two flutes.
   o.max_travel = parameters_.max_approach + station_.flute_depth;
   o.safe_travel = safeTravel(axis);
@@ -649,6 +654,21 @@ bool HammerSequence::surveyDue(double volt) {
   return true;
 }
 
+/// How far a blow lets the tool swing towards the sensor, by the sensor's nominal curve, which far from it
+/// and before a flank tells rather too much.
+void HammerSequence::tried(double now, const Hit& hit) {
+  const auto before =
+      hit.response.begin() + static_cast<std::ptrdiff_t>(std::max<std::size_t>(1, hit.pre_trigger / 2));
+  const double rest = mean({hit.response.begin(), before});
+  const double top = *std::max_element(hit.response.begin(), hit.response.end());
+  const double noise = 3.0 * standardDeviation({hit.response.begin(), before});
+  swing_ = LARGEST_SWING * std::max(0.0, nominalGap(rest) - nominalGap(std::max(rest, top - noise)));
+  swing_ = std::min(*swing_, station_.gap_at_zero_volt);
+  stage_ = Stage::calibrate;
+  say(format("a blow swings the tool by %.0f um at most towards the sensor", 1e6 * *swing_), 0.6);
+  average(now + parameters_.rest_time);
+}
+
 void HammerSequence::surveyed(double now, double volt) {
   addToProfile(static_cast<std::size_t>(direction_), survey_.back(), volt);
   survey_.pop_back();
@@ -664,6 +684,11 @@ void HammerSequence::calibrated(double now, double volt, double volt_std) {
       stage_ = Stage::survey;
       say("looking at the flanks that the sensor's face will meet", 0.56);
       return orient(now, result_.flute_hammer + survey_.back());
+    }
+    if (stage_ == Stage::calibrate && !swing_) {
+      stage_ = Stage::trial;
+      say("a trial blow, before the tool nears the sensor", 0.59);
+      return strike(now);
     }
     calibration_.emplace(calibrationOptions(calibratedAxis()));
     calibration_->start(volt, volt_std);
@@ -690,7 +715,9 @@ void HammerSequence::sensorKnown(double now) {
   calibration_.reset();
   say(format("sensor calibrated: %.3f +- %.3f um/V", 1e6 * sensor.sensitivity, 1e6 * sensor.sensitivity_std) +
           (held_back ? format(" at %.2f V, held back by the tool's edges", sensor.volt) : std::string()),
-      stage_ == Stage::calibrate ? 0.62 : stage_ == Stage::calibrate_cross ? 0.66 : 0.7);
+      stage_ == Stage::calibrate         ? 0.62
+      : stage_ == Stage::calibrate_cross ? 0.66
+                                         : 0.7);
   if (stage_ == Stage::calibrate && has_cross_) {
     stage_ = Stage::calibrate_cross;
     return average(now + parameters_.settle_time);
@@ -748,6 +775,7 @@ void HammerSequence::recorded(double now, HitCollector::Record record,
                                   RANGE_SHARE * station_.range_volt});
   }
   if (!fault.text.empty()) return badHit(now, fault.text, fault.bad_data);
+  if (stage_ == Stage::trial) return tried(now, record.hit);
   hits_.push_back(std::move(record.hit));
   if (cross) cross_hits_.push_back(std::move(cross->hit));
   say("hit " + std::to_string(hits_.size()) + " of " + std::to_string(goal_.hits),
