@@ -65,7 +65,8 @@ void SensorCalibration::ask(double distance) {
   if (jogs_ >= options_.max_jogs) {
     return fail("the sensor's voltage is not zero after " + std::to_string(jogs_) + " jogs");
   }
-  const double safe = std::min(options_.safe_travel, travelled_ + localGap() - options_.min_gap);
+  const double safe =
+      std::min(options_.safe_travel, travelled_ + localGap() - options_.min_gap - options_.swing);
   if (phase_ == Phase::approach && rounded > 0.0 && travelled_ + rounded > safe - options_.check_jog) {
     const double left = safe - options_.check_jog - travelled_;
     const double step = std::floor(left / options_.resolution) * options_.resolution;

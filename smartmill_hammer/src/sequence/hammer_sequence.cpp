@@ -35,6 +35,8 @@ constexpr double SECOND_STEP = 0.5;
 /// Of a depth read from the sensor's nominal curve, which a round and fluted tool does not quite follow.
 constexpr double TRUSTED_DEPTH = 1.0;
 constexpr int FACE_STEPS = 24;
+/// Of the trial blow's swing: no later one's is larger.
+constexpr double LARGEST_SWING = 1.5;
 /// Two tips of a fit band: share of the sensor's range that counts as its end.
 constexpr double RANGE_SHARE = 0.98;
 constexpr std::size_t LEAST_HITS = 3;
@@ -131,6 +133,7 @@ bool HammerSequence::handle(const MeasureFrfGoal& goal) {
   calibration_.reset();
   sensor_ = cross_sensor_ = SensorState();
   has_cross_ = surveyed_ = false;
+  swing_.reset();
   no_cross_.clear();
   collector_.reset();
   cross_collector_.reset();
@@ -600,7 +603,8 @@ double HammerSequence::safeTravel(std::size_t axis) const {
     behind = std::min(behind, radius * (1.0 - std::cos(a)) + leastRetreat(turned - a) * std::cos(a));
   }
   const double moved = target_[axis] - stationPosition()[axis];
-  return flute_gap_ - parameters_.min_gap_share * station_.gap_at_zero_volt + behind - moved;
+  return flute_gap_ - parameters_.min_gap_share * station_.gap_at_zero_volt + behind - moved -
+         swing_.value_or(0.0);
 }
 
 SensorCalibrationOptions HammerSequence::calibrationOptions(std::size_t axis) const {
@@ -616,6 +620,7 @@ SensorCalibrationOptions HammerSequence::calibrationOptions(std::size_t axis) co
   o.gain_volt = station_.gain_volt;
   o.gap_at_zero_volt = station_.gap_at_zero_volt;
   o.min_gap = parameters_.min_gap_share * station_.gap_at_zero_volt;
+  o.swing = swing_.value_or(0.0);
   // The flute faces the hammer, so the sensor may look between two flutes.
   o.max_travel = parameters_.max_approach + station_.flute_depth;
   o.safe_travel = safeTravel(axis);
@@ -652,6 +657,21 @@ bool HammerSequence::surveyDue(double volt) {
   return true;
 }
 
+/// How far a blow lets the tool swing towards the sensor, by the sensor's nominal curve, which far from it
+/// and before a flank tells rather too much.
+void HammerSequence::tried(double now, const Hit& hit) {
+  const auto before =
+      hit.response.begin() + static_cast<std::ptrdiff_t>(std::max<std::size_t>(1, hit.pre_trigger / 2));
+  const double rest = mean({hit.response.begin(), before});
+  const double top = *std::max_element(hit.response.begin(), hit.response.end());
+  const double noise = 3.0 * standardDeviation({hit.response.begin(), before});
+  swing_ = LARGEST_SWING * std::max(0.0, nominalGap(rest) - nominalGap(std::max(rest, top - noise)));
+  swing_ = std::min(*swing_, station_.gap_at_zero_volt);
+  stage_ = Stage::calibrate;
+  say(format("a blow swings the tool by %.0f um at most towards the sensor", 1e6 * *swing_), 0.6);
+  average(now + parameters_.rest_time);
+}
+
 void HammerSequence::surveyed(double now, double volt) {
   addToProfile(static_cast<std::size_t>(direction_), survey_.back(), volt);
   survey_.pop_back();
@@ -667,6 +687,11 @@ void HammerSequence::calibrated(double now, double volt, double volt_std) {
       stage_ = Stage::survey;
       say("looking at the flanks that the sensor's face will meet", 0.56);
       return orient(now, result_.flute_hammer + survey_.back());
+    }
+    if (stage_ == Stage::calibrate && !swing_) {
+      stage_ = Stage::trial;
+      say("a trial blow, before the tool nears the sensor", 0.59);
+      return strike(now);
     }
     calibration_.emplace(calibrationOptions(calibratedAxis()));
     calibration_->start(volt, volt_std);
@@ -753,6 +778,7 @@ void HammerSequence::recorded(double now, HitCollector::Record record,
                                   RANGE_SHARE * station_.range_volt, parameters_.force_high});
   }
   if (!fault.text.empty()) return badHit(now, fault.text, fault.bad_data);
+  if (stage_ == Stage::trial) return tried(now, record.hit);
   hits_.push_back(std::move(record.hit));
   if (cross) cross_hits_.push_back(std::move(cross->hit));
   const std::vector<HitFault> beside = faultsBeside(hits_, std::vector<bool>(hits_.size(), true));
@@ -928,12 +954,15 @@ void HammerSequence::retract(double now) {
   double to_go = 0.0;
   readPosition(*state_, here, to_go);
   const auto d = static_cast<std::size_t>(direction_);
-  Axes3 beside = here;
+  // Away from a second sensor first: sideways another part of the tool would pass it.
+  Axes3 off = here;
+  off[1 - d] = roundTo(std::min(here[1 - d], stationPosition()[1 - d]), parameters_.resolution);
+  Axes3 beside = off;
   // Away from the sensor only, never towards it.
   beside[d] = roundTo(std::min(here[d], stationPosition()[d] - parameters_.standoff), parameters_.resolution);
   Axes3 up = beside;
   up[2] = std::max(here[2], safeHeight());
-  move(now, here, {{beside, parameters_.approach_feed}, {up, 0.0}});
+  move(now, here, {{off, parameters_.approach_feed}, {beside, parameters_.approach_feed}, {up, 0.0}});
 }
 
 void HammerSequence::finish() {

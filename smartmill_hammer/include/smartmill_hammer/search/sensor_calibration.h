@@ -21,10 +21,11 @@ struct SensorCalibrationOptions {
   double gain_volt = 10.0;       ///< [V] nominal curve V = gain_volt (gap_at_zero_volt / gap - 1)
   double gap_at_zero_volt = 250e-6;  ///< [m]
   double min_gap = 100e-6;           ///< [m] no jog to a nominal gap below this
-  double max_travel = 3e-3;          ///< [m] approach at most
-  double safe_travel = 1.0;          ///< [m] nothing of the tool can touch before; the approach ends there
-  double largest_std = 0.02;         ///< [1] of the sensitivity over itself, where the approach ended early
-  int max_jogs = 100;                ///< [1]
+  double swing = 0.0;  ///< [m] towards the sensor that a blow may make, beside min_gap before a sharp edge
+  double max_travel = 3e-3;   ///< [m] approach at most
+  double safe_travel = 1.0;   ///< [m] nothing of the tool can touch before; the approach ends there
+  double largest_std = 0.02;  ///< [1] of the sensitivity over itself, where the approach ended early
+  int max_jogs = 100;         ///< [1]
 };
 
 /// Moves the tool towards the sensor in small jogs until its voltage is about zero, and measures its

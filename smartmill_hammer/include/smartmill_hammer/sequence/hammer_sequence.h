@@ -164,6 +164,7 @@ class HammerSequence {
     to_tip,
     orient_flute,
     survey,
+    trial,
     calibrate,
     calibrate_cross,
     calibrate_again,
@@ -195,6 +196,7 @@ class HammerSequence {
   void addToProfile(std::size_t axis, double further, double volt);
   bool surveyDue(double volt);
   void surveyed(double now, double volt);
+  void tried(double now, const Hit& hit);
   double nominalGap(double volt) const;
   double retreatOf(double volt, double moved) const;
   double turnedFrom(std::size_t axis) const;
@@ -263,8 +265,9 @@ class HammerSequence {
   std::vector<Retreat> profile_;  // of the tool at the tip, as the first search saw it
   std::vector<double> survey_;    // [rad] still to be read beside the place for the hammer, last first
   bool surveyed_ = false;
-  double flute_volt_ = 0.0;  // [V] of that flute at the sensor
-  double flute_gap_ = 0.0;   // [m] at most, from the sensor to a flute that points at it, at the station
+  std::optional<double> swing_;  // [m] towards the sensor that a blow may make
+  double flute_volt_ = 0.0;      // [V] of that flute at the sensor
+  double flute_gap_ = 0.0;       // [m] at most, from the sensor to a flute that points at it, at the station
   std::optional<SensorCalibration> calibration_;
   SensorState sensor_, cross_sensor_;
   bool has_cross_ = false;
