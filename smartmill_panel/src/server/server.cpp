@@ -17,7 +17,7 @@ namespace {
 namespace asio = boost::asio;
 namespace beast = boost::beast;
 namespace http = beast::http;
-using tcp = asio::ip::tcp;
+using Tcp = asio::ip::tcp;
 
 constexpr std::size_t LONGEST_BODY = 16u << 10, LONGEST_HEAD = 8u << 10;  // [bytes] of a request
 constexpr std::chrono::seconds PATIENCE(30);                              // with a slow or silent browser
@@ -26,7 +26,7 @@ constexpr const char* API = "/api/";
 /// One connection of a browser until it becomes a WebSocket.
 class Visitor : public std::enable_shared_from_this<Visitor> {
  public:
-  Visitor(tcp::socket socket, Hub& hub, std::size_t& open)
+  Visitor(Tcp::socket socket, Hub& hub, std::size_t& open)
       : stream_(std::move(socket)), hub_(hub), open_(open) {
     ++open_;
   }
@@ -121,7 +121,7 @@ class Visitor : public std::enable_shared_from_this<Visitor> {
       if (self->response_.keep_alive()) {
         self->read();
       } else {
-        self->stream_.socket().shutdown(tcp::socket::shutdown_send, failed);
+        self->stream_.socket().shutdown(Tcp::socket::shutdown_send, failed);
       }
     });
   }
@@ -147,7 +147,7 @@ class Server::Impl {
     beast::error_code failed;
     const auto address = asio::ip::make_address(hub_.options.address, failed);
     if (failed) throw Error(hub_.options.address + ": no address");
-    const tcp::endpoint endpoint(address, static_cast<unsigned short>(hub_.options.port));
+    const Tcp::endpoint endpoint(address, static_cast<unsigned short>(hub_.options.port));
     acceptor_.open(endpoint.protocol(), failed);
     if (!failed) acceptor_.set_option(asio::socket_base::reuse_address(true), failed);
     if (!failed) acceptor_.bind(endpoint, failed);
@@ -181,7 +181,7 @@ class Server::Impl {
 
  private:
   void accept() {
-    acceptor_.async_accept([this](beast::error_code failed, tcp::socket socket) {
+    acceptor_.async_accept([this](beast::error_code failed, Tcp::socket socket) {
       if (!acceptor_.is_open()) return;
       // Two connections for each client: who only opens them is turned away.
       if (!failed && visitors_ < 2 * hub_.options.most_clients)
@@ -193,7 +193,7 @@ class Server::Impl {
   Hub hub_;
   std::size_t visitors_ = 0;
   asio::io_context io_{1};  // its handlers hold clients and visitors, which know the hub
-  tcp::acceptor acceptor_;
+  Tcp::acceptor acceptor_;
   int port_ = 0;
   std::thread thread_;
 };
