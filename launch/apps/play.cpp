@@ -11,6 +11,7 @@ int main(int argc, char** argv) {
   std::string path;
   std::vector<std::string> topics, nodes;
   double rate = 1.0;
+  bool stay = false;
   smartmill::CommandLine line(
       "Plays topics of a recording, with its clock, to nodes of SmartMill: it waits for them, so that "
       "nothing "
@@ -19,7 +20,8 @@ int main(int argc, char** argv) {
   line.option("--topics", topics, "full names").required();
   line.option("--nodes", nodes, "full names of the nodes that follow").required();
   line.option("--rate", rate, "times real time; 0: as fast as the nodes follow").showDefault().notNegative();
+  line.flag("--stay", stay, "at the end: for who wants to jump back (service replay/control)");
   return smartmill::runProgram(line, argc, argv, [&] {
-    smartmill::session::BagPlayer(ros::NodeHandle(), path, topics, nodes).run(rate);
+    smartmill::session::BagPlayer(ros::NodeHandle(), path, topics, nodes).run(rate, stay);
   });
 }

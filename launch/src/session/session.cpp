@@ -5,11 +5,13 @@
 #include <cstdio>
 
 #include <smartmill_msgs/SampleBlock.h>
+#include <smartmill_msgs/SessionState.h>
 #include <smartmill_msgs/SpindleAngle.h>
 #include <boost/function.hpp>
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/names.h"
+#include "smartmill_core/panel_names.h"
 #include "smartmill_core/units.h"
 #include "smartmill_ros/conversions.h"
 #include "smartmill_ros/follower.h"
@@ -63,7 +65,8 @@ Session::Session(ros::NodeHandle nh, const ros::NodeHandle& private_nh, const st
       tool_frf_(nh_, names::MEASURE_TOOL_FRF, false),
       sensor_frf_(nh_, names::MEASURE_SENSOR_FRF, false),
       identify_(nh_, names::IDENTIFY_COEFFICIENTS, false),
-      driver_(nh_, [this] { return stop_.load(); }) {
+      driver_(nh_, [this] { return stop_.load(); }),
+      state_(nh_.advertise<smartmill_msgs::SessionState>(names::SESSION_STATE, 100, true)) {
   summary_.tool = parameters_.plan.tool;
   summary_.material = plan_.material();
   const auto subscribe = [this](const char* topic, auto example, auto use) {
@@ -116,6 +119,7 @@ int Session::run() {
     say("FAIL", "session", error.what());
   }
   if (code != 0) makeSafe();
+  tell("", true);
   if (!parameters_.summary.empty()) {
     try {
       summary_.write(parameters_.summary);
@@ -171,6 +175,7 @@ void Session::job() {
 
 void Session::step(const std::string& name, const std::function<std::string()>& work) {
   driver_.checkStop();
+  tell(name);
   try {
     const std::string detail = work();
     say("ok", name, detail);
@@ -185,6 +190,34 @@ void Session::say(const char* mark, const std::string& name, const std::string& 
               detail.c_str());
   std::fflush(stdout);
   summary_.steps.push_back({name, detail, elapsed, std::string(mark) == "ok"});
+  using Step = smartmill_msgs::SessionStep;
+  outcomes_.push_back(summary_.steps.back().done ? Step::DONE : *mark == 's' ? Step::STOPPED : Step::FAILED);
+}
+
+void Session::tell(const std::string& running, bool ended) {
+  constexpr double SENDING = 0.2;  // [s] that a latched message needs to leave before the program does
+  smartmill_msgs::SessionState message;
+  message.header.stamp = ros::Time::now();
+  message.tool = summary_.tool;
+  message.material = summary_.material;
+  message.running = !ended;
+  message.completed = summary_.completed;
+  for (std::size_t k = 0; k < summary_.steps.size(); ++k) {
+    smartmill_msgs::SessionStep step;
+    step.name = summary_.steps[k].name;
+    step.detail = summary_.steps[k].detail;
+    step.elapsed = summary_.steps[k].elapsed;
+    step.state = outcomes_[k];
+    message.steps.push_back(step);
+  }
+  if (!running.empty()) {
+    smartmill_msgs::SessionStep step;
+    step.name = running;
+    step.elapsed = (ros::WallTime::now() - begin_).toSec();
+    message.steps.push_back(step);
+  }
+  state_.publish(message);
+  if (ended) ros::WallDuration(SENDING).sleep();
 }
 
 // ---------------------------------------------------------------------------------------------- waiting

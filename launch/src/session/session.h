@@ -39,6 +39,8 @@ class Session {
   void job();
   void step(const std::string& name, const std::function<std::string()>& work);
   void say(const char* mark, const std::string& name, const std::string& detail);
+  /// The steps so far for who looks on. @param running name of a step that has begun; empty: none
+  void tell(const std::string& running, bool ended = false);
   void pause(double seconds) const;
   bool waitUntil(const std::function<bool()>& ready, double seconds) const;
 
@@ -69,6 +71,8 @@ class Session {
   Client<smartmill_msgs::IdentifyCoefficientsAction> identify_;
   MachineDriver driver_;
   std::vector<ros::Subscriber> subscribers_;
+  ros::Publisher state_;
+  std::vector<std::uint8_t> outcomes_;  // SessionStep.DONE, ... of the summary's steps
   std::unique_ptr<ros::AsyncSpinner> spinner_;
 
   mutable std::mutex mutex_;  // of what subscribers write

@@ -66,6 +66,7 @@ class CncNode {
   const std::shared_ptr<linuxcnc::ServoStream> stream_;      // of a LinuxCNC
   Bridge bridge_;                                            // the bridge's thread only
   std::optional<Active> active_;                             // the bridge's thread only
+  std::string last_note_;                                    // the bridge's thread only
   std::optional<std::vector<ControllerAlarm>> told_alarms_;  // the bridge's thread only
 
   ros::Publisher state_publisher_, load_publisher_, condition_publisher_, alarms_publisher_;

@@ -81,6 +81,7 @@ class LinuxCncMachine : public ::testing::Test {
     }
     stream_ = std::make_shared<ServoStream>(folder_);
     MotionParameters motion;
+    motion.read_only = false;
     motion.condition_lead = 0.0;
     motion.read_only = false;
     motion.limits.travel = {{{-0.25, 0.25}, {-0.2, 0.2}, {-0.3, 0.0}}};

@@ -18,6 +18,29 @@ Resemblance resemblanceOf(const Member& member, const Standing& standing) {
               formatted("the %s ask for %.0f +- %.0f %% of it", tests, percent, 100.0 * asked.std_dev)};
 }
 
+// An effect of fewer values that explains as much, as far as the tests can tell: the simpler name.
+const Rival* simplerRival(const Workbench& bench, const SearchResult& found) {
+  const FitState& best = found.best.state;
+  const auto simpler = std::find_if(found.rivals.begin(), found.rivals.end(), [&](const Rival& r) {
+    return r.state.members.back().values.size() < best.members[r.member].values.size() &&
+           !standingOf(bench, best, r.state).holds();
+  });
+  return simpler == found.rivals.end() ? nullptr : &*simpler;
+}
+
+// @return false: none
+bool takeSimpler(Workbench& bench, const SearchOptions& options, SearchResult* found) {
+  const Rival* simpler = simplerRival(bench, *found);
+  if (!simpler) return false;
+  const Hypothesis& old = *found->best.state.members[simpler->member].hypothesis;
+  const FitState state = simpler->state;
+  const Hypothesis& name = *state.members.back().hypothesis;
+  options.say("  the tests do not tell " + old.title() + " from the simpler " + name.title());
+  found->tellSwapped(old, name);
+  if (!refine(bench, state, options, found)) found->forgetMembers();
+  return true;
+}
+
 }  // namespace
 
 void challenge(Workbench& bench, const SearchOptions& options, SearchResult* found,
@@ -41,7 +64,10 @@ void challenge(Workbench& bench, const SearchOptions& options, SearchResult* fou
       weakest = m;
       of_weakest = standing;
     }
-    if (weakest == best.members.size()) return;
+    if (weakest == best.members.size()) {
+      if (takeSimpler(bench, options, found)) continue;
+      return;
+    }
     options.say("  does not hold: " + best.members[weakest].hypothesis->title());
     resembles->push_back(resemblanceOf(best.members[weakest], of_weakest));
     if (!refine(bench, without(best, weakest), options, found)) found->forgetMembers();

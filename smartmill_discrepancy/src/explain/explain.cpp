@@ -12,6 +12,7 @@
 #include "smartmill_discrepancy/explain/outcome.h"
 #include "smartmill_discrepancy/explain/sentence.h"
 #include "smartmill_discrepancy/results/formatted.h"
+#include "smartmill_discrepancy/search/refinement.h"
 #include "smartmill_sim/twin/twin.h"
 
 namespace smartmill::discrepancy {
@@ -113,6 +114,7 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
   const std::optional<FitState> named_only = nameless.extend(&found, &result.unexplained);
   tellFallen(named, found.best.state, &result.resembles);
   result.interrupted = bench.cancelled();
+  found.best.covariance = settledCovariance(bench, found.best);
   bench.guide(false);
   bench.turnTo(found.best.state);
 

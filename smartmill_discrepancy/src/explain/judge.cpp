@@ -101,8 +101,7 @@ MachineModel nameEffects(const Workbench& bench, const SearchOptions& options, c
                          Explanation* result) {
   const Fit& best = found.best;
   MachineModel model = bench.exact().model(best.state);
-  // Where structure is left, the noise does not tell how well the values are known.
-  const Eigen::MatrixXd covariance = std::max(1.0, best.chi2 / bench.samples()) * best.covariance;
+  const Eigen::MatrixXd& covariance = best.covariance;
   std::vector<double> nominal_std;
   auto first = static_cast<Eigen::Index>(best.state.nominal.size());
   for (Eigen::Index i = 0; i < first; ++i) nominal_std.push_back(std::sqrt(covariance(i, i)));

@@ -12,6 +12,7 @@
 #include "smartmill_discrepancy/search/evidence.h"
 #include "smartmill_discrepancy/search/refinement.h"
 #include "smartmill_discrepancy/search/screening.h"
+#include "smartmill_discrepancy/search/standing.h"
 
 namespace smartmill::discrepancy {
 namespace {
@@ -234,11 +235,9 @@ bool Nameless::take(const Fit& start, const FitState& before, SearchResult* foun
     r.tried.taken = r.tried.taken || r.hypothesis == fit.state.members.back().hypothesis;
   // Values settle; what repeated must still do, and nothing be lost that names had explained.
   if (!refine(bench_, fit.state, options_.search, &more) || !repeats(before, more.best)) return false;
-  const auto heldout = [&](const Fit& at) {
-    return squaresLeft(bench_.heldout(), bench_.heldout().simulate(bench_.exact().model(at.state)));
-  };
+  // Against the names that it takes the place of it must stand as a name would.
   if (more.best.bic > found->best.bic - options_.search.least_gain ||
-      heldout(more.best) > heldout(found->best))
+      !standingOf(bench_, more.best.state, found->best.state).holds())
     return false;
   *found = std::move(more);
   return true;

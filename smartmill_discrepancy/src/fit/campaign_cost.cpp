@@ -170,12 +170,18 @@ VectorXd CampaignCost::residual(const VectorXd& at) const {
   return residual;
 }
 
+VectorXd CampaignCost::influence(const VectorXd& amplitudes) const {
+  VectorXd sum = VectorXd::Zero(apart_.size());
+  own_columns_.addTo(amplitudes(own_places_), &sum);
+  if (!frozen_places_.empty()) frozen_->columns.addTo(amplitudes(frozen_places_), &sum);
+  return sum;
+}
+
 const CampaignCost::Linear* CampaignCost::linearise(const VectorXd& at) const {
   if (same(linearised_at_, at)) return &linear_;
   linearised_at_.resize(0);
-  BlockColumns own;
-  if (!simulate(at) || !tangentsAt(at, &own)) return nullptr;
-  normalEquations(at, own, &linear_);
+  if (!simulate(at) || !tangentsAt(at, &own_columns_)) return nullptr;
+  normalEquations(at, own_columns_, &linear_);
   linearised_at_ = at;
   return &linear_;
 }

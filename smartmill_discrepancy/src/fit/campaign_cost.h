@@ -42,6 +42,9 @@ class CampaignCost : public fit::Residuals {
   /// (simulated - measured) / noise where linearise() stands.
   Eigen::VectorXd residual(const Eigen::VectorXd& at) const;
 
+  /// Over the samples, where linearise() stands: tangents * amplitudes.
+  Eigen::VectorXd influence(const Eigen::VectorXd& amplitudes) const;
+
   /// From which coordinate on they are turns of records: what a prior holds of them only keeps steps short.
   std::size_t turnsBegin() const { return coordinates_.size() - turns_; }
 
@@ -70,6 +73,7 @@ class CampaignCost : public fit::Residuals {
   mutable Eigen::VectorXd apart_;  // (simulated - measured) / noise, of frozen nominal values where they are
   mutable double apart_squares_ = 0.0;
   mutable Eigen::VectorXd frozen_along_;  // frozen tangents' * apart
+  mutable BlockColumns own_columns_;  // tangents of what is not frozen
   mutable Linear linear_;
 };
 

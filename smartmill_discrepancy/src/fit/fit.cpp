@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <optional>
 #include <utility>
 
@@ -11,6 +12,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/fit/least_squares.h"
 #include "smartmill_core/math/linear_algebra.h"
+#include "smartmill_discrepancy/gap/asked.h"
 
 namespace smartmill::discrepancy {
 namespace {
@@ -53,6 +55,31 @@ std::optional<Eigen::VectorXd> solve(const CampaignCost& cost, const FitOptions&
   return at;
 }
 
+// Inverse of the information with priors.
+MatrixXd inverseAt(const CampaignCost& cost, MatrixXd information) {
+  for (Index c = 0; c < information.cols(); ++c)
+    information(c, c) += cost.precision(static_cast<std::size_t>(c));
+  return linear::inverseSymmetric(information);
+}
+
+// Variance of influence.residual over all tests.
+double pulledVariance(const TwinRunner& runner, const Eigen::VectorXd& influence,
+                      const Eigen::VectorXd& residual, const std::vector<Values>& power) {
+  std::map<std::size_t, AskedTest> by_test;
+  for (std::size_t b = 0; b < power.size(); ++b) {
+    const Block& block = runner.blocks()[b];
+    by_test[block.test].add(influence.data() + block.offset, residual.data() + block.offset, block.size,
+                            power[b]);
+  }
+  std::vector<AskedTest> tests;
+  double squares = 0.0;
+  for (const auto& [test, asked] : by_test) {
+    tests.push_back(asked);
+    squares += asked.squares;
+  }
+  return std::max(squares, varianceOfProducts(tests));
+}
+
 // Cost, residual and covariance at a point. @return false: no numbers there
 bool describe(const CampaignCost& cost, const Eigen::VectorXd& at, double samples, Fit& fit) {
   const CampaignCost::Linear* point = cost.linearise(at);
@@ -62,17 +89,12 @@ bool describe(const CampaignCost& cost, const Eigen::VectorXd& at, double sample
   fit.chi2 = residual.squaredNorm();
   fit.residual.resize(static_cast<std::size_t>(residual.size()));
   Eigen::Map<Eigen::VectorXd>(fit.residual.data(), residual.size()) = -residual;
-  MatrixXd information = point->information;
-  for (Index c = 0; c < at.size(); ++c) {
-    const auto k = static_cast<std::size_t>(c);
-    if (k < cost.turnsBegin())
-      fit.penalty += cost.precision(k) * std::pow(at[c] - cost.coordinates()[k].null, 2);
-    information(c, c) += cost.precision(k);
-  }
+  for (std::size_t k = 0; k < cost.turnsBegin(); ++k)
+    fit.penalty += cost.precision(k) * std::pow(at[static_cast<Index>(k)] - cost.coordinates()[k].null, 2);
   fit.bic = fit.chi2 + fit.penalty;
   for (const Member& m : fit.state.members)
     fit.bic += static_cast<double>(m.values.size()) * std::log(samples) + m.hypothesis->handicap;
-  fit.covariance = linear::inverseSymmetric(information);
+  fit.covariance = inverseAt(cost, point->information);
   return true;
 }
 
@@ -140,6 +162,32 @@ Fit Fitter::fit(const FitState& start, const NominalTangents* frozen, const FitO
     fit.chi2 = fit.bic = std::numeric_limits<double>::infinity();
   }
   return fit;
+}
+
+MatrixXd Fitter::sandwichCovariance(const FitState& state, const NominalTangents& tangents,
+                                    double prior_weight) const {
+  FitOptions options;
+  options.prior_weight = prior_weight;
+  const CampaignCost cost(*this, state, &tangents, options);
+  const std::vector<fit::Parameter> parameters = cost.parameters();
+  Eigen::VectorXd at(static_cast<Index>(parameters.size())), std_dev = at;
+  for (Index c = 0; c < at.size(); ++c) at[c] = parameters[static_cast<std::size_t>(c)].start;
+  const CampaignCost::Linear* point = cost.linearise(at);
+  if (!point) return {};
+  const MatrixXd inverse = inverseAt(cost, point->information);
+  const Eigen::VectorXd residual = cost.residual(at);
+  std::vector<Values> power;
+  for (const Block& b : runner_.blocks()) power.push_back(powerOf(residual.data() + b.offset, b.size));
+  for (Index c = 0; c < at.size(); ++c) {
+    double variance = pulledVariance(runner_, cost.influence(inverse.col(c)), residual, power);
+    // What is stated lies off by its own deviation.
+    for (Index k = 0; k < at.size(); ++k) {
+      const double precision = cost.precision(static_cast<std::size_t>(k));
+      variance += std::pow(inverse(k, c), 2) * prior_weight * precision;
+    }
+    std_dev[c] = std::sqrt(variance / inverse(c, c));
+  }
+  return std_dev.asDiagonal() * inverse * std_dev.asDiagonal();
 }
 
 }  // namespace smartmill::discrepancy

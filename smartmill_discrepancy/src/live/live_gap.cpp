@@ -76,7 +76,7 @@ LiveGap liveGap(const MachineModel& model, const Stretch& stretch, const LiveGap
   if (with_load) shown.add("load_meter").assign(shown.size(), 0.0);
   sim::SimulationOptions twin;
   twin.noise = false;
-  const Record simulated = sim::simulateTest(model, stretch.test, shown, twin);
+  Record simulated = sim::simulateTest(model, stretch.test, shown, twin);
   const Axes3& noise = *model.force_sensor.noise_rms;
   const bool vibrates = !model.tool_tip.x.modes.empty() || !model.tool_tip.y.modes.empty();
   if (stretch.test.kind == TestKind::cut && vibrates &&
@@ -101,6 +101,7 @@ LiveGap liveGap(const MachineModel& model, const Stretch& stretch, const LiveGap
   if (with_load) addLoad(*model.spindle, stretch, simulated, options, result);
   result.model_fits =
       std::all_of(result.gap.begin(), result.gap.end(), [&](double gap) { return gap <= options.limit; });
+  result.simulated = std::move(simulated);
   return result;
 }
 

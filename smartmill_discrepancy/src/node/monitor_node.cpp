@@ -1,9 +1,12 @@
 #include "node/monitor_node.h"
 
 #include <smartmill_msgs/DiscrepancyState.h>
+#include <smartmill_msgs/ForceBlock.h>
 
 #include "node/wiring.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/panel_names.h"
+#include "smartmill_ros/frames.h"
 #include "smartmill_ros/node_main.h"
 #include "smartmill_ros/parameter_reader.h"
 #include "smartmill_ros/run_node.h"
@@ -28,6 +31,7 @@ MonitorNode::MonitorNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
       stretches_(parameters_.stretch, parameters_.hold_back,
                  [this](const Stretch& stretch) { judge(stretch); }),
       state_(nh.advertise<smartmill_msgs::DiscrepancyState>(names::DISCREPANCY_STATE, 100)),
+      force_(nh.advertise<smartmill_msgs::ForceBlock>(names::TWIN_FORCE, 100)),
       install_(nh.advertiseService(names::INSTALL_MODEL, &MonitorNode::install, this)) {
   connect(shell_.inputs(), stretches_);
   shell_.diagnose("model fits", [this](auto& status) { diagnose(status); });
@@ -48,9 +52,23 @@ void MonitorNode::judge(const Stretch& stretch) {
   message.gap = last_.gap;
   message.model_fits = last_.model_fits;
   state_.publish(message);
+  publishForce(stretch);
   shell_.tell();
   const bool wanted = !last_.model_fits || (parameters_.record_all && last_.aside.empty());
   if (wanted && !last_.at_the_edge) record(stretch);
+}
+
+// Late by the stretch and its simulation, with the stamps of what was measured.
+void MonitorNode::publishForce(const Stretch& stretch) {
+  const Record& simulated = last_.simulated;
+  if (simulated.size() == 0) return;
+  ForceBlock block;
+  block.sample_rate = stretch.test.sample_rate;
+  block.stamp = stretch.stamp - static_cast<double>(simulated.size()) / block.sample_rate;
+  block.first_index = simulated_;
+  block.force = {simulated.column("fx"), simulated.column("fy"), simulated.column("fz")};
+  simulated_ += simulated.size();
+  force_.publish(toMsg(block, frames::DYNAMOMETER));
 }
 
 void MonitorNode::record(const Stretch& stretch) {

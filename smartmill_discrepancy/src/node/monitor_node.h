@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <string>
 
@@ -14,7 +15,8 @@
 
 namespace smartmill::discrepancy {
 
-/// Shell around SortedStretches and liveGap(): the twin follows the running machine, discrepancy/state out.
+/// Shell around SortedStretches and liveGap(): the twin follows the running machine, discrepancy/state and
+/// discrepancy/force out.
 class MonitorNode {
  public:
   using Parameters = MonitorParameters;
@@ -23,6 +25,7 @@ class MonitorNode {
 
  private:
   void judge(const Stretch& stretch);
+  void publishForce(const Stretch& stretch);
   void record(const Stretch& stretch);
   bool install(smartmill_msgs::InstallModel::Request& request,
                smartmill_msgs::InstallModel::Response& response);
@@ -36,7 +39,8 @@ class MonitorNode {
   std::string problem_;  // why the last stretch could not be judged
   int recorded_ = 0;
   std::map<std::string, int> recorded_of_;  // by condition
-  ros::Publisher state_;
+  std::uint64_t simulated_ = 0;             // samples of the twin published
+  ros::Publisher state_, force_;
   ros::ServiceServer install_;
 };
 

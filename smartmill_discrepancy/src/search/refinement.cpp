@@ -120,4 +120,11 @@ bool refine(Workbench& bench, const FitState& state, const SearchOptions& option
   return true;
 }
 
+Eigen::MatrixXd settledCovariance(Workbench& bench, const Fit& best) {
+  const NominalTangents tangents = bench.linearise(best.state);
+  const double weight = std::max(1.0, best.chi2 / bench.samples());
+  const Eigen::MatrixXd covariance = bench.quick().sandwichCovariance(best.state, tangents, weight);
+  return covariance.size() > 0 ? covariance : weight * best.covariance;
+}
+
 }  // namespace smartmill::discrepancy

@@ -395,10 +395,7 @@ bool Search::takeBetterRivals() {
     const Hypothesis& old = *result_.best.state.members[best->member].hypothesis;
     const Hypothesis& better = *best->state.members.back().hypothesis;
     options_.say("  better in the place of " + old.title() + ": " + better.title());
-    for (Rung& r : result_.ladder) {
-      if (r.tried.effect == old.effect && r.tried.variant == old.variant) r.tried.taken = false;
-      if (r.tried.effect == better.effect && r.tried.variant == better.variant) r.tried.taken = true;
-    }
+    result_.tellSwapped(old, better);
     const FitState state = best->state;
     if (!refine(bench_, state, options_, &result_)) return false;
   }
@@ -425,6 +422,13 @@ SearchResult Search::run() {
 }
 
 }  // namespace
+
+void SearchResult::tellSwapped(const Hypothesis& old, const Hypothesis& better) {
+  for (Rung& r : ladder) {
+    if (r.tried.effect == old.effect && r.tried.variant == old.variant) r.tried.taken = false;
+    if (r.tried.effect == better.effect && r.tried.variant == better.variant) r.tried.taken = true;
+  }
+}
 
 SearchResult search(Workbench& bench, const std::vector<Hypothesis>& hypotheses,
                     const SearchOptions& options) {

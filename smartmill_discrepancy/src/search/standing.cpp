@@ -7,22 +7,8 @@
 #include <numeric>
 #include <vector>
 
-#include "smartmill_core/signal/fourier.h"
-#include "smartmill_core/signal/window.h"
-
 namespace smartmill::discrepancy {
 namespace {
-
-// Squares by frequency, as many as those of the values; the mean square of the window is 3/8.
-std::vector<double> power(const double* values, std::size_t size) {
-  std::vector<double> part = hannWindow(size), squares;
-  for (std::size_t i = 0; i < size; ++i) part[i] *= values[i];
-  for (const std::complex<double>& x : fourier(part)) {
-    const bool single = squares.empty() || 2 * squares.size() == size;
-    squares.push_back((single ? 1.0 : 2.0) * std::norm(x) / (0.375 * static_cast<double>(size)));
-  }
-  return squares;
-}
 
 std::vector<AskedTest> askedBy(const TwinRunner& runner, const MachineModel& better,
                                const MachineModel& other) {
@@ -55,35 +41,14 @@ AskedTest askedByStated(const NominalFreedom& freedom, const FitState& better, c
 
 }  // namespace
 
-// The window spreads a line over bins in such shares that the products of two lines' bins add up to half the
-// product of their squares, the variance at a random phase. Noise of unit variance, two degrees of freedom a
-// bin, is counted twice by that.
-void AskedTest::add(const double* between, const double* left, std::size_t size) {
-  double own = 0.0;
-  for (std::size_t i = 0; i < size; ++i) {
-    own += between[i] * between[i];
-    product += between[i] * left[i];
-  }
-  if (own <= 0.0) return;
-  squares += own;
-  const std::vector<double> of_between = power(between, size), of_left = power(left, size);
-  const double sum = std::inner_product(of_left.begin(), of_left.end(), of_between.begin(), 0.0);
-  variance += std::max(sum - own, 0.5 * sum);
-}
-
 AskedShare sharedBy(const std::vector<AskedTest>& tests) {
-  double squares = 0.0, product = 0.0, variance = 0.0, scatter = 0.0, count = 0.0;
+  double squares = 0.0, product = 0.0;
   for (const AskedTest& t : tests) {
     squares += t.squares;
     product += t.product;
-    variance += t.variance;
-    count += t.squares > 0.0 ? 1.0 : 0.0;
   }
   if (squares <= 0.0) return {0.5, std::numeric_limits<double>::infinity()};
-  const double share = 1.0 + product / squares;
-  for (const AskedTest& t : tests) scatter += std::pow(t.product - t.squares * (share - 1.0), 2);
-  if (count > 1.0) variance = std::max(variance, scatter * count / (count - 1.0));
-  return {share, std::sqrt(variance) / squares};
+  return {1.0 + product / squares, std::sqrt(varianceOfProducts(tests)) / squares};
 }
 
 const AskedShare& Standing::weaker() const {

@@ -53,7 +53,8 @@ HammerServer::HammerServer(ros::NodeHandle nh, ros::NodeHandle private_nh)
 }
 
 void HammerServer::finish(const MeasureFrfResult& result) {
-  server_.finish({result.code, result.message, result.frf, result.modes, result.sensitivity});
+  server_.finish({result.code, result.message, result.frf, result.modes, result.cross, result.sensitivity,
+                  result.sensitivity_std, result.flute_sure, result.spindle_moves});
 }
 
 void HammerServer::watch() {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <utility>
 
 #include "smartmill_core/error.h"
@@ -15,6 +16,10 @@ namespace {
 const double GOLDEN_RATIO = 0.5 * (1.0 + std::sqrt(5.0));
 // Of the larger part, counted from the centre: 1 - 1 / golden ratio.
 const double SECTION = 2.0 - GOLDEN_RATIO;
+/// Of the tolerance: how far beside the top a reading shuts the bracket.
+constexpr double BESIDE = 0.45;
+/// A reading is told from the top's when it lies so many deviations of a reading below it.
+constexpr double NOISE_SIGMAS = 3.0;
 /// Readings this close to the end of the range are out of range.
 constexpr double RANGE_SHARE = 0.97;
 
@@ -50,8 +55,8 @@ bool FluteSearch::above(const Point& a, const Point& b) const {
 
 void FluteSearch::give(double angle, double volt, double volt_std) {
   if (state_ != State::searching) return;
-  ++measurements_;
   const Point p{nearAngle(angle, next_), volt, volt_std};
+  readings_.push_back({p.angle, volt});
   if (!bracketed_) {
     bracket(p);
   } else {
@@ -115,9 +120,44 @@ double FluteSearch::bracketWidth() const {
 }
 
 void FluteSearch::askSection() {
-  if (bracketWidth() <= options_.tolerance) return finish();
+  const Parabola p = parabola();
+  if (bracketWidth() <= std::max(options_.tolerance, 2.2 * p.told)) return finish();
+  widths_.push_back(bracketWidth());
+  const std::size_t n = widths_.size();
+  const bool slow = n > 2 && widths_[n - 1] > 0.5 * widths_[n - 3];
+  if (!options_.golden_only && !slow) {
+    next_ = centre_.angle + closer(p);
+    return;
+  }
+  if (slow) widths_.assign(1, bracketWidth());
   const double to_left = centre_.angle - left_.angle, to_right = right_.angle - centre_.angle;
   next_ = to_right > to_left ? centre_.angle + SECTION * to_right : centre_.angle - SECTION * to_left;
+}
+
+/// The parabola through the bracket.
+FluteSearch::Parabola FluteSearch::parabola() const {
+  const double a = left_.angle - centre_.angle, b = right_.angle - centre_.angle;
+  const double fa = left_.volt - centre_.volt, fb = right_.volt - centre_.volt;
+  Parabola p;
+  p.curvature = a != 0.0 && b != 0.0 ? (fb / b - fa / a) / (b - a) : 0.0;
+  if (!(p.curvature < 0.0)) return p;
+  p.vertex = std::clamp(-(fa / a * b - fb / b * a) / (b - a) / (2.0 * p.curvature), a, b);
+  const double noise = std::max({left_.volt_std, centre_.volt_std, right_.volt_std});
+  p.told = std::min(std::sqrt(NOISE_SIGMAS * noise / -p.curvature), options_.tolerance);
+  return p;
+}
+
+/// [rad] from the centre to the next reading: the vertex where that lies far off, else close beside it on the
+/// side where the bracket is still wide.
+double FluteSearch::closer(const Parabola& p) const {
+  const double a = left_.angle - centre_.angle, b = right_.angle - centre_.angle;
+  const double top = p.vertex, beside = std::max(BESIDE * options_.tolerance, p.told);
+  if (!(p.curvature < 0.0)) return b > -a ? SECTION * b : SECTION * a;
+  if (std::abs(top) > beside && top > 0.9 * a && top < 0.9 * b) return top;
+  const double near = std::clamp(top, -beside, beside);
+  // Not nearer to the centre than a third of the way, where two readings would not differ.
+  if (b > -a) return std::min(std::max(near + beside, 0.6 * beside), 0.9 * b);
+  return std::max(std::min(near - beside, -0.6 * beside), 0.9 * a);
 }
 
 void FluteSearch::section(const Point& p) {
@@ -137,15 +177,15 @@ void FluteSearch::section(const Point& p) {
 void FluteSearch::finish() {
   best_volt_ = centre_.volt;
   angle_ = centre_.angle;
-  // Vertex of the parabola through the bracket, where its curvature stands out of the noise.
-  const double a = left_.angle - centre_.angle, b = right_.angle - centre_.angle;
-  const double fa = left_.volt - centre_.volt, fb = right_.volt - centre_.volt;
+  // The parabola's vertex, where its curvature stands out of the noise.
+  const double fall = 2.0 * centre_.volt - left_.volt - right_.volt;
   const double noise = std::max({left_.volt_std, centre_.volt_std, right_.volt_std});
-  const double curvature = a != 0.0 && b != 0.0 ? (fb / b - fa / a) / (b - a) : 0.0;
-  if (curvature < 0.0 && -(fa + fb) > 6.0 * noise) {
-    const double vertex = -(fa / a * b - fb / b * a) / (b - a) / (2.0 * curvature);
-    angle_ += std::clamp(vertex, a, b);
-  }
+  if (fall > 6.0 * noise) angle_ += parabola().vertex;
+  const auto below = [&](const Point& end) {
+    const double std_dev = std::max(std::hypot(end.volt_std, centre_.volt_std), 1e-12);
+    return 0.5 * std::erfc((end.volt - centre_.volt) / (std_dev * std::sqrt(2.0)));
+  };
+  sure_ = below(left_) * below(right_);
   state_ = State::found;
 }
 

@@ -3,9 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <utility>
 
+#include <Eigen/Core>
+
 #include "smartmill_core/error.h"
+#include "smartmill_core/math/linear_algebra.h"
 
 namespace smartmill {
 namespace hammer {
@@ -13,10 +17,21 @@ namespace {
 
 /// Readings this close to the end of the range tell nothing about the distance.
 constexpr double RANGE_SHARE = 0.95;
+/// Readings must reach so far of what is asked; and how often the reach follows the gap found.
+constexpr double LEAST_REACH = 0.2;
+constexpr int CURVE_ROUNDS = 4;
+/// [m] of a jog whose slope tells of the gap, and by how much the next one's must be steeper.
+constexpr double LEAST_SLOPE = 10e-6;
+constexpr double CLEAR_RISE = 1.05;
+/// Of the nominal gap: below it something sharper than the sensor's electrode is before it.
+constexpr double SHARP = 0.8;
+/// A bend beyond these shares of the nominal gap is none.
+constexpr double LEAST_BEND = 0.08, MOST_BEND = 4.0;
 
 }  // namespace
 
-SensorCalibration::SensorCalibration(const SensorCalibrationOptions& options) : options_(options) {
+SensorCalibration::SensorCalibration(const SensorCalibrationOptions& options)
+    : options_(options), bend_gap_(std::numeric_limits<double>::quiet_NaN()) {
   const auto& o = options_;
   if (!(o.least_jog > 0.0 && o.first_jog >= o.least_jog && o.max_jog >= o.first_jog)) {
     throw Error("sensor calibration: 0 < least_jog <= first_jog <= max_jog is due, got " +
@@ -36,6 +51,7 @@ double SensorCalibration::nominalGap(double volt) const {
 void SensorCalibration::start(double volt, double volt_std) {
   volt_ = volt;
   volt_std_ = volt_std;
+  readings_.push_back({0.0, volt});
   if (clipped(volt)) {
     ask(volt < 0.0 ? options_.max_jog : -options_.max_jog);
   } else {
@@ -48,6 +64,28 @@ void SensorCalibration::ask(double distance) {
   const double rounded = std::round(distance / options_.resolution) * options_.resolution;
   if (jogs_ >= options_.max_jogs) {
     return fail("the sensor's voltage is not zero after " + std::to_string(jogs_) + " jogs");
+  }
+  const double safe = std::min(options_.safe_travel, travelled_ + localGap() - options_.min_gap);
+  if (phase_ == Phase::approach && rounded > 0.0 && travelled_ + rounded > safe - options_.check_jog) {
+    const double left = safe - options_.check_jog - travelled_;
+    const double step = std::floor(left / options_.resolution) * options_.resolution;
+    if (step >= options_.least_jog) {
+      next_ = step;
+      return;
+    }
+    held_back_ = true;
+    if (sensitivity_ > 0.0) return check();
+    // Here already: the sensitivity needs a jog all the same, away from the sensor.
+    if (readings_.size() == 1 && !clipped(volt_)) {
+      next_ = -options_.first_jog;
+      return;
+    }
+    char text[160];
+    std::snprintf(
+        text, sizeof text,
+        "the sensor is still out of range (%.2f V) where the tool's edges may touch it, %.2f mm nearer",
+        volt_, 1e3 * travelled_);
+    return fail(text);
   }
   if (travelled_ + rounded > options_.max_travel) {
     char text[120];
@@ -65,6 +103,22 @@ void SensorCalibration::ask(double distance) {
   next_ = rounded;
 }
 
+/// [m] gap of the hyperbola through the last three readings of the approach: its slopes go as 1 / gap^2.
+/// Where a sharp edge is before the sensor it tells of it long before the nominal curve does. Infinite: it
+/// does not tell.
+double SensorCalibration::localGap() const {
+  const double far = std::numeric_limits<double>::infinity();
+  const std::size_t n = readings_.size();
+  if (n < 3) return far;
+  const Reading &a = readings_[n - 3], &b = readings_[n - 2], &c = readings_[n - 1];
+  if (clipped(a.volt) || !(b.at - a.at >= LEAST_SLOPE && c.at - b.at >= LEAST_SLOPE)) return far;
+  const double before = (b.volt - a.volt) / (b.at - a.at), now = (c.volt - b.volt) / (c.at - b.at);
+  if (!(before > 0.0 && now > CLEAR_RISE * before)) return far;
+  const double between = 0.5 * (c.at - a.at), middle = between / (std::sqrt(now / before) - 1.0);
+  const double gap = middle - 0.5 * (c.at - b.at);
+  return gap < SHARP * nominalGap(c.volt) ? gap : far;
+}
+
 void SensorCalibration::give(double volt, double volt_std) {
   if (state_ != State::jogging) return;
   ++jogs_;
@@ -75,6 +129,7 @@ void SensorCalibration::give(double volt, double volt_std) {
   const bool usable = !clipped(volt) && !clipped(volt_);
   volt_ = volt;
   volt_std_ = volt_std;
+  readings_.push_back({travelled_, volt});
   switch (phase_) {
     case Phase::check_near:
       near_volt_ = volt;
@@ -92,18 +147,22 @@ void SensorCalibration::give(double volt, double volt_std) {
       return ask(options_.check_jog);
     }
     case Phase::check_back:
-      state_ = State::done;
-      return;
+      return finish();
     case Phase::approach:
       break;
   }
-  if (!usable) {  // no sensitivity yet: on by the longest jog (the thesis's program does so too)
-    if (!clipped(volt)) return ask(volt < 0.0 ? options_.first_jog : -options_.first_jog);
-    return ask(volt < 0.0 ? options_.max_jog : -options_.max_jog);
-  }
-  const double slope = change / moved;  // eq. 4.8
+  if (usable) return approached(change, moved, noise);
+  // No sensitivity yet: on by the longest jog (the thesis's program does so too).
+  if (!clipped(volt)) return ask(volt < 0.0 ? options_.first_jog : -options_.first_jog);
+  ask(volt < 0.0 ? options_.max_jog : -options_.max_jog);
+}
+
+void SensorCalibration::approached(double change, double moved, double noise) {
+  if (std::abs(moved) < options_.least_jog) return plan();  // the last bit: too short to tell a sensitivity
+  const double slope = change / moved;                      // eq. 4.8
   const bool clear = std::abs(change) >= 5.0 * noise;
-  if (!clear && volt < -0.5 * options_.range_volt) return ask(options_.max_jog);  // far off, hardly sensitive
+  // Far off, hardly sensitive.
+  if (!clear && volt_ < -0.5 * options_.range_volt) return ask(options_.max_jog);
   if (!clear || !(slope > 0.0)) {
     char text[120];
     std::snprintf(text, sizeof text, "the sensor answers a jog of %.0f um by %.4f V: no sensitivity",
@@ -118,16 +177,72 @@ void SensorCalibration::give(double volt, double volt_std) {
 
 void SensorCalibration::plan() {
   const double remaining = -volt_ * sensitivity_;  // eq. 4.9
-  if (std::abs(volt_) <= options_.zero_volt || std::abs(remaining) <= 0.5 * options_.least_jog) {
-    if (options_.check_jog <= 0.0) {
-      state_ = State::done;
-      return;
-    }
-    phase_ = Phase::check_near;
-    return ask(options_.check_jog);
-  }
-  const double size = std::clamp(0.5 * std::abs(remaining), options_.least_jog, options_.max_jog);
+  if (std::abs(volt_) < options_.zero_volt || std::abs(remaining) < options_.resolution) return check();
+  const double size = std::abs(remaining) <= options_.least_jog
+                          ? std::abs(remaining)
+                          : std::clamp(0.5 * std::abs(remaining), options_.least_jog, options_.max_jog);
   ask(std::copysign(size, remaining));
+}
+
+void SensorCalibration::check() {
+  if (options_.check_jog <= 0.0) return finish();
+  phase_ = Phase::check_near;
+  ask(options_.check_jog);
+}
+
+void SensorCalibration::finish() {
+  bend_gap_ = hyperbola();
+  if (std::isfinite(bend_gap_) && options_.check_jog > 0.0) {
+    // K / (g^2 - d^2) is what +-d measures of K / g^2.
+    const double share = options_.check_jog / bend_gap_;
+    sensitivity_ /= 1.0 - share * share;
+  }
+  if (held_back_ && sensitivity_std_ > options_.largest_std * sensitivity_) {
+    char text[160];
+    std::snprintf(text, sizeof text,
+                  "the tool's edges hold it back at %.2f V, where the sensitivity is known to %.1f %% only",
+                  volt_, 100.0 * sensitivity_std_ / sensitivity_);
+    return fail(text);
+  }
+  state_ = State::done;
+}
+
+/// [m] g of V = a + K / (g - (x - x_now)) through the readings nearby, as near as that gap itself where
+/// there are enough: further off another part of the tool counts.
+double SensorCalibration::hyperbola() const {
+  double gap = hyperbola(options_.gap_at_zero_volt);
+  for (int k = 0; k < CURVE_ROUNDS && std::isfinite(gap); ++k) {
+    const double nearer = hyperbola(std::max(gap, 2.0 * options_.check_jog));
+    if (!std::isfinite(nearer)) break;
+    gap = nearer;
+  }
+  return gap;
+}
+
+/// Least squares of V x = g V + a x + c over the readings within `reach` [m]; NaN: too few tell.
+double SensorCalibration::hyperbola(double reach) const {
+  std::vector<Reading> near;
+  double furthest = 0.0;
+  for (const Reading& r : readings_) {
+    const double away = std::abs(r.at - travelled_);
+    if (clipped(r.volt) || away > reach) continue;
+    near.push_back(r);
+    furthest = std::max(furthest, away);
+  }
+  const double none = std::numeric_limits<double>::quiet_NaN();
+  if (near.size() < 5 || furthest < LEAST_REACH * reach) return none;
+  const auto rows = static_cast<Eigen::Index>(near.size());
+  Eigen::MatrixXd a(rows, 3), b(rows, 1);
+  for (Eigen::Index i = 0; i < rows; ++i) {
+    const Reading& r = near[static_cast<std::size_t>(i)];
+    const double x = (r.at - travelled_) / options_.gap_at_zero_volt, v = r.volt / options_.range_volt;
+    a.row(i) << v, x, 1.0;
+    b(i, 0) = v * x;
+  }
+  const linear::LeastSquares fit = linear::leastSquares(a, b);
+  const double gap = fit.x(0, 0);
+  if (fit.rank < 3 || !(gap > LEAST_BEND && gap < MOST_BEND)) return none;
+  return gap * options_.gap_at_zero_volt;
 }
 
 void SensorCalibration::fail(std::string reason) {

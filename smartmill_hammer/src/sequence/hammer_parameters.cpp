@@ -18,6 +18,8 @@ void declareSearch(HammerParameters& p, ParameterTable& table) {
   table.number("noise_sigmas", p.noise_sigmas, "1", Range::positive(),
                "of a mean voltage; a fall or rise counts above this");
   table.number("least_rise", p.least_rise, "V", Range::notNegative(), "and above this");
+  table.number("golden_only", p.golden_only, "1", Range::closed(0, 1),
+               "1: golden section alone, as the thesis; 0: parabolas too, which need fewer moves");
 }
 
 void declareCommands(HammerParameters& p, ParameterTable& table) {
@@ -45,6 +47,8 @@ void declarePaths(HammerParameters& p, ParameterTable& table) {
                "above the station's position: sideways motion is safe there");
   table.number("approach_feed", p.approach_feed, "m/s", Range::positive(), "to the station and from it");
   table.number("jog_feed", p.jog_feed, "m/s", Range::positive(), "of the calibration; thesis: 60 mm/min");
+  table.number("near_path", p.near_path, "m", Range::notNegative(),
+               "last part of the way to the station, at jog_feed and watching the sensor; at most standoff");
 }
 
 void declareCalibration(HammerParameters& p, ParameterTable& table) {
@@ -61,6 +65,9 @@ void declareCalibration(HammerParameters& p, ParameterTable& table) {
   table.number("position_std", p.position_std, "m", Range::notNegative(), "of a distance moved");
   table.number("min_gap_share", p.min_gap_share, "1", Range::open(0.0, 1.0),
                "of gap_at_zero_volt: no nearer");
+  table.number(
+      "sensor_face", p.sensor_face, "m", Range::closed(0.0, 0.1),
+      "diameter of the sensor's face, which the tool beside the sensor's middle must not touch either");
   table.number("max_approach", p.max_approach, "m", Range::positive(),
                "to the sensor, beyond the depth between two flutes");
 }
@@ -77,7 +84,9 @@ void HammerParameters::declare(ParameterTable& table) {
   table.number("exponential_time", exponential_time, "s", Range::notNegative(),
                "time constant of an exponential window; 0: none");
   table.number("straighten_sensor", straighten_sensor, "1", Range::closed(0, 1),
-               "1: bend the sensor's nominal curve straight over the vibration; 0: linear");
+               "1: bend the sensor's curve straight over the vibration, as calibrated; 0: linear");
+  table.number("cross_frf", cross_frf, "1", Range::closed(0, 1),
+               "1: where a second sensor stands at right angles (channel gap_cross), read it too");
   table.section("FRF and fit.");
   declareFit(table);
 }
@@ -93,6 +102,7 @@ void HammerParameters::validate() const {
   need(least_jog >= 4.0 * resolution, "least_jog", least_jog, "at least 4 x resolution");
   need(first_jog >= least_jog, "first_jog", first_jog, "at least least_jog");
   need(max_jog >= first_jog, "max_jog", max_jog, "at least first_jog");
+  need(near_path <= standoff, "near_path", near_path, "at most standoff");
   need(check_jog == 0.0 || check_jog >= least_jog, "check_jog", check_jog, "0 or at least least_jog");
 }
 

@@ -4,6 +4,7 @@
 #include <cctype>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <utility>
 
 #include "smartmill_core/error.h"
@@ -24,6 +25,14 @@ constexpr double COUNTS = 4096.0;
 constexpr int MAX_BAD_AVERAGES = 3;
 /// [s] for the axes to come to rest after a stop.
 constexpr double STOP_TIMEOUT = 10.0;
+/// [V] over the range: the tool stands nearer than the sensor can tell; and samples in a row that say so.
+constexpr double NEAR_SHARE = 0.98;
+constexpr int NEAR_SAMPLES = 8;
+/// Of the first search's step: the helix tells the second where to begin.
+constexpr double SECOND_STEP = 0.5;
+/// Of a depth read from the sensor's nominal curve, which a round and fluted tool does not quite follow.
+constexpr double TRUSTED_DEPTH = 1.0;
+constexpr int FACE_STEPS = 24;
 /// Two tips of a fit band: share of the sensor's range that counts as its end.
 constexpr double RANGE_SHARE = 0.98;
 
@@ -72,7 +81,8 @@ HammerSequence::HammerSequence(const HammerParameters& parameters, const Machine
       model_(model),
       station_(model.needHammer("measure the tool tip")),
       tool_(model.needTool("find a flute")),
-      collector_({parameters.trigger_force, parameters.pre_trigger, parameters.record_length}) {
+      collector_({parameters.trigger_force, parameters.pre_trigger, parameters.record_length}),
+      cross_collector_({parameters.trigger_force, parameters.pre_trigger, parameters.record_length}) {
   parameters_.validate();
 }
 
@@ -83,7 +93,9 @@ void HammerSequence::reset() {
   search_.reset();
   calibration_.reset();
   collector_.reset();
+  cross_collector_.reset();
   hits_.clear();
+  cross_hits_.clear();
   commands_.clear();
   feedback_.reset();
   done_.reset();
@@ -110,10 +122,15 @@ bool HammerSequence::handle(const MeasureFrfGoal& goal) {
   goal_ = goal;
   result_ = MeasureFrfResult();
   hits_.clear();
-  bad_hits_ = bad_averages_ = 0;
+  cross_hits_.clear();
+  bad_hits_ = bad_averages_ = near_samples_ = 0;
   search_.reset();
   calibration_.reset();
+  sensor_ = cross_sensor_ = SensorState();
+  has_cross_ = surveyed_ = false;
+  no_cross_.clear();
   collector_.reset();
+  cross_collector_.reset();
   at_station_ = retracting_after_abort_ = false;
   direction_ = axisIndex(goal.direction);
   const int teeth = goal.teeth > 0 ? goal.teeth : tool_.teeth;
@@ -187,6 +204,7 @@ void HammerSequence::orient(double now, double angle) {
   c.angle = (counts - COUNTS * std::floor(counts / COUNTS)) * units::TWO_PI / COUNTS;
   target_angle_ = c.angle;
   angle_sum_ = 0.0;
+  ++result_.spindle_moves;
   send(std::move(c), Wait::angle, parameters_.orient_timeout);
 }
 
@@ -226,6 +244,7 @@ void HammerSequence::strike(double now) {
   c.stamp = now;
   c.direction = goal_.direction;
   collector_.arm();
+  cross_collector_.arm();
   send(std::move(c), Wait::hit, parameters_.strike_timeout);
 }
 
@@ -270,6 +289,7 @@ bool HammerSequence::late(double now) {
     case Wait::hit:
       if (collector_.recording()) return false;
       collector_.disarm();
+      cross_collector_.disarm();
       badHit(now, format("no hit seen within %.1f s of the command", parameters_.strike_timeout), false);
       return true;
     default:
@@ -360,14 +380,25 @@ void HammerSequence::handle(const SampleBlock& block) {
   } catch (const Error& error) {
     return abort(block.stamp, FrfCode::bad_data, error.what());
   }
+  const auto cross = std::find(block.channels.begin(), block.channels.end(), "gap_cross");
+  has_cross_ = parameters_.cross_frf != 0 && cross != block.channels.end();
+  const auto cross_channel = static_cast<std::size_t>(cross - block.channels.begin());
   for (std::size_t i = 0; i < block.size() && active(); ++i) {
     const double t = block.timeOf(i);
     if (t < goal_.stamp - SAME_TIME) continue;
     const std::uint64_t index = block.first_index + i;
-    const double force = block.at(i, force_channel), volt = block.at(i, gap_channel);
+    const double force = block.at(i, force_channel);
+    const double volt = block.at(i, stage_ == Stage::calibrate_cross ? cross_channel : gap_channel);
     auto record = collector_.add(t, index, block.sample_rate, force, volt);
-    if (record && wait_ == Wait::hit) {
-      recorded(t, std::move(*record));
+    std::optional<HitCollector::Record> beside;
+    if (has_cross_) {
+      beside = cross_collector_.add(t, index, block.sample_rate, force, block.at(i, cross_channel));
+    }
+    if (tooNear(volt)) {
+      abort(t, FrfCode::no_flute,
+            format("the tool is too near to the sensor: %.2f V is the end of its range", volt));
+    } else if (record && wait_ == Wait::hit) {
+      recorded(t, std::move(*record), std::move(beside));
     } else if (wait_ == Wait::rest && t >= rest_until_ - SAME_TIME) {
       strike(t);
     } else if (wait_ == Wait::average && t >= average_from_ - SAME_TIME) {
@@ -395,6 +426,14 @@ void HammerSequence::handle(const SampleBlock& block) {
   if (active() && block.size() > 0) late(block.timeOf(block.size() - 1));
 }
 
+/// On the way to the station and while the spindle turns before it.
+bool HammerSequence::tooNear(double volt) {
+  const bool watched = at_station_ && (stage_ == Stage::to_station || stage_ == Stage::search_low ||
+                                       stage_ == Stage::to_height || stage_ == Stage::search_high);
+  near_samples_ = watched && volt >= NEAR_SHARE * station_.range_volt ? near_samples_ + 1 : 0;
+  return near_samples_ >= NEAR_SAMPLES;
+}
+
 // ---------------------------------------------------------------------------------------------- steps
 
 FluteSearchOptions HammerSequence::searchOptions() const {
@@ -406,6 +445,8 @@ FluteSearchOptions HammerSequence::searchOptions() const {
   options.range_volt = station_.range_volt;
   options.noise_sigmas = parameters_.noise_sigmas;
   options.least_rise = parameters_.least_rise;
+  options.golden_only = parameters_.golden_only != 0;
+  if (stage_ == Stage::search_high && !options.golden_only) options.first_step *= SECOND_STEP;
   return options;
 }
 
@@ -420,9 +461,15 @@ void HammerSequence::moveToStation(double now) {
   Axes3 up = here, beside = above;
   up[2] = above[2];
   beside[2] = station[2];
+  Axes3 near = station;
+  near[static_cast<std::size_t>(direction_)] -= parameters_.near_path;
   at_station_ = true;
   move(now, here,
-       {{up, 0.0}, {above, 0.0}, {beside, parameters_.approach_feed}, {station, parameters_.approach_feed}});
+       {{up, 0.0},
+        {above, 0.0},
+        {beside, parameters_.approach_feed},
+        {near, parameters_.approach_feed},
+        {station, parameters_.jog_feed}});
 }
 
 void HammerSequence::reached(double now) {
@@ -439,7 +486,10 @@ void HammerSequence::reached(double now) {
       return orient(now, search_->next());
     case Stage::search_low:
     case Stage::search_high:
+    case Stage::survey:
     case Stage::calibrate:
+    case Stage::calibrate_cross:
+    case Stage::calibrate_again:
       return average(now + parameters_.settle_time);
     case Stage::to_height:
       stage_ = Stage::search_high;
@@ -454,7 +504,7 @@ void HammerSequence::reached(double now) {
       return orient(now, result_.flute_hammer);
     case Stage::orient_flute:
       stage_ = Stage::calibrate;
-      say("calibrating the displacement sensor", 0.55);
+      say("calibrating the displacement sensor", surveyed_ ? 0.58 : 0.55);
       return average(now + parameters_.settle_time);
     case Stage::retract:
       return finish();
@@ -463,7 +513,94 @@ void HammerSequence::reached(double now) {
   }
 }
 
-SensorCalibrationOptions HammerSequence::calibrationOptions() const {
+/// The axis along which the sensor now calibrated looks.
+std::size_t HammerSequence::calibratedAxis() const {
+  const auto along = static_cast<std::size_t>(direction_);
+  return stage_ == Stage::calibrate_cross ? 1 - along : along;
+}
+
+void HammerSequence::keepProfile() {
+  profile_.clear();
+  flute_volt_ = search_->volt();
+  flute_gap_ = std::min(2.0 * station_.gap_at_zero_volt, nominalGap(flute_volt_));
+  for (const FluteSearch::Reading& r : search_->readings())
+    profile_.push_back({nearAngle(r.angle, result_.flute_low) - result_.flute_low, retreatOf(r.volt, 0.0)});
+}
+
+double HammerSequence::nominalGap(double volt) const {
+  return station_.gap_at_zero_volt / std::max(0.02, 1.0 + volt / station_.gain_volt);
+}
+
+/// [m] behind a flute at the sensor, of a reading so much nearer than the station.
+double HammerSequence::retreatOf(double volt, double moved) const {
+  const double depth = nominalGap(volt) + moved - nominalGap(flute_volt_);
+  return TRUSTED_DEPTH * std::clamp(depth, 0.0, station_.flute_depth);
+}
+
+/// What a sensor sees with the flute at the hammer belongs to the flanks of the flutes on either side.
+/// @param further [rad] that the spindle has turned on from there
+void HammerSequence::addToProfile(std::size_t axis, double further, double volt) {
+  const double off = turnedFrom(axis) + further, moved = target_[axis] - stationPosition()[axis];
+  double ahead = units::TWO_PI, behind = -units::TWO_PI;
+  for (int tooth = 0; tooth < tool_.teeth; ++tooth) {
+    const double turned = std::remainder(off - tool_.toothAngle(tooth), units::TWO_PI);
+    if (turned >= 0.0) ahead = std::min(ahead, turned);
+    if (turned <= 0.0) behind = std::max(behind, turned);
+  }
+  for (const double place : {ahead, behind}) {
+    if (std::abs(place) < units::TWO_PI) profile_.push_back({place, retreatOf(volt, moved)});
+  }
+}
+
+/// [rad] that the spindle, a flute at the hammer, stands from a flute at the sensor of an axis.
+double HammerSequence::turnedFrom(std::size_t axis) const {
+  const double across = axis == static_cast<std::size_t>(direction_) ? 0.0
+                        : axis == 0                                  ? 0.5 * units::PI
+                                                                     : -0.5 * units::PI;
+  return result_.flute_hammer - result_.flute_low - across;
+}
+
+/// [m] at least, of the surface that the sensor would see with the spindle so far from a flute. The root of
+/// the depth runs straight between two readings, which lies below a flank that is round or straight; beyond
+/// the last reading the surface falls towards the gullet.
+double HammerSequence::leastRetreat(double off) const {
+  double least = station_.flute_depth;
+  for (int tooth = 0; tooth < tool_.teeth; ++tooth) {
+    const double turned = std::remainder(off - tool_.toothAngle(tooth), units::TWO_PI);
+    const double sense = turned < 0.0 ? -1.0 : 1.0, at = sense * turned;
+    Retreat below, above{std::numeric_limits<double>::infinity(), 0.0};
+    for (const Retreat& r : profile_) {
+      const double place = sense * r.off;
+      if (place > below.off && place <= at) below = {place, r.depth};
+      if (place > at && place < above.off) above = {place, r.depth};
+    }
+    double depth = below.depth;
+    if (std::isfinite(above.off) && above.depth > below.depth) {
+      const double share = (at - below.off) / (above.off - below.off);
+      const double root = std::sqrt(below.depth) + share * (std::sqrt(above.depth) - std::sqrt(below.depth));
+      depth = root * root;
+    }
+    least = std::min(least, depth);
+  }
+  return least;
+}
+
+/// [m] towards the sensor until the tool would be as near to its face as allowed. At the station a flute that
+/// points at the sensor leaves about twice the gap at zero volt; now the spindle stands as it does for the
+/// hammer, and what is foremost before the face follows from the first search.
+double HammerSequence::safeTravel(std::size_t axis) const {
+  const double turned = turnedFrom(axis), radius = tool_.radius();
+  const double widest = std::asin(std::min(0.9, 0.5 * parameters_.sensor_face / radius));
+  double behind = 2.0 * radius;
+  for (int k = -FACE_STEPS; k <= FACE_STEPS; ++k) {
+    const double a = widest * k / FACE_STEPS;
+    behind = std::min(behind, radius * (1.0 - std::cos(a)) + leastRetreat(turned - a) * std::cos(a));
+  }
+  const double moved = target_[axis] - stationPosition()[axis];
+  return flute_gap_ - parameters_.min_gap_share * station_.gap_at_zero_volt + behind - moved;
+}
+
+SensorCalibrationOptions HammerSequence::calibrationOptions(std::size_t axis) const {
   SensorCalibrationOptions o;
   o.first_jog = parameters_.first_jog;
   o.max_jog = parameters_.max_jog;
@@ -478,11 +615,15 @@ SensorCalibrationOptions HammerSequence::calibrationOptions() const {
   o.min_gap = parameters_.min_gap_share * station_.gap_at_zero_volt;
   // The flute faces the hammer, so the sensor may look between two flutes.
   o.max_travel = parameters_.max_approach + station_.flute_depth;
+  o.safe_travel = safeTravel(axis);
   return o;
 }
 
 void HammerSequence::measured(double now, double volt, double volt_std) {
-  if (stage_ == Stage::calibrate) return calibrated(now, volt, volt_std);
+  if (stage_ == Stage::calibrate || stage_ == Stage::calibrate_cross || stage_ == Stage::calibrate_again) {
+    return calibrated(now, volt, volt_std);
+  }
+  if (stage_ == Stage::survey) return surveyed(now, volt);
   search_->give(reached_angle_, volt, volt_std);
   if (search_->state() == FluteSearch::State::searching) return orient(now, search_->next());
   if (search_->state() == FluteSearch::State::no_flute) {
@@ -496,33 +637,88 @@ void HammerSequence::measured(double now, double volt, double volt_std) {
   fluteFound(now);
 }
 
+/// Whether what is known of the flanks would hold the tool back before the sensor is zeroed: then two more
+/// readings to either side, from the station's safe distance.
+bool HammerSequence::surveyDue(double volt) {
+  if (std::exchange(surveyed_, true)) return false;
+  const auto along = static_cast<std::size_t>(direction_);
+  const double due = nominalGap(volt) - station_.gap_at_zero_volt + parameters_.check_jog;
+  if (safeTravel(along) >= due) return false;
+  const double beside = 0.5 * std::asin(std::min(0.9, 0.5 * parameters_.sensor_face / tool_.radius()));
+  survey_ = {beside, -beside};
+  return true;
+}
+
+void HammerSequence::surveyed(double now, double volt) {
+  addToProfile(static_cast<std::size_t>(direction_), survey_.back(), volt);
+  survey_.pop_back();
+  if (!survey_.empty()) return orient(now, result_.flute_hammer + survey_.back());
+  stage_ = Stage::orient_flute;
+  orient(now, result_.flute_hammer);
+}
+
 void HammerSequence::calibrated(double now, double volt, double volt_std) {
   if (!calibration_) {
-    calibration_.emplace(calibrationOptions());
+    if (stage_ != Stage::calibrate_again) addToProfile(calibratedAxis(), 0.0, volt);
+    if (stage_ == Stage::calibrate && surveyDue(volt)) {
+      stage_ = Stage::survey;
+      say("looking at the flanks that the sensor's face will meet", 0.56);
+      return orient(now, result_.flute_hammer + survey_.back());
+    }
+    calibration_.emplace(calibrationOptions(calibratedAxis()));
     calibration_->start(volt, volt_std);
   } else {
     calibration_->give(volt, volt_std);
   }
   switch (calibration_->state()) {
     case SensorCalibration::State::jogging:
-      return jog(now, goal_.direction, calibration_->next(), parameters_.jog_feed);
+      return jog(now, AXIS_NAMES[calibratedAxis()], calibration_->next(), parameters_.jog_feed);
     case SensorCalibration::State::failed:
+      if (stage_ == Stage::calibrate_cross) return crossFailed(now);
       return abort(now, FrfCode::bad_data, "sensor calibration: " + calibration_->reason());
     case SensorCalibration::State::done:
-      result_.sensitivity = calibration_->sensitivity();
-      result_.sensitivity_std = calibration_->sensitivityStd();
-      stage_ = Stage::strike;
-      say(format("sensor calibrated: %.3f +- %.3f um/V", 1e6 * result_.sensitivity,
-                 1e6 * result_.sensitivity_std),
-          0.7);
-      return strike(now);
+      return sensorKnown(now);
   }
+}
+
+/// With a second sensor the first is done again: the second's jogs have moved the round tool before it.
+void HammerSequence::sensorKnown(double now) {
+  SensorState& sensor = stage_ == Stage::calibrate_cross ? cross_sensor_ : sensor_;
+  sensor = {calibration_->sensitivity(), calibration_->sensitivityStd(), calibration_->bendGap(),
+            calibration_->volt()};
+  const bool held_back = calibration_->heldBack();
+  calibration_.reset();
+  say(format("sensor calibrated: %.3f +- %.3f um/V", 1e6 * sensor.sensitivity, 1e6 * sensor.sensitivity_std) +
+          (held_back ? format(" at %.2f V, held back by the tool's edges", sensor.volt) : std::string()),
+      stage_ == Stage::calibrate ? 0.62 : stage_ == Stage::calibrate_cross ? 0.66 : 0.7);
+  if (stage_ == Stage::calibrate && has_cross_) {
+    stage_ = Stage::calibrate_cross;
+    return average(now + parameters_.settle_time);
+  }
+  if (stage_ == Stage::calibrate_cross) {
+    stage_ = Stage::calibrate_again;
+    return average(now + parameters_.settle_time);
+  }
+  result_.sensitivity = sensor_.sensitivity;
+  result_.sensitivity_std = sensor_.sensitivity_std;
+  stage_ = Stage::strike;
+  strike(now);
+}
+
+void HammerSequence::crossFailed(double now) {
+  no_cross_ = calibration_->reason();
+  calibration_.reset();
+  stage_ = Stage::calibrate_again;
+  say("no cross FRF: " + no_cross_, 0.66);
+  average(now + parameters_.settle_time);
 }
 
 void HammerSequence::fluteFound(double now) {
   const double half = roundTo(0.5 * station_.offset, parameters_.resolution);
   if (stage_ == Stage::search_low) {
     result_.flute_low = search_->angle();
+    result_.flute_sure = search_->sure();
+    keepProfile();
     stage_ = Stage::to_height;
     say("lowering the tool to find the flute halfway up to the hammer", 0.28);
     return jog(now, "z", -half, parameters_.approach_feed);
@@ -530,25 +726,30 @@ void HammerSequence::fluteFound(double now) {
   // Another flute may have been nearer to the walk: the one meant is within half a pitch of where the helix
   // puts it.
   result_.flute_high = search_->angle();
+  result_.flute_sure *= search_->sure();
   const double full_pitch = units::TWO_PI / (goal_.teeth > 0 ? goal_.teeth : tool_.teeth);
   result_.flute_high -= full_pitch * std::round((result_.flute_high - expected_angle_) / full_pitch);
   result_.flute_hammer = 2.0 * result_.flute_high - result_.flute_low;  // eq. 4.1
   stage_ = Stage::to_tip;
   say(format("flute at %.2f deg at the tip, %.2f deg halfway up, %.2f deg at the hammer",
              units::degFromRad(result_.flute_low), units::degFromRad(result_.flute_high),
-             units::degFromRad(result_.flute_hammer)),
+             units::degFromRad(result_.flute_hammer)) +
+          format(", sure by %.1f %%, %.0f spindle moves", 100.0 * result_.flute_sure, result_.spindle_moves),
       0.48);
   jog(now, "z", half, parameters_.approach_feed);
 }
 
-void HammerSequence::recorded(double now, HitCollector::Record record) {
+void HammerSequence::recorded(double now, HitCollector::Record record,
+                              std::optional<HitCollector::Record> cross) {
   HitFault fault{record.fault, true};
+  if (fault.text.empty() && cross) fault.text = cross->fault;
   if (fault.text.empty()) {
     fault = hitFault(record.hit, {parameters_.weak_force, parameters_.second_hit_share,
                                   RANGE_SHARE * station_.range_volt});
   }
   if (!fault.text.empty()) return badHit(now, fault.text, fault.bad_data);
   hits_.push_back(std::move(record.hit));
+  if (cross) cross_hits_.push_back(std::move(cross->hit));
   say("hit " + std::to_string(hits_.size()) + " of " + std::to_string(goal_.hits),
       0.7 + 0.25 * static_cast<double>(hits_.size()) / goal_.hits);
   if (static_cast<int>(hits_.size()) >= goal_.hits) {
@@ -569,13 +770,36 @@ void HammerSequence::badHit(double now, const std::string& why, bool bad_data) {
   rest_until_ = now + parameters_.rest_time;
 }
 
-void HammerSequence::evaluate() {
+ImpactOptions HammerSequence::impactOptions(const SensorState& sensor, double factor) const {
   ImpactOptions options;
   options.exponential_time = parameters_.exponential_time;
-  // The blow drives the tool away from the sensor: the voltage falls.
+  // The blow drives the tool away from the sensor: the voltage falls. Across, the blow's sense is turned too.
+  options.response_scale = -sensor.sensitivity * factor;
+  if (parameters_.straighten_sensor == 0) return options;
+  options.sensor_gain = std::isfinite(sensor.bend_gap) ? sensor.bend_gap / sensor.sensitivity - sensor.volt
+                                                       : station_.gain_volt;
+  return options;
+}
+
+/// Struck along the goal's direction, read across it.
+void HammerSequence::evaluateCross(double factor) {
+  if (cross_hits_.size() != hits_.size() || !std::isfinite(cross_sensor_.sensitivity)) return;
+  ImpactAnalysis analysis(impactOptions(cross_sensor_, factor));
+  for (const Hit& hit : cross_hits_) analysis.add(hit);
+  const double relative = cross_sensor_.sensitivity_std / cross_sensor_.sensitivity;
+  MeasuredFrf& cross = result_.cross;
+  cross.stamp = result_.frf.stamp;
+  cross.tool = goal_.tool;
+  cross.point = goal_.point;
+  cross.direction = goal_.direction + AXIS_NAMES[1 - direction_];
+  cross.frf = analysis.frf().band(1e-3, parameters_.frf_high);
+  for (std::size_t k = 0; k < cross.frf.size(); ++k)
+    cross.frf.std_dev[k] = std::hypot(cross.frf.std_dev[k], relative * std::abs(cross.frf.value[k]));
+}
+
+void HammerSequence::evaluate() {
   const double factor = goal_.stickout > 0.0 ? offsetFactor(goal_.stickout, station_.offset) : 1.0;
-  options.response_scale = -result_.sensitivity * factor;
-  if (parameters_.straighten_sensor != 0) options.sensor_gain = station_.gain_volt;
+  const ImpactOptions options = impactOptions(sensor_, factor);
   const double relative = result_.sensitivity_std / result_.sensitivity;
   result_.frf.stamp = result_.modes.stamp = hits_.back().stamp;
   result_.frf.tool = result_.modes.tool = goal_.tool;
@@ -606,9 +830,11 @@ void HammerSequence::evaluate() {
     result_.modes.model.direct_std =
         std::hypot(result_.modes.model.direct_std, relative * result_.modes.model.direct);
     analysis.removeWindowDamping(result_.modes.model);
+    evaluateCross(factor);
     result_.message = std::to_string(hits_.size()) + " hits, " +
                       std::to_string(result_.modes.model.modes.size()) + " modes" +
-                      (goal_.stickout > 0.0 ? format(", offset correction %.3f", factor) : std::string());
+                      (goal_.stickout > 0.0 ? format(", offset correction %.3f", factor) : std::string()) +
+                      (no_cross_.empty() ? std::string() : ", no cross FRF: " + no_cross_);
   } catch (const Error& error) {
     result_.code = FrfCode::fit_failed;
     result_.message = error.what();
@@ -645,6 +871,7 @@ void HammerSequence::lost(double stamp, const std::string& text) {
 void HammerSequence::abort(double now, FrfCode code, const std::string& why) {
   if (!active()) return;
   collector_.disarm();
+  cross_collector_.disarm();
   if (stage_ == Stage::stopping || stage_ == Stage::retract) {
     // Already on the way out: what failed is the retract.
     if (result_.code == FrfCode::ok) result_.code = code;
@@ -688,6 +915,7 @@ void HammerSequence::finish() {
   stage_ = Stage::idle;
   wait_ = Wait::nothing;
   collector_.disarm();
+  cross_collector_.disarm();
   done_ = std::move(result_);
   result_ = MeasureFrfResult();
 }

@@ -101,6 +101,64 @@ TEST(SensorCalibration, RefusesWhatIsNoSensor) {
   EXPECT_NE(far.reason().find("out of the sensor's range"), std::string::npos);
 }
 
+// A sensor whose curve is another hyperbola than the nominal one, as before a round tool.
+TEST(SensorCalibration, MeasuresTheCurveItself) {
+  const auto volt = [](double gap) { return std::clamp(0.8 * 10.0 * 180e-6 / gap - 9.0, -10.0, 10.0); };
+  SensorCalibrationOptions options;
+  options.position_std = 0.0;
+  SensorCalibration c{options};
+  double gap = 700e-6;
+  c.start(volt(gap), 1e-5);
+  while (c.state() == SensorCalibration::State::jogging) {
+    gap -= c.next();
+    c.give(volt(gap), 1e-5);
+  }
+  ASSERT_EQ(c.state(), SensorCalibration::State::done) << c.reason();
+  EXPECT_LT(std::abs(c.volt()), 0.1);
+  EXPECT_FALSE(c.heldBack());
+  EXPECT_NEAR(c.bendGap() / gap, 1.0, 1e-6);
+  const double slope = 0.8 * 10.0 * 180e-6 / (gap * gap);
+  EXPECT_NEAR(c.sensitivity() * slope, 1.0, 1e-6);
+}
+
+// Edges beside the sensor reach out further than what it sees.
+TEST(SensorCalibration, EndsWhereTheToolWouldTouch) {
+  const Sensor sensor;
+  SensorCalibrationOptions options;
+  options.safe_travel = 200e-6;
+  double gap = 700e-6;
+  const double begin = gap;
+  SensorCalibration c{options};
+  c.start(sensor.volt(gap), 1e-4);
+  while (c.state() == SensorCalibration::State::jogging) {
+    gap -= c.next();
+    ASSERT_LE(begin - gap, 200e-6 + 1e-9);
+    c.give(sensor.volt(gap), 1e-4);
+  }
+  ASSERT_EQ(c.state(), SensorCalibration::State::done) << c.reason();
+  EXPECT_TRUE(c.heldBack());
+  EXPECT_NEAR(c.sensitivity() / sensor.sensitivity(gap), 1.0, 0.01);
+  EXPECT_GT(c.sensitivityStd(), 0.0);
+}
+
+// An edge of a tenth of the electrode's width: the voltage is zero only where the edge nearly touches.
+TEST(SensorCalibration, DoesNotTouchWithASharpEdge) {
+  SensorCalibrationOptions options;
+  options.min_gap = 125e-6;
+  double gap = 520e-6, closest = gap;
+  const auto volt = [](double g) {
+    return std::clamp(10.0 * (250e-6 * (0.1 / g + 0.9 / (g + 900e-6)) - 1.0), -10.0, 10.0);
+  };
+  SensorCalibration c{options};
+  c.start(volt(gap), 1e-4);
+  while (c.state() == SensorCalibration::State::jogging) {
+    gap -= c.next();
+    closest = std::min(closest, gap);
+    c.give(volt(gap), 1e-4);
+  }
+  EXPECT_GT(closest, 40e-6);
+}
+
 TEST(SensorCalibration, NeverJogsBelowTheLeastGap) {
   SensorCalibrationOptions options;
   options.min_gap = 245e-6;

@@ -110,8 +110,8 @@ void Node::addTruth(const std::string& point, const std::string& direction, cons
 }
 
 void Node::publishTruth() {
-  addTruth(POINT_TOOL_TIP, "x", model_.tool_tip.x);
-  addTruth(POINT_TOOL_TIP, "y", model_.tool_tip.y);
+  addTruth(POINT_TOOL_TIP, "x", world_->toolTip().x);
+  addTruth(POINT_TOOL_TIP, "y", world_->toolTip().y);
   for (std::size_t axis = 0; axis < 3; ++axis)
     addTruth(POINT_FORCE_SENSOR, std::string(1, "xyz"[axis]), model_.force_sensor.axis[axis]);
   CoefficientSet set;

@@ -10,34 +10,72 @@ namespace smartmill::sim {
 namespace {
 
 // In front of a sensor: not beside it, not above it, not far from it.
-constexpr double BESIDE = 2e-3;  // [m]
-constexpr double ABOVE = 30e-3;  // [m]
-constexpr double FAR = 4e-3;     // [m]
-// Flanks of a flute seen by the sensor, either side of the edge.
-constexpr double RAKE_FLANK = 0.25, RELIEF_FLANK = 0.35;  // [rad]
+constexpr double BESIDE = 2e-3;    // [m]
+constexpr double ABOVE = 30e-3;    // [m]
+constexpr double FAR = 4e-3;       // [m]
+constexpr double STANDING = 0.02;  // [rad/s] a hammer that meets no standing tool hits the air
+constexpr double RINGS = 2.0;      // [s] after a blow all is still
+constexpr int LOOK = 32;           // samples between two looks at a moving surface
+constexpr std::array<const char*, 2> AXIS{{"x", "y"}};
+
+/// A tooth that points along the axis.
+double angleOf(std::size_t axis) {
+  return axis == 0 ? 0.5 * units::PI : 0.0;
+}
+
+/// Share of a cantilever's bending at the tip of a force so far below its root's end: l^2 (3 L - l) / (2 L^3)
+/// with l = L - offset (Dunwoody eq. 4.43).
+double cantilever(double stickout, double offset) {
+  const double l = stickout - offset;
+  if (!(l > 0.0)) {
+    throw Error("hammer.offset_mm: " + std::to_string(offset / units::MM) +
+                " is not below the tool's stickout");
+  }
+  return l * l * (3.0 * stickout - l) / (2.0 * stickout * stickout * stickout);
+}
+
+bool same(const HammerStation::Place& a, const HammerStation::Place& b) {
+  return a.angle == b.angle && a.position == b.position;
+}
 
 }  // namespace
 
-double Blow::force(double time) const {
-  const double u = time - begin;
-  return u > 0.0 && u < contact ? peak * std::sin(units::PI * u / contact) : 0.0;
+HammerStation::HammerStation(const MachineModel& model, const StationTraits& traits, double force_scatter,
+                             double step)
+    : station_(model.needHammer("simulate its station")),
+      tool_(model.needTool("simulate the hammer station")),
+      traits_(traits),
+      surface_(traits, tool_, station_.flute_depth),
+      sensor_{{GapSensor(traits, station_, angleOf(0)), GapSensor(traits, station_, angleOf(1))}},
+      solenoid_(traits, station_, force_scatter) {
+  if (model.stickout) shape_ = cantilever(*model.stickout, station_.offset);
+  if (traits.structure != "beam") return;
+  if (!model.stickout) throw Error("hammer_structure: beam needs the model's tool.stickout_mm");
+  cantilever(*model.stickout, station_.offset + traits.read_height);
+  structure_.emplace(traits, tool_, *model.stickout);
+  const double struck = traits.read_height + station_.offset;
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    const auto filter = [&](std::size_t read_axis, double height) {
+      return ModalFilter(structure_->between(read_axis, height, axis, struck), 1.0 / step, Hold::first_order);
+    };
+    ways_.push_back({{{filter(0, traits.read_height), filter(1, traits.read_height)}},
+                     {{filter(0, 0.0), filter(1, 0.0)}}});
+  }
 }
 
-HammerStation::HammerStation(const smartmill::HammerStation& station, const ToolGeometry& tool,
-                             std::optional<double> stickout)
-    : station_(station), tool_(tool) {
-  if (!stickout) return;
-  const double whole = *stickout, l = whole - station.offset;
-  if (!(l > 0.0)) {
-    throw Error("hammer.offset_mm: " + std::to_string(station.offset / units::MM) +
-                " is not below the tool's stickout");
-  }
-  shape_ = l * l * (3.0 * whole - l) / (2.0 * whole * whole * whole);
+std::optional<ToolTip> HammerStation::tip() const {
+  if (!structure_) return std::nullopt;
+  return structure_->tip();
+}
+
+ModalModel HammerStation::measured(std::size_t read_axis, std::size_t struck_axis) const {
+  return structure_->between(read_axis, traits_.read_height, struck_axis,
+                             traits_.read_height + station_.offset);
 }
 
 std::optional<std::size_t> HammerStation::facing(const std::array<double, 3>& position) const {
   for (std::size_t axis = 0; axis < 2; ++axis) {
-    const auto found = station_.position.find(axis == 0 ? "x" : "y");
+    const auto found = station_.position.find(AXIS[axis]);
     if (found == station_.position.end()) continue;
     const Axes3& p = found->second;
     if (std::abs(position[1 - axis] - p[1 - axis]) < BESIDE && std::abs(position[2] - p[2]) < ABOVE &&
@@ -48,32 +86,130 @@ std::optional<std::size_t> HammerStation::facing(const std::array<double, 3>& po
   return std::nullopt;
 }
 
-/// [m] how far the surface that faces the sensor lies behind the cutting circle.
-double HammerStation::retreat(double angle, double facing) const {
-  double least = station_.flute_depth;
-  for (int tooth = 0; tooth < tool_.teeth; ++tooth) {
-    const double off = std::remainder(angle + tool_.toothAngle(tooth) - facing, units::TWO_PI);
-    const double width = off > 0.0 ? RAKE_FLANK : RELIEF_FLANK;
-    least = std::min(least, -station_.flute_depth * std::expm1(-off * off / (width * width)));
+void HammerStation::fire(std::size_t axis, double now, double touch, std::mt19937_64& random) {
+  fired_ = true;
+  fired_axis_ = axis;
+  solenoid_.fire(now, touch, random);
+}
+
+double HammerStation::struckRetreat(const Place& place, std::size_t axis) const {
+  const double height = station_.position.at(AXIS[axis])[2] - place.position[2];
+  return surface_.retreat(place.angle, height + traits_.read_height + station_.offset, angleOf(axis));
+}
+
+/// Where an axis has stopped it is not quite where it shows.
+void HammerStation::settle(const Place& place, std::mt19937_64& random) {
+  if (place.position != place_.position) {
+    moving_ = true;
+  } else if (moving_) {
+    moving_ = false;
+    std::normal_distribution<double> normal;
+    for (std::size_t axis = 0; axis < 2 && traits_.axis_scatter > 0.0; ++axis) {
+      if (place.position[axis] != stopped_[axis]) unseen_[axis] = traits_.axis_scatter * normal(random);
+    }
+    stopped_ = place.position;
   }
-  return least;
 }
 
-double HammerStation::voltage(const std::array<double, 3>& position, double angle,
-                              const std::array<double, 2>& displacement) const {
-  const std::optional<std::size_t> axis = facing(position);
-  if (!axis) return -station_.range_volt;
-  const Axes3& p = station_.position.at(*axis == 0 ? "x" : "y");
-  // A lower tool shows the sensor a higher point of its edges, which lags.
-  const double lag = tool_.lag() * (p[2] - position[2]);
-  const double gap = p[*axis] + 2.0 * station_.gap_at_zero_volt - position[*axis] - displacement[*axis] +
-                     retreat(angle - lag, *axis == 0 ? 0.5 * units::PI : 0.0);
-  if (gap <= 0.0) return station_.range_volt;
-  return clipped(station_.gain_volt * (station_.gap_at_zero_volt / gap - 1.0));
+void HammerStation::stand(const Place& place, std::mt19937_64& random) {
+  settle(place, random);
+  place_ = place;
+  steps_ = 0;
+  force_sum_ = 0.0;
+  volt_sum_ = {{0, 0}};
+  touched_ = false;
+  const std::optional<std::size_t> before = facing(place.position);
+  if (before != before_) {
+    before_ = before;
+    faced_.reset();
+    rings_until_ = -1.0;
+    now_ = {{0, 0}};
+    for (Way& way : ways_) {
+      for (ModalFilter& f : way.read) f.reset();
+      for (ModalFilter& f : way.tip) f.reset();
+    }
+    if (before) closest_ = 1.0;
+  }
+  if (!before_) return;
+  const bool stale = !faced_ || !same(*faced_, place);
+  const bool at_rest = !moving_ && place.speed == 0.0;
+  if (stale && (at_rest || !faced_ || ++since_faced_ >= LOOK)) {
+    since_faced_ = 0;
+    faced_ = place;
+    const Axes3& p = station_.position.at(AXIS[*before_]);
+    const double above = p[2] - place.position[2] + traits_.read_height;
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      if (axis != *before_ && !traits_.cross_sensor) continue;
+      const double off = place.position[1 - axis] - p[1 - axis] + traits_.beside;
+      sensor_[axis].face(surface_, place.angle, above, off);
+      seen_[axis] = Seen();
+    }
+  }
 }
 
-double HammerStation::clipped(double voltage) const {
-  return std::clamp(voltage, -station_.range_volt, station_.range_volt);
+HammerStation::Push HammerStation::push(double time) {
+  Push push;
+  const bool meets = fired_ && before_ == fired_axis_ && place_.speed <= STANDING;
+  if (meets) push.force = solenoid_.force(time);
+  if (push.force != 0.0) rings_until_ = time + RINGS;
+  if (structure_ && before_ && time < rings_until_) {
+    // The blow comes from the sensor's side.
+    Way& way = ways_[fired_axis_];
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      now_[axis] = way.read[axis].step(-push.force);
+      push.tip[axis] = way.tip[axis].step(-push.force);
+    }
+  } else if (meets) {
+    push.tip_force[fired_axis_] = -shape_ * push.force;
+  }
+  ++steps_;
+  force_sum_ += push.force;
+  return push;
+}
+
+/// [m] from each sensor's face to the cutting circle.
+std::array<double, 2> HammerStation::gaps(const std::array<double, 2>& displacement) const {
+  const Axes3& p = station_.position.at(AXIS[*before_]);
+  std::array<double, 2> gap{};
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    gap[axis] = p[axis] + 2.0 * station_.gap_at_zero_volt - place_.position[axis] - unseen_[axis] -
+                displacement[axis];
+  }
+  return gap;
+}
+
+void HammerStation::hear(const std::array<double, 2>& displacement) {
+  if (!before_) return;
+  const std::array<double, 2> gap = gaps({{displacement[0] + now_[0], displacement[1] + now_[1]}});
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    if (axis != *before_ && !traits_.cross_sensor) continue;
+    Seen& seen = seen_[axis];
+    if (gap[axis] != seen.gap) {
+      seen.gap = gap[axis];
+      seen.clearance = sensor_[axis].clearance(gap[axis]);
+      seen.volt = seen.clearance > 0.0 ? sensor_[axis].voltage(gap[axis]) : station_.range_volt;
+    }
+    closest_ = std::min(closest_, seen.clearance);
+    if (seen.clearance <= 0.0 && traits_.housing > 0.0) touched_ = true;
+    volt_sum_[axis] += seen.volt;
+  }
+}
+
+HammerStation::Reading HammerStation::read(double time, std::mt19937_64& random) {
+  std::normal_distribution<double> normal;
+  const double current = fired_ ? solenoid_.current(time) : 0.0;
+  Reading reading;
+  reading.force = force_sum_ / std::max(1, steps_) + traits_.coil_force * current +
+                  station_.force_noise_rms * normal(random);
+  const auto volt = [&](std::size_t axis) {
+    const double mean = before_ ? volt_sum_[axis] / std::max(1, steps_) : -station_.range_volt;
+    return sensor_[axis].clipped(mean + traits_.coil_volt * current +
+                                 station_.voltage_noise_rms * normal(random));
+  };
+  const std::size_t axis = before_.value_or(0);
+  reading.gap = volt(axis);
+  if (traits_.cross_sensor) reading.cross = volt(1 - axis);
+  return reading;
 }
 
 }  // namespace smartmill::sim

@@ -17,12 +17,11 @@
 namespace smartmill::sim {
 namespace {
 
-constexpr std::size_t LOOK = 64;               // samples between two looks at where the tool meets stock
-constexpr double HAMMER_DELAY = 0.03;          // [s] of the solenoid
-constexpr double TURNING = 1.0;                // [rad/s] a slower spindle cannot cut
-constexpr double STANDING = 0.02;              // [rad/s]
-constexpr double SAME_ANGLE = 1e-7;            // [rad]
-constexpr int TOUCHED = 3001, PLUNGED = 3002;  // external alarms
+constexpr std::size_t LOOK = 64;       // samples between two looks at where the tool meets stock
+constexpr double HAMMER_DELAY = 0.03;  // [s] of the solenoid
+constexpr double TURNING = 1.0;        // [rad/s] a slower spindle cannot cut
+constexpr double SAME_ANGLE = 1e-7;    // [rad]
+constexpr int TOUCHED = 3001, PLUNGED = 3002, SENSOR = 3003;  // external alarms
 
 bool same(const std::vector<ContactArc>& a, const std::vector<ContactArc>& b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const ContactArc& p, const ContactArc& q) {
@@ -31,10 +30,25 @@ bool same(const std::vector<ContactArc>& a, const std::vector<ContactArc>& b) {
   });
 }
 
+/// The model with the tool's structure that the hammer station's traits give it.
+MachineModel withStructure(MachineModel model, const std::optional<HammerStation>& station) {
+  if (station) {
+    if (const std::optional<ToolTip> tip = station->tip()) model.tool_tip = *tip;
+  }
+  return model;
+}
+
+std::optional<HammerStation> stationOf(const MachineModel& model, const WorldOptions& options) {
+  if (!model.hammer || !model.tool) return std::nullopt;
+  return HammerStation(model, options.hammer, options.force_scatter,
+                       1.0 / (World::SAMPLE_RATE * options.substeps));
+}
+
 }  // namespace
 
 void WorldOptions::validate() const {
   checkBounds(*this);
+  hammer.validate();
 }
 
 class World::Impl {
@@ -44,7 +58,9 @@ class World::Impl {
         spindle_(model.needSpindle("simulate the machine")),
         controller_(controllerOptions(model, options)),
         servo_(options.servo_trigger),
-        machine_(model, 1.0 / (SAMPLE_RATE * options.substeps)),
+        station_(stationOf(model, options)),
+        tip_(withStructure(model, station_).tool_tip),
+        machine_(withStructure(model, station_), 1.0 / (SAMPLE_RATE * options.substeps)),
         random_(options.seed) {
     const ToolGeometry& tool = model.needTool("simulate the machine");
     model.needCutting("simulate the machine");
@@ -54,42 +70,38 @@ class World::Impl {
                   ": spindle.load_meter_full_scale_v is missing (needed to simulate the machine)");
     }
     if (model.workpiece) stock_.emplace(*model.workpiece, tool.radius());
-    if (model.hammer) {
-      station_.emplace(*model.hammer, tool, model.stickout);
-      hammer_ = *model.hammer;
-    }
     if (model.force_sensor.noise_rms) force_noise_ = *model.force_sensor.noise_rms;
     last_ = controller_.motion();
     machine_.resetLoadMeter(0.0);
   }
 
   Controller& controller() { return controller_; }
+  const ToolTip& toolTip() const { return tip_; }
 
   StrikeAnswer strike(const std::string& point, const std::string& direction, std::string& message) {
     const std::lock_guard<std::mutex> lock(mutex_);
     const std::size_t axis = direction == "x" ? 0 : direction == "y" ? 1 : direction == "z" ? 2 : 3;
     const double now = static_cast<double>(index_) / SAMPLE_RATE;
-    if (blow_ && !blow_->over(now)) {
+    if ((blow_ && !blow_->over(now)) || (station_ && station_->busy(now))) {
       message = "a blow is still under way";
       return StrikeAnswer::failed;
     }
     const bool tool = point == "tool";
-    if (tool && hammer_ && axis < 2) {
+    if (tool && station_ && axis < 2) {
       // Between two samples anywhere, as a real one.
-      blow_ = Blow{now + HAMMER_DELAY + uniform() / SAMPLE_RATE, scattered(hammer_->peak_force),
-                   hammer_->contact_time};
+      station_->fire(axis, now, now + HAMMER_DELAY + uniform() / SAMPLE_RATE, random_);
       message = "hammer fired in " + direction;
     } else if (point == "force_sensor" && axis < 3) {
       const double delay = options_.operator_delay > 0.0 ? options_.operator_delay : HAMMER_DELAY;
-      blow_ = Blow{now + delay + uniform() / SAMPLE_RATE, scattered(options_.tap_peak), options_.tap_contact};
+      blow_ = Blow{now + delay + uniform() / SAMPLE_RATE, scattered(options_.tap_peak), options_.tap_contact,
+                   0.0};
+      blow_axis_ = axis;
       message = options_.operator_delay > 0.0 ? "hit the workpiece by hand in " + direction
                                               : "hammer fired on the workpiece in " + direction;
     } else {
       message = "no hammer for point '" + point + "', direction '" + direction + "'";
       return StrikeAnswer::failed;
     }
-    blow_on_tool_ = tool;
-    blow_axis_ = axis;
     return tool || options_.operator_delay == 0.0 ? StrikeAnswer::ok : StrikeAnswer::by_hand;
   }
 
@@ -97,6 +109,10 @@ class World::Impl {
     const std::lock_guard<std::mutex> lock(mutex_);
     controller_.advance(1.0 / SAMPLE_RATE, BLOCK, states_);
     follow(block, states_);
+    controller_.setSpindleLoad(100.0 * load_meter_ / *spindle_.load_meter_full_scale);
+    controller_.setSpindleTorque(torque_ / BLOCK);
+    controller_.setServoCurrent(servo_.current());
+    controller_.setServoLoad(servo_.load());
   }
 
   void advance(Block& block, const std::vector<MotionState>& states) {
@@ -107,7 +123,9 @@ class World::Impl {
   void lose(std::uint64_t samples) {
     const std::lock_guard<std::mutex> lock(mutex_);
     index_ += samples;
-    if (blow_) blow_->begin += static_cast<double>(samples) / SAMPLE_RATE;
+    const double time = static_cast<double>(samples) / SAMPLE_RATE;
+    if (blow_) blow_->begin += time;
+    if (station_) station_->shift(time);
   }
 
  private:
@@ -127,6 +145,7 @@ class World::Impl {
 
   void follow(Block& block, const std::vector<MotionState>& states) {
     begin(block);
+    torque_ = 0.0;
     for (std::size_t i = 0; i < BLOCK; ++i) {
       if ((index_ + i) % LOOK == 0) look(states[i]);
       sample(static_cast<double>(index_ + i) / SAMPLE_RATE, states[i], block);
@@ -138,13 +157,8 @@ class World::Impl {
                         states[i].spindle_speed};
     }
     index_ += BLOCK;
-    block.spindle_load = machine_.rounded(load_meter_) / *spindle_.load_meter_full_scale;
     block.servo = servo_.take();
-    controller_.setSpindleLoad(100.0 * load_meter_ / *spindle_.load_meter_full_scale);
-    controller_.setSpindleTorque(torque_ / BLOCK);
-    torque_ = 0.0;
-    controller_.setServoCurrent(servo_.current());
-    controller_.setServoLoad(servo_.load());
+    block.spindle_load = machine_.rounded(load_meter_) / *spindle_.load_meter_full_scale;
   }
 
   void begin(Block& block) const {
@@ -160,6 +174,8 @@ class World::Impl {
       b.samples.reserve(BLOCK * b.channels.size());
     };
     prepare(block.hammer, {"hammer", "gap"}, {"N", "V"});
+    if (station_ && station_->hasCross())
+      prepare(block.hammer, {"hammer", "gap", "gap_cross"}, {"N", "V", "V"});
     prepare(block.dynamometer, {"fx", "fy", "fz"}, {"N", "N", "N"});
     prepare(block.vibration, {"x", "y"}, {"m", "m"});
     block.force.stamp = stamp;
@@ -208,22 +224,23 @@ class World::Impl {
   /// filter does: what a short blow has above half the sample rate would else fold into its spectrum, another
   /// way in force and in answer. @param now state half a sample after it
   void sample(double time, const MotionState& now, Block& block) {
-    const bool at_station = station_ && station_->facing(now.position).has_value();
+    if (station_) station_->stand({now.position, now.spindle_angle, now.spindle_speed}, random_);
     std::array<double, 3> sensor{}, force{};
     std::array<double, 2> displacement{};
-    double hammer = 0.0, volt = 0.0, torque = 0.0;
+    double tap = 0.0, torque = 0.0;
     for (int s = 0; s < options_.substeps; ++s) {
-      const double share = (s + 0.5) / options_.substeps;
+      const double share = (s + 0.5) / options_.substeps, at = time + (share - 0.5) / SAMPLE_RATE;
       CuttingMachine::Input input;
       input.motion = between(now, share);
-      const double blow = blowAt(time + (share - 0.5) / SAMPLE_RATE, now);
-      if (blow != 0.0 && blow_on_tool_) input.tip_force[blow_axis_] = station_->atTip(blow);
-      if (blow != 0.0 && !blow_on_tool_) input.sensor_force[blow_axis_] = blow;
+      HammerStation::Push push;
+      if (station_) push = station_->push(at);
+      input.tip_force = push.tip_force;
+      if (blow_) tap += input.sensor_force[blow_axis_] = blow_->force(at);
       const CuttingMachine::Output out = machine_.step(input);
-      hammer += blow;
-      if (at_station) volt += station_->voltage(now.position, input.motion.angle, out.displacement);
+      if (station_) station_->hear(out.displacement);
       for (std::size_t axis = 0; axis < 3; ++axis) sensor[axis] += out.sensor[axis];
-      for (std::size_t axis = 0; axis < 2; ++axis) displacement[axis] += out.displacement[axis];
+      for (std::size_t axis = 0; axis < 2; ++axis)
+        displacement[axis] += out.displacement[axis] + push.tip[axis];
       force[0] += out.force.fx;
       force[1] += out.force.fy;
       force[2] += out.force.fz;
@@ -236,12 +253,12 @@ class World::Impl {
                  now,
                  load_meter_ / *spindle_.load_meter_full_scale,
                  {share * force[0], share * force[1], share * force[2]}});
-    block.hammer.samples.push_back(share * hammer + (hammer_ ? noise(hammer_->force_noise_rms) : 0.0));
-    if (station_) {
-      volt = at_station ? share * volt : -hammer_->range_volt;
-      volt = station_->clipped(volt + noise(hammer_->voltage_noise_rms));
-    }
-    block.hammer.samples.push_back(volt);
+    HammerStation::Reading reading;
+    if (station_) reading = station_->read(time, random_);
+    if (station_ && station_->touched()) refuse(SENSOR, "TOOL MET THE DISPLACEMENT SENSOR");
+    block.hammer.samples.push_back(share * tap + reading.force);
+    block.hammer.samples.push_back(reading.gap);
+    if (block.hammer.channels.size() > 2) block.hammer.samples.push_back(reading.cross);
     for (std::size_t axis = 0; axis < 3; ++axis) {
       block.dynamometer.samples.push_back(share * sensor[axis] + noise(force_noise_[axis]));
       block.force.force[axis].push_back(share * force[axis]);
@@ -250,23 +267,14 @@ class World::Impl {
     if (blow_ && blow_->over(time)) blow_.reset();
   }
 
-  /// [N] A hammer that meets no standing tool hits the air.
-  double blowAt(double time, const MotionState& now) const {
-    if (!blow_) return 0.0;
-    if (blow_on_tool_ && (now.spindle_speed > STANDING || station_->facing(now.position) != blow_axis_)) {
-      return 0.0;
-    }
-    return blow_->force(time);
-  }
-
   WorldOptions options_;
   Spindle spindle_;
   Controller controller_;
   ServoRecorder servo_;
+  std::optional<HammerStation> station_;
+  ToolTip tip_;
   CuttingMachine machine_;
   std::optional<Stock> stock_;
-  std::optional<HammerStation> station_;
-  std::optional<smartmill::HammerStation> hammer_;
   Axes3 force_noise_{{0, 0, 0}};
 
   std::mutex mutex_;
@@ -276,8 +284,7 @@ class World::Impl {
   MotionState last_;  // half a sample after the last sample
   std::vector<MotionState> states_;
   std::vector<ContactArc> arcs_;
-  std::optional<Blow> blow_;
-  bool blow_on_tool_ = false;
+  std::optional<Blow> blow_;  // on the workpiece
   std::size_t blow_axis_ = 0;
   double load_meter_ = 0.0;  // [V]
   double torque_ = 0.0;      // [N m] of the cut, summed over the samples of a block
@@ -292,6 +299,10 @@ World::~World() = default;
 
 Controller& World::controller() {
   return impl_->controller();
+}
+
+const ToolTip& World::toolTip() const {
+  return impl_->toolTip();
 }
 
 World::StrikeAnswer World::strike(const std::string& point, const std::string& direction,

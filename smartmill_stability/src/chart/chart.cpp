@@ -4,10 +4,12 @@
 #include <cmath>
 #include <functional>
 #include <memory>
+#include <random>
 
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/units.h"
+#include "smartmill_stability/chart/uncertainty.h"
 #include "smartmill_stability/solvers/solver.h"
 
 namespace smartmill::stability {
@@ -400,6 +402,103 @@ Prediction ChartMaker::predict(double spindle_speed, double axial_depth) const {
   prediction.within_spindle_limits =
       axial_depth <= std::min(torque, power) && (!spindle_.max_speed || spindle_speed <= *spindle_.max_speed);
   return prediction;
+}
+
+WhatIfChart ChartMaker::whatIf(const WhatIf& request) const {
+  constexpr int SPEEDS = 300, NODES = 8;
+  constexpr double TOLERANCE = 1e-3;
+  request.validate();
+  ChartMaker other = *this;
+  const auto change = [](double& value, double wanted) {
+    if (!std::isnan(wanted)) value = wanted;
+  };
+  change(other.tool_geometry_.helix, request.helix);
+  change(other.parameters_.entry, request.entry);
+  change(other.parameters_.exit, request.exit);
+  change(other.parameters_.feed_per_tooth, request.feed_per_tooth);
+  if (request.teeth > 0 && request.teeth != tool_geometry_.teeth) {
+    other.tool_geometry_.teeth = request.teeth;
+    other.tool_geometry_.pitch.clear();
+  }
+  other.parameters_.validate();
+  std::optional<RegenerativeSystem> system = other.system({});
+  if (!system) throw Error("no chart yet, missing: modes in x and y or the tangential coefficient");
+  if (!std::isnan(request.overhang)) system->modes = withOverhang(system->modes, request.overhang);
+  SolverOptions options;
+  options.tolerance = TOLERANCE;
+  options.nodes = NODES;
+  const int count = request.speeds > 0 ? request.speeds : SPEEDS;
+  std::vector<double> speeds;
+  for (int i = 0; i < count; ++i)
+    speeds.push_back(parameters_.speed_low +
+                     (parameters_.speed_high - parameters_.speed_low) * i / (count - 1));
+  WhatIfChart chart;
+  chart.limit = followedLimits(*makeFloquetSolver(Method::collocation, *system, options), speeds,
+                               parameters_.max_depth / (1.0 - parameters_.depth_margin));
+  for (std::size_t k = 0; k < system->modes.size(); ++k) {
+    const SystemMode& mode = system->modes[k];
+    const bool along_x = std::abs(mode.output[0]) >= std::abs(mode.output[1]);
+    chart.modes.push_back((along_x ? "x " : "y ") + std::to_string(std::lround(mode.frequency)) + " Hz");
+  }
+  int stable = 0;
+  for (int i = 0; i < count; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    chart.mode.push_back(dominantMode(system->modes, chart.limit.chatter_frequency[k]));
+    const auto [torque, power] = other.loadLimits(speeds[k]);
+    chart.torque_depth_limit.push_back(torque);
+    chart.power_depth_limit.push_back(power);
+    stable += request.axial_depth < chart.limit.depth[k];
+  }
+  if (!std::isnan(request.axial_depth)) chart.stable_share = static_cast<double>(stable) / count;
+  if (request.spread) other.addSpread(*system, chart);
+  return chart;
+}
+
+// By the zero-order solution, whose ratio to the machine's own is carried over: what matters is the spread.
+void ChartMaker::addSpread(const RegenerativeSystem& system, WhatIfChart& chart) const {
+  constexpr int DRAWS = 40;
+  constexpr unsigned SEED = 1;
+  constexpr std::size_t LINES = 600;  // what they miss, mean and draws miss alike
+  constexpr double LOW = 0.1, HIGH = 0.9, UNKNOWN = 0.1, MOST = 0.5;
+  std::vector<ModeUncertainty> modes;
+  for (const char* direction : {"x", "y"}) {
+    const ModalModel& model = modes_.at(direction).model;
+    const std::size_t before = modes.size(), count = systemModes(model, 0).size();
+    for (const Mode& mode : model.modes) {
+      if (mode.gain == 0.0) continue;
+      const auto share = [&](double deviation, double value) {
+        return std::isfinite(deviation) ? std::min(MOST, std::abs(deviation / value)) : UNKNOWN;
+      };
+      modes.push_back({share(mode.frequency_std, mode.frequency),
+                       share(mode.damping_ratio_std, mode.damping_ratio), share(mode.gain_std, mode.gain)});
+    }
+    // What lies above the band counts as one mode more.
+    modes.resize(before + count, {UNKNOWN, UNKNOWN, UNKNOWN});
+  }
+  const CuttingCoefficients &value = coefficients_->value, &deviation = coefficients_->std_dev;
+  const double kt = std::isfinite(deviation.ktc) ? deviation.ktc / value.ktc : UNKNOWN;
+  const double kr = std::isfinite(deviation.krc) && value.krc > 0.0 ? deviation.krc / value.krc : kt;
+  const UncertainSystem uncertain(system, modes, kt, kr);
+  std::mt19937_64 random(SEED);
+  const std::vector<double>& speeds = chart.limit.spindle_speed;
+  double highest = 0.0;
+  for (const SystemMode& mode : system.modes) highest = std::max(highest, mode.frequency);
+  const auto zeroOrder = [&](const RegenerativeSystem& of) {
+    const RegenerativeProcess process{of.teeth, of.entry, of.exit, of.kt, of.kr / of.kt};
+    return zeroOrderLimit(process, responseOf(of.modes, 1.0, 2.0 * highest, LINES), speeds).depth;
+  };
+  const std::vector<double> mean = zeroOrder(system);
+  std::vector<std::vector<double>> ratios(speeds.size());
+  for (int draw = 0; draw < DRAWS; ++draw) {
+    const std::vector<double> drawn = zeroOrder(uncertain.draw(random));
+    for (std::size_t k = 0; k < speeds.size(); ++k) ratios[k].push_back(drawn[k] / mean[k]);
+  }
+  for (std::size_t k = 0; k < speeds.size(); ++k) {
+    std::sort(ratios[k].begin(), ratios[k].end());
+    const auto at = [&](double share) { return ratios[k][static_cast<std::size_t>(share * (DRAWS - 1))]; };
+    chart.limit_low.push_back(chart.limit.depth[k] * at(LOW));
+    chart.limit_high.push_back(chart.limit.depth[k] * at(HIGH));
+  }
 }
 
 }  // namespace smartmill::stability

@@ -1,5 +1,7 @@
 #include "node/node.h"
 
+#include <algorithm>
+
 #include <smartmill_msgs/ChatterAdvice.h>
 #include <smartmill_msgs/ChatterState.h>
 #include <smartmill_msgs/StabilityChart.h>
@@ -7,6 +9,7 @@
 #include "node/wiring.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/machine_model.h"
+#include "smartmill_core/panel_names.h"
 #include "smartmill_ros/node_main.h"
 #include "smartmill_ros/parameter_reader.h"
 #include "smartmill_ros/run_node.h"
@@ -20,6 +23,21 @@ NodeParameters read(const ros::NodeHandle& private_nh) {
   NodeParameters parameters = ParameterReader::fromServer(private_nh).readAll<NodeParameters>();
   if (parameters.model.empty()) throw Error("model: the path of a smartmill-model/1 file is due");
   return parameters;
+}
+
+WhatIf requestOf(const smartmill_msgs::WhatIf::Request& request) {
+  constexpr std::uint32_t MOST = 1000000;
+  WhatIf what_if;
+  what_if.teeth = static_cast<int>(std::min(request.teeth, MOST));
+  what_if.helix = request.helix;
+  what_if.entry = request.entry_angle;
+  what_if.exit = request.exit_angle;
+  what_if.feed_per_tooth = request.feed_per_tooth;
+  what_if.overhang = request.overhang;
+  what_if.axial_depth = request.axial_depth;
+  what_if.speeds = static_cast<int>(std::min(request.speeds, MOST));
+  what_if.spread = request.spread;
+  return what_if;
 }
 
 }  // namespace
@@ -45,6 +63,10 @@ StabilityNode::StabilityNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
       chatter_(nh.advertise<smartmill_msgs::ChatterState>(names::CHATTER_STATE, STREAM_QUEUE, true)),
       advice_(nh.advertise<smartmill_msgs::ChatterAdvice>(names::CHATTER_ADVICE, 10, true)),
       predict_(nh.advertiseService(names::PREDICT_STABILITY, &StabilityNode::predict, this)) {
+  ros::NodeHandle aside(nh);
+  aside.setCallbackQueue(&what_if_queue_);
+  what_if_ = aside.advertiseService(names::WHAT_IF, &StabilityNode::whatIf, this);
+  what_if_spinner_.start();
   listen();
   shell_.diagnose("stability chart", [this](auto& status) { diagnoseChart(status); });
   shell_.diagnose("chatter detection", [this](auto& status) { diagnoseChatter(status); });
@@ -65,7 +87,10 @@ void StabilityNode::listen() {
 
 template <typename Measured>
 void StabilityNode::measured(const Measured& measured) {
-  maker_.handle(measured);
+  {
+    const std::lock_guard<std::mutex> lock(maker_mutex_);
+    maker_.handle(measured);
+  }
   chart_problem_.clear();
   if (!maker_.missing().empty()) return;
   try {
@@ -128,6 +153,39 @@ bool StabilityNode::predict(smartmill_msgs::PredictStability::Request& request,
     response.within_spindle_limits = prediction.within_spindle_limits;
     response.point = toMsg(prediction.point);
     response.message = prediction.stable ? "stable" : "unstable";
+  } catch (const Error& error) {
+    response.code = Response::BAD_REQUEST;
+    response.message = error.what();
+  }
+  return true;
+}
+
+bool StabilityNode::whatIf(smartmill_msgs::WhatIf::Request& request,
+                           smartmill_msgs::WhatIf::Response& response) {
+  using Response = smartmill_msgs::WhatIf::Response;
+  std::unique_lock<std::mutex> lock(maker_mutex_);
+  const ChartMaker maker = maker_;
+  lock.unlock();
+  if (!maker.system({})) {
+    response.code = Response::NOT_READY;
+    response.message = "modes of x and y or the tangential coefficient are missing";
+    return true;
+  }
+  try {
+    const ros::WallTime begin = ros::WallTime::now();
+    WhatIfChart chart = maker.whatIf(requestOf(request));
+    response.code = Response::OK;
+    response.spindle_speed = std::move(chart.limit.spindle_speed);
+    response.depth_limit = std::move(chart.limit.depth);
+    response.chatter_frequency = std::move(chart.limit.chatter_frequency);
+    response.mode.assign(chart.mode.begin(), chart.mode.end());
+    response.modes = std::move(chart.modes);
+    response.torque_depth_limit = std::move(chart.torque_depth_limit);
+    response.power_depth_limit = std::move(chart.power_depth_limit);
+    response.limit_low = std::move(chart.limit_low);
+    response.limit_high = std::move(chart.limit_high);
+    response.stable_share = chart.stable_share;
+    response.seconds = (ros::WallTime::now() - begin).toSec();
   } catch (const Error& error) {
     response.code = Response::BAD_REQUEST;
     response.message = error.what();

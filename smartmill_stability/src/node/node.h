@@ -1,11 +1,15 @@
 #pragma once
 
+#include <mutex>
 #include <string>
 
+#include <ros/callback_queue.h>
 #include <ros/node_handle.h>
 #include <ros/publisher.h>
 #include <ros/service_server.h>
+#include <ros/spinner.h>
 #include <smartmill_msgs/PredictStability.h>
+#include <smartmill_msgs/WhatIf.h>
 
 #include "node/parameters.h"
 #include "smartmill_ros/node_shell.h"
@@ -14,8 +18,8 @@
 namespace smartmill::stability {
 
 /// Shell around ChartMaker and SortedDetection: FRFs and coefficients in, stability/chart and the service
-/// stability/predict out; compensated force (or vibration, sound) and controller state in,
-/// chatter/state and chatter/advice out.
+/// stability/predict and stability/what_if out; compensated force (or vibration, sound) and controller state
+/// in, chatter/state and chatter/advice out.
 class StabilityNode {
  public:
   using Parameters = NodeParameters;
@@ -30,6 +34,7 @@ class StabilityNode {
   void publish(const ChatterAdvice& advice);
   bool predict(smartmill_msgs::PredictStability::Request& request,
                smartmill_msgs::PredictStability::Response& response);
+  bool whatIf(smartmill_msgs::WhatIf::Request& request, smartmill_msgs::WhatIf::Response& response);
   void watch();
   void diagnoseChart(diagnostic_updater::DiagnosticStatusWrapper& status);
   void diagnoseChatter(diagnostic_updater::DiagnosticStatusWrapper& status);
@@ -44,6 +49,12 @@ class StabilityNode {
 
   ros::Publisher chart_, chatter_, advice_;
   ros::ServiceServer predict_;
+
+  // What if is asked in a thread of its own: chatter must not wait for it.
+  std::mutex maker_mutex_;
+  ros::CallbackQueue what_if_queue_;
+  ros::ServiceServer what_if_;
+  ros::AsyncSpinner what_if_spinner_{1, &what_if_queue_};
 };
 
 }  // namespace smartmill::stability

@@ -27,7 +27,13 @@ using Eigen::VectorXd;
 /// depth.
 constexpr double PHASE = 9.0;
 constexpr int DEFAULT_NODES = 12, REFINEMENT = 4;
-constexpr double EIGENVALUE_TOLERANCE = 1e-9;
+constexpr double EIGENVALUE_TOLERANCE = 1e-9, COARSEST_EIGENVALUE = 1e-6;
+
+/// Of an eigenvalue of which a depth is to be known to a tolerance.
+double eigenvalueTolerance(double tolerance) {
+  constexpr double SHARE = 1e-3;
+  return std::clamp(SHARE * tolerance, EIGENVALUE_TOLERANCE, COARSEST_EIGENVALUE);
+}
 
 /// What depends on the number of nodes alone, on the unit interval.
 struct Reference {
@@ -199,6 +205,7 @@ class Shapes {
   std::shared_ptr<const Reference> reference;
   bool with_velocity;
   Index expected = 0;  ///< applications that the last eigenvalue took
+  double eigenvalue_tolerance = EIGENVALUE_TOLERANCE;
 
  private:
   std::vector<std::shared_ptr<const Shape>> known_;
@@ -231,7 +238,7 @@ class PeriodMap {
 
   Dominant dominant(bool with_vector) {
     return dominantEigenvalue([this](const VectorXd& in, VectorXd& out) { apply(in, out); }, size_,
-                              EIGENVALUE_TOLERANCE, with_vector, shapes_.expected);
+                              shapes_.eigenvalue_tolerance, with_vector, shapes_.expected);
   }
 
   /// [Hz] of the strongest Fourier component of the motion that starts with a mode of the map.
@@ -446,7 +453,9 @@ class Collocation : public FloquetSolver {
         : system_(solver.system_),
           speed_(speed),
           shapes_(system_.modes, solver.reference_,
-                  system_.damping_radial > 0.0 || system_.damping_tangential > 0.0) {}
+                  system_.damping_radial > 0.0 || system_.damping_tangential > 0.0) {
+      shapes_.eigenvalue_tolerance = eigenvalueTolerance(solver.options_.tolerance);
+    }
 
     CharacteristicMultiplier multiplier(double depth) override {
       const DelayedSystem delayed = delayedSystem(system_, speed_, depth);

@@ -38,7 +38,10 @@ void BagReader::run(const std::function<void(double)>& progress) {
       if (progress && ++done % 1000 == 0) progress(static_cast<double>(done) / view.size());
     }
     if (progress) progress(1.0);
-  } catch (const rosbag::BagException& e) {
+  } catch (const Error&) {
+    throw;
+  } catch (const std::exception& e) {
+    // Of the bag, or of a message whose lengths are not its own.
     throw Error(path_ + ": the bag ends too early or is damaged: " + e.what());
   }
 }

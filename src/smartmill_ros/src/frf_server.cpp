@@ -25,7 +25,7 @@ smartmill_msgs::MeasureFrfResult answer(FrfCode code, const std::string& text) {
   smartmill_msgs::MeasureFrfResult result;
   result.code = static_cast<std::uint8_t>(code);
   result.message = text;
-  result.sensitivity = NOT_A_NUMBER;
+  result.sensitivity = result.sensitivity_std = result.flute_sure = NOT_A_NUMBER;
   return result;
 }
 
@@ -119,6 +119,10 @@ void FrfServer::feedback(const std::string& stage, double progress, int hits_don
 void FrfServer::finish(const Result& result) {
   smartmill_msgs::MeasureFrfResult message = answer(result.code, result.message);
   message.sensitivity = result.sensitivity;
+  message.sensitivity_std = result.sensitivity_std;
+  message.flute_sure = result.flute_sure;
+  message.spindle_moves = static_cast<std::uint32_t>(result.spindle_moves);
+  if (result.cross.frf.size() > 0) message.cross = toMsg(result.cross);
   impl_->last_message = result.message;
   if (result.frf.frf.size() > 0) message.frf = toMsg(result.frf);
   if (!result.modes.model.modes.empty()) message.modes = toMsg(result.modes);
@@ -127,6 +131,7 @@ void FrfServer::finish(const Result& result) {
     ROS_INFO("%s: %s: %s", impl_->node.c_str(), direction.c_str(), result.message.c_str());
     impl_->frf.publish(direction, message.frf);
     impl_->modes.publish(direction, message.modes);
+    if (result.cross.frf.size() > 0) impl_->frf.publish(result.cross.direction, message.cross);
   } else {
     ROS_ERROR("%s: %s", impl_->node.c_str(), result.message.c_str());
   }

@@ -86,6 +86,14 @@ class Fitter {
   /// @return at a start where the twin gives no numbers: the start, not converged
   Fit fit(const FitState& start, const NominalTangents* frozen, const FitOptions& options) const;
 
+  /// Covariance of a fit at its state when what is left is not noise: each value is moved by u.r, u its
+  /// influence over the samples, and that has the variance of varianceOfProducts(), if not less than that of
+  /// noise. Correlations are those of the fit (inverse information with priors).
+  /// @param tangents taken at the state @param prior_weight with which it was fitted
+  /// @return as Fit::covariance; empty where the twin gives no numbers
+  Eigen::MatrixXd sandwichCovariance(const FitState& state, const NominalTangents& tangents,
+                                     double prior_weight) const;
+
   const TwinRunner& runner() const { return runner_; }
   const NominalFreedom& freedom() const { return freedom_; }
 

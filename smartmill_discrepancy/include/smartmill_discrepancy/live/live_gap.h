@@ -26,6 +26,7 @@ struct LiveGap {
   std::string condition;
   std::vector<std::string> channels;
   std::vector<double> gap;   ///< [1] RMS of (measured - simulated) over noise; 1 is the noise floor
+  Record simulated;          ///< what the twin's sensor shows in the stretch; empty: nothing was compared
   bool model_fits = true;    ///< no channel's gap is above the limit
   std::string aside;         ///< why nothing was compared (chatter); empty: it was
   bool at_the_edge = false;  ///< so near the stability limit that explain's faster twin does not follow it

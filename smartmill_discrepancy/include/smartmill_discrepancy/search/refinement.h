@@ -10,4 +10,8 @@ namespace smartmill::discrepancy {
 /// @return false: the twin gives no numbers there, best is as it was
 bool refine(Workbench& bench, const FitState& state, const SearchOptions& options, SearchResult* result);
 
+/// Covariance of the values of a refined fit as far as what is left lets one know them
+/// (Fitter::sandwichCovariance()).
+Eigen::MatrixXd settledCovariance(Workbench& bench, const Fit& best);
+
 }  // namespace smartmill::discrepancy

@@ -51,6 +51,9 @@ struct SearchResult {
   std::vector<Rival> rivals;
   std::vector<const Hypothesis*> refused;  ///< took the shape of something else: held-out tests deny them
 
+  /// The ladder says what was taken: one effect in the place of another.
+  void tellSwapped(const Hypothesis& old, const Hypothesis& better);
+
   /// Back to the nominal values alone.
   void forgetMembers() {
     best = null;

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "smartmill_discrepancy/gap/asked.h"
 #include "smartmill_discrepancy/search/workbench.h"
 
 namespace smartmill::discrepancy {
@@ -25,16 +26,6 @@ struct AskedShare {
 
   /// Standard deviations by which the tests ask for more than half and less than one and a half.
   double beyond() const { return (0.5 - std::abs(share - 1.0)) / std_dev; }
-};
-
-/// What one test says of two models: sums over its channels.
-struct AskedTest {
-  double squares = 0.0;   ///< d.d
-  double product = 0.0;   ///< d.r
-  double variance = 0.0;  ///< of the product
-
-  /// One channel, values over the noise. @param between d @param left r
-  void add(const double* between, const double* left, std::size_t size);
 };
 
 /// Of tests that tell the models apart; of none the deviation is infinite.

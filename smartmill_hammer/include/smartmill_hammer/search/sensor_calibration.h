@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 namespace smartmill {
 namespace hammer {
@@ -21,12 +22,18 @@ struct SensorCalibrationOptions {
   double gap_at_zero_volt = 250e-6;  ///< [m]
   double min_gap = 100e-6;           ///< [m] no jog to a nominal gap below this
   double max_travel = 3e-3;          ///< [m] approach at most
+  double safe_travel = 1.0;          ///< [m] nothing of the tool can touch before; the approach ends there
+  double largest_std = 0.02;         ///< [1] of the sensitivity over itself, where the approach ended early
   int max_jogs = 100;                ///< [1]
 };
 
 /// Moves the tool towards the sensor in small jogs until its voltage is about zero, and measures its
-/// sensitivity there. Resumable: start(volt), then as long as state() is jogging: jog by next(), measure,
-/// give().
+/// sensitivity there (eq. 4.8, 4.9). The sensor's curve is measured with it: through the readings of the
+/// approach goes a + K / (g - x), as before a flat target, whose g is the bend of this tool's curve; with it
+/// the symmetric measurement about the resting place is exact to the next order, and who evaluates a
+/// vibration can bend it straight. Where the tool may not come near enough (its edges reach out further than
+/// what the sensor sees), the sensitivity is that of the nearest place. Resumable: start(volt), then as long
+/// as state() is jogging: jog by next(), measure, give().
 class SensorCalibration {
  public:
   enum class State { jogging, done, failed };
@@ -47,12 +54,24 @@ class SensorCalibration {
   double sensitivity() const { return sensitivity_; }
   double sensitivityStd() const { return sensitivity_std_; }
 
+  /// [m] > 0: gap of the hyperbola that the sensor's curve follows here; NaN: too few readings tell.
+  double bendGap() const { return bend_gap_; }
+  /// Whether the approach ended at safe_travel instead of at zero volt.
+  bool heldBack() const { return held_back_; }
+  double volt() const { return volt_; }  ///< [V] last reading
+
  private:
   void plan();
   void ask(double distance);
   void fail(std::string reason);
   bool clipped(double volt) const;
   double nominalGap(double volt) const;
+  void check();
+  void finish();
+  void approached(double change, double moved, double noise);
+  double localGap() const;
+  double hyperbola() const;
+  double hyperbola(double reach) const;
 
   enum class Phase { approach, check_near, check_far, check_back };
 
@@ -64,6 +83,12 @@ class SensorCalibration {
   double volt_ = 0.0, volt_std_ = 0.0;  // last reading
   double near_volt_ = 0.0, near_std_ = 0.0;
   double sensitivity_ = 0.0, sensitivity_std_ = 0.0;
+  double bend_gap_;
+  bool held_back_ = false;
+  struct Reading {
+    double at, volt;  // [m] towards the sensor, [V]
+  };
+  std::vector<Reading> readings_;
   int jogs_ = 0;
 };
 

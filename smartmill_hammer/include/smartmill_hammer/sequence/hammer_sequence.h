@@ -28,6 +28,7 @@ struct HammerParameters : HitTestParameters {
   double flute_tolerance = 0.02618;
   double noise_sigmas = 5.0;
   double least_rise = 0.005;
+  int golden_only = 0;
   // When a command is done.
   double command_delay = 0.2;
   double settle_time = 0.05;
@@ -43,6 +44,7 @@ struct HammerParameters : HitTestParameters {
   double retract_height = 50.0e-3;
   double approach_feed = 16.7e-3;
   double jog_feed = 1.0e-3;
+  double near_path = 1.0e-3;
   // Sensor calibration.
   double first_jog = 50.0e-6;
   double max_jog = 100.0e-6;
@@ -51,11 +53,13 @@ struct HammerParameters : HitTestParameters {
   double zero_volt = 0.1;
   double check_jog = 10.0e-6;
   double position_std = 0.1e-6;
-  double min_gap_share = 0.4;
+  double min_gap_share = 0.5;
+  double sensor_face = 8.0e-3;
   double max_approach = 1.0e-3;
   // Hits.
   double exponential_time = 0.0;
   int straighten_sensor = 1;
+  int cross_frf = 1;
 
   HammerParameters() {
     fit_low = 200.0;
@@ -77,6 +81,11 @@ struct MeasureFrfResult {
   double flute_low = NOT_A_NUMBER;        ///< [rad] spindle angle with a flute at the sensor, at the tip
   double flute_high = NOT_A_NUMBER;       ///< [rad] halfway up to the hammer
   double flute_hammer = NOT_A_NUMBER;     ///< [rad] a flute at the hammer (eq. 4.1)
+  double flute_sure = NOT_A_NUMBER;       ///< [1] probability that both searches hold their flute, by noise
+  int spindle_moves = 0;                  ///< [1] orientations of the spindle
+  /// Struck along the direction, read at right angles to it; direction "xy" or "yx". Empty: no second sensor,
+  /// or the message says why.
+  MeasuredFrf cross;
 };
 
 struct Waypoint {
@@ -152,12 +161,22 @@ class HammerSequence {
     search_high,
     to_tip,
     orient_flute,
+    survey,
     calibrate,
+    calibrate_cross,
+    calibrate_again,
     strike,
     stopping,
     retract
   };
   enum class Wait { nothing, position, angle, average, hit, rest, standstill };
+
+  /// A sensor as its calibration left it.
+  struct SensorState {
+    double sensitivity = NOT_A_NUMBER, sensitivity_std = NOT_A_NUMBER;  // [m/V]
+    double bend_gap = NOT_A_NUMBER;                                     // [m]
+    double volt = 0.0;                                                  // [V] at rest
+  };
 
   void start(double now);
   void orient(double now, double angle);
@@ -168,15 +187,30 @@ class HammerSequence {
   void send(Command command, Wait wait, double timeout);
 
   FluteSearchOptions searchOptions() const;
-  SensorCalibrationOptions calibrationOptions() const;
+  SensorCalibrationOptions calibrationOptions(std::size_t axis) const;
+  double safeTravel(std::size_t axis) const;
+  void keepProfile();
+  void addToProfile(std::size_t axis, double further, double volt);
+  bool surveyDue(double volt);
+  void surveyed(double now, double volt);
+  double nominalGap(double volt) const;
+  double retreatOf(double volt, double moved) const;
+  double turnedFrom(std::size_t axis) const;
+  double leastRetreat(double off) const;
+  std::size_t calibratedAxis() const;
+  void sensorKnown(double now);
+  void crossFailed(double now);
+  bool tooNear(double volt);
   void moveToStation(double now);
   void reached(double now);
   void measured(double now, double volt, double volt_std);
   void calibrated(double now, double volt, double volt_std);
   void fluteFound(double now);
   void search(double now);
-  void recorded(double now, HitCollector::Record record);
+  void recorded(double now, HitCollector::Record record, std::optional<HitCollector::Record> cross);
   void badHit(double now, const std::string& why, bool bad_data);
+  ImpactOptions impactOptions(const SensorState& sensor, double factor) const;
+  void evaluateCross(double factor);
   void evaluate();
 
   void abort(double now, FrfCode code, const std::string& why);
@@ -219,9 +253,21 @@ class HammerSequence {
 
   std::optional<FluteSearch> search_;
   double expected_angle_ = 0.0;
+  struct Retreat {
+    double off = 0.0, depth = 0.0;  // [rad] of the spindle from a flute at the sensor, [m] behind that flute
+  };
+  std::vector<Retreat> profile_;  // of the tool at the tip, as the first search saw it
+  std::vector<double> survey_;    // [rad] still to be read beside the place for the hammer, last first
+  bool surveyed_ = false;
+  double flute_volt_ = 0.0;  // [V] of that flute at the sensor
+  double flute_gap_ = 0.0;   // [m] at most, from the sensor to a flute that points at it, at the station
   std::optional<SensorCalibration> calibration_;
-  HitCollector collector_;
-  std::vector<Hit> hits_;
+  SensorState sensor_, cross_sensor_;
+  bool has_cross_ = false;
+  std::string no_cross_;  // why there is no cross FRF
+  int near_samples_ = 0;
+  HitCollector collector_, cross_collector_;
+  std::vector<Hit> hits_, cross_hits_;
   int bad_hits_ = 0;
 
   std::vector<Command> commands_;

@@ -10,6 +10,7 @@
 #include "smartmill_core/parameters/parameter_table.h"
 #include "smartmill_core/signal/streams.h"
 #include "smartmill_sim/controller/controller.h"
+#include "smartmill_sim/world/station_traits.h"
 
 namespace smartmill::sim {
 
@@ -22,6 +23,7 @@ struct WorldOptions {
   double force_scatter = 0.05;
   double load_step = 3.0e-4;
   int servo_trigger = 0;
+  StationTraits hammer;
 
   void declare(ParameterTable& table) {
     table.number("seed", seed, "1", Range::notNegative(), "of noise and scatter");
@@ -36,6 +38,8 @@ struct WorldOptions {
                  "of the load meter's scale, to which the controller rounds the loads that it tells; 0: not");
     table.number("servo_trigger", servo_trigger, "1", Range::notNegative(),
                  "N word of the block that starts the trigger in daq/servo; 0: none");
+    table.part("hammer_", hammer);
+    table.section();
   }
   /// @throws Error naming key and value.
   void validate() const;
@@ -52,7 +56,7 @@ class World {
 
   /// What the sensors deliver and what is true; stamps [s] count from sample 0.
   struct Block {
-    SampleBlock hammer;       ///< hammer [N] positive in compression, gap [V]
+    SampleBlock hammer;       ///< hammer [N] positive in compression, gap [V]; gap_cross [V] where it stands
     SampleBlock dynamometer;  ///< fx, fy, fz [N]
     std::array<SpindleAngle, ANGLES> angle;
     ForceBlock force;           ///< true force of the cut on the tool
@@ -71,6 +75,9 @@ class World {
 
   /// May be used from any thread.
   Controller& controller();
+
+  /// Direct receptances of the tool's tip, of the model or of the hammer station's beam.
+  const ToolTip& toolTip() const;
 
   /// Fires a hammer, once. May be called from any thread. @param point tool or force_sensor @param message
   /// one line

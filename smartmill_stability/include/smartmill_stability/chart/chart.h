@@ -11,6 +11,7 @@
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/parameters/parameter_table.h"
 #include "smartmill_core/units.h"
+#include "smartmill_stability/chart/what_if.h"
 #include "smartmill_stability/solvers/solver.h"
 #include "smartmill_stability/solvers/zero_order.h"
 
@@ -80,9 +81,14 @@ class ChartMaker {
   /// @throws Error as chart(), or on a speed or depth that is not positive.
   Prediction predict(double spindle_speed, double axial_depth) const;
 
+  /// The chart of a cut that differs, by collocation from the modes, within a tenth of a second.
+  /// @throws Error while modes of x and y or the tangential coefficient are missing, or on a bad request.
+  WhatIfChart whatIf(const WhatIf& request) const;
+
  private:
   struct Basis;
   Basis basis() const;
+  void addSpread(const RegenerativeSystem& system, WhatIfChart& chart) const;
   bool byCollocation() const;
   bool needsModes() const;
   void use(const std::string& tool, double stamp);

@@ -286,7 +286,7 @@ std::vector<EffectKind> geometry() {
        "Kline & DeVor 1983; Dunwoody 6.1",
        {number("offset_um", "um", NOT_NEGATIVE).drawn(5.0, 25.0), angle("angle_deg")},
        {Need::cuts},
-       always(EffectForm({planar("offset_um", "angle_deg", 200.0, 5e-4, 20.0)}).straight({1.0}))},
+       always(EffectForm({planar("offset_um", "angle_deg", 200.0, 5e-4, 20.0)}).straight({1.0, 15.0}))},
       {"tooth_radius",
        Stage::geometry,
        "tooth j cuts at radius R + offset[j]: a chipped, re-ground or badly seated insert; only differences "

@@ -27,7 +27,11 @@ class FrfServer {
     std::string message;
     MeasuredFrf frf;
     MeasuredModes modes;
-    double sensitivity = NOT_A_NUMBER;  ///< [m/V] of the capacitive sensor, where there is one
+    MeasuredFrf cross;                      ///< read at right angles to the blow; empty: none
+    double sensitivity = NOT_A_NUMBER;      ///< [m/V] of the capacitive sensor, where there is one
+    double sensitivity_std = NOT_A_NUMBER;  ///< [m/V]
+    double flute_sure = NOT_A_NUMBER;       ///< [1]
+    int spindle_moves = 0;                  ///< [1]
   };
 
   /// @param action name, relative @param node name in the log

@@ -1,0 +1,59 @@
+#include "smartmill_discrepancy/gap/asked.h"
+
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <numeric>
+
+#include "smartmill_core/signal/fourier.h"
+#include "smartmill_core/signal/window.h"
+
+namespace smartmill::discrepancy {
+
+// The mean square of the window is 3/8.
+std::vector<double> powerOf(const double* values, std::size_t size) {
+  std::vector<double> part = hannWindow(size), squares;
+  for (std::size_t i = 0; i < size; ++i) part[i] *= values[i];
+  for (const std::complex<double>& x : fourier(part)) {
+    const bool single = squares.empty() || 2 * squares.size() == size;
+    squares.push_back((single ? 1.0 : 2.0) * std::norm(x) / (0.375 * static_cast<double>(size)));
+  }
+  return squares;
+}
+
+void AskedTest::add(const double* between, const double* left, std::size_t size) {
+  add(between, left, size, powerOf(left, size));
+}
+
+// The window spreads a line over bins in such shares that the products of two lines' bins add up to half the
+// product of their squares, the variance at a random phase. Noise of unit variance, two degrees of freedom a
+// bin, is counted twice by that.
+void AskedTest::add(const double* between, const double* left, std::size_t size,
+                    const std::vector<double>& power) {
+  double own = 0.0;
+  for (std::size_t i = 0; i < size; ++i) {
+    own += between[i] * between[i];
+    product += between[i] * left[i];
+  }
+  if (own <= 0.0) return;
+  squares += own;
+  const std::vector<double> of_between = powerOf(between, size);
+  const double sum = std::inner_product(power.begin(), power.end(), of_between.begin(), 0.0);
+  variance += std::max(sum - own, 0.5 * sum);
+}
+
+double varianceOfProducts(const std::vector<AskedTest>& tests) {
+  double squares = 0.0, variance = 0.0, product = 0.0, scatter = 0.0, count = 0.0;
+  for (const AskedTest& t : tests) {
+    squares += t.squares;
+    variance += t.variance;
+    product += t.product;
+    count += t.squares > 0.0 ? 1.0 : 0.0;
+  }
+  const double share = squares > 0.0 ? product / squares : 0.0;
+  for (const AskedTest& t : tests) scatter += std::pow(t.product - t.squares * share, 2);
+  if (count > 1.0) variance = std::max(variance, scatter * count / (count - 1.0));
+  return variance;
+}
+
+}  // namespace smartmill::discrepancy

@@ -1,0 +1,152 @@
+// The panel: one page for one machine. It shows topics as they come and commands nothing unless it was allowed to.
+import { Link } from './link.js';
+import { make } from './format.js';
+import { StatusLine } from './views/status.js';
+import { Tiles } from './views/tiles.js';
+import { ChartView, PointsTable } from './views/chart.js';
+import { WhatIf } from './views/what_if.js';
+import { Revolution, Spectrum, SpectrumCourse, Strips } from './views/forces.js';
+import { Dynamics } from './views/dynamics.js';
+import { Session, Progress, Notes, Replay } from './views/session.js';
+import { Commands } from './views/commands.js';
+import { Discrepancy, Report, Database, Diagnostics } from './views/model.js';
+
+const REFRESH = 100;  // [ms] ten times a second, as controllers' own panels do
+
+const VIEWS = {
+  overview: 'Overview', forces: 'Forces', stability: 'Stability', dynamics: 'Dynamics', session: 'Session', model: 'Model',
+};
+
+// A card with a headline.
+function card(title, extra = '') {
+  const aside = make('span', { class: 'aside' });
+  const element = make('section', { class: `card ${extra}` }, make('h2', {}, title, aside));
+  element.aside = aside;
+  return element;
+}
+
+class Page {
+  constructor(config) {
+    this.config = config;
+    this.parts = [];
+    const scheme = location.protocol === 'https:' ? 'wss' : 'ws';
+    this.link = new Link(`${scheme}://${location.host}/`, config.namespace);
+    this.store = { axis: 'x', source: 1 };
+    this.status = new StatusLine(document.querySelector('#status'), this.link, config.name);
+    this.parts.push(this.status);
+    this.buildMachines();
+    this.build();
+    this.setTheme(localStorage.getItem('theme') ?? (matchMedia('(prefers-color-scheme: light)').matches ? 'light' : 'dark'));
+    addEventListener('hashchange', () => this.show());
+    this.show();
+    setInterval(() => this.refresh(), REFRESH);
+  }
+
+  // Other panels: each its status line; its own page is one touch away.
+  buildMachines() {
+    const place = document.querySelector('#machines');
+    for (const address of this.config.machines) {
+      const button = make('button', { onclick: () => { location.href = address; } });
+      place.append(button);
+      const link = new Link(address.replace(/^http/, 'ws'), this.config.namespace);
+      const line = new StatusLine(button, link, new URL(address).hostname, true);
+      this.parts.push(line);
+    }
+  }
+
+  add(view, place, part) {
+    part.view = view;
+    this.parts.push(part);
+    return part;
+  }
+
+  build() {
+    const main = document.querySelector('main'), nav = document.querySelector('#views');
+    this.views = {};
+    for (const [name, title] of Object.entries(VIEWS)) {
+      this.views[name] = make('div', { class: `view ${name}`, id: `view-${name}`, hidden: true });
+      main.append(this.views[name]);
+      nav.append(make('button', { 'data-view': name, onclick: () => { location.hash = name; } }, title));
+    }
+    nav.append(make('button', { id: 'theme', title: 'Light or dark', onclick: () => this.setTheme(this.theme === 'dark' ? 'light' : 'dark') }, '◐'));
+    const { link, store } = this;
+    const place = (view, title, extra, build) => {
+      const element = card(title, extra);
+      this.views[view].append(element);
+      for (const part of [build(element)].flat()) this.add(view, element, part);
+      return element;
+    };
+
+    this.add('overview', null, new Tiles(this.views.overview, link));
+    place('overview', 'Stability', '', e => new ChartView(e, link, 'overview'));
+    const right = make('div', { class: 'right' });
+    this.views.overview.append(right);
+    for (const [title, build] of [['Force over one revolution', e => new Revolution(e, link, store)], ['Spectrum', e => new Spectrum(e, link, store)]]) {
+      const element = card(title);
+      right.append(element);
+      this.add('overview', element, build(element));
+    }
+
+    place('forces', 'Forces, the last minute', 'wide', e => new Strips(e, link, store));
+    place('forces', 'Spectrum', '', e => new Spectrum(e, link, store));
+    place('forces', 'One revolution', '', e => new Revolution(e, link, store, false));
+    place('forces', 'The last minute', 'tools-free', e => new SpectrumCourse(e, link, store));
+
+    let chart = null;
+    place('stability', 'Stability', '', e => chart = new ChartView(e, link, 'stability'));
+    place('stability', 'What if', 'side what-if tools-free', e => new WhatIf(e, link, chart));
+    place('stability', 'Points to cut at', 'wide tools-free', e => new PointsTable(e, link));
+
+    const dynamics = new Dynamics(this.views.dynamics, link, card);
+    this.add('dynamics', null, dynamics);
+
+    place('session', 'Session', 'tools-free', e => new Session(e, link));
+    const beside = make('div', { style: 'display: grid; gap: 12px' });
+    this.views.session.append(beside);
+    const notes = card('Notes', 'tools-free'), commands = card('Commands', 'tools-free');
+    beside.append(notes, commands);
+    const orders = new Commands(commands, link, this.config);
+    this.add('session', commands, orders);
+    this.add('session', notes, new Notes(notes, link, orders));
+    this.add(null, null, new Replay(document.querySelector('#replay'), link));
+    this.add(null, null, new Progress(document.querySelector('#foot'), link));
+
+    place('model', 'Does the model fit', 'tools-free', e => [new Discrepancy(e, link), new Report(e, link)]);
+    const more = make('div', { style: 'display: grid; gap: 12px' });
+    this.views.model.append(more);
+    for (const [title, build] of [['Cutting coefficients', e => new Database(e, link)], ['Nodes', e => new Diagnostics(e, link)]]) {
+      const element = card(title, 'tools-free');
+      more.append(element);
+      this.add('model', element, build(element));
+    }
+  }
+
+  setTheme(theme) {
+    this.theme = theme;
+    document.documentElement.dataset.theme = theme;
+    localStorage.setItem('theme', theme);
+    document.dispatchEvent(new Event('theme'));
+  }
+
+  show() {
+    const wanted = location.hash.slice(1);
+    this.current = VIEWS[wanted] ? wanted : 'overview';
+    for (const [name, element] of Object.entries(this.views)) element.hidden = name !== this.current;
+    for (const button of document.querySelectorAll('nav button[data-view]'))
+      button.dataset.view === this.current ? button.setAttribute('aria-current', 'page') : button.removeAttribute('aria-current');
+    for (const part of this.parts) if (part.view === this.current) part.shown?.();
+    this.refresh();
+  }
+
+  refresh() {
+    document.body.classList.toggle('gone', !this.link.alive);
+    for (const part of this.parts) if (!part.view || part.view === this.current) part.refresh?.();
+  }
+}
+
+async function start() {
+  const answer = await fetch('api/config');
+  window.smartmill = new Page(await answer.json());
+}
+
+start();

@@ -1,0 +1,74 @@
+// What the hammer measured, and the modes fitted to it.
+import { deg, digits, fixed, make, table, withDeviation } from '../format.js';
+import { Plot, colour } from '../plot.js';
+
+const POINTS = { tool_tip: 'tool', force_sensor: 'force sensor' };
+
+// direct + sum of gain w0^2 / (w0^2 - w^2 + 2 i z w0 w)
+function response(model, f) {
+  let re = model.direct, im = 0;
+  for (const m of model.modes) {
+    const a = m.frequency ** 2 - f ** 2, b = 2 * m.damping_ratio * m.frequency * f, n = a * a + b * b;
+    re += m.gain * m.frequency ** 2 * a / n;
+    im -= m.gain * m.frequency ** 2 * b / n;
+  }
+  return [re, im];
+}
+
+const PARTS = {
+  magnitude: { name: 'magnitude', of: (re, im) => Math.hypot(re, im), log: true },
+  phase: { name: 'phase', of: (re, im) => deg(Math.atan2(im, re)), label: 'Phase [°]', plain: true },
+  real: { name: 'real', of: re => re },
+  imag: { name: 'imaginary', of: (re, im) => im },
+};
+
+export class Dynamics {
+  constructor(parent, link, card) {
+    Object.assign(this, { frfs: {}, models: {}, picked: null, part: 'magnitude' });
+    const big = card('Frequency response'), small = card('Coherence'), side = card('Modes', 'side tools-free');
+    parent.append(big, side, small);
+    this.big = big;
+    this.measured = make('span', { class: 'choice row' });
+    this.parts = make('span', { class: 'choice row' }, ...Object.entries(PARTS).map(([key, p]) => make('button', { 'data-part': key, onclick: () => { this.part = key; this.draw(); } }, p.name)));
+    big.append(make('div', { class: 'choices' }, this.measured, this.parts));
+    this.plot = new Plot(big, { name: 'frf', group: 'frf', x: { label: 'Frequency [Hz]', low: 0 }, y: { label: '' }, empty: 'No FRF measured yet', read: (x, y) => [`${fixed(x, 1)} Hz`, digits(y)] });
+    this.coherence = new Plot(small, { name: 'coherence', group: 'frf', x: { label: 'Frequency [Hz]', low: 0 }, y: { label: 'Coherence', low: 0, high: 1 }, empty: 'Coherence needs two hits', read: (x, y) => [`${fixed(x, 1)} Hz`, fixed(y, 3)] });
+    this.list = make('div', { class: 'dim' }, 'No modes yet');
+    side.append(this.list);
+    const key = m => `${POINTS[m.point] ?? m.point} ${m.direction}`;
+    link.on('tool/frf', m => { this.frfs[key(m)] = m; this.picked ??= key(m); this.news = true; });
+    link.on('tool/modes', m => { this.models[key(m)] = m; this.news = true; });
+  }
+
+  draw() {
+    const frf = this.frfs[this.picked], model = this.models[this.picked], part = PARTS[this.part];
+    const names = Object.keys(this.frfs).sort();
+    this.measured.replaceChildren(...names.map(name => make('button', { 'aria-pressed': String(name === this.picked), onclick: () => { this.picked = name; this.draw(); } }, name)));
+    for (const b of this.parts.children) b.setAttribute('aria-pressed', String(b.dataset.part === this.part));
+    this.drawModes();
+    if (!frf) return;
+    const scale = frf.unit === 'm/N' ? 1e6 : 1, unit = frf.unit === 'm/N' ? 'µm/N' : '1';
+    const x = frf.frequency, of = (re, im) => part.plain ? part.of(re, im) : scale * part.of(re, im);
+    const series = [{ x, y: Array.from(x, (_, k) => of(frf.real[k], frf.imag[k])), color: colour('measured'), width: 1.4, label: `measured, ${frf.averages} hits` }];
+    if (model) series.push({ x, y: Array.from(x, f => of(...response(model, f))), color: colour('x'), width: 2, label: `fitted, ${fixed(100 * model.relative_error, 1)} % off` });
+    Object.assign(this.plot.options.y, { label: part.label ?? `${part.name} [${unit}]`, log: !!part.log });
+    this.plot.set({ series, marks: (model?.modes ?? []).map(m => ({ x: m.frequency, label: `${fixed(m.frequency)} Hz`, color: colour('x') })) });
+    this.coherence.set({ series: frf.averages > 1 ? [{ x, y: frf.coherence, color: colour('z'), width: 1.3 }] : [] });
+    this.big.aside.textContent = frf.tool;
+  }
+
+  drawModes() {
+    const names = Object.keys(this.models).sort();
+    if (!names.length) return;
+    this.list.className = '';
+    this.list.replaceChildren(...names.flatMap(name => {
+      const model = this.models[name], tool = model.unit === 'm/N';
+      return [make('h3', { class: 'dim', style: 'font-size: 15px; margin: 10px 0 2px' }, name),
+        table(['Frequency [Hz]', 'Damping [%]', tool ? 'Stiffness [N/µm]' : 'Gain'], model.modes.map(m => [withDeviation(m.frequency, m.frequency_std),
+          withDeviation(100 * m.damping_ratio, 100 * m.damping_ratio_std),
+          tool ? withDeviation(1e-6 / m.gain, 1e-6 * m.gain_std / m.gain ** 2) : withDeviation(m.gain, m.gain_std)]))];
+    }));
+  }
+  refresh() { if (this.news) { this.news = false; this.draw(); } }
+  shown() { this.draw(); }
+}

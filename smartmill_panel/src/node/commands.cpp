@@ -1,0 +1,137 @@
+#include "node/commands.h"
+
+#include <actionlib_msgs/GoalID.h>
+#include <ros/console.h>
+#include <ros/topic.h>
+#include <smartmill_msgs/ArmMotion.h>
+#include <smartmill_msgs/CncState.h>
+#include <smartmill_msgs/IdentifyCoefficientsActionGoal.h>
+#include <smartmill_msgs/InstallModel.h>
+#include <smartmill_msgs/MeasureFrfActionGoal.h>
+#include <std_msgs/String.h>
+#include <nlohmann/json.hpp>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/names.h"
+#include "smartmill_core/panel_names.h"
+#include "smartmill_panel/server/command_gate.h"
+
+namespace smartmill::panel {
+namespace {
+
+using nlohmann::json;
+
+constexpr int BAD_REQUEST = 400, CONFLICT = 409;
+constexpr int HITS = 5;
+
+}  // namespace
+
+Commands::Commands(ros::NodeHandle nh)
+    : nh_(std::move(nh)),
+      measure_(nh_.advertise<smartmill_msgs::MeasureFrfActionGoal>(names::goals(names::MEASURE_TOOL_FRF), 1)),
+      identify_(nh_.advertise<smartmill_msgs::IdentifyCoefficientsActionGoal>(
+          names::goals(names::IDENTIFY_COEFFICIENTS), 1)),
+      log_(nh_.advertise<std_msgs::String>(names::PANEL_LOG, 100, true)) {
+  for (const char* action : {names::RUN_PROGRAM, names::JOG, names::ORIENT_SPINDLE, names::MEASURE_TOOL_FRF,
+                             names::MEASURE_SENSOR_FRF, names::IDENTIFY_COEFFICIENTS, names::DISCOVER})
+    cancels_[action] = nh_.advertise<actionlib_msgs::GoalID>(std::string(action) + "/cancel", 1);
+}
+
+Answer Commands::run(const Question& command) {
+  const json request = json::parse(command.body, nullptr, false);
+  if (!request.is_object()) return answerOf(BAD_REQUEST, "a JSON object is due");
+  const auto word = [&](const char* key) {
+    const auto found = request.find(key);
+    return found != request.end() && found->is_string() ? oneLine(found->get<std::string>()) : std::string();
+  };
+  const std::string name = word("command"), who = oneLine(word("who"), 40);
+  if (who.empty()) return answerOf(BAD_REQUEST, "who: a name for the log is due");
+  std::string outcome;
+  int status = 200;
+  try {
+    if (name == "cancel")
+      outcome = cancel();
+    else if (name == "disarm")
+      outcome = disarm();
+    else if (name == "install_model")
+      outcome = install(word("file"));
+    else if (name == "measure_frf")
+      outcome = measure(word("direction"), word("tool"));
+    else if (name == "identify")
+      outcome = identify(word("tool"), word("material"));
+    else if (name == "mark")
+      outcome = mark(word("text"));
+    else
+      throw Error("'" + oneLine(name, 40) + "' is no command of the panel");
+  } catch (const Error& error) {
+    outcome = error.what();
+    status = CONFLICT;
+  }
+  std_msgs::String line;
+  line.data = std::to_string(ros::Time::now().toSec()) + " " + who + " (" + command.from + "): " + name +
+              (status == 200 ? ": " : " REFUSED: ") + outcome;
+  log_.publish(line);
+  ROS_INFO("panel: command of %s", line.data.c_str());
+  return answerOf(status, outcome);
+}
+
+// An empty goal id cancels every goal of an action.
+std::string Commands::cancel() {
+  for (auto& [action, publisher] : cancels_) publisher.publish(actionlib_msgs::GoalID());
+  return "every running action is asked to end";
+}
+
+std::string Commands::disarm() {
+  smartmill_msgs::ArmMotion service;
+  service.request.arm = false;
+  if (!nh_.serviceClient<smartmill_msgs::ArmMotion>(names::ARM_MOTION).call(service))
+    throw Error("the controller's node does not answer");
+  if (service.response.code != service.response.OK) throw Error(service.response.message);
+  return service.response.message;
+}
+
+std::string Commands::install(const std::string& file) {
+  smartmill_msgs::InstallModel service;
+  service.request.file = file;
+  if (!nh_.serviceClient<smartmill_msgs::InstallModel>(names::INSTALL_MODEL).call(service))
+    throw Error("the monitor does not answer");
+  if (service.response.code != service.response.OK) throw Error(service.response.message);
+  return service.response.message;
+}
+
+std::string Commands::measure(const std::string& direction, const std::string& tool) {
+  if (direction != "x" && direction != "y") throw Error("direction: x or y is due");
+  if (measure_.getNumSubscribers() == 0) throw Error("the hammer's node is not there");
+  const auto state =
+      ros::topic::waitForMessage<smartmill_msgs::CncState>(names::CNC_STATE, nh_, ros::Duration(2.0));
+  if (!state || !state->connected || !state->armed) throw Error("motion is not armed");
+  smartmill_msgs::MeasureFrfActionGoal goal;
+  goal.header.stamp = goal.goal.header.stamp = ros::Time::now();
+  goal.goal_id.id = "panel";
+  goal.goal_id.stamp = goal.header.stamp;
+  goal.goal.tool = tool;
+  goal.goal.point = "tool_tip";
+  goal.goal.direction = direction;
+  goal.goal.hits = HITS;
+  measure_.publish(goal);
+  return "asked for the tool's FRF in " + direction;
+}
+
+std::string Commands::identify(const std::string& tool, const std::string& material) {
+  if (identify_.getNumSubscribers() == 0) throw Error("the load meter's node is not there");
+  smartmill_msgs::IdentifyCoefficientsActionGoal goal;
+  goal.header.stamp = goal.goal.header.stamp = ros::Time::now();
+  goal.goal_id.id = "panel";
+  goal.goal_id.stamp = goal.header.stamp;
+  goal.goal.tool = tool;
+  goal.goal.material = material;
+  identify_.publish(goal);
+  return "asked for the coefficients of " + material;
+}
+
+std::string Commands::mark(const std::string& text) {
+  if (text.empty()) throw Error("text: a note is due");
+  return text;
+}
+
+}  // namespace smartmill::panel

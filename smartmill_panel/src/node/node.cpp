@@ -1,0 +1,225 @@
+#include "node/node.h"
+
+#include <cstdio>
+#include <sstream>
+
+#include <smartmill_msgs/ChatterState.h>
+#include <smartmill_msgs/ForceRevolution.h>
+#include <smartmill_msgs/ForceSpectrum.h>
+#include <smartmill_msgs/ForceStrip.h>
+#include <nlohmann/json.hpp>
+
+#include "node/questions.h"
+#include "smartmill_core/error.h"
+#include "smartmill_core/names.h"
+#include "smartmill_core/panel_names.h"
+#include "smartmill_ros/node_main.h"
+#include "smartmill_ros/parameter_reader.h"
+#include "smartmill_ros/run_node.h"
+
+namespace smartmill::panel {
+namespace {
+
+constexpr double INPUT_TIMEOUT = 2.0;                        // [s]
+constexpr double DISCOVER_PERIOD = 0.5, CLOCK_PERIOD = 0.5;  // [s]
+
+using StripMessage = smartmill_msgs::ForceStrip;
+
+PanelParameters read(const ros::NodeHandle& private_nh) {
+  PanelParameters parameters = ParameterReader::fromServer(private_nh).readAll<PanelParameters>();
+  if (parameters.page.empty()) throw Error("page: the folder of the page is due");
+  return parameters;
+}
+
+std::vector<std::string> words(const std::string& text) {
+  std::istringstream in(text);
+  std::vector<std::string> list;
+  for (std::string word; in >> word;) list.push_back(word);
+  return list;
+}
+
+ServerOptions optionsOf(const PanelParameters& parameters) {
+  ServerOptions options;
+  options.address = parameters.address;
+  options.port = parameters.port;
+  options.folder = parameters.page;
+  options.name = parameters.name;
+  options.names = words(parameters.names);
+  options.origins = words(parameters.origins);
+  options.others = words(parameters.machines);
+  options.queue = static_cast<std::size_t>(parameters.queue * 1e6);
+  options.most_clients = static_cast<std::size_t>(parameters.most_clients);
+  return options;
+}
+
+CommandGate gateOf(const PanelParameters& parameters) {
+  return parameters.allow_commands ? CommandGate(parameters.token_file) : CommandGate();
+}
+
+}  // namespace
+
+PanelNode::PanelNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
+    : parameters_(read(private_nh)),
+      nh_(nh),
+      shell_(nh, private_nh, "none", INPUT_TIMEOUT),
+      gate_(gateOf(parameters_)),
+      strip_(nh.advertise<StripMessage>(names::FORCE_STRIP, 1000)),
+      revolution_(nh.advertise<smartmill_msgs::ForceRevolution>(names::FORCE_REVOLUTION, 100)),
+      spectrum_(nh.advertise<smartmill_msgs::ForceSpectrum>(names::FORCE_SPECTRUM, 100)),
+      server_(optionsOf(parameters_),
+              {[this](std::uint32_t channel, bool wanted) {
+                 discovery_.post([this, channel, wanted] { bridge_.want(channel, wanted); });
+               },
+               [this](Question question, const Server::Respond& respond) {
+                 answer(std::move(question), respond);
+               }}),
+      bridge_(nh, server_) {
+  if (gate_.open()) commands_ = std::make_unique<Commands>(nh);
+  listen();
+  shell_.every(DISCOVER_PERIOD, [this] {
+    if (!discovery_.busy()) discovery_.post([this] { bridge_.discover(); });
+  });
+  shell_.every(CLOCK_PERIOD, [this] { server_.tell(ros::WallTime::now().toNSec()); });
+  shell_.every(parameters_.digest_period, [this] {
+    for (Digests& digests : digests_) publish(digests);
+  });
+  shell_.diagnose("panel", [this](auto& status) { diagnose(status); });
+  const std::string host = parameters_.address == "0.0.0.0" ? "localhost" : parameters_.address;
+  nh.setParam("panel_at", "http://" + host + ":" + std::to_string(server_.port()) + "/");
+  std::printf("panel: look at http://%s:%d/%s\n", host.c_str(), server_.port(),
+              gate_.open() ? " (commands are allowed, with the token)" : "");
+  std::fflush(stdout);
+}
+
+PanelNode::~PanelNode() {
+  discovery_.stop();
+  worker_.stop();
+}
+
+void PanelNode::listen() {
+  shell_.inputs().on<smartmill_msgs::SpindleAngle>(
+      names::SPINDLE_ANGLE,
+      [this](const smartmill_msgs::SpindleAngle& message, double) { angle_.push(fromMsg(message)); });
+  shell_.inputs().on<smartmill_msgs::CuttingCondition>(
+      names::CUTTING_CONDITION, [this](const smartmill_msgs::CuttingCondition& message, double) {
+        if (message.name != condition_)
+          for (Digests& digests : digests_) digests.revolution->forget();
+        condition_ = message.name;
+        teeth_ = message.teeth;
+      });
+  shell_.inputs().on<smartmill_msgs::ChatterState>(
+      names::CHATTER_STATE,
+      [this](const smartmill_msgs::ChatterState& message, double) { steady_ = message.valid; });
+  listen(names::FORCE_MEASURED, StripMessage::MEASURED);
+  listen(names::FORCE_COMPENSATED, StripMessage::COMPENSATED);
+  listen(names::TWIN_FORCE, StripMessage::TWIN);
+}
+
+void PanelNode::listen(const char* topic, std::size_t source) {
+  Digests& digests = digests_.at(source);
+  digests.source = static_cast<std::uint8_t>(source);
+  digests.strip = std::make_unique<StripMaker>(parameters_.strip, [this, source](const auto& strip) {
+    StripMessage message;
+    message.header.stamp = fromSec(strip.stamp);
+    message.source = static_cast<std::uint8_t>(source);
+    message.bin = strip.bin;
+    message.low = strip.low;
+    message.high = strip.high;
+    strip_.publish(message);
+  });
+  digests.revolution = std::make_unique<RevolutionMaker>(parameters_.revolution);
+  digests.spectrum = std::make_unique<SpectrumMaker>(parameters_.spectrum);
+  shell_.inputs().on<smartmill_msgs::ForceBlock>(
+      topic, [this, &digests](const smartmill_msgs::ForceBlock& message, double) {
+        const ForceBlock block = fromMsg(message);
+        digests.strip->push(block);
+        digests.revolution->push(block, angle_);
+        digests.spectrum->push(block);
+      });
+}
+
+void PanelNode::publish(Digests& digests) {
+  if (const auto found = digests.revolution->take()) {
+    smartmill_msgs::ForceRevolution message;
+    message.header.stamp = fromSec(found->stamp);
+    message.condition = condition_;
+    message.steady = steady_;
+    message.source = digests.source;
+    message.spindle_speed = found->spindle_speed;
+    message.revolutions = found->revolutions;
+    message.bins = static_cast<std::uint32_t>(found->bins);
+    message.mean = found->mean;
+    message.low = found->low;
+    message.high = found->high;
+    revolution_.publish(message);
+  }
+  if (const auto found = digests.spectrum->take()) {
+    smartmill_msgs::ForceSpectrum message;
+    message.header.stamp = fromSec(found->stamp);
+    message.condition = condition_;
+    message.steady = steady_;
+    message.source = digests.source;
+    message.spindle_speed = angle_.speed();
+    message.teeth = teeth_;
+    message.resolution = found->resolution;
+    message.step = found->step;
+    message.fx = found->amplitude[0];
+    message.fy = found->amplitude[1];
+    message.fz = found->amplitude[2];
+    spectrum_.publish(message);
+  }
+}
+
+// In the server's thread.
+void PanelNode::answer(Question question, const Server::Respond& respond) {
+  constexpr int BUSY = 503, BAD_REQUEST = 400;
+  const bool taken = worker_.post([this, question = std::move(question), respond] {
+    try {
+      respond(answerNow(question));
+    } catch (const Error& error) {
+      respond(answerOf(BAD_REQUEST, error.what()));
+    }
+  });
+  if (!taken) respond(answerOf(BUSY, "too many questions at once"));
+}
+
+Answer PanelNode::answerNow(const Question& question) {
+  constexpr int NOT_FOUND = 404;
+  if (question.path == "config") return {200, config()};
+  if (question.path == "what_if") return askWhatIf(nh_, question);
+  if (question.path == "coefficients") return askCoefficients(nh_, question);
+  if (question.path == "report") return newestReport(parameters_.reports);
+  if (question.path == "replay") return controlReplay(nh_, question);
+  if (question.path == "command") {
+    if (const auto refusal = gate_.refusal(question)) {
+      ROS_WARN("panel: command from %s refused", question.from.c_str());
+      return *refusal;
+    }
+    return commands_->run(question);
+  }
+  return answerOf(NOT_FOUND, "nobody answers this");
+}
+
+std::string PanelNode::config() const {
+  return nlohmann::json({{"name", parameters_.name},
+                         {"namespace", names::NAMESPACE},
+                         {"commands", gate_.open()},
+                         {"machines", words(parameters_.machines)}})
+      .dump();
+}
+
+void PanelNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
+  const ServerStatistics statistics = server_.statistics();
+  status.summary(diagnostic_msgs::DiagnosticStatus::OK, "serving");
+  status.add("clients", statistics.clients);
+  status.add("messages sent", statistics.sent);
+  status.add("megabytes sent", 1e-6 * static_cast<double>(statistics.bytes));
+  status.add("messages dropped for slow clients", statistics.dropped);
+  status.add("requests refused", statistics.refused);
+}
+
+}  // namespace smartmill::panel
+
+int smartmill::nodeMain(int argc, char** argv) {
+  return runNode<panel::PanelNode>(argc, argv, "panel");
+}

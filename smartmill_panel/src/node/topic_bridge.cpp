@@ -1,0 +1,166 @@
+#include "node/topic_bridge.h"
+
+#include <cstdio>
+#include <optional>
+#include <set>
+
+#include <diagnostic_msgs/DiagnosticArray.h>
+#include <ros/master.h>
+#include <ros/message_traits.h>
+#include <smartmill_msgs/ChatterAdvice.h>
+#include <smartmill_msgs/ChatterState.h>
+#include <smartmill_msgs/CncState.h>
+#include <smartmill_msgs/CuttingCoefficients.h>
+#include <smartmill_msgs/CuttingCondition.h>
+#include <smartmill_msgs/DiscrepancyState.h>
+#include <smartmill_msgs/ForceBlock.h>
+#include <smartmill_msgs/ForceRevolution.h>
+#include <smartmill_msgs/ForceSpectrum.h>
+#include <smartmill_msgs/ForceStrip.h>
+#include <smartmill_msgs/Frf.h>
+#include <smartmill_msgs/LoadSample.h>
+#include <smartmill_msgs/ModalModel.h>
+#include <smartmill_msgs/SampleBlock.h>
+#include <smartmill_msgs/SessionState.h>
+#include <smartmill_msgs/SpindleAngle.h>
+#include <smartmill_msgs/StabilityChart.h>
+#include <boost/function.hpp>
+
+#include "smartmill_core/names.h"
+
+namespace smartmill::panel {
+namespace {
+
+constexpr std::uint32_t QUEUE = 1000;  // messages of a topic that wait for this node
+/// Of topics whose course a page draws: so many messages are kept.
+constexpr std::uint64_t STRIPS_KEPT = 1200, STATES_KEPT = 600;
+
+/// Types of which the definition is known before the first message.
+template <class... Messages>
+std::map<std::string, std::string> definitionsOf() {
+  return {{ros::message_traits::DataType<Messages>::value(),
+           ros::message_traits::Definition<Messages>::value()}...};
+}
+
+const std::map<std::string, std::string>& known() {
+  using namespace smartmill_msgs;
+  static const auto definitions =
+      definitionsOf<ChatterAdvice, ChatterState, CncState, CuttingCoefficients, CuttingCondition,
+                    DiscrepancyState, ForceBlock, ForceRevolution, ForceSpectrum, ForceStrip, Frf, LoadSample,
+                    ModalModel, SampleBlock, SessionState, SpindleAngle, StabilityChart,
+                    diagnostic_msgs::DiagnosticArray>();
+  return definitions;
+}
+
+template <class Message>
+bool is(const std::string& type) {
+  return type == ros::message_traits::DataType<Message>::value();
+}
+
+bool stream(const std::string& type) {
+  return is<smartmill_msgs::SampleBlock>(type) || is<smartmill_msgs::ForceBlock>(type) ||
+         is<smartmill_msgs::SpindleAngle>(type);
+}
+
+std::string ring(std::uint64_t count, std::uint64_t most) {
+  char text[24];
+  std::snprintf(text, sizeof text, "%06lu", static_cast<unsigned long>(count % most));
+  return text;
+}
+
+}  // namespace
+
+TopicBridge::TopicBridge(ros::NodeHandle nh, Server& server) : nh_(std::move(nh)), server_(server) {
+}
+
+void TopicBridge::discover() {
+  ros::master::V_TopicInfo topics;
+  if (!ros::master::getTopics(topics)) return;
+  static const std::set<std::string> OTHERS{"/diagnostics", "/tf", "/tf_static"};
+  const std::string room = std::string(names::NAMESPACE) + "/";
+  for (const ros::master::TopicInfo& topic : topics)
+    if (topic.name.rfind(room, 0) == 0 || OTHERS.count(topic.name)) add(topic.name, topic.datatype);
+}
+
+void TopicBridge::add(const std::string& name, const std::string& type) {
+  std::optional<Channel> news;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (topics_.count(name)) return;
+    Topic& topic = topics_[name];
+    topic.id = static_cast<std::uint32_t>(topics_.size());
+    topic.type = type;
+    const auto definition = known().find(type);
+    topic.advertised = definition != known().end();
+    if (topic.advertised) news = Channel{topic.id, name, type, definition->second};
+    // Of an unknown type a stream cannot be told from the rest before the first message.
+    if (!stream(type)) topic.subscriber = subscribe(name);
+  }
+  if (news) server_.advertise(*news);
+}
+
+void TopicBridge::want(std::uint32_t channel, bool wanted) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  for (auto& [name, topic] : topics_) {
+    if (topic.id != channel || !stream(topic.type)) continue;
+    topic.subscriber = wanted ? subscribe(name) : ros::Subscriber();
+  }
+}
+
+ros::Subscriber TopicBridge::subscribe(const std::string& name) {
+  const boost::function<void(const topic_tools::ShapeShifter&)> callback =
+      [this, name](const topic_tools::ShapeShifter& message) { hand(name, message); };
+  return nh_.subscribe<topic_tools::ShapeShifter>(name, QUEUE, callback, ros::VoidConstPtr(),
+                                                  ros::TransportHints().tcpNoDelay());
+}
+
+std::string TopicBridge::keyOf(const Topic& topic, const topic_tools::ShapeShifter& message) {
+  const std::string& type = topic.type;
+  if (is<smartmill_msgs::Frf>(type)) {
+    const auto frf = message.instantiate<smartmill_msgs::Frf>();
+    return frf->point + frf->direction;
+  }
+  if (is<smartmill_msgs::ModalModel>(type)) {
+    const auto modes = message.instantiate<smartmill_msgs::ModalModel>();
+    return modes->point + modes->direction;
+  }
+  // Of each source the newest, and the newest of a steady cut.
+  const auto digest = [](const auto& found) {
+    return std::to_string(found->source) + (found->steady ? " steady" : "");
+  };
+  if (is<smartmill_msgs::ForceRevolution>(type))
+    return digest(message.instantiate<smartmill_msgs::ForceRevolution>());
+  if (is<smartmill_msgs::ForceSpectrum>(type))
+    return digest(message.instantiate<smartmill_msgs::ForceSpectrum>());
+  if (is<smartmill_msgs::ForceStrip>(type)) return ring(topic.count, STRIPS_KEPT);
+  if (is<smartmill_msgs::ChatterState>(type) || is<smartmill_msgs::DiscrepancyState>(type))
+    return ring(topic.count, STATES_KEPT);
+  return {};
+}
+
+void TopicBridge::hand(const std::string& name, const topic_tools::ShapeShifter& message) {
+  std::optional<Channel> news;
+  std::uint32_t id = 0;
+  bool kept = false;
+  std::string key;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    Topic& topic = topics_.at(name);
+    if (!topic.advertised) {
+      topic.advertised = true;
+      topic.type = message.getDataType();
+      news = Channel{topic.id, name, topic.type, message.getMessageDefinition()};
+    }
+    id = topic.id;
+    kept = !stream(topic.type);
+    if (kept) key = keyOf(topic, message);
+    ++topic.count;
+  }
+  if (news) server_.advertise(*news);
+  std::string data(message.size(), '\0');
+  ros::serialization::OStream out(reinterpret_cast<std::uint8_t*>(data.data()), message.size());
+  message.write(out);
+  server_.publish(id, ros::WallTime::now().toNSec(), std::move(data), kept, key);
+}
+
+}  // namespace smartmill::panel

@@ -1,0 +1,323 @@
+#!/usr/bin/env python3
+"""The page in a real browser, before a panel node and topics of a machine made here, so that each value is known.
+usage: page_test.py NODE PAGE OUT: writes OUT/results.json, {case: what failed or ""}, and a screenshot of each size."""
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+import traceback
+import urllib.error
+import urllib.request
+
+from browser import PATIENCE, Browser, free_port
+
+NODE, PAGE, OUT = sys.argv[1:4]
+TOKEN = "a token that is long enough"
+SIZES = {"1280x800": (1280, 800), "1920x1080": (1920, 1080), "phone": (390, 844)}
+VIEWS = ["overview", "forces", "stability", "dynamics", "session", "model"]
+GONE = 2.0  # [s] within which the page must say that the node is gone
+
+
+class Machine:
+    """Topics of a machine that stands in a cut, ten times a second."""
+
+    def __init__(self):
+        import rospy
+        from smartmill_msgs import msg
+        self.rospy, self.msg, self.publishers, self.silent = rospy, msg, {}, False
+        rospy.init_node("machine", anonymous=True, disable_signals=True)
+        self.index = 0
+        self.last = {}
+        self.once()
+        self.thread = threading.Thread(target=self.run, daemon=True)
+        self.thread.start()
+
+    def publish(self, topic, message, latch=False):
+        if topic not in self.publishers:
+            self.publishers[topic] = self.rospy.Publisher("/smartmill/" + topic, type(message), queue_size=100, latch=latch)
+        message.header.stamp = self.rospy.Time.now()
+        self.last[topic] = message
+        self.publishers[topic].publish(message)
+
+    def once(self):
+        m = self.msg
+        self.publish("cut/condition", m.CuttingCondition(
+            kind=2, name="slot_7", material="al7050", tool="end_mill", teeth=4, diameter=0.01905, helix=0.5236, spindle_speed=418.9,
+            feed_per_tooth=1e-4, axial_depth=1.234e-3, entry_angle=0.0, exit_angle=math.pi), latch=True)
+        speeds = [200.0 + 6.0 * k for k in range(300)]
+        limits = [math.inf if k == 150 else 1e-3 * (2.0 + math.sin(0.1 * k)) for k in range(300)]
+        best = m.StabilityPoint(spindle_speed=1200.0, axial_depth=2.2e-3, depth_limit=2.9e-3, chatter_frequency=1234.5, torque=3.21, power=3852.0,
+                                material_removal_rate=8.0e-6)
+        self.publish("stability/chart", m.StabilityChart(
+            tool="end_mill", material="al7050", method="zero_order", exit_angle=math.pi, feed_per_tooth=1e-4, spindle_speed=speeds,
+            depth_limit=limits, chatter_frequency=[math.nan if math.isinf(x) else 1200.0 for x in limits],
+            torque_depth_limit=[5e-3] * 300, power_depth_limit=[8.0 / s for s in speeds], absolute_depth_limit=1e-3, recommended=[best]), latch=True)
+        f = [10.0 * k for k in range(300)]
+        self.publish("tool/frf", m.Frf(tool="end_mill", point="tool_tip", direction="x", unit="m/N", averages=5, frequency=f,
+                                       real=[1e-8 * math.cos(x / 500) for x in f], imag=[-1e-8] * 300, coherence=[0.99] * 300,
+                                       standard_deviation=[math.nan] * 300), latch=True)
+        mode = m.Mode(frequency=1210.0, damping_ratio=0.031, gain=1 / 28e6, frequency_std=0.3, damping_ratio_std=2e-4, gain_std=1e-10)
+        self.publish("tool/modes", m.ModalModel(tool="end_mill", point="tool_tip", direction="x", unit="m/N", modes=[mode],
+                                                direct_std=math.nan, relative_error=0.04), latch=True)
+        nan = math.nan
+        self.publish("material/coefficients", m.CuttingCoefficients(
+            tool="end_mill", material="al7050", ktc=796.4e6, krc=nan, kac=nan, kte=27.7e3, kre=nan, kae=nan, ktc_std=4.2e6, krc_std=nan, kac_std=nan,
+            kte_std=800.0, kre_std=nan, kae_std=nan, friction_viscous=nan, friction_coulomb=nan, source="load_meter", test_count=12), latch=True)
+        steps = [m.SessionStep(name="connect", detail="all there", elapsed=1.5, state=1), m.SessionStep(name="slot test", elapsed=61.0)]
+        self.publish("session/state", m.SessionState(tool="end_mill", material="al7050", running=True, steps=steps), latch=True)
+
+    def run(self):
+        while not self.rospy.is_shutdown():
+            if not self.silent:
+                self.tick()
+            time.sleep(0.1)
+
+    def tick(self):
+        m = self.msg
+        self.publish("cnc/state", m.CncState(connected=True, armed=True, mode=10, run=3, axes=["x", "y", "z"], position=[-0.0123456, 0.05, -0.1],
+                                             distance_to_go=[0.001, 0.0, 0.0], spindle_speed=418.87902, feed=0.0123))
+        self.publish("cnc/load", m.LoadSample(spindle_load=0.4567, spindle_speed=418.87902, axes=["x"], axis_load=[0.12]))
+        self.publish("chatter/state", m.ChatterState(condition="slot_7", valid=True, chatter=True, frequency=1203.4, energy_ratio=0.4, severity=85.2))
+        self.publish("discrepancy/state", m.DiscrepancyState(condition="slot_7", channels=["fx", "fy"], gap=[1.04, 3.21], model_fits=False))
+        self.publish("spindle/angle", m.SpindleAngle(angle=(41.887902 * self.index) % (2 * math.pi), speed=418.87902))
+        n, rate = 2560, 25600.0
+        first = self.index * n
+        fx = [100.0 + 40.0 * math.sin(2 * math.pi * 300.0 * (first + i) / rate) for i in range(n)]
+        for topic, status in (("force/measured", 0), ("force/compensated", 1)):
+            self.publish(topic, m.ForceBlock(sample_rate=rate, first_index=first, fx=fx, fy=fx, fz=[0.0] * n, status=status))
+        self.index += 1
+
+
+class Bench:
+    def __init__(self):
+        self.port, self.failed, self.pids = free_port(), {}, []
+        self.log = open(OUT + "/log.txt", "w")
+        self.token_file = OUT + "/token"
+        with open(os.open(self.token_file, os.O_CREAT | os.O_WRONLY | os.O_TRUNC, 0o600), "w") as f:
+            f.write(TOKEN)
+        master = free_port()
+        os.environ.update(ROS_MASTER_URI=f"http://localhost:{master}", ROS_HOSTNAME="localhost", ROS_HOME=OUT)
+        self.core = subprocess.Popen(["rosmaster", "--core", "-p", str(master)], stdout=self.log, stderr=self.log)
+        self.node = None
+        self.address = f"http://127.0.0.1:{self.port}/"
+
+    def start_node(self):
+        parameters = {"page": PAGE, "port": self.port, "allow_commands": "true", "token_file": self.token_file}
+        arguments = [f"_{key}:={value}" for key, value in parameters.items()]
+        self.node = subprocess.Popen([NODE, "__ns:=/smartmill", "__name:=panel"] + arguments, stdout=self.log, stderr=self.log)
+        end = time.time() + 60
+        while True:
+            try:
+                return urllib.request.urlopen(self.address, timeout=5).read()
+            except OSError:
+                if time.time() > end or self.node.poll() is not None:
+                    raise
+                time.sleep(0.1)
+
+    def stop(self):
+        for process in (self.node, self.core):
+            if process:
+                process.send_signal(signal.SIGINT)
+        for process in (self.node, self.core):
+            if process:
+                process.wait()
+
+    def case(self, work, *args):
+        name = "".join(word.capitalize() for word in work.__name__.split("_"))
+        try:
+            work(*args)
+            self.failed[name] = ""
+        except Exception:
+            self.failed[name] = traceback.format_exc()
+
+
+def equal(found, due):
+    assert found == due, f"{found!r} instead of {due!r}"
+
+
+def becomes(read, due):
+    """A busy computer takes its time."""
+    end = time.time() + PATIENCE
+    while read() != due and time.time() < end:
+        time.sleep(0.05)
+    equal(read(), due)
+
+
+def tile(browser, what):
+    return browser.js("[...document.querySelectorAll('.tile')].find(t => t.querySelector('.what').textContent.startsWith(arguments[0]))"
+                      ".querySelector('.value').textContent", what)
+
+
+def values_are_the_topics(browser):
+    browser.wait("document.querySelector('.tile.bad')")
+    becomes(lambda: tile(browser, "Spindle [rpm]"), "4000")
+    becomes(lambda: tile(browser, "Spindle load"), "45.7")
+    becomes(lambda: tile(browser, "Feed"), "738")
+    becomes(lambda: tile(browser, "Cut"), "CHATTER")
+    becomes(lambda: "1203 Hz, 85 N" in browser.text(".tile.lamp .more"), True)
+    becomes(lambda: browser.js("[...document.querySelectorAll('.axes b')].map(e => e.textContent)"), ["-12.346", "50.000", "-100.000"])
+    for word in ("Connected", "Armed", "DNC", "running", "no alarm", "Chatter"):
+        becomes(lambda: word in browser.text("#status"), True)
+    row = "[...document.querySelectorAll('#points tbody td')].map(e => e.textContent)"
+    browser.wait("document.querySelector('#points td')")
+    becomes(lambda: browser.js(row), ["11459", "2.200", "2.90", "1235", "3.21", "3.85", "480.0"])
+    becomes(lambda: browser.js("[...document.querySelectorAll('#coefficients td')].map(e => e.textContent)"),
+          ["Ktc", "796 ± 4", "N/mm²", "Kte", "27.7 ± 0.8", "N/mm"])
+    browser.js("(location.hash = 'model', 1)")
+    browser.wait("document.querySelector('#gap td')")
+    becomes(lambda: browser.js("[...document.querySelectorAll('#gap td:nth-child(2)')].map(e => e.textContent)"), ["1.04", "3.21"])
+    browser.js("(location.hash = 'session', 1)")
+    browser.wait("document.querySelector('#steps td')")
+    becomes(lambda: browser.js("[...document.querySelectorAll('#steps tbody tr')].map(e => e.children[0].textContent + ' ' + e.children[1].textContent)"),
+          ["done connect", "running slot test"])
+
+
+def messages_are_decoded_as_by_ros(browser, machine):
+    import io
+    for topic in ("stability/chart", "tool/frf", "tool/modes", "material/coefficients", "cut/condition", "session/state"):
+        browser.wait("window.smartmill.link.message(arguments[0]) !== undefined", topic)
+        sent = machine.last[topic]
+        wire = io.BytesIO()
+        sent.serialize(wire)
+        page = browser.js("JSON.parse(JSON.stringify(window.smartmill.link.message(arguments[0]), (k, v) => ArrayBuffer.isView(v) ?"
+                          " Array.from(v, x => Number.isFinite(x) ? x : String(x)) : typeof v === 'number' && !Number.isFinite(v) ? String(v) : v))", topic)
+        compare(page, sent, topic)
+
+
+def compare(page, sent, where):
+    if hasattr(sent, "__slots__") and hasattr(sent, "to_sec"):
+        assert abs(page - sent.to_sec()) < 1e-6, where
+    elif hasattr(sent, "__slots__"):
+        for name in sent.__slots__:
+            if name != "seq":  # counted by the publisher as it sends
+                compare(page[name], getattr(sent, name), where + "." + name)
+    elif isinstance(sent, (list, tuple)):
+        equal(len(page), len(sent))
+        for k, (a, b) in enumerate(zip(page, sent)):
+            compare(a, b, f"{where}[{k}]")
+    elif isinstance(sent, float) and not math.isfinite(sent):
+        equal(page, {"nan": "NaN", "inf": "Infinity", "-inf": "-Infinity"}[str(sent)])
+    else:
+        assert page == sent, f"{where}: {page!r} instead of {sent!r}"
+
+
+def every_view_is_drawn(browser):
+    canvases = ("[...document.querySelectorAll('.view:not([hidden]) canvas')].map(c => [c.getAttribute('aria-label'),"
+                " c.width && c.height ? c.getContext('2d').getImageData(0, 0, c.width, c.height).data.filter((v, i) => i % 4 == 3 && v > 0).length : 0])")
+    browser.wait("window.smartmill.link.message('panel/spectrum') && window.smartmill.link.message('panel/revolution')")
+    for size, (width, height) in SIZES.items():
+        browser.resize(width, height)
+        for view in VIEWS:
+            browser.js("(location.hash = arguments[0], 1)", view)
+            browser.wait("[...document.querySelectorAll('.view:not([hidden]) canvas')].every(c => c.dataset.drawn == 'yes')")
+            time.sleep(0.15)  # two redraws
+            for name, count in browser.js(canvases):
+                assert count > 500, f"{view} at {size}: {name} is empty"
+            wide = browser.js("document.documentElement.scrollWidth")
+            assert wide <= width, f"{view} at {size}: {wide} pixels wide"
+            browser.picture(f"{OUT}/{view}_{size}.png")
+    browser.resize(*SIZES["1280x800"])
+    browser.js("(location.hash = 'overview', 1)")
+
+
+def force_and_spectrum_are_those_of_the_machine(browser):
+    # 300 Hz of 40 N about 100 N: a line on the spectrum, the least and largest of every strip.
+    line = browser.wait("(m => m && [m.fx[Math.floor(300 / m.step)], m.resolution])(window.smartmill.link.message('panel/spectrum'))")
+    assert abs(line[0] - 40.0) < 0.5, line
+    strip = browser.js("(m => [Math.min(...m.low.filter((v, i) => i % 3 == 0 && v == v)), Math.max(...m.high.filter((v, i) => i % 3 == 0 && v == v))])"
+                       "(window.smartmill.link.message('panel/strip'))")
+    assert abs(strip[0] - 60.0) < 0.5 and abs(strip[1] - 140.0) < 0.5, strip
+
+
+def silence_turns_values_grey(browser, machine):
+    machine.silent = True
+    browser.wait("document.querySelector('#status').textContent.includes('Controller silent')")
+    browser.wait("[...document.querySelectorAll('.tile .value')].every(e => e.classList.contains('stale'))")
+    machine.silent = False
+    browser.wait("document.querySelector('#status').textContent.includes('Connected')")
+
+
+def a_dead_node_is_told_and_one_that_is_back_shows(browser, bench):
+    browser.js("(location.hash = 'overview', 1)")
+    bench.node.kill()
+    bench.node.wait()
+    begin = time.time()
+    browser.wait("document.querySelector('#status').textContent.includes('Panel does not answer')")
+    said = time.time() - begin
+    assert said < GONE, f"{said:.1f} s"
+    browser.wait("[...document.querySelectorAll('.tile .value')].every(e => e.classList.contains('stale'))")
+    bench.start_node()
+    browser.wait("document.querySelector('#status').textContent.includes('Connected')")
+    browser.wait("!document.querySelector('.tile .value.stale')")
+    browser.errors()  # that nobody answered is known
+
+
+def status_of(address, body=None, **headers):
+    request = urllib.request.Request(address, body, {key.replace("_", "-"): value for key, value in headers.items()})
+    try:
+        with urllib.request.urlopen(request, timeout=30) as answer:
+            return answer.status
+    except urllib.error.HTTPError as error:
+        return error.code
+
+
+def hostile_origins_and_commands_without_token_are_refused(bench):
+    equal(status_of(bench.address, Origin="http://evil.example"), 403)
+    command = json.dumps({"command": "mark", "who": "test", "text": "here"}).encode()
+    equal(status_of(bench.address + "api/command", command), 401)
+    equal(status_of(bench.address + "api/command", command, X_SmartMill_Token="wrong"), 401)
+    equal(status_of(bench.address + "api/command", command, X_SmartMill_Token=TOKEN, Origin="http://evil.example"), 403)
+    equal(status_of(bench.address + "api/command", command, X_SmartMill_Token=TOKEN), 200)
+    equal(status_of(bench.address + "api/command", json.dumps({"command": "start_spindle", "who": "test"}).encode(), X_SmartMill_Token=TOKEN), 409)
+    equal(status_of(bench.address + "api/command", json.dumps({"command": "mark", "text": "x"}).encode(), X_SmartMill_Token=TOKEN), 400)
+
+
+def the_page_commands_after_an_unlock(browser):
+    browser.js("(location.hash = 'session', 1)")
+    assert not browser.js("document.querySelector('[data-command=disarm]').checkVisibility()")
+    browser.js("(document.querySelector('input[type=password]').value = arguments[0],"
+               " document.querySelector('input[placeholder^=Your]').value = 'a tester', 1)", TOKEN)
+    browser.click("#unlock")
+    browser.wait("document.querySelector('[data-command=disarm]').checkVisibility()")
+    browser.click("[data-command=disarm]")
+    browser.wait("document.querySelector('#command-answer').textContent.includes('does not answer')")
+    browser.wait("window.smartmill.link.message('panel/log')?.data.includes('a tester')")
+    said = browser.js("window.smartmill.link.message('panel/log').data")
+    assert "disarm REFUSED" in said, said
+    browser.js("(window.smartmill.parts.find(p => p.unlocked).until = 0, 1)")  # a minute later
+    browser.wait("!document.querySelector('[data-command=disarm]').checkVisibility()")
+
+
+def no_error_on_the_console(browser):
+    errors = [e for e in browser.errors() if "/api/command" not in e]  # the refusal above was meant
+    assert not errors, errors
+
+
+def main():
+    bench = Bench()
+    try:
+        machine = Machine()
+        bench.start_node()
+        with Browser() as browser:
+            browser.resize(*SIZES["1280x800"])
+            browser.open(bench.address)
+            bench.case(values_are_the_topics, browser)
+            bench.case(messages_are_decoded_as_by_ros, browser, machine)
+            bench.case(force_and_spectrum_are_those_of_the_machine, browser)
+            bench.case(every_view_is_drawn, browser)
+            bench.case(silence_turns_values_grey, browser, machine)
+            bench.case(hostile_origins_and_commands_without_token_are_refused, bench)
+            bench.case(the_page_commands_after_an_unlock, browser)
+            bench.case(no_error_on_the_console, browser)
+            bench.case(a_dead_node_is_told_and_one_that_is_back_shows, browser, bench)
+    finally:
+        bench.stop()
+        with open(OUT + "/results.json", "w") as out:
+            json.dump(bench.failed, out, indent=1)
+
+
+main()

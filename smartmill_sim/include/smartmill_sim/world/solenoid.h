@@ -1,0 +1,47 @@
+#pragma once
+
+#include <random>
+#include <vector>
+
+#include "smartmill_core/model/machine_model.h"
+#include "smartmill_sim/world/station_traits.h"
+
+namespace smartmill::sim {
+
+/// One touch of a hammer: sin(pi u^(1 + skew)) of the peak, u the share of the contact; skew 0 is the half
+/// sine of Dunwoody section 4.3.1.
+struct Blow {
+  double begin = 0.0;    ///< [s]
+  double peak = 0.0;     ///< [N]
+  double contact = 0.0;  ///< [s] > 0
+  double skew = 0.0;     ///< [1] > -1
+
+  double force(double time) const;  ///< [N]
+  double end() const { return begin + contact; }
+  bool over(double time) const { return time > end(); }
+};
+
+/// The solenoid: its current rises from the command until the hammer touches, which ends it; then the hammer
+/// falls back, or bounces.
+class Solenoid {
+ public:
+  /// @param force_scatter [1] standard deviation of the peak over its nominal value
+  Solenoid(const StationTraits& traits, const smartmill::HammerStation& station, double force_scatter);
+
+  /// @param now [s] of the command @param touch [s] of the first contact
+  void fire(double now, double touch, std::mt19937_64& random);
+  /// Time went on without it.
+  void shift(double time);
+
+  double force(double time) const;    ///< [N] of the hammer on what it meets
+  double current(double time) const;  ///< [1] of its final value
+  bool over(double time) const { return blows_.empty() || blows_.back().over(time); }
+
+ private:
+  StationTraits traits_;
+  double peak_, contact_, force_scatter_;
+  std::vector<Blow> blows_;
+  double fired_ = 0.0;
+};
+
+}  // namespace smartmill::sim

@@ -1,0 +1,65 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "smartmill_core/parameters/parameter_table.h"
+
+namespace smartmill::sim {
+
+/// What a hammer station is like beyond the model's `hammer` section: how the tool bends between hammer,
+/// sensor and tip, what the sensor's electrode sees of it, and what the solenoid does wrong. The defaults are
+/// an ideal station: a point sensor, half-sine blows and the model's modes along a cantilever's line.
+struct StationTraits {
+  std::string structure = "modes";
+  // The tool as a beam.
+  double shank_diameter = 0.0;
+  double flute_length = 25.0e-3;
+  double flute_core = 0.8;
+  double young = 5.8e11;
+  double density = 14500.0;
+  double tool_damping = 0.004;
+  // Spindle and holder where the tool leaves the holder, and the joint.
+  std::vector<double> spindle_frequency{620.0, 1050.0, 1900.0};
+  std::vector<double> spindle_damping{0.035, 0.03, 0.025};
+  std::vector<double> spindle_stiffness{1.6e8, 1.2e8, 2.5e8};
+  std::vector<double> spindle_slope{4.0, 7.0, -9.0};
+  double joint_stiffness = 2.0e8;
+  double joint_rotation = 6.0e4;
+  double joint_damping = 0.03;
+  double plane_ratio = 1.0;
+  double plane_turn = 0.0;
+  // The sensor.
+  double read_height = 0.0;
+  double electrode = 0.0;
+  double housing = 0.0;
+  double beside = 0.0;
+  double gain_error = 0.0;
+  double bend = 0.0;
+  bool cross_sensor = false;
+  // The tool's surface.
+  std::string tooth = "flute";
+  double rake_flank = 0.25;
+  double relief_flank = 0.35;
+  double land = 0.0;
+  std::vector<double> tooth_low;
+  double eccentricity = 0.0;
+  double eccentricity_angle = 0.0;
+  // The solenoid.
+  double pulse_skew = 0.0;
+  double pulse_scatter = 0.0;
+  double contact_scatter = 0.0;
+  double bounce_chance = 0.0;
+  double bounce_share = 0.3;
+  double bounce_delay = 2.0e-3;
+  double coil_time = 3.0e-3;
+  double coil_force = 0.0;
+  double coil_volt = 0.0;
+  double axis_scatter = 0.0;
+
+  void declare(ParameterTable& table);
+  /// What bounds alone do not say. @throws Error naming key and value.
+  void validate() const;
+};
+
+}  // namespace smartmill::sim

@@ -1,0 +1,111 @@
+#include "smartmill_sim/world/gap_sensor.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "smartmill_core/units.h"
+
+namespace smartmill::sim {
+namespace {
+
+constexpr int ACROSS = 9, ALONG = 5;  // spots of an electrode's diameter, across and along the tool
+constexpr int HOUSING = 32;           // spots across the housing
+constexpr double TOUCHING = 0.5e-6;   // [m] gap that a voltage is still told of
+
+}  // namespace
+
+ToolSurface::ToolSurface(const StationTraits& traits, const ToolGeometry& tool, double depth)
+    : tool_(tool),
+      depth_(depth),
+      rake_(traits.rake_flank),
+      relief_(traits.relief_flank),
+      land_(traits.land),
+      insert_(traits.tooth == "insert"),
+      low_(traits.tooth_low),
+      eccentricity_(traits.eccentricity),
+      eccentricity_angle_(traits.eccentricity_angle) {
+  low_.resize(static_cast<std::size_t>(tool.teeth), 0.0);
+}
+
+/// Of one tooth, `off` [rad] ahead of the direction looked at: then its relief is seen.
+double ToolSurface::behind(double off) const {
+  const double past = off > 0.0 ? std::max(0.0, off - land_) : off;
+  const double width = past > 0.0 ? relief_ : rake_;
+  if (insert_ && past > 0.0) return std::min(depth_, depth_ * past / width);
+  return -depth_ * std::expm1(-past * past / (width * width));
+}
+
+double ToolSurface::retreat(double angle, double height, double facing) const {
+  double least = std::numeric_limits<double>::infinity();
+  for (int tooth = 0; tooth < tool_.teeth; ++tooth) {
+    const double off =
+        std::remainder(angle + tool_.toothAngle(tooth) - tool_.lag() * height - facing, units::TWO_PI);
+    least = std::min(least, low_[static_cast<std::size_t>(tooth)] + behind(off));
+  }
+  return std::min(least, depth_);
+}
+
+double ToolSurface::throwTo(double angle, double facing) const {
+  return eccentricity_ * std::cos(angle + eccentricity_angle_ - facing);
+}
+
+GapSensor::GapSensor(const StationTraits& traits, const smartmill::HammerStation& station, double facing)
+    : facing_(facing),
+      gain_(station.gain_volt * (1.0 + traits.gain_error)),
+      gap_(station.gap_at_zero_volt),
+      range_(station.range_volt),
+      bend_(traits.bend) {
+  const double radius = 0.5 * traits.electrode;
+  if (radius <= 0.0) {
+    spots_.push_back({0.0, 0.0, 1.0});
+  } else {
+    double sum = 0.0;
+    // Even in the angle about the disc's middle: the chord's end needs no fine steps.
+    for (int i = 0; i < ACROSS; ++i) {
+      const double turn = units::PI * (i + 0.5) / ACROSS, chord = radius * std::sin(turn);
+      const double share = chord * chord;
+      for (int k = 0; k < ALONG; ++k) {
+        spots_.push_back({-radius * std::cos(turn), chord * ((k + 0.5) / ALONG * 2.0 - 1.0), share});
+        sum += share;
+      }
+    }
+    for (Spot& s : spots_) s.share /= sum;
+  }
+  for (int i = 0; i <= HOUSING && traits.housing > 0.0; ++i)
+    spots_.push_back({traits.housing * (static_cast<double>(i) / HOUSING - 0.5), 0.0, 0.0});
+  behind_.assign(spots_.size(), 0.0);
+}
+
+void GapSensor::face(const ToolSurface& surface, double angle, double above, double beside) {
+  const double radius = surface.radius(), towards = surface.throwTo(angle, facing_);
+  for (std::size_t i = 0; i < spots_.size(); ++i) {
+    const double across = (spots_[i].lateral + beside) / radius;
+    if (std::abs(across) >= 1.0) {  // beside the tool
+      behind_[i] = radius;
+      continue;
+    }
+    const double turn = std::asin(across);
+    const double retreat = surface.retreat(angle, above + spots_[i].height, facing_ + turn);
+    behind_[i] = radius - (radius - retreat) * std::cos(turn) - towards;
+  }
+}
+
+double GapSensor::voltage(double gap) const {
+  double capacity = 0.0;  // [1/m] over that of a flat target at 1 m
+  for (std::size_t i = 0; i < spots_.size(); ++i) {
+    if (spots_[i].share > 0.0) capacity += spots_[i].share / std::max(gap + behind_[i], TOUCHING);
+  }
+  const double straight = gain_ * (gap_ * capacity - 1.0);
+  return clipped(straight + bend_ * straight * straight / range_);
+}
+
+double GapSensor::clearance(double gap) const {
+  return gap + *std::min_element(behind_.begin(), behind_.end());
+}
+
+double GapSensor::clipped(double voltage) const {
+  return std::clamp(voltage, -range_, range_);
+}
+
+}  // namespace smartmill::sim

@@ -1,0 +1,157 @@
+#include "smartmill_stability/chart/what_if.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "smartmill_core/error.h"
+#include "smartmill_stability/chart/chart.h"
+#include "smartmill_stability_testing/benchmark.h"
+
+namespace smartmill::stability {
+namespace {
+
+ChartMaker benchmarkMaker(double direct = 0.0) {
+  ChartParameters parameters;
+  parameters.speed_low = units::radPerSecFromRpm(5000.0);
+  parameters.radial_ratio = 1.0 / 3.0;
+  parameters.method = "auto";
+  ChartMaker maker(parameters, machine());
+  for (const char* direction : {"x", "y"}) {
+    MeasuredModes modes;
+    modes.tool = "end_mill";
+    modes.point = POINT_TOOL_TIP;
+    modes.direction = direction;
+    modes.unit = "m/N";
+    modes.model = benchmark();
+    modes.model.direct = direct;
+    maker.handle(modes);
+  }
+  maker.handle(coefficients());
+  return maker;
+}
+
+// What is followed from neighbour to neighbour against the solver that searches each speed from zero, six
+// digits: at slotting, and at a small immersion with its flip lobes. Interpolation may cost 0.5 % (a quarter
+// of what ends the refinement), at the very meeting of two lobes more: there 99 of 100 speeds are asked for.
+TEST(WhatIf, FollowsTheLimitsOfTheFullSearch) {
+  for (const double exit_deg : {180.0, 60.0}) {
+    RegenerativeSystem system = *benchmarkMaker().system({0.0, units::radFromDeg(exit_deg), 0.0, 0.0});
+    std::vector<double> speeds;
+    for (int i = 0; i < 100; ++i) speeds.push_back(units::radPerSecFromRpm(5000.0 + 150.0 * i));
+    constexpr double DEEPEST = 5e-3;
+    SolverOptions coarse;
+    coarse.tolerance = 1e-3;
+    coarse.nodes = 8;
+    const StabilityLimit found =
+        followedLimits(*makeFloquetSolver(Method::collocation, system, coarse), speeds, DEEPEST);
+    const std::vector<Limit> exact = makeFloquetSolver(Method::collocation, system)->limits(speeds, DEEPEST);
+    ASSERT_EQ(found.depth.size(), speeds.size());
+    int off = 0;
+    for (std::size_t k = 0; k < speeds.size(); ++k) {
+      if (std::isinf(found.depth[k]) && exact[k].depth > 0.98 * DEEPEST) continue;
+      off += !(std::abs(found.depth[k] / exact[k].depth - 1.0) <= 0.01);
+    }
+    EXPECT_LE(off, 1) << exit_deg << " deg";
+  }
+}
+
+TEST(WhatIf, NothingChangedIsTheChart) {
+  const ChartMaker maker = benchmarkMaker();
+  WhatIf same;
+  same.speeds = 31;
+  same.axial_depth = 0.05e-3;
+  const WhatIfChart chart = maker.whatIf(same);
+  ASSERT_EQ(chart.limit.depth.size(), 31u);
+  const auto solver = makeSolver(Method::collocation, *maker.system({}));
+  for (const std::size_t k : {10u, 20u, 30u})
+    EXPECT_NEAR(chart.limit.depth[k] / solver->limit(chart.limit.spindle_speed[k], 0.02).depth, 1.0, 0.005);
+  EXPECT_GT(chart.stable_share, 0.5);
+  EXPECT_TRUE(chart.limit_low.empty());
+  // At the torque's limit a cut takes what friction leaves of the rated torque.
+  const Prediction prediction = maker.predict(units::radPerSecFromRpm(10000.0), 0.05e-3);
+  const double torque_at_limit = prediction.point.torque * chart.torque_depth_limit[10] / 0.05e-3;
+  EXPECT_NEAR(torque_at_limit, 20.0 - 0.1 - 1e-3 * units::radPerSecFromRpm(10000.0), 1e-6);
+}
+
+// In a slot four straight teeth add up to a force that does not vary with the angle: the zero-order solution
+// (Altintas and Budak) is exact there.
+TEST(WhatIf, FourTeethInASlotHaveTheZeroOrderLimits) {
+  const ChartMaker maker = benchmarkMaker();
+  WhatIf four;
+  four.speeds = 60;
+  four.teeth = 4;
+  const WhatIfChart chart = maker.whatIf(four);
+  RegenerativeSystem system = *maker.system({});
+  system.teeth = 4;
+  const std::vector<Limit> exact =
+      makeSolver(Method::zero_order, system)->limits(chart.limit.spindle_speed, 1.0);
+  int off = 0, compared = 0;
+  for (std::size_t k = 0; k < exact.size(); ++k) {
+    if (std::isinf(chart.limit.depth[k])) continue;
+    ++compared;
+    off += !(std::abs(chart.limit.depth[k] / exact[k].depth - 1.0) <= 0.01);
+  }
+  EXPECT_GT(compared, 50);
+  EXPECT_LE(off, 1);  // where two lobes meet
+}
+
+TEST(WhatIf, OverhangBendsAsABeam) {
+  const std::vector<SystemMode> modes = systemModes(benchmark(), benchmark());
+  const std::vector<SystemMode> longer = withOverhang(modes, 2.0);
+  EXPECT_NEAR(std::abs(receptance(longer, 0.0)[0]) / std::abs(receptance(modes, 0.0)[0]), 8.0, 1e-9);
+  EXPECT_DOUBLE_EQ(longer[0].frequency, 922.0 / 4.0);
+  EXPECT_EQ(longer[0].damping_ratio, modes[0].damping_ratio);
+}
+
+TEST(WhatIf, NamesTheModeThatLimits) {
+  std::vector<SystemMode> modes = systemModes(benchmark(), benchmark());
+  modes[1].frequency = 2000.0;
+  EXPECT_EQ(dominantMode(modes, 930.0), 0);
+  EXPECT_EQ(dominantMode(modes, 2050.0), 1);
+  EXPECT_EQ(dominantMode(modes, WhatIf::SAME), -1);
+  WhatIf request;
+  request.speeds = 20;
+  const WhatIfChart chart = benchmarkMaker().whatIf(request);
+  EXPECT_EQ(chart.modes.at(0), "x 922 Hz");
+  EXPECT_EQ(chart.modes.at(1), "y 922 Hz");
+  for (std::size_t k = 0; k < 20; ++k) EXPECT_EQ(chart.mode[k] >= 0, std::isfinite(chart.limit.depth[k]));
+}
+
+TEST(WhatIf, SpreadLiesAroundTheLimit) {
+  WhatIf request;
+  request.speeds = 40;
+  request.spread = true;
+  for (const double direct : {0.0, 1e-9}) {  // a residual compliance counts as a mode more
+    const WhatIfChart chart = benchmarkMaker(direct).whatIf(request);
+    ASSERT_EQ(chart.limit_low.size(), 40u);
+    for (std::size_t k = 0; k < 40; ++k) {
+      EXPECT_LT(chart.limit_low[k], chart.limit_high[k]) << k;
+      EXPECT_GT(chart.limit_low[k], 0.0) << k;
+    }
+  }
+}
+
+TEST(WhatIf, RefusesWhatCannotBe) {
+  const ChartMaker maker = benchmarkMaker();
+  const auto refused = [&](auto change) {
+    WhatIf request;
+    change(request);
+    EXPECT_THROW(maker.whatIf(request), Error);
+  };
+  refused([](WhatIf& w) { w.teeth = 21; });
+  refused([](WhatIf& w) { w.teeth = -1; });
+  refused([](WhatIf& w) { w.helix = 1.5; });
+  refused([](WhatIf& w) { w.exit = 7.0; });
+  refused([](WhatIf& w) { w.entry = 3.0, w.exit = 1.0; });
+  refused([](WhatIf& w) { w.overhang = 0.0; });
+  refused([](WhatIf& w) { w.feed_per_tooth = -1e-4; });
+  refused([](WhatIf& w) { w.axial_depth = 0.0; });
+  refused([](WhatIf& w) { w.speeds = 1; });
+  refused([](WhatIf& w) { w.speeds = 100000; });
+  ChartParameters parameters;
+  EXPECT_THROW(ChartMaker(parameters, machine()).whatIf({}), Error);
+}
+
+}  // namespace
+}  // namespace smartmill::stability

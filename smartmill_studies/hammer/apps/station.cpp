@@ -1,0 +1,67 @@
+// rosrun smartmill_studies hammer_station: drawn tools in drawn machines before the simulated hammer station,
+// measured by the hammer's own sequence and held against their truth.
+
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "hammer/station_score.h"
+#include "smartmill_core/program.h"
+
+namespace {
+
+using namespace smartmill;
+using nlohmann::json;
+
+struct Options {
+  hammer::StationStudy study;
+  std::string out = "hammer_station";
+  int machines = 500, only = -1;
+};
+
+void run(const Options& o) {
+  std::filesystem::create_directories(o.out);
+  const std::string file =
+      o.out + "/stations_" + std::to_string(o.study.seed) + "_" + std::to_string(o.study.hits) + ".jsonl";
+  std::map<int, json> lines;
+  std::ifstream in(file);
+  for (std::string text; std::getline(in, text);) {
+    const json line = json::parse(text, nullptr, false);
+    if (!line.is_discarded()) lines[line["machine"]] = line;  // a line cut off by an end is done again
+  }
+  if (o.only >= 0) {
+    std::printf("%s\n", hammer::runStation(o.study, o.only).dump().c_str());
+    return;
+  }
+  std::ofstream table(file, std::ios::app);
+  for (int number = 0; number < o.machines; ++number) {
+    if (lines.count(number) > 0) continue;
+    lines[number] = hammer::runStation(o.study, number);
+    table << lines[number].dump() << std::endl;
+    std::fprintf(stderr, "%zu of %d machines\n", lines.size(), o.machines);
+  }
+  std::vector<json> all;
+  for (const auto& [number, line] : lines) {
+    if (number < o.machines) all.push_back(line);
+  }
+  std::printf("%s\n", hammer::scoreStations(all).dump(1).c_str());
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Options o;
+  CommandLine line{
+      "Measures drawn tools in drawn machines with the automatic hammer and scores the answers. One line of "
+      "JSON a machine in OUT/stations_SEED_HITS.jsonl; goes on where an earlier run ended; prints the "
+      "score."};
+  line.option("--machines", o.machines, "to draw").within(1, 100000).showDefault();
+  line.option("--seed", o.study.seed, "of everything drawn").showDefault();
+  line.option("--hits", o.study.hits, "a measurement").within(1, 100).showDefault();
+  line.option("--machine", o.only, "only this one, its line on standard output");
+  line.option("-o,--out", o.out, "folder of the lines").showDefault();
+  return runProgram(line, argc, argv, [&] { run(o); });
+}

@@ -1,0 +1,238 @@
+#include "hammer/station_score.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <functional>
+#include <optional>
+
+#include "hammer/station_draw.h"
+#include "hammer/station_machine.h"
+#include "smartmill_hammer/analysis/offset_factor.h"
+
+namespace smartmill::hammer {
+namespace {
+
+using nlohmann::json;
+
+constexpr double BAND_LOW = 250.0, BAND_HIGH = 4900.0;  // [Hz] of the modes that count
+constexpr double FIT_HIGH = 8000.0;  // [Hz] a mode above the band that counts bends its upper end
+constexpr double SAME_MODE = 0.015;  // [1] of the frequency
+constexpr double SHOWS = 0.05;       // [1] of the largest peak: a mode that counts
+
+struct Truth {
+  ModalModel tip, measured;  // the same modes
+};
+
+double peak(const Mode& mode) {
+  return std::abs(mode.gain) / (2.0 * mode.damping_ratio);
+}
+
+double largestPeak(const ModalModel& model) {
+  double largest = 0.0;
+  for (const Mode& mode : model.modes) {
+    if (mode.frequency > BAND_LOW && mode.frequency < BAND_HIGH) largest = std::max(largest, peak(mode));
+  }
+  return largest;
+}
+
+/// The fitted mode that a true one shows as; not where a stronger true mode is as near to it.
+std::optional<std::size_t> shownAs(const Truth& truth, std::size_t k, const std::vector<Mode>& fitted) {
+  const Mode& mode = truth.measured.modes[k];
+  for (std::size_t j = 0; j < truth.measured.modes.size(); ++j) {
+    const Mode& other = truth.measured.modes[j];
+    if (std::abs(other.frequency / mode.frequency - 1.0) < SAME_MODE && peak(other) > peak(mode)) return {};
+  }
+  std::optional<std::size_t> best;
+  for (std::size_t i = 0; i < fitted.size(); ++i) {
+    const double off = std::abs(fitted[i].frequency / mode.frequency - 1.0);
+    if (off < SAME_MODE && (!best || off < std::abs(fitted[*best].frequency / mode.frequency - 1.0)))
+      best = i;
+  }
+  return best;
+}
+
+json modeLines(const Truth& truth, const std::vector<Mode>& fitted, double factor, json& line) {
+  json modes = json::array();
+  const double tip_peak = largestPeak(truth.tip), shown_peak = largestPeak(truth.measured);
+  std::vector<bool> used(fitted.size(), false);
+  int missed = 0, alone = 0;
+  for (std::size_t k = 0; k < truth.tip.modes.size(); ++k) {
+    const Mode &tip = truth.tip.modes[k], &measured = truth.measured.modes[k];
+    if (tip.frequency < BAND_LOW || tip.frequency > BAND_HIGH) continue;
+    const auto found = shownAs(truth, k, fitted);
+    if (found) used[*found] = true;
+    const bool counts = peak(tip) > SHOWS * tip_peak;
+    if (!counts) continue;
+    if (!found) {
+      // Not shown at the sensor, or within another's width, is not the fit's fault; still no mode of the tip.
+      ++(peak(measured) > SHOWS * shown_peak ? missed : alone);
+      continue;
+    }
+    const Mode& fit = fitted[*found];
+    modes.push_back({{"f", tip.frequency},
+                     {"zeta", tip.damping_ratio},
+                     {"f_error", fit.frequency / tip.frequency - 1.0},
+                     {"f_z", (fit.frequency - tip.frequency) / fit.frequency_std},
+                     {"zeta_error", fit.damping_ratio / tip.damping_ratio - 1.0},
+                     {"zeta_z", (fit.damping_ratio - tip.damping_ratio) / fit.damping_ratio_std},
+                     {"gain_z", (fit.gain - measured.gain) / fit.gain_std},
+                     {"measured_error", fit.gain / measured.gain - 1.0},
+                     {"k_none", tip.gain / fit.gain - 1.0},
+                     {"k_444", tip.gain / (factor * fit.gain) - 1.0},
+                     {"weight", peak(measured) / shown_peak}});
+  }
+  line["missed"] = missed;
+  line["unseen"] = alone;
+  int spurious = 0;
+  for (std::size_t i = 0; i < fitted.size(); ++i) {
+    if (!used[i] && fitted[i].frequency > BAND_LOW && fitted[i].frequency < BAND_HIGH) ++spurious;
+  }
+  line["spurious"] = spurious;
+  return modes;
+}
+
+/// [1] spindle moves of the thesis's search: golden section alone.
+int thesisMoves(const StationStudy& study, int number, const DrawnStation& drawn, HammerParameters parameters,
+                const MeasureFrfGoal& goal) {
+  parameters.golden_only = 1;
+  StationMachine machine(drawn, study.seed + 7919u * static_cast<std::uint64_t>(number));
+  HammerSequence sequence(parameters, drawn.believed);
+  sequence.handle(goal);
+  StationMachine::Streams streams;
+  while (true) {
+    machine.block(streams);
+    sequence.handle(streams.samples);
+    sequence.handle(streams.state);
+    sequence.handle(streams.angle);
+    for (const Command& command : sequence.takeCommands()) machine.obey(command);
+    const auto feedback = sequence.takeFeedback();
+    if (feedback && feedback->progress >= 0.55 && feedback->progress < 0.9) sequence.cancel(machine.time());
+    if (const auto result = sequence.takeResult()) return result->spindle_moves;
+  }
+}
+
+}  // namespace
+
+json runStation(const StationStudy& study, int number) {
+  const auto begun = std::chrono::steady_clock::now();
+  const DrawnStation drawn = drawStation(study.seed, number);
+  HammerParameters parameters;
+  parameters.frf_high = parameters.fit_high = FIT_HIGH;
+  parameters.max_modes = 12;
+  parameters.sensor_face = drawn.traits.housing;  // whoever set the sensor up knows it
+  parameters.max_bad_hits = 2 * study.hits;
+  MeasureFrfGoal goal;
+  goal.stamp = 1000.0;
+  goal.tool = "drawn";
+  goal.point = POINT_TOOL_TIP;
+  goal.direction = drawn.direction;
+  goal.hits = study.hits;
+  goal.teeth = drawn.believed.tool->teeth;
+  StationMachine machine(drawn, study.seed + 7919u * static_cast<std::uint64_t>(number));
+  double seconds = 0.0;
+  const MeasureFrfResult result = measure(machine, parameters, drawn.believed, goal, seconds);
+
+  json line{{"machine", number},
+            {"out_of_range", drawn.out_of_range},
+            {"code", static_cast<int>(result.code)},
+            {"message", result.message},
+            {"moves", result.spindle_moves},
+            {"sure", std::isfinite(result.flute_sure) ? json(result.flute_sure) : json()},
+            {"seconds", seconds},
+            {"strikes", machine.strikes()},
+            {"closest_um", 1e6 * machine.closest()},
+            {"touched", machine.touched()},
+            {"struck_retreat", machine.struckRetreat() / drawn.believed.hammer->flute_depth},
+            {"insert", drawn.traits.tooth == "insert"},
+            {"zeroed", std::abs(machine.restVolt()) < 0.1},
+            {"teeth", goal.teeth}};
+  line["thesis_moves"] = thesisMoves(study, number, drawn, parameters, goal);
+  if (result.code == FrfCode::ok) {
+    const std::size_t axis = drawn.direction == "x" ? 0 : 1;
+    const sim::HammerStation station(drawn.true_model, drawn.traits, 0.0, 1e-5);
+    const sim::ToolStructure structure(drawn.traits, *drawn.believed.tool, *drawn.believed.stickout);
+    const Truth truth{structure.between(axis, 0.0, axis, 0.0), station.measured(axis, axis)};
+    const double factor = offsetFactor(*drawn.believed.stickout, drawn.believed.hammer->offset);
+    line["sensitivity_std"] = result.sensitivity_std / result.sensitivity;
+    line["cross"] = result.cross.frf.size() > 0;
+    line["modes"] = modeLines(truth, result.modes.model.modes, factor, line);
+  }
+  line["cpu"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+  return line;
+}
+
+namespace {
+
+double quantile(std::vector<double> values, double share) {
+  if (values.empty()) return 0.0;
+  std::sort(values.begin(), values.end());
+  const double at = share * static_cast<double>(values.size() - 1);
+  const auto low = static_cast<std::size_t>(at);
+  const std::size_t high = std::min(low + 1, values.size() - 1);
+  return values[low] + (at - static_cast<double>(low)) * (values[high] - values[low]);
+}
+
+/// Median and 95 % bound of the sizes; of deviations the share within 1.96.
+json spread(const std::vector<json>& modes, const char* key) {
+  std::vector<double> sizes;
+  for (const json& mode : modes) {
+    if (mode[key].is_number()) sizes.push_back(std::abs(mode[key].get<double>()));
+  }
+  return {{"median", quantile(sizes, 0.5)}, {"95", quantile(sizes, 0.95)}, {"count", sizes.size()}};
+}
+
+double within(const std::vector<json>& modes, const char* key) {
+  int inside = 0, all = 0;
+  for (const json& mode : modes) {
+    if (!mode[key].is_number()) continue;
+    ++all;
+    if (std::abs(mode[key].get<double>()) < 1.96) ++inside;
+  }
+  return all > 0 ? static_cast<double>(inside) / all : 0.0;
+}
+
+}  // namespace
+
+json scoreStations(const std::vector<json>& lines) {
+  std::vector<json> modes;
+  std::vector<double> moves, thesis, seconds, cpu, closest;
+  int good = 0, due = 0, told = 0, away = 0, touched = 0, missed = 0, unseen = 0, spurious = 0, gullet = 0;
+  for (const json& line : lines) {
+    cpu.push_back(line["cpu"]);
+    if (line["touched"]) ++touched;
+    if (line["out_of_range"]) {
+      ++away;
+      if (line["code"] == static_cast<int>(FrfCode::no_flute)) ++told;
+      continue;
+    }
+    ++due;
+    closest.push_back(line["closest_um"]);
+    if (line["code"] != static_cast<int>(FrfCode::ok)) continue;
+    ++good;
+    moves.push_back(line["moves"]);
+    thesis.push_back(line["thesis_moves"]);
+    seconds.push_back(line["seconds"]);
+    if (line["struck_retreat"] > 0.3) ++gullet;
+    missed += line["missed"].get<int>();
+    unseen += line["unseen"].get<int>();
+    spurious += line["spurious"].get<int>();
+    for (const json& mode : line["modes"]) modes.push_back(mode);
+  }
+  json score{{"machines", lines.size()},  {"due", due},
+             {"measured", good},          {"out_of_range", away},
+             {"told_so", told},           {"collisions", touched},
+             {"struck_a_gullet", gullet}, {"missed_modes", missed},
+             {"modes_unseen", unseen},    {"spurious_modes", spurious},
+             {"modes", modes.size()}};
+  score["least_gap_um"] = closest.empty() ? 0.0 : *std::min_element(closest.begin(), closest.end());
+  for (const auto& [name, values] : {std::pair{"spindle_moves", &moves}, std::pair{"thesis_moves", &thesis},
+                                     std::pair{"seconds", &seconds}, std::pair{"cpu_seconds", &cpu}})
+    score[name] = {{"median", quantile(*values, 0.5)}, {"95", quantile(*values, 0.95)}};
+  for (const char* key : {"f_error", "zeta_error", "measured_error", "k_none", "k_444"})
+    score[key] = spread(modes, key);
+  for (const char* key : {"f_z", "zeta_z", "gain_z"}) score["coverage"][key] = within(modes, key);
+  return score;
+}
+
+}  // namespace smartmill::hammer

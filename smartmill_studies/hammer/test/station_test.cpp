@@ -1,0 +1,189 @@
+// The hammer's sequence before the simulated station, whose physics is not the sequence's own.
+
+#include "hammer/station_score.h"
+
+#include <cmath>
+#include <complex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "hammer/station_draw.h"
+#include "hammer/station_machine.h"
+#include "smartmill_sim/world/hammer_station.h"
+
+namespace smartmill::hammer {
+namespace {
+
+constexpr std::uint64_t SEED = 3;
+
+MeasureFrfGoal goalOf(const DrawnStation& drawn, int hits) {
+  MeasureFrfGoal goal;
+  goal.stamp = 1000.0;
+  goal.tool = "drawn";
+  goal.point = POINT_TOOL_TIP;
+  goal.direction = drawn.direction;
+  goal.hits = hits;
+  goal.teeth = drawn.believed.tool->teeth;
+  return goal;
+}
+
+/// The first drawn machine that fulfils a condition.
+template <class Condition>
+DrawnStation firstWith(Condition condition) {
+  for (int number = 0;; ++number) {
+    const DrawnStation drawn = drawStation(SEED, number);
+    if (condition(drawn)) return drawn;
+  }
+}
+
+TEST(Station, TheSameArgumentsGiveTheSameMachine) {
+  const DrawnStation a = drawStation(5, 3), b = drawStation(5, 3), c = drawStation(5, 4);
+  EXPECT_EQ(a.mounting, b.mounting);
+  EXPECT_EQ(a.traits.spindle_frequency, b.traits.spindle_frequency);
+  EXPECT_NE(a.mounting, c.mounting);
+}
+
+// Bounds of the task for 95 % of the modes: 0.2 % of frequency, 6 % of damping; every one of these few.
+TEST(Station, MeasuresDrawnMachinesWithoutTouching) {
+  const StationStudy study{SEED, 8};
+  for (int number = 0; number < 4; ++number) {
+    const nlohmann::json line = runStation(study, number);
+    EXPECT_FALSE(line["touched"]) << number;
+    ASSERT_FALSE(line["out_of_range"]) << number;
+    ASSERT_EQ(line["code"], 0) << number << " " << line["message"];
+    EXPECT_LT(line["moves"], line["thesis_moves"]) << number;
+    EXPECT_LT(line["struck_retreat"], 0.3) << number;
+    EXPECT_FALSE(line["modes"].empty());
+    for (const nlohmann::json& mode : line["modes"]) {
+      EXPECT_LT(std::abs(mode["f_error"].get<double>()), 2e-3) << number << " " << mode["f"];
+      EXPECT_LT(std::abs(mode["zeta_error"].get<double>()), 6e-2) << number << " " << mode["f"];
+    }
+  }
+}
+
+// Struck along one axis, read across it: against the station's own cross receptance, in the lines where that
+// stands ten of their deviations above zero.
+TEST(Station, TheCrossFrfIsThatOfTheStructure) {
+  DrawnStation drawn = firstWith([](const DrawnStation& d) {
+    return d.traits.cross_sensor && !d.out_of_range && d.traits.tooth == "flute";
+  });
+  drawn.traits.plane_turn = 0.6;
+  drawn.traits.plane_ratio = 0.85;
+  drawn.traits.bounce_chance = 0.0;
+  StationMachine machine(drawn, 1);
+  HammerParameters parameters;
+  parameters.sensor_face = drawn.traits.housing;
+  double seconds = 0.0;
+  const MeasureFrfResult result = measure(machine, parameters, drawn.believed, goalOf(drawn, 10), seconds);
+  ASSERT_EQ(result.code, FrfCode::ok) << result.message;
+  EXPECT_FALSE(machine.touched());
+  ASSERT_GT(result.cross.frf.size(), 0u) << result.message;
+  const std::size_t axis = drawn.direction == "x" ? 0 : 1;
+  EXPECT_EQ(result.cross.direction, drawn.direction == "x" ? "xy" : "yx");
+  const sim::HammerStation station(drawn.true_model, drawn.traits, 0.0, 1e-5);
+  const ModalModel truth = station.measured(1 - axis, axis);
+  double off = 0.0, all = 0.0;
+  int lines = 0;
+  for (std::size_t k = 0; k < result.cross.frf.size(); ++k) {
+    const double f = result.cross.frf.frequency[k];
+    if (f < 300.0 || f > 5000.0 || std::abs(truth.response(f)) < 10.0 * result.cross.frf.std_dev[k]) continue;
+    ++lines;
+    off += std::norm(result.cross.frf.value[k] - truth.response(f));
+    all += std::norm(truth.response(f));
+  }
+  EXPECT_GT(lines, 10);
+  EXPECT_LT(std::sqrt(off / all), 0.1);
+}
+
+TEST(Station, SaysThatNothingStandsThere) {
+  const DrawnStation drawn = firstWith([](const DrawnStation& d) { return d.out_of_range; });
+  StationMachine machine(drawn, 1);
+  double seconds = 0.0;
+  const MeasureFrfResult result =
+      measure(machine, HammerParameters(), drawn.believed, goalOf(drawn, 3), seconds);
+  EXPECT_EQ(result.code, FrfCode::no_flute) << result.message;
+  EXPECT_EQ(machine.strikes(), 0);
+  EXPECT_LT(seconds, 60.0);
+}
+
+// A sensor set up far too near, or a tool far too large: stopped on the way, nothing touched.
+TEST(Station, ATooLargeToolStopsBeforeTheSensor) {
+  DrawnStation drawn = firstWith([](const DrawnStation& d) { return !d.out_of_range; });
+  for (auto& [name, place] : drawn.true_model.hammer->position) {
+    for (std::size_t axis = 0; axis < 2; ++axis) place[axis] -= 0.4e-3;
+  }
+  drawn.traits.cross_sensor = false;
+  StationMachine machine(drawn, 1);
+  double seconds = 0.0;
+  const MeasureFrfResult result =
+      measure(machine, HammerParameters(), drawn.believed, goalOf(drawn, 3), seconds);
+  EXPECT_EQ(result.code, FrfCode::no_flute) << result.message;
+  EXPECT_NE(result.message.find("too near"), std::string::npos) << result.message;
+  EXPECT_EQ(machine.strikes(), 0);
+  EXPECT_FALSE(machine.touched());
+}
+
+// A hammer that always bounces: the reason is the message's.
+TEST(Station, RefusedHitsEndTheMeasurementWithTheirReason) {
+  DrawnStation drawn = firstWith([](const DrawnStation& d) { return !d.out_of_range; });
+  drawn.traits.bounce_chance = 1.0;
+  drawn.traits.bounce_share = 0.6;
+  drawn.traits.bounce_delay = 3e-3;
+  StationMachine machine(drawn, 1);
+  HammerParameters parameters;
+  parameters.max_bad_hits = 3;
+  double seconds = 0.0;
+  const MeasureFrfResult result = measure(machine, parameters, drawn.believed, goalOf(drawn, 3), seconds);
+  EXPECT_EQ(result.code, FrfCode::no_hit) << result.message;
+  EXPECT_NE(result.message.find("4 useless hits"), std::string::npos) << result.message;
+  EXPECT_NE(result.message.find("double"), std::string::npos) << result.message;
+  EXPECT_EQ(machine.strikes(), 4);
+}
+
+// From the first to the last stage: each cancel ends the measurement, retracted.
+TEST(Station, ACancelAtEveryStageRetracts) {
+  const DrawnStation drawn =
+      firstWith([](const DrawnStation& d) { return d.traits.cross_sensor && !d.out_of_range; });
+  HammerParameters parameters;
+  parameters.sensor_face = drawn.traits.housing;
+  std::size_t stages = 0;
+  for (std::size_t stop_at = 0; stop_at <= stages; ++stop_at) {
+    StationMachine machine(drawn, 1);
+    HammerSequence sequence(parameters, drawn.believed);
+    ASSERT_TRUE(sequence.handle(goalOf(drawn, 1)));
+    StationMachine::Streams streams;
+    std::vector<std::string> seen;
+    std::optional<MeasureFrfResult> result;
+    double last = 0.0, cancelled = 0.0;
+    while (!result && machine.time() < 1200.0) {
+      machine.block(streams);
+      sequence.handle(streams.samples);
+      sequence.handle(streams.state);
+      sequence.handle(streams.angle);
+      for (const Command& command : sequence.takeCommands()) machine.obey(command);
+      if (const auto feedback = sequence.takeFeedback()) {
+        if (cancelled == 0.0) EXPECT_GE(feedback->progress, last - 1e-9) << feedback->stage;
+        last = feedback->progress;
+        seen.push_back(feedback->stage);
+        if (seen.size() == stop_at + 1 && cancelled == 0.0) {
+          cancelled = machine.time();
+          sequence.cancel(cancelled);
+        }
+      }
+      result = sequence.takeResult();
+    }
+    ASSERT_TRUE(result) << stop_at;
+    if (stop_at == 0) stages = 8;  // at least so many on the way to the first blow
+    if (result->code == FrfCode::ok) break;
+    EXPECT_EQ(result->code, FrfCode::cancelled) << result->message;
+    EXPECT_LT(machine.time() - cancelled, 15.0) << seen.back();
+    EXPECT_FALSE(machine.touched());
+    EXPECT_LT(streams.state.distance_to_go[2], 1e-9);
+  }
+}
+
+}  // namespace
+}  // namespace smartmill::hammer
