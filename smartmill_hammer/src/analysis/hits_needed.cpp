@@ -9,6 +9,11 @@
 
 namespace smartmill {
 namespace hammer {
+namespace {
+
+constexpr double MOST_HITS = 1e9;  // an int holds
+
+}  // namespace
 
 HitsNeeded hitsNeeded(const FrequencyResponse& frf, double low, double high, double asked) {
   double variance = 0.0, power = 0.0;
@@ -23,9 +28,8 @@ HitsNeeded hitsNeeded(const FrequencyResponse& frf, double low, double high, dou
   HitsNeeded result;
   result.relative_std = std::sqrt(variance / power);
   result.hits = frf.averages;
-  result.needed = std::max(
-      1,
-      static_cast<int>(std::ceil(frf.averages * std::pow(result.relative_std / asked, 2) * (1.0 - 1e-12))));
+  const double needed = std::ceil(frf.averages * std::pow(result.relative_std / asked, 2) * (1.0 - 1e-12));
+  result.needed = static_cast<int>(std::clamp(needed, 1.0, MOST_HITS));
   return result;
 }
 

