@@ -86,7 +86,7 @@ export class Spectrum {
     for (const [direction, modes] of Object.entries(this.modes ?? {}))
       for (const mode of modes) marks.push({ x: mode.frequency, label: `mode ${direction}`, color: colour(direction), dash: [2, 3] });
     const chatter = this.link.message('chatter/state');
-    if (chatter?.chatter) marks.push({ x: chatter.frequency, label: `chatter ${fixed(chatter.frequency)} Hz`, color: colour('bad'), width: 2, dash: [] });
+    if (chatter?.chatter && m.steady) marks.push({ x: chatter.frequency, label: `chatter ${fixed(chatter.frequency)} Hz`, color: colour('bad'), width: 2, dash: [] });
     return marks;
   }
 

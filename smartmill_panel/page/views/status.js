@@ -9,7 +9,7 @@ export class StatusLine {
   constructor(element, link, name, short = false) {
     Object.assign(this, { element, link, name, short });
     this.shown = '';
-    for (const topic of ['cnc/state', 'chatter/state']) link.on(topic, () => {});
+    for (const topic of ['cnc/state', 'chatter/state', 'cut/condition']) link.on(topic, () => {});
   }
 
   words() {
@@ -29,7 +29,7 @@ export class StatusLine {
     } else if (!words.length) {
       words.push(['good', RUNS[state.run]]);
     }
-    if (link.message('chatter/state')?.chatter && link.age('chatter/state') < 3) words.push(['bad', 'Chatter']);
+    if (link.message('chatter/state')?.chatter && link.message('cut/condition')?.kind === 2 && link.age('chatter/state') < 3) words.push(['bad', 'Chatter']);
     return words;
   }
 

@@ -105,6 +105,7 @@ void PanelNode::listen() {
         if (message.name != condition_)
           for (Digests& digests : digests_) digests.revolution->forget();
         condition_ = message.name;
+        if (message.kind != smartmill_msgs::CuttingCondition::CUT) steady_ = false;
         teeth_ = message.teeth;
       });
   shell_.inputs().on<smartmill_msgs::ChatterState>(

@@ -406,7 +406,7 @@ Prediction ChartMaker::predict(double spindle_speed, double axial_depth) const {
 
 WhatIfChart ChartMaker::whatIf(const WhatIf& request) const {
   constexpr int SPEEDS = 300, NODES = 8;
-  constexpr double TOLERANCE = 1e-3;
+  constexpr double TOLERANCE = 1e-3, LEAST_DEPTH = 0.01;
   request.validate();
   ChartMaker other = *this;
   const auto change = [](double& value, double wanted) {
@@ -433,8 +433,11 @@ WhatIfChart ChartMaker::whatIf(const WhatIf& request) const {
     speeds.push_back(parameters_.speed_low +
                      (parameters_.speed_high - parameters_.speed_low) * i / (count - 1));
   WhatIfChart chart;
-  chart.limit = followedLimits(*makeFloquetSolver(Method::collocation, *system, options), speeds,
-                               parameters_.max_depth / (1.0 - parameters_.depth_margin));
+  // What lies far beyond the depth in question is not looked for: it would take most of the time.
+  const double all = parameters_.max_depth / (1.0 - parameters_.depth_margin);
+  const double deepest =
+      std::isnan(request.axial_depth) ? all : std::min(all, std::max(LEAST_DEPTH, 3.0 * request.axial_depth));
+  chart.limit = followedLimits(*makeFloquetSolver(Method::collocation, *system, options), speeds, deepest);
   for (std::size_t k = 0; k < system->modes.size(); ++k) {
     const SystemMode& mode = system->modes[k];
     const bool along_x = std::abs(mode.output[0]) >= std::abs(mode.output[1]);

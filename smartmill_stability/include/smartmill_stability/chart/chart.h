@@ -81,7 +81,7 @@ class ChartMaker {
   /// @throws Error as chart(), or on a speed or depth that is not positive.
   Prediction predict(double spindle_speed, double axial_depth) const;
 
-  /// The chart of a cut that differs, by collocation from the modes, within a tenth of a second.
+  /// The chart of a cut that differs, by collocation from the modes, for who moves a slider.
   /// @throws Error while modes of x and y or the tangential coefficient are missing, or on a bad request.
   WhatIfChart whatIf(const WhatIf& request) const;
 
