@@ -73,7 +73,7 @@ class CampaignCost : public fit::Residuals {
   mutable Eigen::VectorXd apart_;  // (simulated - measured) / noise, of frozen nominal values where they are
   mutable double apart_squares_ = 0.0;
   mutable Eigen::VectorXd frozen_along_;  // frozen tangents' * apart
-  mutable BlockColumns own_columns_;  // tangents of what is not frozen
+  mutable BlockColumns own_columns_;      // tangents of what is not frozen
   mutable Linear linear_;
 };
 
