@@ -769,14 +769,22 @@ void HammerSequence::fluteFound(double now) {
   jog(now, "z", half, parameters_.approach_feed);
 }
 
+// Of a trial blow only the blow counts: the tool stands too far from the sensor for its answer to be judged.
+HitFault HammerSequence::judged(const Hit& hit) const {
+  HitJudgeOptions options{parameters_.weak_force, parameters_.second_hit_share,
+                          RANGE_SHARE * station_.range_volt, parameters_.force_high};
+  if (stage_ != Stage::trial) return hitFault(hit, options);
+  Hit blow = hit;
+  blow.response = blow.force;
+  options.response_range = 0.0;
+  return hitFault(blow, options);
+}
+
 void HammerSequence::recorded(double now, HitCollector::Record record,
                               std::optional<HitCollector::Record> cross) {
   HitFault fault{record.fault, true};
   if (fault.text.empty() && cross) fault.text = cross->fault;
-  if (fault.text.empty()) {
-    fault = hitFault(record.hit, {parameters_.weak_force, parameters_.second_hit_share,
-                                  RANGE_SHARE * station_.range_volt, parameters_.force_high});
-  }
+  if (fault.text.empty()) fault = judged(record.hit);
   if (!fault.text.empty()) return badHit(now, fault.text, fault.bad_data);
   if (stage_ == Stage::trial) return tried(now, record.hit);
   hits_.push_back(std::move(record.hit));

@@ -211,6 +211,7 @@ class HammerSequence {
   void calibrated(double now, double volt, double volt_std);
   void fluteFound(double now);
   void search(double now);
+  HitFault judged(const Hit& hit) const;
   void recorded(double now, HitCollector::Record record, std::optional<HitCollector::Record> cross);
   void badHit(double now, const std::string& why, bool bad_data);
   bool enough() const;
