@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <chrono>
 #include <random>
+#include <thread>
 
 #include "bridge_rig.h"
 #include "fault_proxy.h"
@@ -35,6 +37,11 @@ class FaultTest : public BridgeTest {
   static constexpr std::size_t STEPS = 6;
 
   void expectStandsStill(const std::string& after) {
+    // The controller learns of a lost connection in its own thread.
+    for (int i = 0; i < 2000 && machine_.streaming(); ++i) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    EXPECT_FALSE(machine_.streaming()) << after;
     const auto before = machine_.machinePosition();
     const std::string text = machine_.get(machine_.all_text);
     for (int i = 0; i < 100; ++i) {

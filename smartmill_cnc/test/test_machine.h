@@ -171,6 +171,8 @@ class TestMachine : public focas::ControllerInterface {
     halt();
   }
   focas::EwCode dncAbort() override { return get(abort_); }
+  /// Whether a program is being sent.
+  bool streaming() const { return get(session_); }
 
  private:
   void halt() {

@@ -46,7 +46,12 @@ KalmanNode::KalmanNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
                },
                [this](const TapFeedback& f) { measure_.feedback(f.stage, f.progress, f.hits_done); },
                [this](const SensorResult& r) {
-                 measure_.finish({r.code, r.message, r.frf, r.modes});
+                 FrfServer::Result result;
+                 result.code = r.code;
+                 result.message = r.message;
+                 result.frf = r.frf;
+                 result.modes = r.modes;
+                 measure_.finish(result);
                }}),
       measure_(nh, names::MEASURE_SENSOR_FRF, "kalman",
                {[this](const MeasureFrfGoal& goal, std::function<bool(bool)> begin) {

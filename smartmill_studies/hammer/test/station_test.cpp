@@ -165,7 +165,9 @@ TEST(Station, ACancelAtEveryStageRetracts) {
       sequence.handle(streams.angle);
       for (const Command& command : sequence.takeCommands()) machine.obey(command);
       if (const auto feedback = sequence.takeFeedback()) {
-        if (cancelled == 0.0) EXPECT_GE(feedback->progress, last - 1e-9) << feedback->stage;
+        if (cancelled == 0.0) {
+          EXPECT_GE(feedback->progress, last - 1e-9) << feedback->stage;
+        }
         last = feedback->progress;
         seen.push_back(feedback->stage);
         if (seen.size() == stop_at + 1 && cancelled == 0.0) {

@@ -112,7 +112,8 @@ TEST(ModalEstimate, FindsEveryModeOfAFreeBeam) {
     ASSERT_EQ(estimate.modes.size(), due.size());
     for (std::size_t k = 0; k < due.size(); ++k) {
       EXPECT_NEAR(estimate.modes[k].frequency, due[k], 1e-5 * due[k]);
-      if (k > 0) EXPECT_NEAR(estimate.modes[k].damping_ratio, damping, 0.05 * damping) << due[k];
+      if (k == 0) continue;
+      EXPECT_NEAR(estimate.modes[k].damping_ratio, damping, 0.05 * damping) << due[k];
     }
   }
 }
