@@ -456,11 +456,12 @@ void ControlledMachine::startSpindle(double time, const NcBlock& block) {
   if (block.speed) {
     modal_.speed = std::min(units::radPerSecFromRpm(*block.speed), options.spindle_max_speed);
   }
-  const bool begins = block.m_code == 3 || block.m_code == 4;
+  const int m_code = block.m_code.value_or(0);
+  const bool begins = m_code == 3 || m_code == 4;
   if (begins) {
-    turn_ = block.m_code == 3 ? Turn::forwards : Turn::backwards;
+    turn_ = m_code == 3 ? Turn::forwards : Turn::backwards;
     oriented_ = false;
-    last_m_ = *block.m_code;
+    last_m_ = m_code;
   }
   if (turn_ != Turn::off && (block.speed || begins)) {
     spindle_.ramp(time, commandedSpeed());

@@ -139,7 +139,7 @@ class ControlledMachine {
   bool move_rapid_ = false;
   struct Pending {
     PathMove move;
-    bool rapid;
+    bool rapid = false;
   };
   std::deque<Pending> pending_;  // of the running block
   SpindleMotion spindle_;

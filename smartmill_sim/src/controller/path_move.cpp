@@ -155,7 +155,7 @@ std::optional<double> PathMove::curveFeed(double acceleration) const {
 }
 
 std::array<std::array<double, 2>, 2> PathMove::extent() const {
-  std::array<std::array<double, 2>, 2> ends;
+  std::array<std::array<double, 2>, 2> ends{};
   for (std::size_t i = 0; i < 2; ++i) {
     ends[i] = {std::min(start_[i], target_[i]), std::max(start_[i], target_[i])};
   }
