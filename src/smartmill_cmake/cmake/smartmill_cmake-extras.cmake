@@ -123,6 +123,13 @@ function(smartmill_gtest name)
   add_dependencies(${PROJECT_NAME}_gtests ${PROJECT_NAME}_${name})
 endfunction()
 
+# smartmill_run_alone(NAME): a gtest of this package beside which no other runs, as it has a real-time thread.
+function(smartmill_run_alone name)
+  if(TARGET ${PROJECT_NAME}_${name})
+    set_tests_properties(_ctest_${PROJECT_NAME}_gtest_${PROJECT_NAME}_${name} PROPERTIES RUN_SERIAL TRUE)
+  endif()
+endfunction()
+
 # smartmill_rostest(LAUNCH_FILE NAME SOURCES a.cpp ... LIBRARIES x ... NODES t ...): a gtest node run by rostest.
 # NODES are targets that the launch file starts.
 function(smartmill_rostest launch name)
