@@ -1,9 +1,14 @@
 #include "dnc_stream.h"
 
+#include <linux/sockios.h>
 #include <poll.h>
+#include <sys/ioctl.h>
+#include <sys/socket.h>
 
 #include <algorithm>
+#include <chrono>
 #include <optional>
+#include <thread>
 
 #include "smartmill_focas/client.h"
 
@@ -11,6 +16,19 @@ namespace smartmill::focas {
 namespace {
 
 constexpr int MOST_UNASKED = 1000;  // frames that nobody asked for, one after the other
+constexpr int ARRIVAL_MS = 50;      // longer than TCP puts off saying that something has arrived
+
+/// Whether all that was sent has reached the controller's side; what waits here, it does not take.
+bool hasArrived(int fd) {
+  for (int i = 0; i < ARRIVAL_MS; ++i) {
+    int waiting = 0;
+    if (::ioctl(fd, SIOCOUTQ, &waiting) != 0 || waiting == 0) {
+      return true;
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  return false;
+}
 
 }  // namespace
 
@@ -118,12 +136,15 @@ void DncStream::cancel(DncResult result) {
   }
   open_ = false;
   Circuit& stream = connection_.stream;
-  const bool held_back = !stream.unsent.empty();
+  const bool held_back = !stream.unsent.empty() || !hasArrived(stream.socket.get());
   if (!held_back) {
     Connection::queue(stream, FRAME_DNC_CANCEL, DIR_STREAM, Writer().i16(0).i16(result).i16(0).i16(0).data());
   }
   if (held_back || !connection_.flush(stream)) {
-    // A word would come behind the text that the controller does not take: the stream's end comes at once.
+    // A word, and the end of the connection too, would come behind the text that the controller does not
+    // take: with nothing to linger for, the end comes at once.
+    const linger at_once{1, 0};
+    ::setsockopt(stream.socket.get(), SOL_SOCKET, SO_LINGER, &at_once, sizeof at_once);
     connection_.open(stream);
   }
 }
