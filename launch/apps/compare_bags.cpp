@@ -13,6 +13,7 @@
 #include <smartmill_msgs/ModalModel.h>
 #include <smartmill_msgs/StabilityChart.h>
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/names.h"
 #include "smartmill_core/program.h"
 #include "smartmill_launch/comparison/topic_comparison.h"
@@ -25,9 +26,8 @@ using namespace smartmill::session;
 
 /// Keys are made of stamps with every digit, so that results of equal times meet.
 std::string keyOf(const std_msgs::Header& header, const std::string& about) {
-  char stamp[40];
-  std::snprintf(stamp, sizeof stamp, "%u.%09u", header.stamp.sec, header.stamp.nsec);
-  return about + (about.empty() ? "" : " ") + "at " + stamp;
+  return about + (about.empty() ? "" : " ") + "at " +
+         formatted("%u.%09u", header.stamp.sec, header.stamp.nsec);
 }
 
 ResultRecord begin(const std_msgs::Header& header, const std::string& about) {

@@ -15,6 +15,7 @@
 #include "../src/report/session_bag.h"
 #include "../src/shell.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/program.h"
 #include "smartmill_core/units.h"
@@ -37,14 +38,12 @@ class TrueLimit {
   StabilityChart over(double low, double high, std::size_t count) const {
     const std::string csv = (folder_ / "lobes_true.csv").string(),
                       log = (folder_ / "lobes_true.txt").string();
-    char numbers[300];
-    std::snprintf(numbers, sizeof numbers,
-                  " --entry-deg %.12g --exit-deg %.12g --speeds %.12g:%.12g:%zu --max-depth-mm 1000",
+    const std::string command =
+        "rosrun smartmill_stability lobes " + shellQuoted(model_) +
+        formatted(" --entry-deg %.12g --exit-deg %.12g --speeds %.12g:%.12g:%zu --max-depth-mm 1000",
                   units::degFromRad(chart_.entry), units::degFromRad(chart_.exit),
-                  units::rpmFromRadPerSec(low), units::rpmFromRadPerSec(high), count);
-    const std::string command = "rosrun smartmill_stability lobes " + shellQuoted(model_) + numbers +
-                                " --method collocation -o " + shellQuoted(csv) + " >" + shellQuoted(log) +
-                                " 2>&1";
+                  units::rpmFromRadPerSec(low), units::rpmFromRadPerSec(high), count) +
+        " --method collocation -o " + shellQuoted(csv) + " >" + shellQuoted(log) + " 2>&1";
     if (std::system(command.c_str()) != 0) throw Error("lobes failed on the true machine, see " + log);
     return read(csv);
   }

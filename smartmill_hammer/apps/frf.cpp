@@ -12,6 +12,7 @@
 
 #include "../src/node/bag_replay.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/program.h"
 #include "smartmill_core/units.h"
 #include "smartmill_hammer/analysis/frf_files.h"
@@ -53,13 +54,6 @@ const std::map<std::string, TapFormat> FORMATS = {
 const std::map<std::string, FrfAverage> AVERAGES = {
     {"h1", FrfAverage::h1}, {"h2", FrfAverage::h2}, {"hv", FrfAverage::hv}};
 
-/// A row's plus-minus.
-std::string pm(const char* format, double value, double std) {
-  char text[80];
-  std::snprintf(text, sizeof text, format, value, std);
-  return text;
-}
-
 void printModes(const std::vector<EstimatedMode>& modes, bool receptance) {
   std::printf("  %-24s %-24s %-26s %s\n", "frequency [Hz]", "damping ratio [%]",
               receptance ? "stiffness [N/um]" : "gain [1]", "phase [deg]  evidence");
@@ -67,9 +61,9 @@ void printModes(const std::vector<EstimatedMode>& modes, bool receptance) {
     const Gain gain = gainOf(m, 0);
     const double shown = receptance ? 1.0 / gain.value / units::N_PER_UM : gain.value;
     std::printf("  %-24s %-24s %-26s %8.1f  %10.1f\n",
-                pm("%.3f +- %.3f", m.frequency, m.frequency_std).c_str(),
-                pm("%.4f +- %.4f", 100.0 * m.damping_ratio, 100.0 * m.damping_ratio_std).c_str(),
-                pm("%.4g +- %.2g", shown, std::abs(shown * gain.std / gain.value)).c_str(),
+                formatted("%.3f +- %.3f", m.frequency, m.frequency_std).c_str(),
+                formatted("%.4f +- %.4f", 100.0 * m.damping_ratio, 100.0 * m.damping_ratio_std).c_str(),
+                formatted("%.4g +- %.2g", shown, std::abs(shown * gain.std / gain.value)).c_str(),
                 units::degFromRad(gain.phase), m.evidence);
   }
 }
@@ -188,10 +182,10 @@ void writeTip(const Options& options, const FrequencyResponse& frf, const ModalE
   std::printf("at the tip (struck %.1f mm above it, read %.1f mm):\n", options.tip.struck, options.tip.read);
   for (const TipMode& m : tip.modes) {
     std::printf("  %9.2f Hz  %-26s ", m.direct.frequency,
-                pm("%.4g +- %.2g N/um", 1.0 / m.direct.gain / units::N_PER_UM,
-                   m.direct.gain_std / std::pow(m.direct.gain, 2) / units::N_PER_UM)
+                formatted("%.4g +- %.2g N/um", 1.0 / m.direct.gain / units::N_PER_UM,
+                          m.direct.gain_std / std::pow(m.direct.gain, 2) / units::N_PER_UM)
                     .c_str());
-    std::printf("%s\n", m.seen ? pm("gain x %.3f +- %.3f", m.factor, m.factor_std).c_str()
+    std::printf("%s\n", m.seen ? formatted("gain x %.3f +- %.3f", m.factor, m.factor_std).c_str()
                                : "told by the beam alone");
   }
   writeFrfCsv(tipResponse(frf, tip), options.out + "/frf_tip.csv");

@@ -12,6 +12,7 @@
 #include "smartmill_core/campaign/campaign.h"
 #include "smartmill_core/campaign/record.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/io/csv.h"
 #include "smartmill_core/model/strict_yaml.h"
 #include "smartmill_core/program.h"
@@ -89,16 +90,13 @@ void writeMatrix(const TransferMatrix& matrix, const std::string& file) {
     }
   }
   out << "\n";
-  char text[160];
   for (std::size_t l = 0; l < matrix.frequency.size(); ++l) {
-    std::snprintf(text, sizeof text, "%.6g,%.6g", matrix.frequency[l], matrix.condition[l]);
-    out << text;
+    out << formatted("%.6g,%.6g", matrix.frequency[l], matrix.condition[l]);
     for (Eigen::Index i = 0; i < matrix.forward[l].rows(); ++i) {
       for (Eigen::Index j = 0; j < matrix.forward[l].cols(); ++j) {
         const auto g = matrix.forward[l](i, j), h = matrix.inverse[l](i, j);
-        std::snprintf(text, sizeof text, ",%.6g,%.6g,%.4g,%.6g,%.6g,%.4g", g.real(), g.imag(),
-                      matrix.forward_std[l](i, j), h.real(), h.imag(), matrix.inverse_std[l](i, j));
-        out << text;
+        out << formatted(",%.6g,%.6g,%.4g,%.6g,%.6g,%.4g", g.real(), g.imag(), matrix.forward_std[l](i, j),
+                         h.real(), h.imag(), matrix.inverse_std[l](i, j));
       }
     }
     out << "\n";
@@ -160,10 +158,8 @@ void report(const TransferMatrix& matrix, double low, double high, int max_modes
     for (const kalman::StateSpaceCheck& c : kalman::checkSensor(fit.model)) {
       // A constant force is a pole at zero: A has no inverse and needs none.
       const bool integrates = !std::isfinite(c.condition);
-      char condition[24];
-      std::snprintf(condition, sizeof condition, "%7.1e", c.condition);
       std::printf("  %-32s %6d  %7s  %-12s  %-6s  %11.1f  %7d  %7.1e  %-10s  %.1e\n", c.form.c_str(),
-                  c.states, integrates ? "    -" : condition,
+                  c.states, integrates ? "    -" : formatted("%7.1e", c.condition).c_str(),
                   integrates      ? "pole at 0"
                   : c.conditioned ? "yes"
                                   : "NO",

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/program.h"
 #include "smartmill_core/units.h"
 #include "smartmill_kalman/filter/low_pass.h"
@@ -102,11 +103,8 @@ void apply(const Request& request) {
   }
   std::ofstream out(request.out);
   out << "time[s],fx[N],fy[N],fz[N]\n";
-  char line[120];
   for (std::size_t i = 0; i < record.size(); ++i) {
-    std::snprintf(line, sizeof line, "%.9g,%.6g,%.6g,%.6g\n", record.time[i], force[0][i], force[1][i],
-                  force[2][i]);
-    out << line;
+    out << formatted("%.9g,%.6g,%.6g,%.6g\n", record.time[i], force[0][i], force[1][i], force[2][i]);
   }
   out.close();
   if (!out) throw Error(request.out + ": cannot be written");

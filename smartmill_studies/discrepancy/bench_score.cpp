@@ -9,6 +9,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/io/gnuplot.h"
 
 namespace smartmill::discrepancy {
@@ -144,9 +145,7 @@ void drawReliability(const std::vector<json>& lines, const std::string& folder) 
   for (const Bin& b : bins) {
     if (b.all == 0.0) continue;
     const auto [low, high] = wilson(b.right / b.all, b.all);
-    char row[200];
-    std::snprintf(row, sizeof row, "%.5f %.5f %.5f %.5f\n", b.stated / b.all, b.right / b.all, low, high);
-    data += row;
+    data += formatted("%.5f %.5f %.5f %.5f\n", b.stated / b.all, b.right / b.all, low, high);
     csv << b.stated / b.all << "," << b.right / b.all << "," << b.all << "\n";
     std::printf("stated confidence %.4f: %.0f of %.0f named effects right\n", b.stated / b.all, b.right,
                 b.all);

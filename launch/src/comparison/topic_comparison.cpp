@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
+
+#include "smartmill_core/formatted.h"
 
 namespace smartmill::session {
 namespace {
@@ -32,18 +33,14 @@ bool TopicDifference::sameButFor(double share) const {
 }
 
 std::string TopicDifference::text(const std::string& topic) const {
-  char line[500];
-  std::snprintf(line, sizeof line, "%-22s %-9s %7zu common, %zu different", topic.c_str(),
-                same() ? "same" : "DIFFERENT", common, different);
-  std::string out = line;
+  std::string out = formatted("%-22s %-9s %7zu common, %zu different", topic.c_str(),
+                              same() ? "same" : "DIFFERENT", common, different);
   if (different > 0) {
-    std::snprintf(line, sizeof line, " (largest %.3g of %.3g; first at %s)", largest, scale, where.c_str());
-    out += line;
+    out += formatted(" (largest %.3g of %.3g; first at %s)", largest, scale, where.c_str());
   }
   const auto add = [&](std::size_t count, const char* what) {
     if (count == 0) return;
-    std::snprintf(line, sizeof line, ", %zu %s", count, what);
-    out += line;
+    out += formatted(", %zu %s", count, what);
   };
   add(first_only, "only in the first");
   add(second_only, "only in the second");

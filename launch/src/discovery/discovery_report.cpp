@@ -2,18 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/model/effect_catalogue.h"
 
 namespace smartmill::discovery {
 namespace {
-
-std::string formatted(const char* format, double a, double b) {
-  char text[80];
-  std::snprintf(text, sizeof text, format, a, b);
-  return text;
-}
 
 // Rows of one effect: each key found and true; an effect that was only found, or only hidden, has gaps.
 std::string rowsOf(const Explained::Effect* found, const EffectEntry* hidden) {
@@ -26,7 +20,7 @@ std::string rowsOf(const Explained::Effect* found, const EffectEntry* hidden) {
   };
   const auto truths = hidden ? numbersOf(*hidden) : std::vector<std::pair<std::string, double>>();
   if (!found) {
-    for (const auto& [key, truth] : truths) row(key, "-", formatted("%.5g", truth, 0.0), "not named");
+    for (const auto& [key, truth] : truths) row(key, "-", formatted("%.5g", truth), "not named");
     return rows;
   }
   for (const Explained::Parameter& p : found->parameters) {
@@ -41,8 +35,8 @@ std::string rowsOf(const Explained::Effect* found, const EffectEntry* hidden) {
     } else {
       const double off =
           kind ? parameterOf(*kind, p.key).difference(p.value, at->second) : p.value - at->second;
-      row(p.key, formatted("%.5g +- %.2g", p.value, p.std_dev), formatted("%.5g", at->second, 0.0),
-          p.std_dev > 0.0 ? formatted("%+.1f standard deviations", off / p.std_dev, 0.0) : "");
+      row(p.key, formatted("%.5g +- %.2g", p.value, p.std_dev), formatted("%.5g", at->second),
+          p.std_dev > 0.0 ? formatted("%+.1f standard deviations", off / p.std_dev) : "");
     }
   }
   return rows;

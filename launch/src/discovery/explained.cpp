@@ -1,13 +1,13 @@
 #include "smartmill_launch/discovery/explained.h"
 
 #include <cmath>
-#include <cstdio>
 #include <fstream>
 
 #include <nlohmann/json.hpp>
 
 #include "session/shown.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::discovery {
@@ -20,9 +20,7 @@ constexpr double BETTER = 0.98;         // [1] of the gap, from which on another
 constexpr double SAME_ANGLE = 1e-3;     // [rad]
 
 std::string withDeviation(double value, double std_dev) {
-  char text[80];
-  std::snprintf(text, sizeof text, "%.5g +- %.2g", value, std_dev);
-  return text;
+  return formatted("%.5g +- %.2g", value, std_dev);
 }
 
 Explained::Effect effectOf(const Json& json) {

@@ -11,7 +11,6 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/names.h"
-#include "smartmill_core/panel_names.h"
 
 namespace smartmill::session {
 namespace {

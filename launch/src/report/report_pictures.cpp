@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/io/gnuplot.h"
 #include "smartmill_core/units.h"
 
@@ -50,9 +50,7 @@ void draw(const std::filesystem::path& png, int width, int height, const std::st
 }
 
 std::string number(double value) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%.9g", value);
-  return text;
+  return formatted("%.9g", value);
 }
 
 /// -270..90: a receptance's phase goes from 0 to -180 and must not jump there.

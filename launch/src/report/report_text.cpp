@@ -1,11 +1,11 @@
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <sstream>
 
 #include <nlohmann/json.hpp>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/units.h"
 #include "smartmill_launch/report/session_report.h"
 
@@ -17,9 +17,7 @@ using Row = std::vector<std::string>;
 
 std::string shown(const char* format, double value) {
   if (std::isnan(value)) return "-";
-  char text[100];
-  std::snprintf(text, sizeof text, format, value);
-  return text;
+  return formatted(format, value);
 }
 
 std::string aligned(const std::vector<Row>& rows) {

@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/units.h"
 
@@ -25,12 +26,6 @@ constexpr double SETTLE_REVOLUTIONS = 10.0;
 constexpr int WINDOW_REVOLUTIONS = 16;
 constexpr const char* AXES = "xyz";
 constexpr const char* RESONANCE = "resonance";
-
-std::string shown(const char* format, double a, double b = 0.0) {
-  char text[200];
-  std::snprintf(text, sizeof text, format, a, b);
-  return text;
-}
 
 template <class Item>
 const Item* find(const std::vector<Item>& items, const std::string& point, const std::string& direction) {
@@ -131,12 +126,12 @@ std::string frfNote(const MeasuredFrf& measured, const MeasuredFrf* truth) {
     error += std::norm(band.value[i] - value);
     all += std::norm(value);
   }
-  std::string note = "FRF of the tool in " + measured.direction + shown(", %.0f..%.0f Hz: ", LOW, HIGH) +
+  std::string note = "FRF of the tool in " + measured.direction + formatted(", %.0f..%.0f Hz: ", LOW, HIGH) +
                      std::to_string(measured.frf.averages) + " hits";
-  if (!coherence.empty()) note += shown(", median coherence %.4f", median(coherence));
+  if (!coherence.empty()) note += formatted(", median coherence %.4f", median(coherence));
   if (all > 0.0)
-    note += shown(", measured minus true is %.2f %% of true where the coherence exceeds 0.9",
-                  100.0 * std::sqrt(error / all));
+    note += formatted(", measured minus true is %.2f %% of true where the coherence exceeds 0.9",
+                      100.0 * std::sqrt(error / all));
   return note;
 }
 
@@ -146,12 +141,13 @@ Section chartSection(const SessionRecording& recording, const std::optional<Stab
   if (!recording.chart) return section;
   const StabilityChart& chart = *recording.chart;
   for (const CutCheck& cut : cuts) {
-    section.figures.push_back({"limit at" + shown(" %.0f rpm", units::rpmFromRadPerSec(cut.spindle_speed)),
-                               "mm",
-                               cut.limit / units::MM,
-                               NOT_A_NUMBER,
-                               cut.true_limit / units::MM,
-                               {}});
+    section.figures.push_back(
+        {"limit at" + formatted(" %.0f rpm", units::rpmFromRadPerSec(cut.spindle_speed)),
+         "mm",
+         cut.limit / units::MM,
+         NOT_A_NUMBER,
+         cut.true_limit / units::MM,
+         {}});
   }
   section.figures.push_back({"limit at any speed",
                              "mm",
@@ -212,8 +208,8 @@ Section forceSection(const RecordedCut& cut, std::vector<std::string>& notes) {
   }
   const double revolutions = static_cast<double>(to - from) / cut.compensated.sampleRate() *
                              cut.condition.spindle_speed / units::TWO_PI;
-  notes.push_back("force at " + shown("%.0f rpm over %.0f revolutions",
-                                      units::rpmFromRadPerSec(cut.condition.spindle_speed), revolutions));
+  notes.push_back("force at " + formatted("%.0f rpm over %.0f revolutions",
+                                          units::rpmFromRadPerSec(cut.condition.spindle_speed), revolutions));
   return section;
 }
 
@@ -289,7 +285,7 @@ Report makeReport(const SessionRecording& recording, const std::optional<Stabili
   if (const RecordedCut* cut = recording.cut(RESONANCE)) {
     report.sections.push_back(forceSection(*cut, report.notes));
   }
-  report.notes.push_back("recording of" + shown(" %.0f s", recording.duration));
+  report.notes.push_back("recording of" + formatted(" %.0f s", recording.duration));
   report.sections.erase(std::remove_if(report.sections.begin(), report.sections.end(),
                                        [](const Section& section) { return section.figures.empty(); }),
                         report.sections.end());

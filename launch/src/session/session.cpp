@@ -10,8 +10,8 @@
 #include <boost/function.hpp>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/names.h"
-#include "smartmill_core/panel_names.h"
 #include "smartmill_core/units.h"
 #include "smartmill_ros/conversions.h"
 #include "smartmill_ros/follower.h"
@@ -22,20 +22,14 @@ namespace {
 
 constexpr double FRESH = 0.5;  // [s] since the last message of a sensor
 
-std::string format(const char* text, double a, double b = 0.0, double c = 0.0, double d = 0.0) {
-  char line[300];
-  std::snprintf(line, sizeof line, text, a, b, c, d);
-  return line;
-}
-
 std::string modesText(const smartmill_msgs::ModalModel& model) {
   std::string text;
   for (const smartmill_msgs::Mode& mode : model.modes) {
     text += text.empty() ? "" : ", ";
-    text += format("%.2f +- %.2f Hz", mode.frequency, mode.frequency_std);
-    text += model.unit == "m/N" ? format(" %.2f N/um", 1.0 / mode.gain / units::N_PER_UM)
-                                : format(" gain %.3f", mode.gain);
-    text += format(" damping %.2f %%", 100.0 * mode.damping_ratio);
+    text += formatted("%.2f +- %.2f Hz", mode.frequency, mode.frequency_std);
+    text += model.unit == "m/N" ? formatted(" %.2f N/um", 1.0 / mode.gain / units::N_PER_UM)
+                                : formatted(" gain %.3f", mode.gain);
+    text += formatted(" damping %.2f %%", 100.0 * mode.damping_ratio);
   }
   return text;
 }
@@ -49,8 +43,8 @@ std::vector<Point> pointsOf(const std::vector<smartmill_msgs::StabilityPoint>& m
 }
 
 std::string pointText(const Point& point) {
-  return format("%.0f rpm %.2f mm (limit %.2f mm)", units::rpmFromRadPerSec(point.spindle_speed),
-                point.axial_depth / units::MM, point.depth_limit / units::MM);
+  return formatted("%.0f rpm %.2f mm (limit %.2f mm)", units::rpmFromRadPerSec(point.spindle_speed),
+                   point.axial_depth / units::MM, point.depth_limit / units::MM);
 }
 
 }  // namespace
@@ -262,14 +256,14 @@ std::string Session::recorderMissing() const {
 
 std::string Session::waitReady() {
   if (!waitUntil([&] { return missing().empty(); }, parameters_.ready_timeout)) {
-    throw Error(format("after %.0f s still missing: ", parameters_.ready_timeout) + missing());
+    throw Error(formatted("after %.0f s still missing: ", parameters_.ready_timeout) + missing());
   }
   // A recorder that misses something is no reason to leave the job.
   std::string recorder;
   waitUntil([&] { return (recorder = recorderMissing()).empty(); }, parameters_.ready_timeout);
   pause(parameters_.start_delay);
-  return format("nodes, sensors and controller are there; the stock holds %.0f lanes",
-                static_cast<double>(plan_.planner().lanes())) +
+  return formatted("nodes, sensors and controller are there; the stock holds %.0f lanes",
+                   static_cast<double>(plan_.planner().lanes())) +
          (recorder.empty() ? "" : "; not there: " + recorder);
 }
 
@@ -308,7 +302,7 @@ void Session::waitVerdict() {
   };
   if (!waitUntil(passed, parameters_.program_timeout)) {
     throw Error(
-        format("chatter/state: %.0f s after the cut its end is not judged", parameters_.program_timeout));
+        formatted("chatter/state: %.0f s after the cut its end is not judged", parameters_.program_timeout));
   }
 }
 
@@ -333,13 +327,13 @@ std::string Session::waitChart() {
   };
   if (!waitUntil(there, parameters_.chart_timeout)) {
     throw Error(
-        format("stability/chart: none for these coefficients within %.0f s", parameters_.chart_timeout));
+        formatted("stability/chart: none for these coefficients within %.0f s", parameters_.chart_timeout));
   }
   const std::lock_guard<std::mutex> lock(mutex_);
   used_chart_ = *chart_;
-  return format("stable below %.3f mm at any speed, %.0f points recommended",
-                used_chart_.absolute_depth_limit / units::MM,
-                static_cast<double>(used_chart_.recommended.size()));
+  return formatted("stable below %.3f mm at any speed, %.0f points recommended",
+                   used_chart_.absolute_depth_limit / units::MM,
+                   static_cast<double>(used_chart_.recommended.size()));
 }
 
 std::string Session::choose() {

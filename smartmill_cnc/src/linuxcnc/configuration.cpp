@@ -5,6 +5,7 @@
 
 #include "smartmill_cnc/linuxcnc/protocol.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::cnc::linuxcnc {
@@ -19,9 +20,7 @@ constexpr double ORIENT_TOLERANCE = 0.02;  // [deg]
 constexpr double BEAT_LASTS = 0.35;        // [s]
 
 std::string number(double value) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%.9g", value);
-  return text;
+  return formatted("%.9g", value);
 }
 
 std::string jointSection(const MachineAxes& axes, std::size_t axis) {

@@ -1,13 +1,13 @@
 #include "smartmill_cnc/linuxcnc/linuxcnc_controller.h"
 
 #include <cmath>
-#include <cstdio>
 #include <sstream>
 #include <utility>
 
 #include "smartmill_cnc/linuxcnc/gateway_client.h"
 #include "smartmill_cnc/linuxcnc/stillness.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::cnc::linuxcnc {
@@ -22,9 +22,7 @@ constexpr const char* UNMARK = "M68 E0 Q0\n";
 constexpr const char* STOP = "M5\nM66 P0 L3 Q30\n";  // waits for the input "spindle stands"
 
 std::string number(double value) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%.4f", value);
-  return text;
+  return formatted("%.4f", value);
 }
 
 /// One block: its words are separated by blanks (checkProgram).

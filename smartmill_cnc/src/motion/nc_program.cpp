@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <cstdlib>
 #include <optional>
 #include <sstream>
@@ -10,6 +9,7 @@
 #include <vector>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/require.h"
 #include "smartmill_core/units.h"
 
@@ -41,9 +41,7 @@ struct Refusal {
 }
 
 std::string shown(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.6g", value);
-  return text;
+  return formatted("%.6g", value);
 }
 
 std::string withoutComments(const std::string& line) {
@@ -402,12 +400,9 @@ std::string orientProgram(double angle, int macro) {
 }
 
 std::string fixedDecimals(double value, int decimals) {
-  char text[64];
-  std::snprintf(text, sizeof text, "%.*f", decimals, value);
-  if (text[0] == '-' && std::string(text).find_first_not_of("-0.") == std::string::npos) {
-    return text + 1;
-  }
-  return text;
+  const std::string text = formatted("%.*f", decimals, value);
+  const bool minus_zero = text[0] == '-' && text.find_first_not_of("-0.") == std::string::npos;
+  return minus_zero ? text.substr(1) : text;
 }
 
 }  // namespace smartmill::cnc

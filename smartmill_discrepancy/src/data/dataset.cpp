@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <set>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/signal/fourier.h"
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_discrepancy/data/phase.h"
@@ -37,9 +37,7 @@ std::size_t quietSamples(const CampaignTest& test, const Record& record) {
 }
 
 std::string number(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.6g", value);
-  return text;
+  return formatted("%.6g", value);
 }
 
 // A noisy channel repeats its extreme reading only when it is clipped; a dead channel repeats everything.

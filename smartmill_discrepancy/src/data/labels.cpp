@@ -4,10 +4,10 @@
 #include <array>
 #include <cmath>
 
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/units.h"
 #include "smartmill_discrepancy/gap/twin_runner.h"
-#include "smartmill_discrepancy/results/formatted.h"
 #include "smartmill_sim/twin/twin.h"
 
 namespace smartmill::discrepancy {

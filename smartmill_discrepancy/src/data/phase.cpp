@@ -5,8 +5,8 @@
 #include <cmath>
 #include <complex>
 
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/units.h"
-#include "smartmill_discrepancy/results/formatted.h"
 #include "smartmill_sim/twin/twin.h"
 
 namespace smartmill::discrepancy {

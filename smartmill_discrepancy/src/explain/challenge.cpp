@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "smartmill_discrepancy/results/formatted.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_discrepancy/search/refinement.h"
 #include "smartmill_discrepancy/search/standing.h"
 

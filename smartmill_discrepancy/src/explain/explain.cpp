@@ -5,13 +5,13 @@
 #include <cmath>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_discrepancy/data/labels.h"
 #include "smartmill_discrepancy/explain/challenge.h"
 #include "smartmill_discrepancy/explain/judge.h"
 #include "smartmill_discrepancy/explain/nameless.h"
 #include "smartmill_discrepancy/explain/outcome.h"
 #include "smartmill_discrepancy/explain/sentence.h"
-#include "smartmill_discrepancy/results/formatted.h"
 #include "smartmill_discrepancy/search/refinement.h"
 #include "smartmill_sim/twin/twin.h"
 

@@ -6,9 +6,9 @@
 #include <map>
 #include <utility>
 
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/model/effect_catalogue.h"
 #include "smartmill_core/units.h"
-#include "smartmill_discrepancy/results/formatted.h"
 #include "smartmill_discrepancy/search/evidence.h"
 #include "smartmill_discrepancy/search/refinement.h"
 #include "smartmill_discrepancy/search/screening.h"

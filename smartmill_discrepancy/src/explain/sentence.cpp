@@ -5,8 +5,8 @@
 #include <map>
 #include <vector>
 
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/model/effect_catalogue.h"
-#include "smartmill_discrepancy/results/formatted.h"
 
 namespace smartmill::discrepancy {
 namespace {

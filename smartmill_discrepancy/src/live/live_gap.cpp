@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/signal/interpolate.h"
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/units.h"
@@ -41,9 +41,7 @@ double unsettled(const Record& record, const CampaignTest& test) {
 }
 
 std::string chatterText(const Chatter& chatter) {
-  char text[96];
-  std::snprintf(text, sizeof text, "chatters at %.0f Hz with %.0f N", chatter.frequency, chatter.amplitude);
-  return text;
+  return formatted("chatters at %.0f Hz with %.0f N", chatter.frequency, chatter.amplitude);
 }
 
 void addLoad(const Spindle& spindle, const Stretch& stretch, const Record& simulated,

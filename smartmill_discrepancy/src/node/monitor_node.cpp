@@ -5,7 +5,7 @@
 
 #include "node/wiring.h"
 #include "smartmill_core/error.h"
-#include "smartmill_core/panel_names.h"
+#include "smartmill_core/names.h"
 #include "smartmill_ros/frames.h"
 #include "smartmill_ros/node_main.h"
 #include "smartmill_ros/parameter_reader.h"

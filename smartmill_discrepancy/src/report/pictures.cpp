@@ -7,6 +7,7 @@
 #include <set>
 #include <sstream>
 
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/io/gnuplot.h"
 
 namespace smartmill::discrepancy {
@@ -81,8 +82,7 @@ std::string spectra(const Explanation& e) {
       << ",2\nset grid\nset logscale y\nset xlabel 'frequency [Hz]'\nset format y '%.0e'\n";
   for (std::size_t k = 0; k < n; ++k) {
     const SpectrumCurve& s = e.spectra[k];
-    char order[60] = "";
-    if (s.order_hz > 0.0) std::snprintf(order, sizeof order, " (one order: %.4g Hz)", s.order_hz);
+    const std::string order = s.order_hz > 0.0 ? formatted(" (one order: %.4g Hz)", s.order_hz) : "";
     out << "unset arrow\n";
     for (const std::vector<Finding>* list : {&e.where, &e.unexplained}) {
       for (const Finding& f : *list) {

@@ -1,12 +1,12 @@
 #include "smartmill_discrepancy/report/report_html.h"
 
-#include <cstdio>
 #include <fstream>
 #include <iterator>
 #include <map>
 #include <sstream>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 
 namespace smartmill::discrepancy {
 namespace {
@@ -19,9 +19,7 @@ std::string escaped(const std::string& text) {
 }
 
 std::string number(double value, const char* format = "%.4g") {
-  char text[40];
-  std::snprintf(text, sizeof text, format, value);
-  return text;
+  return formatted(format, value);
 }
 
 std::string base64(const std::string& bytes) {

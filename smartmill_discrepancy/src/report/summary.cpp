@@ -1,6 +1,6 @@
 #include "smartmill_discrepancy/report/summary.h"
 
-#include "smartmill_discrepancy/results/formatted.h"
+#include "smartmill_core/formatted.h"
 
 namespace smartmill::discrepancy {
 std::string summaryOf(const Explanation& e) {

@@ -3,8 +3,8 @@
 #include <cmath>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/units.h"
-#include "smartmill_discrepancy/results/formatted.h"
 #include "smartmill_sim/twin/twin.h"
 
 namespace smartmill::discrepancy {

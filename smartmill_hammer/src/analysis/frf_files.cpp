@@ -1,9 +1,9 @@
 #include "smartmill_hammer/analysis/frf_files.h"
 
 #include <cmath>
-#include <cstdio>
 #include <utility>
 
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/io/csv.h"
 #include "smartmill_core/io/text_file.h"
 #include "smartmill_core/io/uff.h"
@@ -93,11 +93,9 @@ void writeFrfUff(const std::vector<NamedFrf>& frfs, const std::string& file, boo
 void writeCutPro(const FrequencyResponse& frf, const std::string& file) {
   std::string text;
   const std::string unit = frf.unit == "m/N" ? "m/N" : "N/N";
-  char row[120];
   for (std::size_t k = 0; k < frf.size(); ++k) {
-    std::snprintf(row, sizeof row, "%14.6e\t%14.12e\t%14.12e\t", frf.frequency[k], frf.value[k].real(),
-                  frf.value[k].imag());
-    text += row;
+    text +=
+        formatted("%14.6e\t%14.12e\t%14.12e\t", frf.frequency[k], frf.value[k].real(), frf.value[k].imag());
     if (k == 0) text += "Freq\tHz\tReal\t" + unit + "\tImag\t" + unit + "\t";
     text += "\n";
   }

@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
+
+#include "smartmill_core/formatted.h"
 
 namespace smartmill {
 namespace hammer {
@@ -21,9 +22,7 @@ double known(double std) {
 }
 
 std::string naming(const char* quantity, const Mode& mode) {
-  char text[80];
-  std::snprintf(text, sizeof text, "%s of the mode at %.0f Hz", quantity, mode.frequency);
-  return text;
+  return formatted("%s of the mode at %.0f Hz", quantity, mode.frequency);
 }
 
 HealthChange change(const std::string& what, double before, double before_std, double now, double now_std,
@@ -91,11 +90,9 @@ std::string driftOf(const std::vector<HealthChange>& changes) {
     if (c.drifted() && (!worst || std::abs(c.sigmas) > std::abs(worst->sigmas))) worst = &c;
   }
   if (!worst) return "";
-  char text[160];
   if (!std::isfinite(worst->sigmas)) return worst->what;
-  std::snprintf(text, sizeof text, "%s changed by %+.1f %% (%.1f deviations)", worst->what.c_str(),
-                100.0 * worst->relative, std::abs(worst->sigmas));
-  return text;
+  return formatted("%s changed by %+.1f %% (%.1f deviations)", worst->what.c_str(), 100.0 * worst->relative,
+                   std::abs(worst->sigmas));
 }
 
 }  // namespace hammer

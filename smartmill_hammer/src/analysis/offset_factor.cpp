@@ -1,19 +1,15 @@
 #include "smartmill_hammer/analysis/offset_factor.h"
 
-#include <cstdio>
-
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 
 namespace smartmill {
 namespace hammer {
 
 double offsetFactor(double stickout, double offset) {
   if (!(offset >= 0.0 && offset < stickout)) {
-    char line[120];
-    std::snprintf(line, sizeof line,
-                  "offset correction: the hammer's offset %.2f mm must lie in 0..stickout (%.2f mm)",
-                  1e3 * offset, 1e3 * stickout);
-    throw Error(line);
+    throw Error(formatted("offset correction: the hammer's offset %.2f mm must lie in 0..stickout (%.2f mm)",
+                          1e3 * offset, 1e3 * stickout));
   }
   const double l = stickout - offset;
   return 2.0 * stickout * stickout * stickout / (l * l * (3.0 * stickout - l));

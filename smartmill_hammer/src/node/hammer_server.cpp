@@ -1,10 +1,10 @@
 #include "hammer_server.h"
 
-#include <cstdio>
 #include <string>
 #include <utility>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/names.h"
 #include "smartmill_hammer/analysis/health.h"
 #include "smartmill_ros/node_main.h"
@@ -72,9 +72,8 @@ void HammerServer::watch() {
   machine_->pump();
   const InputHealth* dead = shell_.inputs().dead({names::HAMMER, names::CNC_STATE, names::SPINDLE_ANGLE});
   if (!dead) return;
-  char text[120];
-  std::snprintf(text, sizeof text, "%s is silent for %.1f s", dead->topic().c_str(),
-                dead->watchdog().silent());
+  const std::string text =
+      formatted("%s is silent for %.1f s", dead->topic().c_str(), dead->watchdog().silent());
   sorted_.lost(text);
   server_.refuseWaiting(text, parameters_.stale_timeout);
 }

@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <utility>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill {
@@ -107,9 +107,7 @@ void FluteSearch::bracket(const Point& p) {
   if (std::abs(last.angle - start_) > units::TWO_PI + 2.0 * options_.max_step) {
     double top = walk_.front().volt;
     for (const Point& w : walk_) top = std::max(top, w.volt);
-    char text[120];
-    std::snprintf(text, sizeof text, "no flute within one turn: the sensor reads %.3f V at most", top);
-    return fail(text);
+    return fail(formatted("no flute within one turn: the sensor reads %.3f V at most", top));
   }
   step_ = std::min(GOLDEN_RATIO * step_, options_.max_step);
   next_ = last.angle + direction_ * step_;

@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <utility>
 
 #include <Eigen/Core>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/math/linear_algebra.h"
 
 namespace smartmill {
@@ -81,25 +81,18 @@ void SensorCalibration::ask(double distance) {
       next_ = -options_.first_jog;
       return;
     }
-    char text[160];
-    std::snprintf(
-        text, sizeof text,
+    return fail(formatted(
         "the sensor is still out of range (%.2f V) where the tool's edges may touch it, %.2f mm nearer",
-        volt_, 1e3 * travelled_);
-    return fail(text);
+        volt_, 1e3 * travelled_));
   }
   if (travelled_ + rounded > options_.max_travel) {
-    char text[120];
-    std::snprintf(text, sizeof text, "the tool is still out of the sensor's range %.2f mm nearer (%.2f V)",
-                  1e3 * travelled_, volt_);
-    return fail(text);
+    return fail(formatted("the tool is still out of the sensor's range %.2f mm nearer (%.2f V)",
+                          1e3 * travelled_, volt_));
   }
   // The gap read from the nominal curve; out of range there is at least the gap at the end of the range.
   if (rounded > 0.0 && nominalGap(volt_) - rounded < options_.min_gap) {
-    char text[120];
-    std::snprintf(text, sizeof text, "a jog of %.0f um at %.2f V would bring the tool nearer than %.0f um",
-                  1e6 * rounded, volt_, 1e6 * options_.min_gap);
-    return fail(text);
+    return fail(formatted("a jog of %.0f um at %.2f V would bring the tool nearer than %.0f um",
+                          1e6 * rounded, volt_, 1e6 * options_.min_gap));
   }
   next_ = rounded;
 }
@@ -165,10 +158,8 @@ void SensorCalibration::approached(double change, double moved, double noise) {
   // Far off, hardly sensitive.
   if (!clear && volt_ < -0.5 * options_.range_volt) return ask(options_.max_jog);
   if (!clear || !(slope > 0.0)) {
-    char text[120];
-    std::snprintf(text, sizeof text, "the sensor answers a jog of %.0f um by %.4f V: no sensitivity",
-                  1e6 * moved, change);
-    return fail(text);
+    return fail(
+        formatted("the sensor answers a jog of %.0f um by %.4f V: no sensitivity", 1e6 * moved, change));
   }
   sensitivity_ = 1.0 / slope;
   sensitivity_std_ =
@@ -199,11 +190,9 @@ void SensorCalibration::finish() {
     sensitivity_ /= 1.0 - share * share;
   }
   if (held_back_ && sensitivity_std_ > options_.largest_std * sensitivity_) {
-    char text[160];
-    std::snprintf(text, sizeof text,
-                  "the tool's edges hold it back at %.2f V, where the sensitivity is known to %.1f %% only",
-                  volt_, 100.0 * sensitivity_std_ / sensitivity_);
-    return fail(text);
+    return fail(
+        formatted("the tool's edges hold it back at %.2f V, where the sensitivity is known to %.1f %% only",
+                  volt_, 100.0 * sensitivity_std_ / sensitivity_));
   }
   state_ = State::done;
 }

@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <utility>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/modal/hit_judge.h"
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/units.h"
@@ -51,12 +51,6 @@ double roundTo(double value, double step) {
   return std::round(value / step) * step;
 }
 
-std::string format(const char* pattern, double a, double b = 0.0, double c = 0.0) {
-  char line[200];
-  std::snprintf(line, sizeof line, pattern, a, b, c);
-  return line;
-}
-
 }  // namespace
 
 std::string moveProgram(const Axes3& from, const std::vector<Waypoint>& path) {
@@ -68,14 +62,12 @@ std::string moveProgram(const Axes3& from, const std::vector<Waypoint>& path) {
     for (std::size_t i = 0; i < 3; ++i) {
       const double distance = (w.position[i] - at[i]) / units::MM;
       if (std::abs(distance) < 0.5e-4) continue;
-      char word[40];
-      std::snprintf(word, sizeof word, " %c%.4f", "XYZ"[i], distance);
-      block += word;
+      block += formatted(" %c%.4f", "XYZ"[i], distance);
       moves = true;
     }
     at = w.position;
     if (!moves) continue;
-    if (w.feed > 0.0) block += format(" F%.1f", w.feed / units::MM * 60.0);
+    if (w.feed > 0.0) block += formatted(" F%.1f", w.feed / units::MM * 60.0);
     text += block + "\n";
   }
   return text + "G90\n";
@@ -152,8 +144,8 @@ bool HammerSequence::handle(const MeasureFrfGoal& goal) {
   } else if (teeth < 1 || teeth > 20) {
     fault = "teeth " + std::to_string(teeth) + ": 1..20 are due";
   } else if (!(goal.stickout == 0.0 || (goal.stickout > station_.offset && std::isfinite(goal.stickout)))) {
-    fault = format("stickout %.2f mm: 0 or more than the hammer's offset %.2f mm is due", 1e3 * goal.stickout,
-                   1e3 * station_.offset);
+    fault = formatted("stickout %.2f mm: 0 or more than the hammer's offset %.2f mm is due",
+                      1e3 * goal.stickout, 1e3 * station_.offset);
   }
   if (!fault.empty()) {
     result_.code = FrfCode::bad_goal;
@@ -282,12 +274,12 @@ bool HammerSequence::late(double now) {
   switch (wait_) {
     case Wait::angle:
       abort(now, FrfCode::motion_failed,
-            format("the spindle did not come to %.2f deg within %.1f s", units::degFromRad(target_angle_),
-                   waited));
+            formatted("the spindle did not come to %.2f deg within %.1f s", units::degFromRad(target_angle_),
+                      waited));
       return true;
     case Wait::position:
       abort(now, FrfCode::motion_failed,
-            format("the axes did not come to their place within %.1f s", waited));
+            formatted("the axes did not come to their place within %.1f s", waited));
       return true;
     case Wait::average:
       abort(now, FrfCode::bad_data, "no sound voltage of the displacement sensor");
@@ -296,7 +288,7 @@ bool HammerSequence::late(double now) {
       if (collector_.recording()) return false;
       collector_.disarm();
       cross_collector_.disarm();
-      badHit(now, format("no hit seen within %.1f s of the command", parameters_.strike_timeout), false);
+      badHit(now, formatted("no hit seen within %.1f s of the command", parameters_.strike_timeout), false);
       return true;
     default:
       return false;
@@ -402,7 +394,7 @@ void HammerSequence::handle(const SampleBlock& block) {
     }
     if (tooNear(volt)) {
       abort(t, FrfCode::no_flute,
-            format("the tool is too near to the sensor: %.2f V is the end of its range", volt));
+            formatted("the tool is too near to the sensor: %.2f V is the end of its range", volt));
     } else if (record && wait_ == Wait::hit) {
       recorded(t, std::move(*record), std::move(beside));
     } else if (wait_ == Wait::rest && t >= rest_until_ - SAME_TIME) {
@@ -640,7 +632,7 @@ void HammerSequence::measured(double now, double volt, double volt_std) {
   if (search_->volt() > RANGE_SHARE * station_.range_volt) {
     return abort(
         now, FrfCode::no_flute,
-        format("the flute is too near to the sensor: %.2f V is the end of its range", search_->volt()));
+        formatted("the flute is too near to the sensor: %.2f V is the end of its range", search_->volt()));
   }
   fluteFound(now);
 }
@@ -668,7 +660,7 @@ void HammerSequence::tried(double now, const Hit& hit) {
   swing_ = LARGEST_SWING * std::max(0.0, nominalGap(rest) - nominalGap(std::max(rest, top - noise)));
   swing_ = std::min(*swing_, station_.gap_at_zero_volt);
   stage_ = Stage::calibrate;
-  say(format("a blow swings the tool by %.0f um at most towards the sensor", 1e6 * *swing_), 0.6);
+  say(formatted("a blow swings the tool by %.0f um at most towards the sensor", 1e6 * *swing_), 0.6);
   average(now + parameters_.rest_time);
 }
 
@@ -716,8 +708,9 @@ void HammerSequence::sensorKnown(double now) {
             calibration_->volt()};
   const bool held_back = calibration_->heldBack();
   calibration_.reset();
-  say(format("sensor calibrated: %.3f +- %.3f um/V", 1e6 * sensor.sensitivity, 1e6 * sensor.sensitivity_std) +
-          (held_back ? format(" at %.2f V, held back by the tool's edges", sensor.volt) : std::string()),
+  say(formatted("sensor calibrated: %.3f +- %.3f um/V", 1e6 * sensor.sensitivity,
+                1e6 * sensor.sensitivity_std) +
+          (held_back ? formatted(" at %.2f V, held back by the tool's edges", sensor.volt) : std::string()),
       stage_ == Stage::calibrate         ? 0.62
       : stage_ == Stage::calibrate_cross ? 0.66
                                          : 0.7);
@@ -761,10 +754,10 @@ void HammerSequence::fluteFound(double now) {
   result_.flute_high -= full_pitch * std::round((result_.flute_high - expected_angle_) / full_pitch);
   result_.flute_hammer = 2.0 * result_.flute_high - result_.flute_low;  // eq. 4.1
   stage_ = Stage::to_tip;
-  say(format("flute at %.2f deg at the tip, %.2f deg halfway up, %.2f deg at the hammer",
-             units::degFromRad(result_.flute_low), units::degFromRad(result_.flute_high),
-             units::degFromRad(result_.flute_hammer)) +
-          format(", sure by %.1f %%, %.0f spindle moves", 100.0 * result_.flute_sure, result_.spindle_moves),
+  say(formatted("flute at %.2f deg at the tip, %.2f deg halfway up, %.2f deg at the hammer",
+                units::degFromRad(result_.flute_low), units::degFromRad(result_.flute_high),
+                units::degFromRad(result_.flute_hammer)) +
+          formatted(", sure by %.1f %%, %d spindle moves", 100.0 * result_.flute_sure, result_.spindle_moves),
       0.48);
   jog(now, "z", half, parameters_.approach_feed);
 }
@@ -892,7 +885,7 @@ void HammerSequence::evaluate() {
     result_.message =
         std::to_string(hits_.size()) + " hits, " + std::to_string(result_.modes.model.modes.size()) +
         " modes" +
-        (goal_.stickout > 0.0 ? format(", offset correction %.3f", offsetCorrection()) : std::string()) +
+        (goal_.stickout > 0.0 ? formatted(", offset correction %.3f", offsetCorrection()) : std::string()) +
         (no_cross_.empty() ? std::string() : ", no cross FRF: " + no_cross_);
   } catch (const Error& error) {
     result_.code = FrfCode::fit_failed;

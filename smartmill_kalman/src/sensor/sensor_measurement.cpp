@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <utility>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/modal/hit_judge.h"
 #include "smartmill_core/modal/impact_analysis.h"
 #include "smartmill_core/modal/modal_fit.h"
@@ -20,12 +20,6 @@ constexpr double SAME_TIME = 1e-6;  // [s]
 constexpr std::size_t LEAST_STATIC_LINES = 4;
 /// Share of the time before the trigger that is free of the foot of the hit.
 constexpr double QUIET_SHARE = 0.75;
-
-std::string format(const char* pattern, double a, double b = 0.0) {
-  char line[200];
-  std::snprintf(line, sizeof line, pattern, a, b);
-  return line;
-}
 
 }  // namespace
 
@@ -134,7 +128,7 @@ void SensorMeasurement::sample(double time, std::uint64_t index, double rate, do
     if (time >= rest_until_ - SAME_TIME) strike(time);
   } else if (time > deadline_ && !collector_.recording()) {
     collector_.disarm();
-    badHit(time, format("no hit within %.1f s", parameters_.strike_timeout), false);
+    badHit(time, formatted("no hit within %.1f s", parameters_.strike_timeout), false);
   }
 }
 
@@ -212,8 +206,8 @@ void SensorMeasurement::evaluate() {
     if (!(off <= parameters_.static_tolerance + 4.0 * result_.static_gain_std)) {
       return finish(
           FrfCode::bad_data,
-          format("static gain %.3f +- %.3f, 1 is due: check the hammer's and the sensor's sensitivity",
-                 result_.static_gain, result_.static_gain_std));
+          formatted("static gain %.3f +- %.3f, 1 is due: check the hammer's and the sensor's sensitivity",
+                    result_.static_gain, result_.static_gain_std));
     }
     for (std::size_t k = 0; k < frf.size(); ++k) {
       if (result_.static_gain < 0.0) frf.value[k] = -frf.value[k];
@@ -231,7 +225,7 @@ void SensorMeasurement::evaluate() {
     result_.modes.relative_error = fit.relative_error;
     finish(FrfCode::ok, std::to_string(hits_.size()) + " hits, " + std::to_string(fit.model.modes.size()) +
                             " modes, static gain measured " +
-                            format("%.3f +- %.3f", result_.static_gain, result_.static_gain_std));
+                            formatted("%.3f +- %.3f", result_.static_gain, result_.static_gain_std));
   } catch (const Error& error) {
     finish(FrfCode::fit_failed, error.what());
   }

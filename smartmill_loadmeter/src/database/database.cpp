@@ -10,6 +10,7 @@
 
 #include "record_fields.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/model/machine_model.h"
 
 namespace smartmill::loadmeter {
@@ -94,10 +95,7 @@ std::string identityOf(CoefficientRecord record) {
     a = (a ^ static_cast<unsigned char>(c)) * 1099511628211ull;
     b = (b ^ static_cast<unsigned char>(c)) * 1099511628211ull + 0x9e3779b97f4a7c15ull;
   }
-  char id[40];
-  std::snprintf(id, sizeof id, "%016llx%016llx", static_cast<unsigned long long>(a),
-                static_cast<unsigned long long>(b));
-  return id;
+  return formatted("%016llx%016llx", static_cast<unsigned long long>(a), static_cast<unsigned long long>(b));
 }
 
 int bucketOf(double cutting_speed) {

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/units.h"
 #include "smartmill_loadmeter/calibration/fit.h"
@@ -19,11 +19,9 @@ constexpr double MODEL_ERROR = 0.03;  // [1] of a coefficient: thin shear zone, 
 
 void checkEdge(double rake, double inclination) {
   if (std::abs(rake) < radFromDeg(60.0) && inclination >= 0.0 && inclination < radFromDeg(80.0)) return;
-  char text[160];
-  std::snprintf(text, sizeof text,
-                "oblique edge: rake %.1f deg (-60 < rake < 60), inclination %.1f deg (0 <= inclination < 80)",
-                units::degFromRad(rake), units::degFromRad(inclination));
-  throw Error(text);
+  throw Error(
+      formatted("oblique edge: rake %.1f deg (-60 < rake < 60), inclination %.1f deg (0 <= inclination < 80)",
+                units::degFromRad(rake), units::degFromRad(inclination)));
 }
 
 struct Belief {

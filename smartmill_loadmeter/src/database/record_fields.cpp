@@ -1,8 +1,8 @@
 #include "record_fields.h"
 
 #include <cmath>
-#include <cstdio>
 
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/model/machine_model.h"
 
 namespace smartmill::loadmeter {
@@ -92,9 +92,7 @@ const std::vector<NumberField>& numberFields() {
 
 std::string exactNumber(double value) {
   if (!std::isfinite(value)) return {};
-  char text[40];
-  std::snprintf(text, sizeof text, "%.17g", value);
-  return text;
+  return formatted("%.17g", value);
 }
 
 }  // namespace smartmill::loadmeter

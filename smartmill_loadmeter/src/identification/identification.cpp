@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/signal/steady_path.h"
 #include "smartmill_core/units.h"
 
@@ -122,10 +122,8 @@ void LoadMeterIdentification::handle(const LoadSample& sample) {
   if (!condition_ || condition_->kind == CuttingCondition::Kind::none) return;
   if (!std::isfinite(sample.spindle_load) || !std::isfinite(sample.spindle_speed)) {
     if (bad_data_.empty()) {
-      char text[200];
-      std::snprintf(text, sizeof text, "test '%s': the load sample at %.3f s is not a finite number",
-                    condition_->name.c_str(), sample.stamp);
-      bad_data_ = text;
+      bad_data_ = formatted("test '%s': the load sample at %.3f s is not a finite number",
+                            condition_->name.c_str(), sample.stamp);
     }
     return;
   }
@@ -295,12 +293,11 @@ IdentifyResult LoadMeterIdentification::identify(const IdentifyGoal& goal) const
   if (!goal.tool.empty()) k.tool = goal.tool;
   if (!goal.material.empty()) k.material = goal.material;
   result.coefficients = k;
-  char text[200];
-  std::snprintf(
-      text, sizeof text, "Ktc %.1f +- %.1f N/mm2, Kte %.2f +- %.2f N/mm from %zu air cuts and %zu cuts",
-      k.value.ktc / units::N_PER_MM2, k.std_dev.ktc / units::N_PER_MM2, k.value.kte / units::N_PER_MM,
-      k.std_dev.kte / units::N_PER_MM, air_cuts_.size(), cuts.size());
-  result.message = text + aside;
+  result.message = formatted("Ktc %.1f +- %.1f N/mm2, Kte %.2f +- %.2f N/mm from %zu air cuts and %zu cuts",
+                             k.value.ktc / units::N_PER_MM2, k.std_dev.ktc / units::N_PER_MM2,
+                             k.value.kte / units::N_PER_MM, k.std_dev.kte / units::N_PER_MM, air_cuts_.size(),
+                             cuts.size()) +
+                   aside;
   return result;
 }
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <set>
 
@@ -10,6 +9,7 @@
 
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_core/units.h"
 #include "smartmill_loadmeter/calibration/load_meter.h"
@@ -551,12 +551,11 @@ void LoadEstimator::describe(LoadRecordResult* result) const {
   if (terms.runout && !(options_.runout_uncertainty > 0.0)) result->terms.push_back("runout");
   if (terms.lag && !options_.spindle_uncertainty) result->terms.push_back("load meter's lag");
   if (chosen_.disagrees()) {
-    char text[200];
-    std::snprintf(text, sizeof text,
-                  "the records disagree by %.3f %% (chi2 %.1f a degree of freedom): something acts that the "
+    result->notes.push_back(
+        where_ +
+        formatted("the records disagree by %.3f %% (chi2 %.1f a degree of freedom): something acts that the "
                   "model lacks, the coefficients carry its bias",
-                  100.0 * chosen_.share, chosen_.misfit);
-    result->notes.push_back(where_ + text);
+                  100.0 * chosen_.share, chosen_.misfit));
   }
 }
 

@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <set>
 
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::loadmeter {
@@ -216,12 +216,9 @@ TestPlan planTests(const ToolGeometry& tool, const Spindle& spindle, const Cutti
   const bool reached = planner.choose(most);
   const std::array<double, 2> s = planner.stds();
   if (!reached) {
-    char text[200];
-    std::snprintf(
-        text, sizeof text,
+    throw Error(formatted(
         "test plan: %zu cuts within the limits reach Ktc +- %.3g N/mm2 and Kte +- %.3g N/mm, more is asked",
-        most, s[0] / units::N_PER_MM2, s[1] / units::N_PER_MM);
-    throw Error(text);
+        most, s[0] / units::N_PER_MM2, s[1] / units::N_PER_MM));
   }
   TestPlan plan;
   for (const std::size_t k : planner.chosen()) plan.cuts.push_back(allowed[k].cut);

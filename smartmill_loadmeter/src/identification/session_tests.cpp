@@ -2,12 +2,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <map>
 
 #include "load_estimator.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/units.h"
 #include "smartmill_loadmeter/calibration/friction_law.h"
@@ -77,11 +77,9 @@ std::vector<LoadRecord> recordsOf(const std::vector<LoadTest>& air_cuts, const s
 
 std::string foundText(const LoadRecordResult& found) {
   std::string text;
-  char part[100];
   for (const std::string& term : found.terms) text += "; with " + term;
   if (found.runout > 0.0) {
-    std::snprintf(part, sizeof part, "; runout of %.1f um", found.runout / units::UM);
-    text += part;
+    text += formatted("; runout of %.1f um", found.runout / units::UM);
   }
   for (const std::string& note : found.notes) text += "; " + note;
   return text;

@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <fstream>
 #include <limits>
 #include <map>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/io/csv.h"
 #include "smartmill_core/model/strict_yaml.h"
 #include "smartmill_core/units.h"
@@ -196,13 +196,10 @@ std::optional<DriveCalibration> calibrateDrive(const char* axis, const std::vect
   // No current beyond air means no force: a line that misses zero tells of other air cuts than these.
   const Line line = fitLine(rises, forces);
   if (std::abs(line.level.value) > 4.0 * line.level.std_dev + 1e-9 * std::sqrt(rf)) {
-    char text[160];
-    std::snprintf(
-        text, sizeof text,
+    notes->push_back(formatted(
         "axis %s: forces are %.1f +- %.1f N where the current is that of air: were the air currents "
         "taken in the same motion?",
-        axis, line.level.value, line.level.std_dev);
-    notes->push_back(text);
+        axis, line.level.value, line.level.std_dev));
   }
   return drive;
 }

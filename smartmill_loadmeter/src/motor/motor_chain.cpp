@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::loadmeter {
@@ -106,14 +106,13 @@ std::string MotorForce::text() const {
   for (std::size_t c = 0; c < 4; ++c) {
     if (c == 3 && !torque && reason[3] == NOT_MEASURED) continue;
     const std::optional<Estimate>& e = c == 3 ? torque : force[c];
-    char line[200];
+    std::string line;
     if (e) {
-      std::snprintf(line, sizeof line, c == 3 ? "%s %.2f +- %.2f Nm" : "%s %.1f +- %.1f N", names[c],
-                    e->value, e->std_dev);
+      line = formatted(c == 3 ? "%s %.2f +- %.2f Nm" : "%s %.1f +- %.1f N", names[c], e->value, e->std_dev);
     } else {
-      std::snprintf(line, sizeof line, "%s not observable: %s", names[c], reason[c].c_str());
+      line = formatted("%s not observable: %s", names[c], reason[c].c_str());
     }
-    out += (out.empty() ? "" : "; ") + std::string(line);
+    out += (out.empty() ? "" : "; ") + line;
   }
   return out;
 }

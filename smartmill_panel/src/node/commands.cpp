@@ -13,7 +13,6 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/names.h"
-#include "smartmill_core/panel_names.h"
 #include "smartmill_panel/server/command_gate.h"
 
 namespace smartmill::panel {

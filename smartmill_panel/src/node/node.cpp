@@ -12,7 +12,6 @@
 #include "node/questions.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/names.h"
-#include "smartmill_core/panel_names.h"
 #include "smartmill_ros/node_main.h"
 #include "smartmill_ros/parameter_reader.h"
 #include "smartmill_ros/run_node.h"

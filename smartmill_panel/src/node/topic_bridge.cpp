@@ -1,6 +1,5 @@
 #include "node/topic_bridge.h"
 
-#include <cstdio>
 #include <optional>
 #include <set>
 
@@ -26,6 +25,7 @@
 #include <smartmill_msgs/StabilityChart.h>
 #include <boost/function.hpp>
 
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/names.h"
 
 namespace smartmill::panel {
@@ -63,9 +63,7 @@ bool stream(const std::string& type) {
 }
 
 std::string ring(std::uint64_t count, std::uint64_t most) {
-  char text[24];
-  std::snprintf(text, sizeof text, "%06lu", static_cast<unsigned long>(count % most));
-  return text;
+  return formatted("%06lu", static_cast<unsigned long>(count % most));
 }
 
 }  // namespace

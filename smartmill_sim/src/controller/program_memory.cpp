@@ -1,8 +1,9 @@
 #include "controller/program_memory.h"
 
 #include <cctype>
-#include <cstdio>
 #include <sstream>
+
+#include "smartmill_core/formatted.h"
 
 namespace smartmill::sim {
 namespace {
@@ -34,9 +35,7 @@ std::string commentOf(const std::string& text) {
 }
 
 std::string nameOf(int number) {
-  char name[16];
-  std::snprintf(name, sizeof name, "O%04d", number);
-  return name;
+  return formatted("O%04d", number);
 }
 
 }  // namespace

@@ -9,7 +9,7 @@
 #include "node/wiring.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/machine_model.h"
-#include "smartmill_core/panel_names.h"
+#include "smartmill_core/names.h"
 #include "smartmill_ros/node_main.h"
 #include "smartmill_ros/parameter_reader.h"
 #include "smartmill_ros/run_node.h"

@@ -9,6 +9,7 @@
 
 #include "hammer/offset_cases.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/io/csv.h"
 #include "smartmill_core/program.h"
 #include "smartmill_core/signal/statistics.h"
@@ -96,10 +97,7 @@ void run(const Request& request) {
   for (int w = 0; w < WAYS; ++w) {
     const Tally& t = tallies[w];
     const auto show = [](const std::vector<double>& x) {
-      char text[40];
-      std::snprintf(text, sizeof text, "%.1f %%, %.1f %%", 100.0 * percentile(x, 0.5),
-                    100.0 * percentile(x, 0.95));
-      return std::string(text);
+      return formatted("%.1f %%, %.1f %%", 100.0 * percentile(x, 0.5), 100.0 * percentile(x, 0.95));
     };
     std::printf("%-24s %-22s %-22s %-26s", nameOf(static_cast<Way>(w)).c_str(), show(t.gains).c_str(),
                 show(t.frfs).c_str(), show(depths[w]).c_str());

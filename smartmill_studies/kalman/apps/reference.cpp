@@ -10,6 +10,7 @@
 
 #include "kalman/delay_filter.h"
 #include "kalman/tuning.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/program.h"
 #include "smartmill_core/units.h"
 #include "smartmill_kalman/compensation/campaign_compensation.h"
@@ -337,11 +338,10 @@ class TuningStudy {
   void draw(const std::string& picture) const {
     std::vector<std::pair<std::string, TuningMap>> maps{{"sensor as measured", map_}};
     for (const double k : {-3.0, -2.0, 2.0, 3.0}) {
-      char name[64];
-      std::snprintf(name, sizeof name, "%+.0f standard deviations", k);
+      const std::string name = formatted("%+.0f standard deviations", k);
       maps.emplace_back(name,
                         tapMap(plantAt(taps_, frf_, rate(), k), sensor_, rate(), r_taps_, speeds_, BAND));
-      std::printf("plant at %s: best q at 9300 rpm 2^%d, at 17600 rpm 2^%d\n", name,
+      std::printf("plant at %s: best q at 9300 rpm 2^%d, at 17600 rpm 2^%d\n", name.c_str(),
                   maps.back().second.best(units::radPerSecFromRpm(9300.0)),
                   maps.back().second.best(units::radPerSecFromRpm(17600.0)));
     }

@@ -1,14 +1,13 @@
 #include "smartmill_core/range.h"
 
 #include <cmath>
-#include <cstdio>
+
+#include "smartmill_core/formatted.h"
 
 namespace smartmill {
 
 std::string shortNumber(double value) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%.10g", value);
-  return text;
+  return formatted("%.10g", value);
 }
 
 bool Range::contains(double value) const {

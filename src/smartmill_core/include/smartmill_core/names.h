@@ -29,6 +29,13 @@ constexpr const char* CHATTER_ADVICE = "chatter/advice";
 constexpr const char* DISCREPANCY_STATE = "discrepancy/state";
 constexpr const char* CONTROL_COMMAND = "control/command";
 constexpr const char* CONTROL_MACHINE = "control/machine";
+constexpr const char* SESSION_STATE = "session/state";
+constexpr const char* TWIN_FORCE = "discrepancy/force";
+constexpr const char* FORCE_STRIP = "panel/strip";
+constexpr const char* FORCE_REVOLUTION = "panel/revolution";
+constexpr const char* FORCE_SPECTRUM = "panel/spectrum";
+constexpr const char* PANEL_LOG = "panel/log";
+constexpr const char* REPLAY_STATE = "replay/state";
 
 constexpr const char* TRUE_FRF = "sim/truth/frf";
 constexpr const char* TRUE_MODES = "sim/truth/modes";
@@ -52,6 +59,8 @@ constexpr const char* INSTALL_MODEL = "discrepancy/install_model";
 constexpr const char* SET_MACRO = "cnc/set_macro";
 constexpr const char* FIND_COEFFICIENTS = "loadmeter/find_coefficients";
 constexpr const char* PREDICT_STABILITY = "stability/predict";
+constexpr const char* WHAT_IF = "stability/what_if";
+constexpr const char* REPLAY_CONTROL = "replay/control";
 
 /// A signal of the data acquisition, by its own name: daq/vibration.
 inline std::string daq(const std::string& signal) {

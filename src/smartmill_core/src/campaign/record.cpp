@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/io/csv.h"
 #include "smartmill_core/io/text_file.h"
 #include "smartmill_core/units.h"
@@ -86,16 +87,14 @@ void checkTime(const Record& record, int first_line, double sample_rate) {
     const auto worst = std::max_element(steps.begin(), steps.end(), [usual](double l, double r) {
       return std::abs(l - usual) < std::abs(r - usual);
     });
-    char text[160];
-    std::snprintf(text, sizeof text, ": line %d: column time: a step of %g s, %g s are due",
-                  first_line + 1 + static_cast<int>(worst - steps.begin()), *worst, usual);
-    throw Error(record.file + text);
+    throw Error(record.file + formatted(": line %d: column time: a step of %g s, %g s are due",
+                                        first_line + 1 + static_cast<int>(worst - steps.begin()), *worst,
+                                        usual));
   }
   if (sample_rate > 0.0 && std::abs(step * sample_rate - 1.0) > 1e-3) {
-    char text[160];
-    std::snprintf(text, sizeof text, ": samples come at %.6g Hz, but the campaign's sample_rate_hz is %.6g",
-                  1.0 / step, sample_rate);
-    throw Error(record.file + text);
+    throw Error(record.file +
+                formatted(": samples come at %.6g Hz, but the campaign's sample_rate_hz is %.6g", 1.0 / step,
+                          sample_rate));
   }
 }
 

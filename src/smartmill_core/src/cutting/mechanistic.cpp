@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <string>
 
 #include "smartmill_core/cutting/cutting_law.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill {
@@ -17,9 +17,7 @@ using units::PI;
 using units::TWO_PI;
 
 [[noreturn]] void refuse(const char* what, double value, const char* unit, const char* due) {
-  char text[200];
-  std::snprintf(text, sizeof text, "%s: %g %s is out of range (%s)", what, value, unit, due);
-  throw Error(text);
+  throw Error(formatted("%s: %g %s is out of range (%s)", what, value, unit, due));
 }
 
 double sinc(double x) {

@@ -2,13 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdarg>
 #include <cstdint>
-#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/io/text_file.h"
 
 namespace smartmill {
@@ -180,25 +179,17 @@ UffFunction readBinary58(Bytes& bytes, const std::string& first) {
   return head.function;
 }
 
-void append(std::string& text, const char* format, ...) __attribute__((format(printf, 2, 3)));
-void append(std::string& text, const char* format, ...) {
-  char line[200];
-  va_list arguments;
-  va_start(arguments, format);
-  std::vsnprintf(line, sizeof line, format, arguments);
-  va_end(arguments);
-  text += line;
-}
-
 std::string headOf(const UffFunction& f, bool even) {
   const bool frequency = f.type != uff::TIME_RESPONSE;
   std::string text = f.name.substr(0, 80) + "\nNONE\nNONE\nNONE\nNONE\n";
-  append(text, "%5d%10d%5d%10d %-10s%10d%4d %-10s%10d%4d\n", f.type, 0, 0, 0, "NONE", f.response_node,
-         f.response_direction, "NONE", f.reference_node, f.reference_direction);
-  append(text, "%10d%10zu%10d%13.5E%13.5E%13.5E\n", frequency ? COMPLEX_DOUBLE : REAL_DOUBLE, f.value.size(),
-         even ? 1 : 0, f.abscissa.front(), even ? f.abscissa[1] - f.abscissa[0] : 0.0, 0.0);
+  text += formatted("%5d%10d%5d%10d %-10s%10d%4d %-10s%10d%4d\n", f.type, 0, 0, 0, "NONE", f.response_node,
+                    f.response_direction, "NONE", f.reference_node, f.reference_direction);
+  text +=
+      formatted("%10d%10zu%10d%13.5E%13.5E%13.5E\n", frequency ? COMPLEX_DOUBLE : REAL_DOUBLE, f.value.size(),
+                even ? 1 : 0, f.abscissa.front(), even ? f.abscissa[1] - f.abscissa[0] : 0.0, 0.0);
   const auto axis = [&text](int kind, const char* label, const std::string& unit) {
-    append(text, "%10d%5d%5d%5d %-20s %-20s\n", kind, 0, 0, 0, label, unit.empty() ? "NONE" : unit.c_str());
+    text +=
+        formatted("%10d%5d%5d%5d %-20s %-20s\n", kind, 0, 0, 0, label, unit.empty() ? "NONE" : unit.c_str());
   };
   axis(frequency ? uff::FREQUENCY : uff::TIME, frequency ? "Frequency" : "Time", frequency ? "Hz" : "s");
   axis(f.numerator, "NONE", f.unit);
@@ -210,10 +201,8 @@ std::string headOf(const UffFunction& f, bool even) {
 // Whether the head's digits give every place of the abscissa.
 bool evenlySpaced(const UffFunction& f) {
   if (f.abscissa.size() < 2) return false;
-  char first[24], step[24];
-  std::snprintf(first, sizeof first, "%.5E", f.abscissa[0]);
-  std::snprintf(step, sizeof step, "%.5E", f.abscissa[1] - f.abscissa[0]);
-  const double from = std::atof(first), by = std::atof(step);
+  const double from = std::stod(formatted("%.5E", f.abscissa[0]));
+  const double by = std::stod(formatted("%.5E", f.abscissa[1] - f.abscissa[0]));
   for (std::size_t i = 0; i < f.abscissa.size(); ++i) {
     if (std::abs(from + by * static_cast<double>(i) - f.abscissa[i]) > 1e-6 * by) return false;
   }
@@ -263,8 +252,8 @@ void writeUff(const std::vector<UffFunction>& functions, const std::string& file
     }
     text += std::string(MARK) + "\n";
     if (binary) {
-      append(text, "    58b%6d%6d%12d%12zu%6d%6d%12d%12d\n", 1, 2, HEAD_LINES, 8 * numbers.size(), 0, 0, 0,
-             0);
+      text += formatted("    58b%6d%6d%12d%12zu%6d%6d%12d%12d\n", 1, 2, HEAD_LINES, 8 * numbers.size(), 0, 0,
+                        0, 0);
       text += headOf(f, even);
       text.append(reinterpret_cast<const char*>(numbers.data()), 8 * numbers.size());
       text += "\n";
@@ -273,7 +262,7 @@ void writeUff(const std::vector<UffFunction>& functions, const std::string& file
       // An uneven abscissa stands in 13 columns, values in 20.
       const std::size_t each = (even ? 1u : 2u) + (complex ? 1u : 0u), in_line = even ? 4u : each;
       for (std::size_t i = 0; i < numbers.size(); ++i) {
-        append(text, !even && i % each == 0 ? "%13.7E" : "%20.11E", numbers[i]);
+        text += formatted(!even && i % each == 0 ? "%13.7E" : "%20.11E", numbers[i]);
         if ((i + 1) % in_line == 0 || i + 1 == numbers.size()) text += "\n";
       }
     }

@@ -3,11 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <cstdarg>
-#include <cstdio>
 #include <string>
 
 #include "free_decay.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/modal/impact_analysis.h"
 #include "smartmill_core/signal/fourier.h"
 #include "smartmill_core/signal/statistics.h"
@@ -50,16 +49,6 @@ constexpr double DULL = 0.05;
 constexpr double GAIN_JUMP = 0.1, SKEW = 0.35;
 /// Shifts that are tried [samples]; lines with this share of the strongest take part.
 constexpr double MOST_SKEW = 6.0, SKEW_STEP = 0.1, STRONG_FORCE = 0.2;
-
-std::string text(const char* format, ...) __attribute__((format(printf, 1, 2)));
-std::string text(const char* format, ...) {
-  char line[200];
-  va_list arguments;
-  va_start(arguments, format);
-  std::vsnprintf(line, sizeof line, format, arguments);
-  va_end(arguments);
-  return line;
-}
 
 struct Quiet {
   double level = 0.0, noise = 0.0, scatter = 0.0;
@@ -203,9 +192,9 @@ std::string secondHit(const Channel& force, double rate, double share) {
       const double f = force.values[static_cast<std::size_t>(i)];
       lowest = std::min(lowest, std::max(f, 0.0));
       if (f - lowest > rise && std::abs(i - top) >= soonest) {
-        return text("double hit: the force rises again by %.0f %% of its peak, %.2f ms %s it",
-                    100.0 * (f - lowest) / peak, 1e3 * static_cast<double>(std::abs(i - top)) / rate,
-                    way > 0 ? "after" : "before");
+        return formatted("double hit: the force rises again by %.0f %% of its peak, %.2f ms %s it",
+                         100.0 * (f - lowest) / peak, 1e3 * static_cast<double>(std::abs(i - top)) / rate,
+                         way > 0 ? "after" : "before");
       }
     }
   }
@@ -226,7 +215,7 @@ std::string spike(const Channel& c, const char* name, std::size_t from, std::siz
       if (j + 1 < i || j > i + 1) about.push_back(off[j]);
     }
     if (off[i] > SPIKE * percentile(about, 0.8))
-      return text("dropout: sample %zu of the %s stands alone", i, name);
+      return formatted("dropout: sample %zu of the %s stands alone", i, name);
   }
   return "";
 }
@@ -239,11 +228,11 @@ std::string brokenPulse(const Channel& force) {
   const double least = std::max(NOTCH_SHARE * f[top], ABOVE_NOISE * force.noise);
   for (std::size_t i = 1; i + 2 < f.size(); ++i) {
     if (std::min(f[i - 1], std::max(f[i + 1], f[i + 2])) - f[i] > least)
-      return text("dropout: sample %zu of the force falls out of the contact", i);
+      return formatted("dropout: sample %zu of the force falls out of the contact", i);
   }
   const double beside =
       top > 0 && top + 2 < f.size() ? std::max({f[top - 1], f[top + 1], f[top + 2]}) : f[top];
-  if (f[top] > LONE_TOP * beside) return text("dropout: sample %zu of the force stands alone", top);
+  if (f[top] > LONE_TOP * beside) return formatted("dropout: sample %zu of the force stands alone", top);
   return "";
 }
 
@@ -266,7 +255,7 @@ double endLevel(const std::vector<double>& values) {
 std::string baseline(const Channel& c, const char* name) {
   const double share = endLevel(c.values) / c.largest;
   if (std::abs(share) <= DRIFT_SHARE) return "";
-  return text("baseline: the %s ends %.1f %% of its largest off", name, 100.0 * share);
+  return formatted("baseline: the %s ends %.1f %% of its largest off", name, 100.0 * share);
 }
 
 /// First sample after the contact.
@@ -293,8 +282,8 @@ std::string swelling(const Channel& response, std::size_t from, double rate) {
     const bool some = level > std::max({RISE * softest, RISE_SHARE * loudest, ABOVE_NOISE * response.noise});
     if (clear ||
         (some && unforeseenRise(response.values, from, begin, begin + block, response.noise) > FOREIGN))
-      return text("late bump: %.0f ms after the hit the response swells again by a factor %.1f",
-                  1e3 * static_cast<double>(b * block) / rate, level / softest);
+      return formatted("late bump: %.0f ms after the hit the response swells again by a factor %.1f",
+                       1e3 * static_cast<double>(b * block) / rate, level / softest);
     softest = std::min(softest, level);
   }
   return "";
@@ -303,10 +292,10 @@ std::string swelling(const Channel& response, std::size_t from, double rate) {
 std::string strange(const Channel& force, const Channel& response) {
   const FreeDecayBreak found = freeDecayBreak(response.values, contactEnd(force) + 2, response.noise);
   if (found.sample == 0) return "";
-  return text(found.sudden
-                  ? "dropout: sample %zu of the response breaks its ringing by %.0f %%"
-                  : "late bump: about sample %zu the response does what its ringing does not tell (%.1f %%)",
-              found.sample, 100.0 * found.size / response.largest);
+  return formatted(
+      found.sudden ? "dropout: sample %zu of the response breaks its ringing by %.0f %%"
+                   : "late bump: about sample %zu the response does what its ringing does not tell (%.1f %%)",
+      found.sample, 100.0 * found.size / response.largest);
 }
 
 std::string dull(const Channel& channel, double rate, double high) {
@@ -319,15 +308,15 @@ std::string dull(const Channel& channel, double rate, double high) {
   for (const Complex& s : spectrum) largest = std::max(largest, std::abs(s));
   for (std::size_t k = 0; k < lines.size() && lines[k] <= high; ++k) {
     if (std::abs(spectrum[k]) < DULL * largest)
-      return text("dull hit: at %.0f Hz the force has %.1f %% of its largest line", lines[k],
-                  100.0 * std::abs(spectrum[k]) / largest);
+      return formatted("dull hit: at %.0f Hz the force has %.1f %% of its largest line", lines[k],
+                       100.0 * std::abs(spectrum[k]) / largest);
   }
   return "";
 }
 
 /// What spoils the record whoever struck.
 std::string badData(const Channel& force, const Channel& response) {
-  if (clipped(force, false)) return text("the force is clipped at %.1f N", force.largest);
+  if (clipped(force, false)) return formatted("the force is clipped at %.1f N", force.largest);
   if (clipped(response, true)) return "the response is clipped";
   if (longestRun(response.values, 0.02 * response.largest) >= STUCK_RUN)
     return "stuck: the response repeats one value";
@@ -342,11 +331,12 @@ std::string badData(const Channel& force, const Channel& response) {
 
 std::string weak(const Channel& force, const Channel& response, double least) {
   const double peak = *std::max_element(force.values.begin(), force.values.end());
-  if (peak < least) return text("weak hit: peak %.1f N, %.1f N are due", peak, least);
+  if (peak < least) return formatted("weak hit: peak %.1f N, %.1f N are due", peak, least);
   if (!(peak > CLEAR_HIT * force.noise))
-    return text("weak hit: peak %.2f, noise of the force %.2f", peak, force.noise);
+    return formatted("weak hit: peak %.2f, noise of the force %.2f", peak, force.noise);
   if (!(response.largest > CLEAR_HIT * response.noise))
-    return text("weak hit: the response's largest is %.3g, its noise %.3g", response.largest, response.noise);
+    return formatted("weak hit: the response's largest is %.3g, its noise %.3g", response.largest,
+                     response.noise);
   return "";
 }
 
@@ -417,7 +407,8 @@ HitFault hitFault(const Hit& hit, const HitJudgeOptions& options) {
   if (!reason.empty()) return {reason, false};
   for (const double v : hit.response) {
     if (options.response_range > 0.0 && std::abs(v) >= options.response_range)
-      return {text("the response is clipped: %.3f reaches the range %.3f", v, options.response_range), true};
+      return {formatted("the response is clipped: %.3f reaches the range %.3f", v, options.response_range),
+              true};
   }
   reason = badData(force, response);
   if (!reason.empty()) return {reason, true};
@@ -452,11 +443,12 @@ std::vector<HitFault> faultsBeside(const std::vector<Hit>& hits, const std::vect
       if (found.badness() > worst.badness()) worst = found, at = h;
     }
     if (worst.badness() <= 1.0) break;
-    faults[at] = {std::abs(worst.shift) / SKEW > std::abs(std::log(worst.gain)) / GAIN_JUMP
-                      ? text("trigger skew: the channels are shifted by %.2f samples beside the other hits",
-                             worst.shift)
-                      : text("gain jump: %.2f of that of the other hits", worst.gain),
-                  true};
+    faults[at] = {
+        std::abs(worst.shift) / SKEW > std::abs(std::log(worst.gain)) / GAIN_JUMP
+            ? formatted("trigger skew: the channels are shifted by %.2f samples beside the other hits",
+                        worst.shift)
+            : formatted("gain jump: %.2f of that of the other hits", worst.gain),
+        true};
     members.erase(std::find(members.begin(), members.end(), at));
   }
   return faults;

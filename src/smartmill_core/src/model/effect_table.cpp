@@ -1,8 +1,8 @@
 #include <array>
 #include <cmath>
-#include <cstdio>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/model/effect_catalogue.h"
 #include "smartmill_core/units.h"
 
@@ -46,10 +46,7 @@ std::string keyText(const EffectParameter& p) {
 }
 
 std::string digits(double value) {
-  char text[40];
-  std::snprintf(text, sizeof text, std::abs(value) < 999.5 ? "%.3g" : "%.0f",
-                std::abs(value) < 1e-12 ? 0.0 : value);
-  return text;
+  return formatted(std::abs(value) < 999.5 ? "%.3g" : "%.0f", std::abs(value) < 1e-12 ? 0.0 : value);
 }
 
 std::string searchText(const std::vector<EffectForm>& forms) {

@@ -2,13 +2,13 @@
 
 #include <charconv>
 #include <cmath>
-#include <cstdio>
 #include <set>
 #include <sstream>
 
 #include <yaml-cpp/yaml.h>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 
 namespace smartmill {
 
@@ -228,9 +228,7 @@ std::string withPoint(std::string number) {
 }  // namespace
 
 std::string yamlNumber(double value, int digits) {
-  char text[40];
-  std::snprintf(text, sizeof text, "%.*g", digits, value);
-  return withPoint(text);
+  return withPoint(formatted("%.*g", digits, value));
 }
 
 std::string yamlNumberExact(double value) {
