@@ -14,6 +14,7 @@
 #include <filesystem>
 #include <fstream>
 #include <thread>
+#include <utility>
 
 namespace smartmill::cnc::linuxcnc {
 namespace {
@@ -21,8 +22,7 @@ namespace {
 using Code = Reply::Code;
 
 constexpr std::chrono::milliseconds LOOK{1};
-constexpr double STILL = 0.4;                       // [s] a task whose heartbeat stands so long is gone
-constexpr std::chrono::milliseconds REATTACH{500};  // between two attempts to find it
+constexpr std::chrono::milliseconds REATTACH{500};                 // between two attempts to find it
 constexpr double ANSWER = 1.0, HOMING = 3.0, COMES_TO_REST = 0.3;  // [s]
 constexpr std::uint32_t SETTLED = 4;  // servo cycles of an idle task after a program
 constexpr const char* PIECE = "o<piece> call";
@@ -84,23 +84,46 @@ void ControllerLink::look() {
   channels_->status.peek();
   const std::uint32_t heartbeat = channels_->stat().motion.heartbeat;
   const bool beats = heartbeat != 0 && heartbeat != status_.heartbeat;
-  const double now = std::chrono::duration<double>(Clock::now().time_since_epoch()).count();
-  if (heartbeat_.look(beats, now) > STILL && status_.alive) {
-    status_.alive = false;
-    program_.reset();
-  }
   if (beats) {
     fill();
+    dropOrphan();
   }
   takeErrors();
+  judge(beats);
   noticeEnd();
+}
+
+/// What runs when this gateway first sees the controller was begun through one that has died.
+void ControllerLink::dropOrphan() {
+  if (status_.alive && !std::exchange(met_, true) && status_.busy &&
+      status_.mode == MachineStatus::Mode::mdi) {
+    EMC_TASK_ABORT message;
+    channels_->command.write(&message);
+  }
+}
+
+void ControllerLink::judge(bool beats) {
+  const double now = std::chrono::duration<double>(Clock::now().time_since_epoch()).count();
+  const Liveness::Verdict verdict = liveness_.look(beats, processes_, now);
+  status_.starved = liveness_.starved();
+  if (verdict == Liveness::Verdict::lives || !status_.alive) {
+    return;
+  }
+  status_.alive = false;
+  program_.reset();
+  status_.errors = verdict == Liveness::Verdict::ended   ? "its task has stopped: a process of it has ended"
+                   : verdict == Liveness::Verdict::hangs ? "its task has stopped: it counts no servo cycles"
+                                                         : "the computer gives it no processor";
 }
 
 void ControllerLink::fill() {
   const EMC_STAT& s = channels_->stat();
   const EMC_TRAJ_STAT& t = s.motion.traj;
   // The first heartbeat that is seen may be of a controller that has gone; the second one counts.
-  status_.alive = status_.alive || status_.heartbeat != 0;
+  if (!status_.alive && status_.heartbeat != 0) {
+    status_.alive = true;
+    processes_.find({"milltask", "rtapi_app"});
+  }
   status_.heartbeat = s.motion.heartbeat;
   status_.state = static_cast<MachineStatus::State>(s.task.state);
   status_.mode = static_cast<MachineStatus::Mode>(s.task.mode);
@@ -392,6 +415,8 @@ Reply ControllerLink::carryOut(const Command& command) {
     }
     case Word::variable:
       return variable(command);
+    case Word::guard:
+      return {};
   }
   return {Code::refused, "unknown command"};
 }

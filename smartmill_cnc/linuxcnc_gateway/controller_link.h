@@ -8,8 +8,9 @@
 #include <optional>
 #include <string>
 
+#include "smartmill_cnc/linuxcnc/liveness.h"
+#include "smartmill_cnc/linuxcnc/process_watch.h"
 #include "smartmill_cnc/linuxcnc/protocol.h"
-#include "smartmill_cnc/linuxcnc/stillness.h"
 
 namespace smartmill::cnc::linuxcnc {
 
@@ -35,6 +36,8 @@ class ControllerLink {
   using Clock = std::chrono::steady_clock;
 
   void attach();
+  void dropOrphan();
+  void judge(bool beats);
   void fill();
   void takeErrors();
   void noticeEnd();
@@ -61,7 +64,9 @@ class ControllerLink {
   std::unique_ptr<Channels> channels_;
   MachineStatus status_;
   Clock::time_point attached_;  // when the channels were opened
-  Stillness heartbeat_;
+  bool met_ = false;            // a controller that lives has been seen
+  Liveness liveness_;
+  ProcessWatch processes_;
   std::optional<int> program_;            // serial number of the one that runs
   std::optional<std::uint32_t> idle_at_;  // heartbeat since when nothing of it is left
 };

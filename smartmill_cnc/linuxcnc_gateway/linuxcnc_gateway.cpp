@@ -10,11 +10,15 @@
 
 #include <poll.h>
 
+#include <chrono>
 #include <deque>
 #include <list>
+#include <memory>
+#include <utility>
 #include <vector>
 
 #include "controller_link.h"
+#include "smartmill_cnc/linuxcnc/liveness.h"
 #include "smartmill_cnc/linuxcnc/local_socket.h"
 #include "smartmill_cnc/linuxcnc/stop_signal.h"
 #include "smartmill_core/program.h"
@@ -22,12 +26,22 @@
 namespace smartmill::cnc::linuxcnc {
 namespace {
 
+using Clock = std::chrono::steady_clock;
+
 constexpr int LOOK_EVERY = 2;  // [ms]
 constexpr std::size_t MOST_CLIENTS = 8, MOST_WAITING = 8;
+
+/// What is known of the process that permits motion.
+struct Guard {
+  ProcessWatch process;
+  Liveness liveness;
+  bool heard = true;
+};
 
 struct Client {
   LocalConnection connection;
   bool drives = false;           // has opened programs: what runs is its
+  std::unique_ptr<Guard> guard;  // it is linuxcnc_stream
   std::deque<Received> waiting;  // commands
 };
 
@@ -46,7 +60,7 @@ class Gateway {
     link_.look();
     if (std::optional<LocalConnection> connection = acceptFrom(listener_)) {
       if (clients_.size() < MOST_CLIENTS) {
-        clients_.push_back({std::move(*connection), false, {}});
+        clients_.push_back({std::move(*connection), false, nullptr, {}});
       }
     }
     hear();
@@ -56,6 +70,9 @@ class Gateway {
         client.waiting.pop_front();
         carryOut(client, std::get<Command>(received.message), received.sequence);
       }
+    }
+    for (Client& client : clients_) {
+      watch(client);
     }
     clients_.remove_if([this](const Client& client) { return left(client); });
   }
@@ -73,6 +90,9 @@ class Gateway {
     for (Client& client : clients_) {
       client.connection.receive();
       while (std::optional<Received> received = client.connection.next()) {
+        if (client.guard) {
+          client.guard->heard = true;
+        }
         if (std::holds_alternative<Ask>(received->message)) {
           client.connection.send(link_.status(), received->sequence);
         } else if (std::holds_alternative<Command>(received->message) &&
@@ -84,6 +104,19 @@ class Gateway {
     }
   }
 
+  /// A guard that is silent, though it does not wait for a processor, counts as gone.
+  static void watch(Client& client) {
+    if (!client.guard) {
+      return;
+    }
+    Guard& guard = *client.guard;
+    const double now = std::chrono::duration<double>(Clock::now().time_since_epoch()).count();
+    if (guard.liveness.look(std::exchange(guard.heard, false), guard.process, now) !=
+        Liveness::Verdict::lives) {
+      client.connection.close();
+    }
+  }
+
   void carryOut(Client& client, const Command& command, std::uint16_t sequence) {
     const Reply reply = link_.carryOut(command);
     if (command.word == Word::open && reply.code == Reply::Code::done) {
@@ -91,6 +124,10 @@ class Gateway {
     }
     if (command.word == Word::close) {
       client.drives = false;
+    }
+    if (command.word == Word::guard) {
+      client.guard = std::make_unique<Guard>();
+      client.guard->process.only(client.connection.peer());
     }
     client.connection.send(reply, sequence);
   }
@@ -104,7 +141,9 @@ class Gateway {
   }
 
   void stopFor(const Client& client) {
-    if (client.drives) {
+    if (client.guard) {
+      link_.carryOut({Word::estop, 0, 0.0, {}});
+    } else if (client.drives) {
       link_.carryOut({Word::abort, 0, 0.0, {}});
     }
   }

@@ -14,6 +14,7 @@
 #include <thread>
 
 #include "smartmill_cnc/linuxcnc/configuration.h"
+#include "smartmill_cnc/linuxcnc/liveness.h"
 #include "smartmill_cnc/linuxcnc/local_socket.h"
 #include "smartmill_cnc/linuxcnc/stillness.h"
 #include "smartmill_cnc/linuxcnc/stop_signal.h"
@@ -29,8 +30,8 @@ using Clock = std::chrono::steady_clock;
 constexpr int HAL_SEGMENT = 0x48414c32, SAMPLER_FIFO = 0x48534130;  // keys that LinuxCNC's sources fix
 constexpr int READ_EVERY = 3;                                       // [ms]
 constexpr std::chrono::milliseconds ASK_EVERY{30}, TRY_EVERY{100}, LOADING{10000};
-constexpr double ANSWER_LASTS = 0.4, SILENT = 0.5;  // [s]
-constexpr int GONE = 3;                             // exit code: the controller has
+constexpr double SILENT = 0.5;  // [s]
+constexpr int GONE = 3;         // exit code: the controller has
 
 double seconds() {
   return std::chrono::duration<double>(Clock::now().time_since_epoch()).count();
@@ -150,6 +151,9 @@ class Watch {
       tried_ = now;
       try {
         gateway_ = LocalConnection::to(path_);
+        process_.only(gateway_.peer());
+        liveness_ = Liveness();
+        gateway_.send(Command{Word::guard, 0, 0.0, {}});
       } catch (const Error&) {
       }
     }
@@ -158,22 +162,27 @@ class Watch {
     while (const std::optional<Received> received = gateway_.next()) {
       if (const auto* status = std::get_if<MachineStatus>(&received->message)) {
         good = alive_ = status->alive;
+        starved_ = status->starved > 0.0;
       }
     }
-    silence_.look(good, seconds());
+    const Liveness::Verdict verdict = liveness_.look(good, process_, seconds());
     if (now - asked_ > ASK_EVERY) {
       asked_ = now;
       gateway_.send(Ask{});
     }
-    return gateway_.open() && alive_ && silence_.still() < ANSWER_LASTS;
+    return gateway_.open() && alive_ && verdict == Liveness::Verdict::lives;
   }
+
+  /// The controller is silent because the computer gives it no processor.
+  bool starved() const { return starved_; }
 
  private:
   const std::string path_;
   LocalConnection gateway_;
   Clock::time_point tried_, asked_;
-  bool alive_ = false;
-  Stillness silence_;
+  bool alive_ = false, starved_ = false;
+  ProcessWatch process_;
+  Liveness liveness_;
 };
 
 class Server {
@@ -221,7 +230,7 @@ class Server {
         listen(client, component);
       }
       clients_.remove_if([](const LocalConnection& client) { return !client.open(); });
-      if (silence.look(heard, seconds()) > SILENT) {
+      if (silence.look(heard || watch_.starved(), seconds()) > SILENT) {
         std::cerr << "linuxcnc_stream: the controller has fallen silent\n";
         return GONE;
       }

@@ -15,7 +15,7 @@ constexpr int MOST_STEPS = 40;          // of a program
 constexpr double TOLERANCE = 1e-6;      // [m] of the wire's decimals, summed over a program's relative moves
 constexpr std::size_t MOST_TEXT = 900;  // [byte]
 
-sim::ControllerOptions options() {
+sim::ControllerOptions makeOptions() {
   sim::ControllerOptions o;
   o.axes.travel = {{{-0.25, 0.25}, {-0.2, 0.2}, {-0.3, 0.1}}};
   o.axes.rapid = 10.0;
@@ -25,10 +25,14 @@ sim::ControllerOptions options() {
   return o;
 }
 
+const sim::ControllerOptions& options() {
+  static const sim::ControllerOptions OPTIONS = makeOptions();
+  return OPTIONS;
+}
+
 /// Runs a text; the axes may never leave their travel.
 void run(sim::Controller& controller, const std::string& text) {
-  const sim::ControllerOptions limits = options();
-  std::vector<sim::MotionState> states;
+  static std::vector<sim::MotionState> states;
   if (controller.dncStart() != focas::EW_OK) {
     std::abort();
   }
@@ -37,7 +41,7 @@ void run(sim::Controller& controller, const std::string& text) {
   for (int i = 0; i < MOST_STEPS; ++i) {
     controller.advance(STEP, 1, states);
     for (std::size_t k = 0; k < 3; ++k) {
-      const auto& travel = limits.axes.travel[k];
+      const auto& travel = options().axes.travel[k];
       if (!(states[0].position[k] >= travel[0] - 1e-8 && states[0].position[k] <= travel[1] + 1e-8)) {
         std::abort();
       }

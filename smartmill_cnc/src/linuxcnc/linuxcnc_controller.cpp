@@ -102,11 +102,13 @@ class LinuxCncController : public Controller {
       return lost(e.what());
     }
     if (!status_.alive) {
-      return lost("connection to the " + name() + " lost: its task has stopped");
+      return lost("connection to the " + name() + " lost: " + status_.errors);
     }
     const std::optional<ServoSample> servo = stream_->latest();
     const std::uint64_t count = stream_->count();
-    const double silence = silence_.look(std::exchange(servo_count_, count) != count, now_());
+    // A controller that waits for a processor is silent without having stopped.
+    const bool heard = std::exchange(servo_count_, count) != count || status_.starved > 0.0;
+    const double silence = silence_.look(heard, now_());
     if (!servo || silence > STREAM_SILENT) {
       return lost("connection to the " + name() + " lost: its servo stream is silent");
     }

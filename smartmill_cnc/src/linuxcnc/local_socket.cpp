@@ -69,6 +69,12 @@ LocalConnection LocalConnection::to(const std::string& path) {
   return LocalConnection(std::move(descriptor));
 }
 
+int LocalConnection::peer() const {
+  ucred other{};
+  socklen_t size = sizeof other;
+  return ::getsockopt(descriptor_.get(), SOL_SOCKET, SO_PEERCRED, &other, &size) == 0 ? other.pid : 0;
+}
+
 void LocalConnection::close() {
   descriptor_.reset();
   decoder_ = {};

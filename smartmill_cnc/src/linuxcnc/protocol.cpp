@@ -123,7 +123,7 @@ void pack(const Command& m, Packer& p) {
 }
 
 void unpack(Command& m, Unpacker& u) {
-  m.word = u.word<Word>(1, 9);
+  m.word = u.word<Word>(1, 10);
   m.number = u.number<std::int32_t>();
   m.value = u.finite();
   m.text = u.text();
@@ -160,6 +160,7 @@ void pack(const MachineStatus& m, Packer& p) {
   p.numbers(m.distance_to_go);
   p.numbers(m.offset);
   p.number(m.heartbeat);
+  p.number(m.starved);
   p.text(m.errors, LONGEST_TEXT);
 }
 
@@ -179,6 +180,7 @@ void unpack(MachineStatus& m, Unpacker& u) {
   u.numbers(m.distance_to_go);
   u.numbers(m.offset);
   m.heartbeat = u.number<std::uint32_t>();
+  m.starved = u.finite();
   m.errors = u.text();
 }
 

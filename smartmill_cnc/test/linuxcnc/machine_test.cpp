@@ -3,9 +3,11 @@
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sched.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <csignal>
@@ -43,6 +45,21 @@ double soon() {
 
 void pause(double seconds) {
   std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
+}
+
+/// Takes a processor away from everybody else for some time. @return whether the kernel let it
+bool hog(int processor, double seconds) {
+  bool could = false;
+  std::thread([&] {
+    cpu_set_t one;
+    CPU_ZERO(&one);
+    CPU_SET(static_cast<unsigned>(processor), &one);
+    const sched_param first{50};
+    could = ::sched_setaffinity(0, sizeof one, &one) == 0 && ::sched_setscheduler(0, SCHED_FIFO, &first) == 0;
+    for (const double end = now() + seconds; could && now() < end;) {
+    }
+  }).join();
+  return could;
 }
 
 /// Processes whose command line has both words.
@@ -364,6 +381,100 @@ TEST_F(LinuxCncMachine, WithoutItsStreamTheMachineStops) {
   ASSERT_TRUE(until([&] { return bridge_->state().connected; }));
   EXPECT_TRUE(bridge_->state().emergency || bridge_->state().alarm);
   expectStanding();
+}
+
+TEST_F(LinuxCncMachine, AControllerThatWaitsForAProcessorIsNotTakenForDead) {
+  if (std::thread::hardware_concurrency() < 2) {
+    GTEST_SKIP() << "one processor for the controller and one for its gateway are due";
+  }
+  const std::vector<pid_t> gateway = processes("linuxcnc_gateway", folder_);
+  ASSERT_EQ(gateway.size(), 1u);
+  const auto room = [](pid_t pid) { return fs::read_symlink("/proc/" + std::to_string(pid) + "/ns/pid"); };
+  cpu_set_t first, all;
+  CPU_ZERO(&first);
+  CPU_SET(0, &first);
+  ::sched_getaffinity(0, sizeof all, &all);
+  std::vector<pid_t> threads;  // of the servo thread's process in this machine's namespace
+  for (const pid_t pid : processes("rtapi_app", "")) {
+    for (const auto& entry : fs::directory_iterator("/proc/" + std::to_string(pid) + "/task")) {
+      if (room(pid) == room(gateway.front())) {
+        threads.push_back(static_cast<pid_t>(std::stol(entry.path().filename())));
+      }
+    }
+  }
+  ASSERT_FALSE(threads.empty());
+  cut();
+  for (const pid_t thread : threads) {
+    ::sched_setaffinity(thread, sizeof first, &first);
+  }
+  // Longer than a hanging controller is given.
+  std::atomic<bool> over{false};
+  bool could = false;
+  std::thread rival([&] {
+    could = hog(0, 0.6);
+    over = true;
+  });
+  double silent = 0.0, heard = now();
+  std::size_t count = samples_.size();
+  while (!over) {
+    period();
+    silent = std::max(silent, now() - heard);
+    if (samples_.size() != count) {
+      count = samples_.size();
+      heard = now();
+    }
+  }
+  rival.join();
+  for (const pid_t thread : threads) {
+    ::sched_setaffinity(thread, sizeof all, &all);
+  }
+  if (!could) {
+    GTEST_SKIP() << "no real-time priority can be had";
+  }
+  EXPECT_GT(silent, 0.45);
+  // The program goes on where it was.
+  const double before = samples_.back().position[0];
+  EXPECT_TRUE(until([&] { return samples_.back().position[0] > before + 5e-3; }));
+  EXPECT_TRUE(bridge_->state().connected && bridge_->state().armed);
+  EXPECT_EQ(stream_->statistics().lost, 0u);
+  bridge_->cancel();
+  EXPECT_EQ(outcome().code, MotionCode::cancelled);
+}
+
+TEST_F(LinuxCncMachine, AStreamThatHangsStopsTheMachine) {
+  cut();
+  const std::vector<pid_t> stream = processes("linuxcnc_stream", folder_);
+  ASSERT_EQ(stream.size(), 1u);
+  ::kill(stream.front(), SIGSTOP);
+  EXPECT_LT(took([&] { return !bridge_->state().armed; }), soon());
+  ::kill(stream.front(), SIGCONT);
+  outcome();
+  ASSERT_TRUE(until([&] { return bridge_->state().connected; }));
+  EXPECT_TRUE(bridge_->state().emergency || bridge_->state().alarm);
+  expectStanding();
+}
+
+TEST_F(LinuxCncMachine, AControllerThatHangsIsTold) {
+  cut();
+  const std::vector<pid_t> task = processes("milltask", folder_);
+  ASSERT_FALSE(task.empty());
+  for (const pid_t pid : task) {
+    ::kill(pid, SIGSTOP);
+  }
+  EXPECT_LT(took([&] { return !bridge_->state().connected; }), soon());
+  EXPECT_EQ(outcome().code, MotionCode::lost);
+  expectStanding();
+  for (const pid_t pid : task) {
+    ::kill(pid, SIGCONT);
+  }
+  ASSERT_TRUE(until([&] { return bridge_->state().connected; }));
+  EXPECT_FALSE(bridge_->state().armed);
+  expectStanding();
+  ready();
+  until([] { return false; }, 0.1);
+  const Answer<ArmCode> again = bridge_->arm(true);
+  ASSERT_EQ(again.code, ArmCode::ok) << again.message;
+  EXPECT_EQ(run("G90 G0 X0\n").code, MotionCode::ok);
 }
 
 TEST_F(LinuxCncMachine, WithoutItsControllerNothingGoesOnAndTheNextOneStartsClean) {

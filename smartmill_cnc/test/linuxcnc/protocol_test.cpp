@@ -23,6 +23,7 @@ MachineStatus someStatus() {
   status.position = {1e-3, -2.5, 0.1};
   status.offset = {0.0, 0.5, -1e-9};
   status.heartbeat = 4'000'000'000u;
+  status.starved = 0.125;
   status.errors = "one; two";
   return status;
 }
@@ -89,6 +90,7 @@ TEST(Protocol, FieldsKeepTheirPlaces) {
   EXPECT_EQ(status.position[1], -2.5);
   EXPECT_EQ(status.offset[2], -1e-9);
   EXPECT_EQ(status.heartbeat, 4'000'000'000u);
+  EXPECT_EQ(status.starved, 0.125);
   EXPECT_EQ(status.errors, "one; two");
   const auto block = std::get<ServoBlock>(decoder.next()->message);
   EXPECT_EQ(block.first, 4'294'967'290u);
@@ -103,7 +105,7 @@ TEST(Protocol, WhatIsNoFrameIsRefusedInOneLine) {
     bytes[place] = value;
     return refusalOf(bytes);
   };
-  EXPECT_NE(with(4, 2).find("version 2"), std::string::npos);
+  EXPECT_NE(with(4, 1).find("version 1"), std::string::npos);
   EXPECT_NE(with(5, 0).find("kind 0"), std::string::npos);
   EXPECT_NE(with(5, 7).find("kind 7"), std::string::npos);
   // Nothing waits for bytes that no frame of that kind may have.

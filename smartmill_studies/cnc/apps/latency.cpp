@@ -1,16 +1,28 @@
 // rosrun smartmill_studies cnc_latency: how long questions to a controller take on loopback, how many
-// sessions it serves at once, and what polling costs.
+// sessions it serves at once, and what polling costs; the simulated Fanuc, or a LinuxCNC that runs
+// (linuxcnc_machine).
+
+#include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cstdio>
 #include <ctime>
+#include <fstream>
+#include <functional>
+#include <iterator>
 #include <memory>
+#include <sstream>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "smartmill_cnc/controller/focas_controller.h"
+#include "smartmill_cnc/linuxcnc/gateway_client.h"
+#include "smartmill_cnc/linuxcnc/linuxcnc_controller.h"
+#include "smartmill_cnc/linuxcnc/local_socket.h"
+#include "smartmill_cnc/linuxcnc/servo_stream.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/program.h"
 #include "smartmill_focas/client.h"
@@ -43,9 +55,24 @@ void timed(const char* name, int count, const Ask& ask) {
               1e3 * took[took.size() / 2], 1e3 * took[took.size() * 99 / 100], 1e3 * took.back(), count);
 }
 
+/// [s] of a processor that another process has had: user and system time in proc(5).
+double secondsOf(int pid) {
+  std::ifstream file("/proc/" + std::to_string(pid) + "/stat");
+  std::string text((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+  std::istringstream words(text.substr(std::min(text.rfind(')') + 1, text.size())));
+  std::string word;
+  for (int i = 0; i < 11; ++i) {
+    words >> word;
+  }
+  double user = 0.0, system = 0.0;
+  words >> user >> system;
+  return (user + system) / static_cast<double>(::sysconf(_SC_CLK_TCK));
+}
+
 /// Whole readings of the bridge at its rate: their time and the share of one core of both sides.
-void polled(cnc::Controller& controller, double seconds) {
-  const double cpu = processSeconds();
+/// @param used [s] of a processor by all who take part
+void polled(cnc::Controller& controller, double seconds, const std::function<double()>& used) {
+  const double cpu = used();
   const Clock::time_point began = Clock::now();
   std::vector<double> took;
   for (int i = 0; i < static_cast<int>(seconds * RATE); ++i) {
@@ -58,10 +85,9 @@ void polled(cnc::Controller& controller, double seconds) {
     took.push_back(std::chrono::duration<double>(Clock::now() - before).count());
   }
   std::sort(took.begin(), took.end());
-  std::printf(
-      "bridge's reading at %.0f Hz    median %.3f ms, 99 %% %.3f ms; %.2f %% of a core, server included\n",
-      RATE, 1e3 * took[took.size() / 2], 1e3 * took[took.size() * 99 / 100],
-      100.0 * (processSeconds() - cpu) / seconds);
+  std::printf("bridge's reading at %.0f Hz    median %.3f ms, 99 %% %.3f ms; %.2f %% of a core, both sides\n",
+              RATE, 1e3 * took[took.size() / 2], 1e3 * took[took.size() * 99 / 100],
+              100.0 * (used() - cpu) / seconds);
 }
 
 int sessions(std::uint16_t port) {
@@ -77,37 +103,102 @@ int sessions(std::uint16_t port) {
   }
 }
 
+/// The simulated Fanuc on a free port.
+void measureFanuc(int count, double seconds) {
+  sim::Controller machine(sim::ControllerOptions::ofModel(MachineModel{}));
+  focas::ServerOptions options;
+  options.port = 0;
+  focas::Server server(options, machine);
+  focas::Client client;
+  client.connect("127.0.0.1", server.port(), 2.0);
+  timed("cnc_acts", count, [&] { client.actualSpeed(); });
+  timed("cnc_statinfo (3 requests)", count, [&] { client.statusInfo(); });
+  timed("cnc_rdspmeter (5 requests)", count, [&] { client.spindleMeter(); });
+  client.close();
+  std::printf("sessions at once: %d\n", sessions(server.port()));
+  cnc::FocasParameters parameters;
+  parameters.port = server.port();
+  const std::unique_ptr<cnc::Controller> controller = cnc::makeFocasController(parameters);
+  const Clock::time_point until = Clock::now() + std::chrono::seconds(5);
+  while (!controller->connect() && Clock::now() < until) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));  // the sessions above are being closed
+  }
+  timed("bridge's whole reading", count, [&] {
+    if (!controller->read()) throw Error("a reading failed");
+  });
+  polled(*controller, seconds, processSeconds);
+}
+
+double steadySeconds() {
+  return std::chrono::duration<double>(Clock::now().time_since_epoch()).count();
+}
+
+int gatewaySessions(const std::string& folder) {
+  std::vector<std::unique_ptr<cnc::linuxcnc::GatewayClient>> clients;
+  for (;;) {
+    clients.push_back(std::make_unique<cnc::linuxcnc::GatewayClient>(folder, 2.0));
+    try {
+      clients.back()->connect();
+      clients.back()->status();
+    } catch (const Error&) {
+      return static_cast<int>(clients.size()) - 1;
+    }
+  }
+}
+
+/// The LinuxCNC whose sockets stand in a folder, made ready.
+void measureLinuxCnc(const std::string& folder, int count, double seconds) {
+  using namespace cnc::linuxcnc;
+  const int gateway = LocalConnection::to(folder + "/" + GATEWAY_SOCKET).peer();
+  const int reader = LocalConnection::to(folder + "/" + STREAM_SOCKET).peer();
+  std::printf("sessions at once, besides linuxcnc_stream: %d\n", gatewaySessions(folder));
+  std::this_thread::sleep_for(std::chrono::milliseconds(100));  // they are being closed
+  {
+    GatewayClient client(folder, 2.0);
+    client.connect();
+    timed("status", count, [&] { client.status(); });
+  }
+  const auto stream = std::make_shared<ServoStream>(folder);
+  std::atomic<bool> over{false};
+  std::thread listener([&] {
+    while (!over) stream->step(0.05, steadySeconds);
+  });
+  const auto end = [&] {
+    over = true;
+    listener.join();
+  };
+  try {
+    const std::unique_ptr<cnc::Controller> controller =
+        makeLinuxCncController({folder, 2.0}, stream, steadySeconds);
+    std::this_thread::sleep_for(std::chrono::milliseconds(500));
+    const auto connected = controller->connect();
+    if (!connected) throw Error(connected.failure().message);
+    timed("bridge's whole reading", count, [&] {
+      if (!controller->read()) throw Error("a reading failed");
+    });
+    polled(*controller, seconds, [&] { return processSeconds() + secondsOf(gateway) + secondsOf(reader); });
+  } catch (...) {
+    end();
+    throw;
+  }
+  end();
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   int count = 5000;
   double seconds = 20.0;
-  CommandLine line{
-      "Latency of the simulated controller on loopback, sessions, and the cost of polling at 50 Hz."};
+  std::string folder;
+  CommandLine line{"Latency of a controller on loopback, sessions, and the cost of polling at 50 Hz."};
   line.option("--count", count, "questions of each kind").positive().showDefault();
   line.option("--seconds", seconds, "[s] of polling").positive().showDefault();
+  line.option("--linuxcnc", folder, "of a linuxcnc_machine that has been made ready: it instead");
   return runProgram(line, argc, argv, [&] {
-    sim::Controller machine(sim::ControllerOptions::ofModel(MachineModel{}));
-    focas::ServerOptions options;
-    options.port = 0;
-    focas::Server server(options, machine);
-    focas::Client client;
-    client.connect("127.0.0.1", server.port(), 2.0);
-    timed("cnc_acts", count, [&] { client.actualSpeed(); });
-    timed("cnc_statinfo (3 requests)", count, [&] { client.statusInfo(); });
-    timed("cnc_rdspmeter (5 requests)", count, [&] { client.spindleMeter(); });
-    client.close();
-    std::printf("sessions at once: %d\n", sessions(server.port()));
-    cnc::FocasParameters parameters;
-    parameters.port = server.port();
-    const std::unique_ptr<cnc::Controller> controller = cnc::makeFocasController(parameters);
-    const Clock::time_point until = Clock::now() + std::chrono::seconds(5);
-    while (!controller->connect() && Clock::now() < until) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(10));  // the sessions above are being closed
+    if (folder.empty()) {
+      measureFanuc(count, seconds);
+    } else {
+      measureLinuxCnc(folder, count, seconds);
     }
-    timed("bridge's whole reading", count, [&] {
-      if (!controller->read()) throw Error("a reading failed");
-    });
-    polled(*controller, seconds);
   });
 }

@@ -1,5 +1,7 @@
 #include "smartmill_focas/recording.h"
 
+#include <algorithm>
+#include <charconv>
 #include <cstdio>
 #include <fstream>
 #include <ostream>
@@ -19,12 +21,28 @@ int digitOf(char c) {
   return c >= 'a' && c <= 'f' ? c - 'a' + 10 : -1;
 }
 
-RecordedFrame parseLine(const std::string& line) {
+/// What stands before the next blank, which is taken off.
+std::string_view takeWord(std::string_view& text) {
+  constexpr const char* BLANK = " \t\r\v\f";
+  text.remove_prefix(std::min(text.find_first_not_of(BLANK), text.size()));
+  const std::string_view word = text.substr(0, text.find_first_of(BLANK));
+  text.remove_prefix(word.size());
+  return word;
+}
+
+/// The whole word as a number.
+template <class Number>
+bool isNumber(std::string_view word, Number* value) {
+  const auto [end, code] = std::from_chars(word.data(), word.data() + word.size(), *value);
+  return code == std::errc() && end == word.data() + word.size();
+}
+
+RecordedFrame parseLine(std::string_view line) {
   RecordedFrame recorded;
-  std::istringstream words(line);
-  std::string way, digits, more;
-  if (!(words >> recorded.time >> recorded.connection >> way >> digits) || words >> more ||
-      (way != ">" && way != "<") || digits.size() % 2 != 0) {
+  const std::string_view time = takeWord(line), connection = takeWord(line), way = takeWord(line),
+                         digits = takeWord(line);
+  if (!isNumber(time, &recorded.time) || !isNumber(connection, &recorded.connection) ||
+      (way != ">" && way != "<") || digits.empty() || digits.size() % 2 != 0 || !takeWord(line).empty()) {
     throw WireError("TIME CONNECTION > HEX is due");
   }
   recorded.from_client = way == ">";
@@ -32,7 +50,7 @@ RecordedFrame parseLine(const std::string& line) {
   for (std::size_t i = 0; i < digits.size(); i += 2) {
     const int high = digitOf(digits[i]), low = digitOf(digits[i + 1]);
     if (high < 0 || low < 0) {
-      throw WireError("'" + digits.substr(i, 2) + "' is no byte");
+      throw WireError("'" + std::string(digits.substr(i, 2)) + "' is no byte");
     }
     bytes.push_back(static_cast<std::uint8_t>(16 * high + low));
   }
@@ -96,13 +114,24 @@ void append(std::ostream& out, const RecordedFrame& recorded) {
 }
 
 std::vector<RecordedFrame> readRecording(const std::string& file) {
-  std::ifstream in(file);
-  std::string line;
-  if (!std::getline(in, line) || line != FORMAT) {
-    throw WireError(file + ": not a file of format smartmill-focas-session/1");
-  }
+  std::ifstream in(file, std::ios::binary);
+  std::ostringstream text;
+  text << in.rdbuf();
+  return parseRecording(text.str(), file);
+}
+
+std::vector<RecordedFrame> parseRecording(std::string_view text, const std::string& file) {
   std::vector<RecordedFrame> frames;
-  for (int number = 2; std::getline(in, line); ++number) {
+  for (int number = 1; number == 1 || !text.empty(); ++number) {
+    const std::size_t end = text.find('\n');
+    const std::string_view line = text.substr(0, end);
+    text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
+    if (number == 1) {
+      if (line != FORMAT) {
+        throw WireError(file + ": not a file of format smartmill-focas-session/1");
+      }
+      continue;
+    }
     if (line.empty() || line[0] == '#') {
       continue;
     }

@@ -38,6 +38,7 @@ class LocalConnection {
 
   bool open() const { return descriptor_.valid(); }
   int descriptor() const { return descriptor_.get(); }
+  int peer() const;  ///< number of the process at the other end; 0: unknown
   void close();
   /// Why it is closed, when the other side or what it sent is to blame.
   const std::string& fault() const { return fault_; }

@@ -14,21 +14,22 @@
 /// closed.
 namespace smartmill::cnc::linuxcnc {
 
-constexpr std::uint8_t PROTOCOL_VERSION = 1;
+constexpr std::uint8_t PROTOCOL_VERSION = 2;
 constexpr std::size_t FRAME_HEADER = 8;           ///< [byte]
 constexpr std::size_t LONGEST_PROGRAM = 1 << 20;  ///< [byte]
 constexpr std::size_t LONGEST_TEXT = 4096;        ///< [byte] of any other text
 
 enum class Word : std::uint8_t {
-  ready = 1,    ///< the panel's: emergency stop reset, drives on, homed
-  open = 2,     ///< to where programs come in from outside (MDI)
-  run = 3,      ///< text is a program, number its own, counted up by whoever sends it
-  close = 4,    ///< what open() began ends; the spindle stops
-  abort = 5,    ///< axes and spindle stop, the program is forgotten
-  estop = 6,    ///< emergency stop
-  hold = 7,     ///< feed hold
-  resume = 8,   ///< from feed hold
-  variable = 9  ///< #number = value
+  ready = 1,     ///< the panel's: emergency stop reset, drives on, homed
+  open = 2,      ///< to where programs come in from outside (MDI)
+  run = 3,       ///< text is a program, number its own, counted up by whoever sends it
+  close = 4,     ///< what open() began ends; the spindle stops
+  abort = 5,     ///< axes and spindle stop, the program is forgotten
+  estop = 6,     ///< emergency stop
+  hold = 7,      ///< feed hold
+  resume = 8,    ///< from feed hold
+  variable = 9,  ///< #number = value
+  guard = 10     ///< from linuxcnc_stream: when it goes or falls silent, emergency stop
 };
 
 /// To the gateway; every one is answered by a Reply with the same sequence number.
@@ -75,7 +76,8 @@ struct MachineStatus {
   std::array<double, 3> distance_to_go{};  ///< [m]
   std::array<double, 3> offset{};          ///< [m] machine minus workpiece coordinates
   std::uint32_t heartbeat = 0;             ///< servo cycles that the task has seen
-  std::string errors;                      ///< since a program or ready was asked for last, joined by "; "
+  double starved = 0.0;  ///< [s] that it has not counted for want of a processor; 0 once it counts again
+  std::string errors;    ///< since a program or ready was asked for last, joined by "; "; why it is not alive
 };
 
 /// What the stream reads at every servo cycle, in this order, and its units.

@@ -1,5 +1,6 @@
 #include "smartmill_core/io/text_file.h"
 
+#include <filesystem>
 #include <fstream>
 
 #include "smartmill_core/error.h"
@@ -10,7 +11,8 @@ std::string readText(const std::string& file) {
   std::ifstream stream(file, std::ios::binary | std::ios::ate);
   if (!stream) throw Error(file + ": cannot be read");
   const std::streamoff size = stream.tellg();
-  if (size < 0) throw Error(file + ": cannot be read");
+  // A folder can be opened, and tells whatever size.
+  if (size < 0 || std::filesystem::is_directory(file)) throw Error(file + ": cannot be read");
   std::string text(static_cast<std::size_t>(size), '\0');
   stream.seekg(0);
   stream.read(text.data(), size);

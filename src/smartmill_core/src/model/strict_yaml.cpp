@@ -9,6 +9,7 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
+#include "smartmill_core/io/text_file.h"
 
 namespace smartmill {
 
@@ -86,9 +87,7 @@ struct StrictYaml::Impl {
 StrictYaml StrictYaml::fromFile(const std::string& file) {
   YAML::Node root;
   try {
-    root = YAML::LoadFile(file);
-  } catch (const YAML::BadFile&) {
-    throw Error(file + ": cannot be read");
+    root = YAML::Load(readText(file));
   } catch (const YAML::Exception& error) {
     throw Error(file + ": not a YAML file: " + lineOf(error.what()));
   }

@@ -5,6 +5,7 @@
 #include <iosfwd>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "smartmill_focas/client.h"
@@ -29,6 +30,8 @@ void beginRecording(std::ostream& out);
 void append(std::ostream& out, const RecordedFrame& frame);
 /// @throws WireError naming file and line.
 std::vector<RecordedFrame> readRecording(const std::string& file);
+/// The same of a file's text. @param file for the messages
+std::vector<RecordedFrame> parseRecording(std::string_view text, const std::string& file);
 
 /// Stands between clients and a controller, hands on every byte as it comes and tells of every frame. Bytes
 /// that are no frames pass too, but are not told of. Runs one thread of its own.

@@ -1,0 +1,109 @@
+#include "smartmill_cnc/linuxcnc/process_watch.h"
+
+#include <dirent.h>
+#include <poll.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <memory>
+
+namespace smartmill::cnc::linuxcnc {
+namespace {
+
+/// The numbers among a folder's names.
+std::vector<int> numbersIn(const std::string& folder) {
+  std::vector<int> numbers;
+  const std::unique_ptr<DIR, int (*)(DIR*)> entries(::opendir(folder.c_str()), ::closedir);
+  while (const dirent* entry = entries ? ::readdir(entries.get()) : nullptr) {
+    const int number = std::atoi(entry->d_name);
+    if (number > 0) {
+      numbers.push_back(number);
+    }
+  }
+  return numbers;
+}
+
+/// The first line of a file of /proc; nothing when it has gone.
+std::string lineOf(const std::string& file) {
+  char line[512] = "";
+  const std::unique_ptr<FILE, int (*)(FILE*)> stream(std::fopen(file.c_str(), "r"), std::fclose);
+  if (!stream || !std::fgets(line, sizeof line, stream.get())) {
+    return {};
+  }
+  return line;
+}
+
+/// proc(5): the state stands behind the name in parentheses.
+char stateOf(const std::string& thread) {
+  const std::string line = lineOf(thread + "/stat");
+  const std::size_t name = line.rfind(')');
+  return name != std::string::npos && name + 2 < line.size() ? line[name + 2] : '?';
+}
+
+}  // namespace
+
+void ProcessWatch::find(const std::vector<std::string>& names) {
+  processes_.clear();
+  ran_.clear();
+  std::map<std::string, int> oldest;
+  for (const int pid : numbersIn("/proc")) {
+    const std::string folder = "/proc/" + std::to_string(pid);
+    std::string name = lineOf(folder + "/comm");
+    name = name.substr(0, name.find('\n'));
+    if (std::find(names.begin(), names.end(), name) != names.end() && stateOf(folder) != 'Z') {
+      const auto [at, first] = oldest.emplace(name, pid);
+      at->second = std::min(at->second, pid);
+    }
+  }
+  for (const auto& [name, pid] : oldest) {
+    add(pid);
+  }
+}
+
+void ProcessWatch::only(int pid) {
+  processes_.clear();
+  ran_.clear();
+  add(pid);
+}
+
+void ProcessWatch::add(int pid) {
+  // glibc 2.36 declares pidfd_open() for C only.
+  LocalDescriptor handle(static_cast<int>(::syscall(SYS_pidfd_open, pid, 0)));
+  if (handle.valid()) {
+    processes_.push_back({pid, std::move(handle)});
+  }
+}
+
+bool ProcessWatch::ended() const {
+  return std::any_of(processes_.begin(), processes_.end(), [](const Process& process) {
+    pollfd entry{process.handle.get(), POLLIN, 0};
+    return ::poll(&entry, 1, 0) == 1;
+  });
+}
+
+bool ProcessWatch::waits(double now) {
+  if (now - looked_ < WINDOW) {
+    return waits_;
+  }
+  looked_ = now;
+  waits_ = false;
+  std::map<int, std::uint64_t> ran;
+  for (const Process& process : processes_) {
+    const std::string threads = "/proc/" + std::to_string(process.pid) + "/task/";
+    for (const int thread : numbersIn(threads)) {
+      const std::string folder = threads + std::to_string(thread);
+      // schedstat: what it has run [ns], what it has waited, how often. A thread that still waits is not yet
+      // in the second.
+      ran[thread] = std::strtoull(lineOf(folder + "/schedstat").c_str(), nullptr, 10);
+      const auto before = ran_.find(thread);
+      waits_ = waits_ || (before != ran_.end() && before->second == ran[thread] && stateOf(folder) == 'R');
+    }
+  }
+  ran_ = std::move(ran);
+  return waits_;
+}
+
+}  // namespace smartmill::cnc::linuxcnc

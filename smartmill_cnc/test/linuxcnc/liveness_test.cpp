@@ -1,0 +1,149 @@
+// A controller that has ended, one that hangs and one that waits for a processor are told apart.
+#include "smartmill_cnc/linuxcnc/liveness.h"
+
+#include <gtest/gtest.h>
+#include <sched.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <csignal>
+#include <string>
+#include <thread>
+
+#include "smartmill_cnc/linuxcnc/process_watch.h"
+
+namespace smartmill::cnc::linuxcnc {
+namespace {
+
+using Verdict = Liveness::Verdict;
+
+constexpr double LOOK = 0.002;  // [s]
+
+/// [s] from the last cycle to the verdict when nothing but this evidence is seen.
+double verdictAfter(Verdict due, const Liveness::Evidence& evidence, double step) {
+  Liveness liveness;
+  double now = 100.0;
+  liveness.look(Liveness::Evidence{true, false, false}, now);
+  for (;;) {
+    now += step;
+    const Verdict verdict = liveness.look(evidence, now);
+    if (verdict != Verdict::lives) {
+      EXPECT_EQ(verdict, due);
+      return now - 100.0;
+    }
+  }
+}
+
+TEST(Liveness, OneThatHangsIsToldWithinHalfASecond) {
+  EXPECT_NEAR(verdictAfter(Verdict::hangs, {false, false, false}, LOOK), 0.4, 2 * LOOK);
+}
+
+TEST(Liveness, OneThatHasEndedIsToldAtOnce) {
+  EXPECT_NEAR(verdictAfter(Verdict::ended, {false, true, false}, LOOK), LOOK, 1e-9);
+}
+
+TEST(Liveness, OneThatWaitsForAProcessorLivesForTwoSeconds) {
+  EXPECT_NEAR(verdictAfter(Verdict::starves, {false, false, true}, LOOK), 2.0, 2 * LOOK);
+}
+
+TEST(Liveness, AnObserverThatWaitedItselfBlamesNobody) {
+  // Looks 0.3 s apart: 0.05 s of each count as the controller's, and 2 s are over before 0.4 s of these.
+  EXPECT_NEAR(verdictAfter(Verdict::starves, {false, false, false}, 0.3), 2.1, 1e-9);
+  Liveness liveness;
+  liveness.look(Liveness::Evidence{true, false, false}, 0.0);
+  EXPECT_EQ(liveness.look(Liveness::Evidence{false, false, false}, 1.0), Verdict::lives);
+  EXPECT_NEAR(liveness.starved(), 0.95, 1e-12);
+  EXPECT_EQ(liveness.look(Liveness::Evidence{true, false, false}, 1.1), Verdict::lives);
+  EXPECT_EQ(liveness.starved(), 0.0);
+}
+
+/// A child that has a name of its own and does what it is told on one processor, together with this process'
+/// other children.
+class Child {
+ public:
+  Child(const char* name, bool busy) : pid_(::fork()) {
+    if (pid_ == 0) {
+      ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+      ::prctl(PR_SET_NAME, name);
+      cpu_set_t first;
+      CPU_ZERO(&first);
+      CPU_SET(0, &first);
+      ::sched_setaffinity(0, sizeof first, &first);
+      while (!busy) {
+        ::pause();
+      }
+      for (volatile unsigned i = 0;; ++i) {
+      }
+    }
+  }
+  ~Child() {
+    ::kill(pid_, SIGKILL);
+    ::waitpid(pid_, nullptr, 0);
+  }
+  Child(const Child&) = delete;
+  Child& operator=(const Child&) = delete;
+  pid_t pid() const { return pid_; }
+
+ private:
+  const pid_t pid_;
+};
+
+double now() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+/// The watch's answers over some time.
+int waitsSeen(ProcessWatch& watch, int looks) {
+  int seen = 0;
+  for (int i = 0; i < looks; ++i) {
+    std::this_thread::sleep_for(std::chrono::duration<double>(1.2 * ProcessWatch::WINDOW));
+    seen += watch.waits(now()) ? 1 : 0;
+  }
+  return seen;
+}
+
+TEST(ProcessWatch, SeesWhoEnds) {
+  const std::string name = "smw_e_" + std::to_string(::getpid());
+  ProcessWatch watch;
+  {
+    const Child child(name.c_str(), false);
+    while (watch.found() == 0) {
+      watch.find({name});
+    }
+    EXPECT_FALSE(watch.ended());
+    ::kill(child.pid(), SIGKILL);
+    siginfo_t info{};
+    ::waitid(P_PID, static_cast<id_t>(child.pid()), &info, WEXITED | WNOWAIT);
+    EXPECT_TRUE(watch.ended());
+    watch.find({name});
+    EXPECT_EQ(watch.found(), 0u);  // not yet buried
+  }
+}
+
+TEST(ProcessWatch, SeesWhoWaitsForAProcessorAndWhoSleeps) {
+  const std::string name = "smw_w_" + std::to_string(::getpid()),
+                    idle = "smw_i_" + std::to_string(::getpid());
+  const Child waits(name.c_str(), true), sleeps(idle.c_str(), false);
+  sched_param none{};
+  // Runs only when nobody else wants to.
+  ASSERT_EQ(::sched_setscheduler(waits.pid(), SCHED_IDLE, &none), 0);
+  ProcessWatch watch, other;
+  while (watch.found() == 0 || other.found() == 0) {
+    watch.find({name});
+    other.find({idle});
+  }
+  {
+    const Child rival("smw_rival", true), another("smw_rival", true);
+    EXPECT_GT(waitsSeen(watch, 40), 10);
+    EXPECT_EQ(waitsSeen(other, 5), 0);
+  }
+  ::kill(waits.pid(), SIGSTOP);
+  ASSERT_EQ(::waitpid(waits.pid(), nullptr, WUNTRACED), waits.pid());
+  waitsSeen(watch, 1);
+  EXPECT_EQ(waitsSeen(watch, 5), 0);  // one that is stopped waits for nothing
+}
+
+}  // namespace
+}  // namespace smartmill::cnc::linuxcnc
