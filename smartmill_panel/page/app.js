@@ -1,6 +1,6 @@
 // The panel: one page for one machine. It shows topics as they come and commands nothing unless it was allowed to.
-import { Link } from './link.js';
-import { make } from './format.js';
+import { Beside, Link } from './link.js';
+import { kept, make } from './format.js';
 import { StatusLine } from './views/status.js';
 import { Tiles } from './views/tiles.js';
 import { ChartView, PointsTable } from './views/chart.js';
@@ -31,7 +31,7 @@ class Page {
     this.parts = [];
     const scheme = location.protocol === 'https:' ? 'wss' : 'ws';
     this.link = new Link(`${scheme}://${location.host}/`, config.namespace);
-    this.store = { axis: 'x', source: 1 };
+    this.store = kept('layout', { view: 'overview', axis: 'x', source: 1, part: 'magnitude' });
     this.status = new StatusLine(document.querySelector('#status'), this.link, config.name);
     this.parts.push(this.status);
     this.buildMachines();
@@ -42,16 +42,28 @@ class Page {
     setInterval(() => this.refresh(), REFRESH);
   }
 
-  // Other panels: each its status line; its own page is one touch away.
+  // Other machines: each its status line; its own page is one touch away. Those of other panels by their addresses,
+  // those beside this one (in other namespaces of the same ROS master) by themselves.
   buildMachines() {
-    const place = document.querySelector('#machines');
-    for (const address of this.config.machines) {
-      const button = make('button', { onclick: () => { location.href = address; } });
-      place.append(button);
-      const link = new Link(address.replace(/^http/, 'ws'), this.config.namespace);
-      const line = new StatusLine(button, link, new URL(address).hostname, true);
-      this.parts.push(line);
-    }
+    for (const address of this.config.machines)
+      this.addMachine(new URL(address).host, new Link(address.replace(/^http/, 'ws'), this.config.namespace), () => address);
+    const found = new Set([this.config.namespace]);
+    this.link.onChannel = topic => {
+      const namespace = topic.match(/^(.+)\/cnc\/state$/)?.[1];
+      if (!namespace || found.has(namespace)) return;
+      found.add(namespace);
+      const name = namespace.replace(/\/smartmill$/, '').slice(1) || 'SmartMill';
+      this.addMachine(name, new Beside(this.link, namespace), async () => (await (await fetch('api/config')).json()).panels[namespace]);
+    };
+  }
+
+  addMachine(name, link, addressOf) {
+    const button = make('button', { 'data-machine': name, title: `To the page of ${name}`, onclick: async () => {
+      const address = await addressOf();
+      if (address) location.href = address; else button.title = `${name} has no panel of its own: roslaunch smartmill_launch panel.launch in its namespace`;
+    } });
+    document.querySelector('#machines').append(button);
+    this.parts.push(new StatusLine(button, link, name, true));
   }
 
   add(view, place, part) {
@@ -87,27 +99,27 @@ class Page {
       this.add('overview', element, build(element));
     }
 
-    place('forces', 'Forces, the last minute', 'wide', e => new Strips(e, link, store));
+    const notes = card('Notes', 'tools-free'), orders = card('Commands', 'tools-free');
+    const log = new Notes(notes, link);
+    place('forces', 'Forces, the last minute', 'wide', e => new Strips(e, link, store, log));
     place('forces', 'Spectrum', '', e => new Spectrum(e, link, store));
     place('forces', 'One revolution', '', e => new Revolution(e, link, store, false));
-    place('forces', 'The last minute', 'tools-free', e => new SpectrumCourse(e, link, store));
+    place('forces', 'The last minute', '', e => new SpectrumCourse(e, link, store));
 
     let chart = null;
     place('stability', 'Stability', '', e => chart = new ChartView(e, link, 'stability'));
     place('stability', 'What if', 'side what-if tools-free', e => new WhatIf(e, link, chart));
     place('stability', 'Points to cut at', 'wide tools-free', e => new PointsTable(e, link));
 
-    const dynamics = new Dynamics(this.views.dynamics, link, card);
+    const dynamics = new Dynamics(this.views.dynamics, link, card, store);
     this.add('dynamics', null, dynamics);
 
     place('session', 'Session', 'tools-free', e => new Session(e, link));
     const beside = make('div', { style: 'display: grid; gap: 12px' });
     this.views.session.append(beside);
-    const notes = card('Notes', 'tools-free'), commands = card('Commands', 'tools-free');
-    beside.append(notes, commands);
-    const orders = new Commands(commands, link, this.config);
-    this.add('session', commands, orders);
-    this.add('session', notes, new Notes(notes, link, orders));
+    beside.append(notes, orders);
+    this.add('session', orders, new Commands(orders, link, this.config));
+    this.add(null, notes, log);
     this.add(null, null, new Replay(document.querySelector('#replay'), link));
     this.add(null, null, new Progress(document.querySelector('#foot'), link));
 
@@ -129,8 +141,8 @@ class Page {
   }
 
   show() {
-    const wanted = location.hash.slice(1);
-    this.current = VIEWS[wanted] ? wanted : 'overview';
+    const wanted = location.hash.slice(1) || this.store.view;
+    this.current = this.store.view = VIEWS[wanted] ? wanted : 'overview';
     for (const [name, element] of Object.entries(this.views)) element.hidden = name !== this.current;
     for (const button of document.querySelectorAll('nav button[data-view]'))
       button.dataset.view === this.current ? button.setAttribute('aria-current', 'page') : button.removeAttribute('aria-current');

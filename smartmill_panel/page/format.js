@@ -58,3 +58,16 @@ export function save(name, content, type) {
   make('a', { href: url, download: name }).click();
   setTimeout(() => URL.revokeObjectURL(url), 1000);
 }
+
+// What stays from one visit to the next: an object whose members are written back as they change.
+export function kept(name, defaults) {
+  let found = {};
+  try { found = JSON.parse(localStorage.getItem(name)) ?? {}; } catch { /* what is not readable is forgotten */ }
+  return new Proxy({ ...defaults, ...found }, {
+    set(object, key, value) {
+      object[key] = value;
+      localStorage.setItem(name, JSON.stringify(object));
+      return true;
+    },
+  });
+}

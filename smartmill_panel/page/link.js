@@ -18,9 +18,11 @@ export class Link {
     this.connect();
   }
 
+  full(topic) { return topic.startsWith('/') ? topic : `${this.namespace}/${topic}`; }
+
   // topic relative to the namespace; the listener gets (message, stamp of reception by the server [s]).
   on(topic, listener) {
-    const name = topic.startsWith('/') ? topic : `${this.namespace}/${topic}`;
+    const name = this.full(topic);
     if (!this.listeners.has(name)) this.listeners.set(name, []);
     this.listeners.get(name).push(listener);
     this.subscribe();
@@ -36,10 +38,10 @@ export class Link {
 
   // [s] since the last message of a topic; infinite: none yet.
   age(topic) {
-    const last = this.last.get(`${this.namespace}/${topic}`);
+    const last = this.last.get(this.full(topic));
     return last && this.clock ? Math.max(0, this.now() - last.stamp) : Infinity;
   }
-  message(topic) { return this.last.get(`${this.namespace}/${topic}`)?.message; }
+  message(topic) { return this.last.get(this.full(topic))?.message; }
 
   connect() {
     this.channels = new Map();       // topic -> channel
@@ -62,7 +64,10 @@ export class Link {
 
   told(text) {
     if (text.op === 'advertise') {
-      for (const channel of text.channels) this.channels.set(channel.topic, channel);
+      for (const channel of text.channels) {
+        this.channels.set(channel.topic, channel);
+        this.onChannel?.(channel.topic);
+      }
       this.subscribe();
     } else if (text.op === 'status' && text.level === 1) {
       this.lost = true;
@@ -96,4 +101,13 @@ export class Link {
     this.last.set(subscription.topic, { message, stamp });
     for (const listener of this.listeners.get(subscription.topic)) listener(message, stamp);
   }
+}
+
+// Another machine's topics that come by the same way.
+export class Beside {
+  constructor(link, namespace) { Object.assign(this, { link, namespace }); }
+  get alive() { return this.link.alive; }
+  on(topic, listener) { this.link.on(`${this.namespace}/${topic}`, listener); }
+  age(topic) { return this.link.age(`${this.namespace}/${topic}`); }
+  message(topic) { return this.link.message(`${this.namespace}/${topic}`); }
 }

@@ -31,6 +31,19 @@ function tickText(value, log) {
 
 const linked = new Map();  // group -> plots
 
+// Buttons that save what is seen.
+function exportsOf(plot) {
+  return make('div', { class: 'tools' },
+    make('button', { title: 'Save as picture', onclick: () => plot.savePicture() }, 'PNG'),
+    make('button', { title: 'Save the numbers', onclick: () => plot.saveNumbers() }, 'CSV'));
+}
+
+function saveCanvas(canvas, name) {
+  const copy = make('canvas', { width: canvas.width, height: canvas.height }), c = copy.getContext('2d');
+  c.fillStyle = colour('card'); c.fillRect(0, 0, copy.width, copy.height); c.drawImage(canvas, 0, 0);
+  copy.toBlob(blob => save(`${name}.png`, blob));
+}
+
 export class Plot {
   // options: name (of exported files), x and y: {label, log, low, high}, group: linked zoom and cursor,
   // read(x, y): lines of text at the cursor
@@ -43,10 +56,8 @@ export class Plot {
     this.canvas = make('canvas', { tabindex: '0', role: 'img', 'aria-label': options.name });
     this.note = make('div', { class: 'readout', hidden: true });
     this.empty = make('div', { class: 'empty' }, options.empty ?? 'No data yet');
-    const tools = make('div', { class: 'tools' },
-      make('button', { title: 'Save as picture', onclick: () => this.savePicture() }, 'PNG'),
-      make('button', { title: 'Save the numbers', onclick: () => this.saveNumbers() }, 'CSV'));
-    this.frame = make('div', { class: 'plot' }, this.canvas, this.note, this.empty, tools);
+    this.whole = make('button', { class: 'whole', title: 'Show all (Esc, double-click)', hidden: true, onclick: () => this.setZoom(null) }, 'Show all');
+    this.frame = make('div', { class: 'plot' }, this.canvas, this.note, this.empty, this.whole, exportsOf(this));
     parent.append(this.frame);
     new ResizeObserver(() => this.dirty()).observe(this.frame);
     this.listen();
@@ -129,6 +140,7 @@ export class Plot {
     c.setTransform(ratio, 0, 0, ratio, 0, 0);
     c.clearRect(0, 0, g.width, g.height);
     const something = this.series.length > 0;
+    this.whole.hidden = !this.zoom;
     this.empty.hidden = something;
     this.canvas.dataset.drawn = something ? 'yes' : 'no';
     c.font = `${FONT}px ${getComputedStyle(document.body).fontFamily}`;
@@ -223,7 +235,11 @@ export class Plot {
         c.moveTo(p, TOP); c.lineTo(p, g.height - this.bottom);
         const row = m.label ? ends.findIndex(end => end < p) : -1;
         if (row >= 0) {
-          ends[row] = p + 8 + c.measureText(m.label).width;
+          const wide = c.measureText(m.label).width, tint = c.fillStyle;
+          ends[row] = p + 8 + wide;
+          c.fillStyle = colour('card'); c.globalAlpha = 0.75;
+          c.fillRect(p + 2, TOP + 1 + row * (FONT + 2), wide + 4, FONT + 2);
+          c.fillStyle = tint; c.globalAlpha = 1;
           c.fillText(m.label, p + 4, TOP + 2 + row * (FONT + 2));
         }
       } else {
@@ -322,11 +338,7 @@ export class Plot {
     this.canvas.addEventListener('keydown', event => { if (event.key === 'Escape') this.setZoom(null); });
   }
 
-  savePicture() {
-    const copy = make('canvas', { width: this.canvas.width, height: this.canvas.height }), c = copy.getContext('2d');
-    c.fillStyle = colour('card'); c.fillRect(0, 0, copy.width, copy.height); c.drawImage(this.canvas, 0, 0);
-    copy.toBlob(blob => save(`${this.options.name}.png`, blob));
-  }
+  savePicture() { saveCanvas(this.canvas, this.options.name); }
 
   csv() {
     const lines = [`series,${this.options.x.label},${this.options.y.label},upper end`];
@@ -345,11 +357,14 @@ export class Waterfall {
     this.canvas = make('canvas', { role: 'img', 'aria-label': 'waterfall' });
     this.empty = make('div', { class: 'empty' }, 'No data yet');
     this.label = make('div', { class: 'axis' });
-    parent.append(make('div', { class: 'plot' }, this.canvas, this.empty, this.label));
+    parent.append(make('div', { class: 'plot' }, this.canvas, this.empty, this.label, exportsOf(this)));
     this.image = make('canvas');
+    this.lines = [];  // the amplitudes that are shown, with their times
   }
-  // amplitudes of one moment, up to highest [Hz]
-  push(amplitudes, highest) {
+  // amplitudes of one moment [s], up to highest [Hz]
+  push(amplitudes, highest, time) {
+    this.lines.push({ time, highest, amplitudes });
+    if (this.lines.length > this.columns) this.lines.shift();
     const image = this.image, rows = amplitudes.length;
     if (image.height !== rows || image.width !== this.columns) { image.width = this.columns; image.height = rows; this.peak = 0; }
     const c = image.getContext('2d');
@@ -378,4 +393,11 @@ export class Waterfall {
     c.drawImage(this.image, 0, 0, this.canvas.width, this.canvas.height);
     this.canvas.dataset.drawn = 'yes';
   }
+  savePicture() { saveCanvas(this.canvas, 'waterfall'); }
+  csv() {
+    const count = this.lines.at(-1)?.amplitudes.length ?? 0, step = (this.lines.at(-1)?.highest ?? 0) / count;
+    const head = Array.from({ length: count }, (_, k) => `${((k + 0.5) * step).toPrecision(6)} Hz`);
+    return [`time [s],${head.join()}`, ...this.lines.map(l => `${l.time},${Array.from(l.amplitudes, a => a.toPrecision(4)).join()}`)].join('\n') + '\n';
+  }
+  saveNumbers() { save('waterfall.csv', this.csv(), 'text/csv'); }
 }

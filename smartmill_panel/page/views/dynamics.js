@@ -1,8 +1,10 @@
 // What the hammer measured, and the modes fitted to it.
-import { deg, digits, fixed, make, table, withDeviation } from '../format.js';
+import { clock, deg, digits, fixed, make, table, withDeviation } from '../format.js';
 import { Plot, colour } from '../plot.js';
 
 const POINTS = { tool_tip: 'tool', force_sensor: 'force sensor' };
+
+const nameOf = m => `${POINTS[m.point] ?? m.point} ${m.direction}`;
 
 // direct + sum of gain w0^2 / (w0^2 - w^2 + 2 i z w0 w)
 function response(model, f) {
@@ -23,29 +25,33 @@ const PARTS = {
 };
 
 export class Dynamics {
-  constructor(parent, link, card) {
-    Object.assign(this, { frfs: {}, models: {}, picked: null, part: 'magnitude' });
+  constructor(parent, link, card, store) {
+    Object.assign(this, { frfs: {}, models: {}, picked: null, store });
     const big = card('Frequency response'), small = card('Coherence'), side = card('Modes', 'side tools-free');
+    this.hits = new Hits(link);
     parent.append(big, side, small);
     this.big = big;
     this.measured = make('span', { class: 'choice row' });
-    this.parts = make('span', { class: 'choice row' }, ...Object.entries(PARTS).map(([key, p]) => make('button', { 'data-part': key, onclick: () => { this.part = key; this.draw(); } }, p.name)));
+    this.parts = make('span', { class: 'choice row' }, ...Object.entries(PARTS).map(([key, p]) => make('button', { 'data-part': key, onclick: () => { store.part = key; this.draw(); } }, p.name)));
+    this.blows = make('div', { class: 'hits', id: 'hits' });
     big.append(make('div', { class: 'choices' }, this.measured, this.parts));
+    small.append(this.blows);
     this.plot = new Plot(big, { name: 'frf', group: 'frf', x: { label: 'Frequency [Hz]', low: 0 }, y: { label: '' }, empty: 'No FRF measured yet', read: (x, y) => [`${fixed(x, 1)} Hz`, digits(y)] });
     this.coherence = new Plot(small, { name: 'coherence', group: 'frf', x: { label: 'Frequency [Hz]', low: 0 }, y: { label: 'Coherence', low: 0, high: 1 }, empty: 'Coherence needs two hits', read: (x, y) => [`${fixed(x, 1)} Hz`, fixed(y, 3)] });
     this.list = make('div', { class: 'dim' }, 'No modes yet');
     side.append(this.list);
-    const key = m => `${POINTS[m.point] ?? m.point} ${m.direction}`;
+    const key = nameOf;
     link.on('tool/frf', m => { this.frfs[key(m)] = m; this.picked ??= key(m); this.news = true; });
     link.on('tool/modes', m => { this.models[key(m)] = m; this.news = true; });
   }
 
   draw() {
-    const frf = this.frfs[this.picked], model = this.models[this.picked], part = PARTS[this.part];
+    const frf = this.frfs[this.picked], model = this.models[this.picked], part = PARTS[this.store.part] ?? PARTS.magnitude;
     const names = Object.keys(this.frfs).sort();
     this.measured.replaceChildren(...names.map(name => make('button', { 'aria-pressed': String(name === this.picked), onclick: () => { this.picked = name; this.draw(); } }, name)));
-    for (const b of this.parts.children) b.setAttribute('aria-pressed', String(b.dataset.part === this.part));
+    for (const b of this.parts.children) b.setAttribute('aria-pressed', String(PARTS[b.dataset.part] === part));
     this.drawModes();
+    this.drawHits();
     if (!frf) return;
     const scale = frf.unit === 'm/N' ? 1e6 : 1, unit = frf.unit === 'm/N' ? 'µm/N' : '1';
     const x = frf.frequency, of = (re, im) => part.plain ? part.of(re, im) : scale * part.of(re, im);
@@ -69,6 +75,48 @@ export class Dynamics {
           tool ? withDeviation(1e-6 / m.gain, 1e-6 * m.gain_std / m.gain ** 2) : withDeviation(m.gain, m.gain_std)]))];
     }));
   }
-  refresh() { if (this.news) { this.news = false; this.draw(); } }
+  drawHits() {
+    const found = this.hits.of(this.picked);
+    if (!found) return this.blows.replaceChildren();
+    const taken = found.blows.filter(b => b.taken).length;
+    this.blows.replaceChildren(make('span', { class: 'dim' }, `Hits ${found.name}: ${taken} taken` + (taken < found.blows.length ? `, ${found.blows.length - taken} refused` : '')),
+      ...found.blows.map((b, k) => make('span', { class: `word ${b.taken ? 'good' : 'bad'}`, title: clock(b.time) }, b.taken ? `${k + 1} taken` : `${k + 1} refused: ${b.why}`)),
+      found.stage ? make('span', { class: 'dim' }, found.stage) : '');
+  }
+  refresh() {
+    if (this.news) { this.news = false; this.draw(); }
+    if (this.hits.news) { this.hits.news = false; this.drawHits(); }
+  }
   shown() { this.draw(); }
+}
+
+// Blows of the hammer as the measurement's feedback tells them: "hit 3 of 5", "hit thrown away: why".
+class Hits {
+  constructor(link) {
+    this.goals = new Map();
+    for (const action of ['hammer/measure_frf', 'kalman/measure_frf']) {
+      link.on(`${action}/goal`, m => { Object.assign(this.goal(m.goal_id), { name: nameOf(m.goal) }); this.news = true; });
+      link.on(`${action}/feedback`, m => this.take(m));
+      link.on(`${action}/result`, m => { Object.assign(this.goal(m.status.goal_id), { stage: m.result.code ? m.result.message : '', ended: true }); this.news = true; });
+    }
+  }
+  goal(id) {
+    if (!this.goals.has(id.id)) this.goals.set(id.id, { blows: [], stage: '', name: '', time: id.stamp });
+    return this.goals.get(id.id);
+  }
+  // Kept ones may come in any order.
+  take(m) {
+    const goal = this.goal(m.status.goal_id), text = m.feedback.stage, why = text.match(/^hit thrown away: (.*)/)?.[1], time = m.header.stamp;
+    if (!goal.ended && !(goal.heard > time)) Object.assign(goal, { stage: text, heard: time });
+    if ((why || /^hit \d+ of/.test(text)) && !goal.blows.some(b => b.time === time)) {
+      goal.blows.push({ taken: !why, why, time });
+      goal.blows.sort((a, b) => a.time - b.time);
+    }
+    this.news = true;
+  }
+  // Of the newest measurement at a place, or of what runs.
+  of(name) {
+    const all = [...this.goals.values()].filter(g => g.blows.length || (g.stage && !g.ended)).sort((a, b) => b.time - a.time);
+    return all.find(g => !g.ended) ?? all.find(g => g.name === name) ?? null;
+  }
 }

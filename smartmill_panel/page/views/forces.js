@@ -115,7 +115,7 @@ export class SpectrumCourse {
     this.waterfall = new Waterfall(card);
     link.on('panel/spectrum', message => {
       if (message.source !== store.source) return;
-      this.waterfall.push(message[`f${store.axis}`], message.step * message.fx.length);
+      this.waterfall.push(message[`f${store.axis}`], message.step * message.fx.length, message.header.stamp);
     });
   }
   refresh() { this.waterfall.draw(); }
@@ -138,8 +138,9 @@ export function joined(bins, columns) {
 }
 
 export class Strips {
-  constructor(card, link, store) {
-    Object.assign(this, { card, link, store, strips: [], paused: false });
+  // notes: with a list of {time, text}
+  constructor(card, link, store, notes) {
+    Object.assign(this, { card, link, store, notes, strips: [], paused: false });
     choice(card, store, 'source', [[MEASURED, 'raw'], [COMPENSATED, 'compensated'], [TWIN, 'twin']], () => this.draw());
     const pause = make('button', { onclick: () => { this.paused = !this.paused; pause.textContent = this.paused ? 'Go on' : 'Pause'; this.draw(); } }, 'Pause');
     card.querySelector('h2').append(make('span', { class: 'choice row' }, pause));
@@ -179,7 +180,8 @@ export class Strips {
   draw() {
     AXES.forEach((axis, k) => {
       const bins = joined(this.bins(axis), Math.max(200, this.plots[k].frame.clientWidth));
-      this.plots[k].set({ series: bins.x.length ? [{ kind: 'band', x: bins.x, y: bins.low, y2: bins.high, color: colour(axis), alpha: 0.85 }] : [] });
+      this.plots[k].set({ marks: this.notes.list.map(n => ({ x: n.time, label: k === 0 ? n.text : '', color: colour('warn') })),
+        series: bins.x.length ? [{ kind: 'band', x: bins.x, y: bins.low, y2: bins.high, color: colour(axis), alpha: 0.85 }] : [] });
     });
   }
   refresh() { if (this.news && !this.paused) { this.news = false; this.draw(); } }

@@ -35,31 +35,39 @@ export class Progress {
   }
 }
 
-// Markers with a note: kept in this browser, and in the machine's log where commands are allowed.
+// Markers with a note, in the machine's log: every page beside this one shows them, and a recording keeps them.
 export class Notes {
-  constructor(card, link, commands) {
-    Object.assign(this, { link, commands });
-    this.notes = JSON.parse(localStorage.getItem('notes') ?? '[]');
+  constructor(card, link) {
+    Object.assign(this, { link, list: [] });
     this.input = make('input', { type: 'text', placeholder: 'What was seen', maxlength: '200', 'aria-label': 'Note' });
     this.input.addEventListener('keydown', event => { if (event.key === 'Enter') this.add(); });
-    this.list = make('div');
-    card.append(make('div', { class: 'row' }, this.input, make('button', { onclick: () => this.add() }, 'Mark'),
-      make('button', { onclick: () => save('notes.csv', this.csv(), 'text/csv') }, 'CSV')), this.list);
+    this.told = make('div', { class: 'dim' });
+    this.place = make('div');
+    card.append(make('div', { class: 'row' }, this.input, make('button', { id: 'mark', onclick: () => this.add() }, 'Mark'),
+      make('button', { onclick: () => save('notes.csv', this.csv(), 'text/csv') }, 'CSV')), this.told, this.place);
     link.on('cut/condition', () => {});
+    link.on('panel/log', message => this.heard(message.data));
     this.draw();
   }
-  add() {
-    const text = this.input.value.trim();
+  // "TIME WHO (ADDRESS): mark: TEXT"; kept ones may come in any order.
+  heard(line) {
+    const [, time, who, text] = line.match(/^([\d.]+) (.*?) \([^()]*\): mark: (.*)$/) ?? [];
+    if (!text || this.list.some(n => n.time === +time && n.text === text)) return;
+    this.list.push({ time: +time, who, text });
+    this.list.sort((a, b) => b.time - a.time);
+    this.list.length = Math.min(this.list.length, 200);
+    this.draw();
+  }
+  async add() {
+    const text = this.input.value.trim(), cut = this.link.message('cut/condition');
     if (!text) return;
-    this.notes.unshift({ time: Date.now() / 1000, cut: this.link.message('cut/condition')?.name ?? '', text });
-    this.notes.length = Math.min(this.notes.length, 200);
-    localStorage.setItem('notes', JSON.stringify(this.notes));
-    this.input.value = '';
-    if (this.commands.unlocked) this.commands.send({ command: 'mark', text });
-    this.draw();
+    const where = cut?.kind && cut.name ? `${cut.name}: ` : '';
+    const answer = await fetch('api/note', { method: 'POST', body: JSON.stringify({ who: localStorage.getItem('who') || 'page', text: where + text }) }).catch(() => null);
+    this.told.textContent = answer?.ok ? '' : 'The panel does not answer: the note was not kept.';
+    if (answer?.ok) this.input.value = '';
   }
-  csv() { return 'time,cut,note\n' + this.notes.map(n => `${new Date(1000 * n.time).toISOString()},${n.cut},"${n.text.replaceAll('"', '""')}"`).join('\n') + '\n'; }
-  draw() { this.list.replaceChildren(table(['Time', 'Cut', 'Note'], this.notes.map(n => [clock(n.time), n.cut, n.text]))); }
+  csv() { return 'time,who,note\n' + this.list.map(n => `${new Date(1000 * n.time).toISOString()},"${n.who.replaceAll('"', '""')}","${n.text.replaceAll('"', '""')}"`).join('\n') + '\n'; }
+  draw() { this.place.replaceChildren(this.list.length ? table(['Time', 'Who', 'Note'], this.list.map(n => [clock(n.time), n.who, n.text]), { id: 'notes' }) : ''); }
 }
 
 // A recording that is played: how far, how fast. It commands no machine.

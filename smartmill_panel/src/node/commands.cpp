@@ -23,14 +23,42 @@ using nlohmann::json;
 constexpr int BAD_REQUEST = 400, CONFLICT = 409;
 constexpr int HITS = 5;
 
+/// A word of what was asked, made fit for a line of the log; empty where there is none.
+std::string wordOf(const json& request, const char* key, std::size_t most = 200) {
+  if (!request.is_object()) return {};
+  const auto found = request.find(key);
+  return found != request.end() && found->is_string() ? oneLine(found->get<std::string>(), most)
+                                                      : std::string();
+}
+
 }  // namespace
 
-Commands::Commands(ros::NodeHandle nh)
+PanelLog::PanelLog(ros::NodeHandle nh)
+    : publisher_(nh.advertise<std_msgs::String>(names::PANEL_LOG, 100, true)) {
+}
+
+void PanelLog::write(const std::string& who, const std::string& from, const std::string& what) {
+  std_msgs::String line;
+  line.data = std::to_string(ros::Time::now().toSec()) + " " + who + " (" + from + "): " + what;
+  publisher_.publish(line);
+  ROS_INFO("panel: %s", line.data.c_str());
+}
+
+Answer takeNote(const Question& question, PanelLog& log) {
+  if (!question.post) return answerOf(BAD_REQUEST, "a note comes by POST");
+  const json note = json::parse(question.body, nullptr, false);
+  const std::string who = wordOf(note, "who", 40), text = wordOf(note, "text");
+  if (text.empty()) return answerOf(BAD_REQUEST, "text: a note is due");
+  log.write(who.empty() ? "somebody" : who, question.from, "mark: " + text);
+  return answerOf(200, text);
+}
+
+Commands::Commands(ros::NodeHandle nh, PanelLog& log)
     : nh_(std::move(nh)),
       measure_(nh_.advertise<smartmill_msgs::MeasureFrfActionGoal>(names::goals(names::MEASURE_TOOL_FRF), 1)),
       identify_(nh_.advertise<smartmill_msgs::IdentifyCoefficientsActionGoal>(
           names::goals(names::IDENTIFY_COEFFICIENTS), 1)),
-      log_(nh_.advertise<std_msgs::String>(names::PANEL_LOG, 100, true)) {
+      log_(log) {
   for (const char* action : {names::RUN_PROGRAM, names::JOG, names::ORIENT_SPINDLE, names::MEASURE_TOOL_FRF,
                              names::MEASURE_SENSOR_FRF, names::IDENTIFY_COEFFICIENTS, names::DISCOVER})
     cancels_[action] = nh_.advertise<actionlib_msgs::GoalID>(std::string(action) + "/cancel", 1);
@@ -39,11 +67,8 @@ Commands::Commands(ros::NodeHandle nh)
 Answer Commands::run(const Question& command) {
   const json request = json::parse(command.body, nullptr, false);
   if (!request.is_object()) return answerOf(BAD_REQUEST, "a JSON object is due");
-  const auto word = [&](const char* key) {
-    const auto found = request.find(key);
-    return found != request.end() && found->is_string() ? oneLine(found->get<std::string>()) : std::string();
-  };
-  const std::string name = word("command"), who = oneLine(word("who"), 40);
+  const auto word = [&](const char* key) { return wordOf(request, key); };
+  const std::string name = word("command"), who = wordOf(request, "who", 40);
   if (who.empty()) return answerOf(BAD_REQUEST, "who: a name for the log is due");
   std::string outcome;
   int status = 200;
@@ -58,19 +83,13 @@ Answer Commands::run(const Question& command) {
       outcome = measure(word("direction"), word("tool"));
     else if (name == "identify")
       outcome = identify(word("tool"), word("material"));
-    else if (name == "mark")
-      outcome = mark(word("text"));
     else
       throw Error("'" + oneLine(name, 40) + "' is no command of the panel");
   } catch (const Error& error) {
     outcome = error.what();
     status = CONFLICT;
   }
-  std_msgs::String line;
-  line.data = std::to_string(ros::Time::now().toSec()) + " " + who + " (" + command.from + "): " + name +
-              (status == 200 ? ": " : " REFUSED: ") + outcome;
-  log_.publish(line);
-  ROS_INFO("panel: command of %s", line.data.c_str());
+  log_.write(who, command.from, name + (status == 200 ? ": " : " REFUSED: ") + outcome);
   return answerOf(status, outcome);
 }
 
@@ -126,11 +145,6 @@ std::string Commands::identify(const std::string& tool, const std::string& mater
   goal.goal.material = material;
   identify_.publish(goal);
   return "asked for the coefficients of " + material;
-}
-
-std::string Commands::mark(const std::string& text) {
-  if (text.empty()) throw Error("text: a note is due");
-  return text;
 }
 
 }  // namespace smartmill::panel

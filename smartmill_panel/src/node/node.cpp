@@ -22,6 +22,8 @@ namespace {
 constexpr double INPUT_TIMEOUT = 2.0;                        // [s]
 constexpr double DISCOVER_PERIOD = 0.5, CLOCK_PERIOD = 0.5;  // [s]
 
+constexpr const char* PLACE = "panel_at";  // parameter that tells where a panel is
+
 using StripMessage = smartmill_msgs::ForceStrip;
 
 PanelParameters read(const ros::NodeHandle& private_nh) {
@@ -65,6 +67,7 @@ PanelNode::PanelNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
       strip_(nh.advertise<StripMessage>(names::FORCE_STRIP, 1000)),
       revolution_(nh.advertise<smartmill_msgs::ForceRevolution>(names::FORCE_REVOLUTION, 100)),
       spectrum_(nh.advertise<smartmill_msgs::ForceSpectrum>(names::FORCE_SPECTRUM, 100)),
+      log_(nh),
       server_(optionsOf(parameters_),
               {[this](std::uint32_t channel, bool wanted) {
                  discovery_.post([this, channel, wanted] { bridge_.want(channel, wanted); });
@@ -73,7 +76,7 @@ PanelNode::PanelNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
                  answer(std::move(question), respond);
                }}),
       bridge_(nh, server_) {
-  if (gate_.open()) commands_ = std::make_unique<Commands>(nh);
+  if (gate_.open()) commands_ = std::make_unique<Commands>(nh, log_);
   listen();
   shell_.every(DISCOVER_PERIOD, [this] {
     if (!discovery_.busy()) discovery_.post([this] { bridge_.discover(); });
@@ -84,7 +87,7 @@ PanelNode::PanelNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
   });
   shell_.diagnose("panel", [this](auto& status) { diagnose(status); });
   const std::string host = parameters_.address == "0.0.0.0" ? "localhost" : parameters_.address;
-  nh.setParam("panel_at", "http://" + host + ":" + std::to_string(server_.port()) + "/");
+  nh.setParam(PLACE, "http://" + host + ":" + std::to_string(server_.port()) + "/");
   std::printf("panel: look at http://%s:%d/%s\n", host.c_str(), server_.port(),
               gate_.open() ? " (commands are allowed, with the token)" : "");
   std::fflush(stdout);
@@ -189,6 +192,7 @@ Answer PanelNode::answerNow(const Question& question) {
   if (question.path == "what_if") return askWhatIf(nh_, question);
   if (question.path == "coefficients") return askCoefficients(nh_, question);
   if (question.path == "report") return newestReport(parameters_.reports);
+  if (question.path == "note") return takeNote(question, log_);
   if (question.path == "replay") return controlReplay(nh_, question);
   if (question.path == "command") {
     if (const auto refusal = gate_.refusal(question)) {
@@ -201,10 +205,22 @@ Answer PanelNode::answerNow(const Question& question) {
 }
 
 std::string PanelNode::config() const {
+  // Panels of other machines with the same master: each tells its place as it starts.
+  nlohmann::json panels = nlohmann::json::object();
+  std::vector<std::string> keys;
+  ros::param::getParamNames(keys);
+  const std::string ending = std::string("/") + PLACE;
+  for (const std::string& key : keys) {
+    std::string place;
+    if (key.size() > ending.size() && key.compare(key.size() - ending.size(), ending.size(), ending) == 0 &&
+        ros::param::get(key, place))
+      panels[key.substr(0, key.size() - ending.size())] = place;
+  }
   return nlohmann::json({{"name", parameters_.name},
-                         {"namespace", names::NAMESPACE},
+                         {"namespace", nh_.getNamespace()},
                          {"commands", gate_.open()},
-                         {"machines", words(parameters_.machines)}})
+                         {"machines", words(parameters_.machines)},
+                         {"panels", panels}})
       .dump();
 }
 

@@ -54,6 +54,7 @@ class PanelNode {
   bool steady_ = false;
   std::array<Digests, 3> digests_;
   ros::Publisher strip_, revolution_, spectrum_;
+  PanelLog log_;
   std::unique_ptr<Commands> commands_;
   Worker worker_, discovery_;  // the latter waits for the master, should that be away
   Server server_;

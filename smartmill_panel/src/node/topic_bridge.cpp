@@ -23,6 +23,7 @@
 #include <smartmill_msgs/SessionState.h>
 #include <smartmill_msgs/SpindleAngle.h>
 #include <smartmill_msgs/StabilityChart.h>
+#include <std_msgs/String.h>
 #include <boost/function.hpp>
 
 #include "smartmill_core/formatted.h"
@@ -33,7 +34,7 @@ namespace {
 
 constexpr std::uint32_t QUEUE = 1000;  // messages of a topic that wait for this node
 /// Of topics whose course a page draws: so many messages are kept.
-constexpr std::uint64_t STRIPS_KEPT = 1200, STATES_KEPT = 600;
+constexpr std::uint64_t STRIPS_KEPT = 1200, STATES_KEPT = 600, LINES_KEPT = 200;
 
 /// Types of which the definition is known before the first message.
 template <class... Messages>
@@ -62,6 +63,17 @@ bool stream(const std::string& type) {
          is<smartmill_msgs::SpindleAngle>(type);
 }
 
+/// Of a machine in another namespace what its status line needs.
+bool tellsStatus(const std::string& topic) {
+  for (const char* name : {names::CNC_STATE, names::CHATTER_STATE, names::CUTTING_CONDITION}) {
+    const std::string ending = std::string("/") + name;
+    if (topic.size() > ending.size() &&
+        topic.compare(topic.size() - ending.size(), ending.size(), ending) == 0)
+      return true;
+  }
+  return false;
+}
+
 std::string ring(std::uint64_t count, std::uint64_t most) {
   return formatted("%06lu", static_cast<unsigned long>(count % most));
 }
@@ -75,9 +87,10 @@ void TopicBridge::discover() {
   ros::master::V_TopicInfo topics;
   if (!ros::master::getTopics(topics)) return;
   static const std::set<std::string> OTHERS{"/diagnostics", "/tf", "/tf_static"};
-  const std::string room = std::string(names::NAMESPACE) + "/";
+  const std::string room = nh_.getNamespace() + "/";
   for (const ros::master::TopicInfo& topic : topics)
-    if (topic.name.rfind(room, 0) == 0 || OTHERS.count(topic.name)) add(topic.name, topic.datatype);
+    if (topic.name.rfind(room, 0) == 0 || OTHERS.count(topic.name) || tellsStatus(topic.name))
+      add(topic.name, topic.datatype);
 }
 
 void TopicBridge::add(const std::string& name, const std::string& type) {
@@ -133,6 +146,9 @@ std::string TopicBridge::keyOf(const Topic& topic, const topic_tools::ShapeShift
   if (is<smartmill_msgs::ForceStrip>(type)) return ring(topic.count, STRIPS_KEPT);
   if (is<smartmill_msgs::ChatterState>(type) || is<smartmill_msgs::DiscrepancyState>(type))
     return ring(topic.count, STATES_KEPT);
+  // Goals, hits taken and refused, results; the lines of the log.
+  if (type.rfind("smartmill_msgs/MeasureFrfAction", 0) == 0 || is<std_msgs::String>(type))
+    return ring(topic.count, LINES_KEPT);
   return {};
 }
 

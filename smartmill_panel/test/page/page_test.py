@@ -32,7 +32,11 @@ class Machine:
         rospy.init_node("machine", anonymous=True, disable_signals=True)
         self.index = 0
         self.last = {}
+        self.others = []  # (publisher, state) of other machines
         self.once()
+        for topic, kind in (("goal", msg.MeasureFrfActionGoal), ("feedback", msg.MeasureFrfActionFeedback)):  # as an action's ends do
+            name = "hammer/measure_frf/" + topic
+            self.publishers[name] = rospy.Publisher("/smartmill/" + name, kind, queue_size=10)
         self.thread = threading.Thread(target=self.run, daemon=True)
         self.thread.start()
 
@@ -78,6 +82,9 @@ class Machine:
 
     def tick(self):
         m = self.msg
+        for publisher, state in list(self.others):
+            state.header.stamp = self.rospy.Time.now()
+            publisher.publish(state)
         self.publish("cnc/state", m.CncState(connected=True, armed=True, mode=10, run=3, axes=["x", "y", "z"], position=[-0.0123456, 0.05, -0.1],
                                              distance_to_go=[0.001, 0.0, 0.0], spindle_speed=418.87902, feed=0.0123))
         self.publish("cnc/load", m.LoadSample(spindle_load=0.4567, spindle_speed=418.87902, axes=["x"], axis_load=[0.12]))
@@ -102,29 +109,34 @@ class Bench:
         master = free_port()
         os.environ.update(ROS_MASTER_URI=f"http://localhost:{master}", ROS_HOSTNAME="localhost", ROS_HOME=OUT)
         self.core = subprocess.Popen(["rosmaster", "--core", "-p", str(master)], stdout=self.log, stderr=self.log)
-        self.node = None
+        self.node, self.others = None, []
         self.address = f"http://127.0.0.1:{self.port}/"
 
-    def start_node(self):
-        parameters = {"page": PAGE, "port": self.port, "allow_commands": "true", "token_file": self.token_file}
-        arguments = [f"_{key}:={value}" for key, value in parameters.items()]
-        self.node = subprocess.Popen([NODE, "__ns:=/smartmill", "__name:=panel"] + arguments, stdout=self.log, stderr=self.log)
+    def start_node(self, namespace="/smartmill", name="SmartMill"):
+        port = self.port if namespace == "/smartmill" else free_port()
+        parameters = {"page": PAGE, "port": port, "allow_commands": "true", "token_file": self.token_file}
+        arguments = [f"_{key}:={value}" for key, value in parameters.items()] + ["_name:=" + name]
+        node = subprocess.Popen([NODE, "__ns:=" + namespace, "__name:=panel"] + arguments, stdout=self.log, stderr=self.log)
+        if namespace == "/smartmill":
+            self.node = node
+        else:
+            self.others.append(node)
         end = time.time() + 60
         while True:
             try:
-                return urllib.request.urlopen(self.address, timeout=5).read()
+                urllib.request.urlopen(f"http://127.0.0.1:{port}/", timeout=5).read()
+                return port
             except OSError:
-                if time.time() > end or self.node.poll() is not None:
+                if time.time() > end or node.poll() is not None:
                     raise
                 time.sleep(0.1)
 
     def stop(self):
-        for process in (self.node, self.core):
-            if process:
-                process.send_signal(signal.SIGINT)
-        for process in (self.node, self.core):
-            if process:
-                process.wait()
+        processes = [p for p in [self.node, *self.others, self.core] if p]
+        for process in processes:
+            process.send_signal(signal.SIGINT)
+        for process in processes:
+            process.wait()
 
     def case(self, work, *args):
         name = "".join(word.capitalize() for word in work.__name__.split("_"))
@@ -267,13 +279,16 @@ def status_of(address, body=None, **headers):
 
 def hostile_origins_and_commands_without_token_are_refused(bench):
     equal(status_of(bench.address, Origin="http://evil.example"), 403)
-    command = json.dumps({"command": "mark", "who": "test", "text": "here"}).encode()
+    command = json.dumps({"command": "cancel", "who": "test"}).encode()
     equal(status_of(bench.address + "api/command", command), 401)
     equal(status_of(bench.address + "api/command", command, X_SmartMill_Token="wrong"), 401)
     equal(status_of(bench.address + "api/command", command, X_SmartMill_Token=TOKEN, Origin="http://evil.example"), 403)
     equal(status_of(bench.address + "api/command", command, X_SmartMill_Token=TOKEN), 200)
     equal(status_of(bench.address + "api/command", json.dumps({"command": "start_spindle", "who": "test"}).encode(), X_SmartMill_Token=TOKEN), 409)
-    equal(status_of(bench.address + "api/command", json.dumps({"command": "mark", "text": "x"}).encode(), X_SmartMill_Token=TOKEN), 400)
+    equal(status_of(bench.address + "api/command", json.dumps({"command": "cancel"}).encode(), X_SmartMill_Token=TOKEN), 400)
+    note = json.dumps({"text": "here"}).encode()
+    equal(status_of(bench.address + "api/note", note, Origin="http://evil.example"), 403)
+    equal(status_of(bench.address + "api/note", b"no json"), 400)
 
 
 def the_page_commands_after_an_unlock(browser):
@@ -290,6 +305,113 @@ def the_page_commands_after_an_unlock(browser):
     assert "disarm REFUSED" in said, said
     browser.js("(window.smartmill.parts.find(p => p.unlocked).until = 0, 1)")  # a minute later
     browser.wait("!document.querySelector('[data-command=disarm]').checkVisibility()")
+
+
+def a_note_is_kept_in_the_log_for_every_page(browser, bench):
+    browser.js("(location.hash = 'session', document.querySelector('[aria-label=Note]').value = arguments[0], 1)", "<b>whistles</b>, really")
+    browser.click("#mark")
+    browser.wait("document.querySelector('#notes td')")
+    cells = browser.js("[...document.querySelectorAll('#notes td')].map(e => e.textContent)")
+    equal(cells[1:], ["a tester", "slot_7: <b>whistles</b>, really"])
+    browser.open(bench.address + "#forces")
+    browser.wait("window.smartmill?.parts.find(p => p.strips)?.plots[0].marks.some(m => m.label.includes('whistles'))")
+
+
+def hits_taken_and_refused_are_told(browser, machine):
+    m, now = machine.msg, machine.rospy.Time.now
+    for topic in ("goal", "feedback"):
+        becomes(lambda: machine.publishers["hammer/measure_frf/" + topic].get_num_connections(), 1)
+    goal = m.MeasureFrfActionGoal()
+    goal.goal_id.id, goal.goal_id.stamp = "hits", now()
+    goal.goal.point, goal.goal.direction, goal.goal.hits = "tool_tip", "x", 2
+    machine.publish("hammer/measure_frf/goal", goal)
+    for stage in ("turning the spindle", "hit 1 of 2", "hit thrown away: a second blow after 1.3 ms", "hit 2 of 2"):
+        feedback = m.MeasureFrfActionFeedback()
+        feedback.status.goal_id.id, feedback.feedback.stage = "hits", stage
+        machine.publish("hammer/measure_frf/feedback", feedback)
+        time.sleep(0.05)
+    browser.js("(location.hash = 'dynamics', 1)")
+    becomes(lambda: browser.js("[...document.querySelectorAll('#hits .word')].map(e => e.textContent)"),
+            ["1 taken", "2 refused: a second blow after 1.3 ms", "3 taken"])
+    becomes(lambda: "Hits tool x: 2 taken, 1 refused" in browser.text("#hits"), True)
+
+
+def every_plot_is_saved_as_picture_and_numbers(browser):
+    browser.js("(window.saved = [], URL.createObjectURL = blob => { window.saved.push([blob.type, blob.size]); return 'data:,'; }, 1)")
+    plots = 0
+    for view in VIEWS:
+        browser.js("(location.hash = arguments[0], 1)", view)
+        browser.wait("[...document.querySelectorAll('.view:not([hidden]) canvas')].every(c => c.dataset.drawn == 'yes')")
+        plots += browser.js("document.querySelectorAll('.view:not([hidden]) .plot canvas').length")
+        browser.js("([...document.querySelectorAll('.view:not([hidden]) .plot .tools button')].forEach(b => b.click()), 1)")
+    browser.wait("window.saved.length >= 2 * arguments[0]", plots)
+    found = browser.js("window.saved")
+    equal(len([f for f in found if f[0] == "image/png" and f[1] > 1000]), plots)
+    equal(len([f for f in found if f[0] == "text/csv" and f[1] > 200]), plots)
+    # The chart's numbers are the topic's.
+    line = browser.js("window.smartmill.parts.find(p => p.plot?.options.name == 'stability_stability').plot.csv().split('\\n').find(l => l.startsWith('chatter limit'))")
+    speed, depth = (float(x) for x in line.split(",")[1:3])
+    assert abs(speed - 200.0 * 30 / math.pi) < 1e-6 and abs(depth - 2.0) < 1e-9, line
+
+
+def the_layout_is_kept(browser, bench):
+    browser.js("(location.hash = 'forces', 1)")
+    browser.js("([...document.querySelectorAll('#view-forces .choice button')].find(b => b.textContent == 'z').click(), 1)")
+    browser.open("about:blank")
+    browser.open(bench.address)
+    browser.wait("!!window.smartmill")
+    equal(browser.js("[window.smartmill.current, window.smartmill.store.axis]"), ["forces", "z"])
+    pressed = "[...document.querySelectorAll('#view-forces .choice button[aria-pressed=true]')].map(b => b.textContent)"
+    assert "z" in browser.js(pressed)
+    browser.js("([...document.querySelectorAll('#view-forces .choice button')].find(b => b.textContent == 'x').click(), 1)")
+
+
+def machines_of_other_namespaces_have_their_status_lines(browser, bench, machine):
+    """Two pipelines, one ROS master: the second in a namespace of its own, with a panel of its own."""
+    other = bench.start_node("/mill2/smartmill", "Mill 2")
+    try:
+        state = machine.msg.CncState(connected=True, alarm=True, alarm_text="1010", mode=10, run=1, axes=["x"], position=[0.0], distance_to_go=[0.0])
+        publisher = machine.rospy.Publisher("/mill2/smartmill/cnc/state", type(state), queue_size=10)
+        machine.others.append((publisher, state))
+        line = "document.querySelector('[data-machine=mill2]')"
+        browser.wait(line + "?.textContent.includes('Alarm 1010')")
+        browser.picture(OUT + "/machines.png")
+        assert "1010" not in browser.text("#status"), "the own line shows the other's alarm"
+        machine.others.clear()
+        browser.wait(line + ".textContent.includes('Controller silent')")
+        machine.others.append((publisher, state))
+        browser.js(line + ".click()")
+        browser.wait("location.port == arguments[0] && !!window.smartmill", str(other))
+        browser.wait("document.querySelector('#status').textContent.includes('Alarm 1010')")
+        browser.wait("document.querySelector('#status').textContent.startsWith('Mill 2')")
+        browser.wait("document.querySelector('[data-machine=SmartMill]')?.textContent.includes('Chatter')")
+    finally:
+        browser.open(bench.address)
+
+
+def reports_sort_and_zoom_without_a_server(browser):
+    """report.html, made by page_test.cpp with what every report of the project is made with."""
+    browser.open("file://" + OUT + "/report.html")
+    column = "[...document.querySelectorAll('tr td:first-child')].map(e => e.textContent)"
+    equal(browser.js(column), ["b", "c", "a", "d"])
+    browser.click("th:nth-child(2)")
+    equal(browser.js(column), ["a", "b", "d", "c"])  # by number: 9, 10.5 +- 2, 1e3; what has none is last
+    browser.click("th:nth-child(2)")
+    equal(browser.js(column), ["d", "b", "a", "c"])
+    browser.click("figure img")
+    browser.wait("document.querySelector('dialog').open")
+    scale = "new DOMMatrix(getComputedStyle(document.querySelector('dialog img')).transform).a"
+    before = browser.wait(scale + " > 5 && " + scale)  # a small picture fills the window
+    browser.js("document.querySelector('dialog').dispatchEvent(new WheelEvent('wheel', {deltaY: -100, clientX: 200, clientY: 200})) || 1")
+    assert abs(browser.js(scale) / before - 1.25) < 1e-6
+    for name, (width, height) in SIZES.items():
+        browser.resize(width, height)
+        browser.picture(f"{OUT}/report_{name}.png")
+    browser.resize(*SIZES["1280x800"])
+    browser.click("dialog")
+    assert not browser.js("document.querySelector('dialog').open")
+    wide = browser.js("document.documentElement.scrollWidth")
+    assert wide <= SIZES["1280x800"][0], wide
 
 
 def no_error_on_the_console(browser):
@@ -312,6 +434,13 @@ def main():
             bench.case(silence_turns_values_grey, browser, machine)
             bench.case(hostile_origins_and_commands_without_token_are_refused, bench)
             bench.case(the_page_commands_after_an_unlock, browser)
+            bench.case(a_note_is_kept_in_the_log_for_every_page, browser, bench)
+            bench.case(hits_taken_and_refused_are_told, browser, machine)
+            bench.case(every_plot_is_saved_as_picture_and_numbers, browser)
+            bench.case(the_layout_is_kept, browser, bench)
+            bench.case(machines_of_other_namespaces_have_their_status_lines, browser, bench, machine)
+            bench.case(reports_sort_and_zoom_without_a_server, browser)
+            browser.open(bench.address)
             bench.case(no_error_on_the_console, browser)
             bench.case(a_dead_node_is_told_and_one_that_is_back_shows, browser, bench)
     finally:

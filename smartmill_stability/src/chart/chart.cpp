@@ -405,8 +405,8 @@ Prediction ChartMaker::predict(double spindle_speed, double axial_depth) const {
 }
 
 WhatIfChart ChartMaker::whatIf(const WhatIf& request) const {
-  constexpr int SPEEDS = 300, NODES = 8;
-  constexpr double TOLERANCE = 1e-3, LEAST_DEPTH = 0.01;
+  constexpr int SPEEDS = 300;
+  constexpr double LEAST_DEPTH = 0.01;
   request.validate();
   ChartMaker other = *this;
   const auto change = [](double& value, double wanted) {
@@ -424,9 +424,6 @@ WhatIfChart ChartMaker::whatIf(const WhatIf& request) const {
   std::optional<RegenerativeSystem> system = other.system({});
   if (!system) throw Error("no chart yet, missing: modes in x and y or the tangential coefficient");
   if (!std::isnan(request.overhang)) system->modes = withOverhang(system->modes, request.overhang);
-  SolverOptions options;
-  options.tolerance = TOLERANCE;
-  options.nodes = NODES;
   const int count = request.speeds > 0 ? request.speeds : SPEEDS;
   std::vector<double> speeds;
   for (int i = 0; i < count; ++i)
@@ -437,7 +434,7 @@ WhatIfChart ChartMaker::whatIf(const WhatIf& request) const {
   const double all = parameters_.max_depth / (1.0 - parameters_.depth_margin);
   const double deepest =
       std::isnan(request.axial_depth) ? all : std::min(all, std::max(LEAST_DEPTH, 3.0 * request.axial_depth));
-  chart.limit = followedLimits(*makeFloquetSolver(Method::collocation, *system, options), speeds, deepest);
+  chart.limit = followedLimits(*system, speeds, deepest);
   for (std::size_t k = 0; k < system->modes.size(); ++k) {
     const SystemMode& mode = system->modes[k];
     const bool along_x = std::abs(mode.output[0]) >= std::abs(mode.output[1]);

@@ -1,10 +1,13 @@
 #include "smartmill_stability/chart/what_if.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <complex>
+#include <functional>
 #include <future>
 
+#include "smartmill_core/error.h"
 #include "smartmill_core/require.h"
 #include "smartmill_core/units.h"
 
@@ -13,104 +16,333 @@ namespace {
 
 constexpr double NO_LIMIT = std::numeric_limits<double>::infinity();
 
-/// First losses at the speeds of a chart, one after another, each from what its neighbours know.
+/// Two numbers within a share of each other.
+bool close(double a, double b, double share) {
+  return std::abs(a - b) <= share * std::min(std::abs(a), std::abs(b));
+}
+
+/// Zero-order limits as a first guess; without any where the solution does not apply.
+StabilityLimit firstGuess(const RegenerativeSystem& system, const std::vector<double>& speeds) {
+  if (system.cut != Cut::milling || !system.evenPitch() || !(system.kt > 0.0) ||
+      system.exit > units::TWO_PI + 1e-9)
+    return {};
+  // Lines dense around each mode: within a twentieth of its half-power width.
+  constexpr int NEAR = 60;
+  constexpr double REACH = 20.0, LEAST = 50.0;
+  double highest = 0.0;
+  std::vector<double> lines;
+  for (const SystemMode& mode : system.modes) {
+    highest = std::max(highest, mode.frequency);
+    for (int i = -NEAR; i <= NEAR; ++i) {
+      const double share = static_cast<double>(i) / NEAR;
+      lines.push_back(mode.frequency * (1.0 + mode.damping_ratio * REACH * share * share * share));
+    }
+  }
+  for (double f = LEAST; f < 1.5 * highest; f *= 1.02) lines.push_back(f);
+  std::sort(lines.begin(), lines.end());
+  ToolTipResponse response;
+  for (const double f : lines) {
+    if (f < LEAST || (!response.frequency.empty() && f <= response.frequency.back())) continue;
+    const auto g = receptance(system.modes, f);
+    response.frequency.push_back(f);
+    response.xx.push_back(g[0]);
+    response.xy.push_back(g[1]);
+    response.yx.push_back(g[2]);
+    response.yy.push_back(g[3]);
+  }
+  const RegenerativeProcess mean{system.teeth, system.entry, std::min(system.exit, units::TWO_PI), system.kt,
+                                 system.kr / system.kt};
+  return zeroOrderLimit(mean, response, speeds);
+}
+
+/// First losses at the speeds of a chart: solved from zero at every so many, between them from what the
+/// neighbours and the first guess foretell.
 class Following {
  public:
-  Following(const FloquetSolver& solver, const std::vector<double>& speeds, double max_depth)
-      : solver_(solver), max_depth_(max_depth), speeds_(speeds) {
-    limit_.spindle_speed = speeds;
-    limit_.depth.assign(speeds.size(), NO_LIMIT);
-    limit_.chatter_frequency.assign(speeds.size(), std::numeric_limits<double>::quiet_NaN());
+  /// @param teeth that follow each other evenly; 0: they do not
+  Following(const FloquetSolver& solver, const std::vector<double>& speeds, double max_depth, int teeth,
+            StabilityLimit guess)
+      : solver_(solver),
+        max_depth_(max_depth),
+        teeth_(teeth),
+        speeds_(speeds),
+        guess_(std::move(guess)),
+        knots_(speeds.size()) {
+    start_ = max_depth_;
+    for (const double depth : guess_.depth) start_ = std::min(start_, BELOW * depth);
   }
 
   StabilityLimit run() {
-    constexpr std::size_t STRIDE = 8;
-    solve(0);
-    for (std::size_t a = 0; a + 1 < speeds_.size();) {
-      const std::size_t b = std::min(a + STRIDE, speeds_.size() - 1);
-      solve(b);
-      fill(a, b);
-      a = b;
+    std::vector<std::size_t> seeds;
+    for (std::size_t i = 0; i < speeds_.size(); i += STRIDE) seeds.push_back(i);
+    if (seeds.back() + 1 != speeds_.size()) seeds.push_back(speeds_.size() - 1);
+    inThreads(seeds.size(), [&](std::size_t k) { search(seeds[k]); });
+    inThreads(seeds.size() - 1, [&](std::size_t k) { fill(seeds[k], seeds[k + 1]); });
+    const std::vector<std::size_t> doubted = besideFlips();
+    inThreads(doubted.size(), [&](std::size_t k) { follow(doubted[k], knots_[doubted[k]]); });
+    StabilityLimit limit;
+    limit.spindle_speed = speeds_;
+    for (const Knot& knot : knots_) {
+      limit.depth.push_back(knot.depth);
+      limit.chatter_frequency.push_back(knot.frequency);
     }
-    return std::move(limit_);
+    return limit;
   }
 
  private:
-  void solve(std::size_t i) {
-    const Limit found = solver_.limit(speeds_[i], max_depth_);
-    limit_.depth[i] = found.depth;
-    limit_.chatter_frequency[i] = found.frequency;
+  static constexpr std::size_t STRIDE = 10;
+  static constexpr double BELOW = 0.6;       // of the least first guess: a search begins there
+  static constexpr double GROWTH = 1.25;     // of the depth in a search
+  static constexpr double TOLERANCE = 1e-3;  // of a depth
+  static constexpr double SAME_LOBE = 0.03;  // of the chatter frequency
+  static constexpr double STRAIGHT = 0.01;   // of a depth foretold
+
+  struct Knot {
+    double depth = NO_LIMIT;
+    double frequency = std::numeric_limits<double>::quiet_NaN();  // [Hz]
+    double slope = 1.0;  // of the log of the radius over that of the depth, at the limit
+    Kind kind = Kind::none;
+    bool solved = false;  // else interpolated
+  };
+
+  /// What the map says at a depth.
+  struct Sample {
+    double depth = 0.0, log_radius = 0.0;
+    CharacteristicMultiplier multiplier;
+  };
+
+  /// Work 0..count - 1, each independent of the others, by two threads.
+  static void inThreads(std::size_t count, const std::function<void(std::size_t)>& work) {
+    std::atomic<std::size_t> next{0};
+    const auto take = [&] {
+      for (std::size_t k = next++; k < count; k = next++) work(k);
+    };
+    auto other = std::async(std::launch::async, take);
+    take();
+    other.get();
   }
 
-  double between(std::size_t a, std::size_t b, std::size_t i, const std::vector<double>& values) const {
+  static Sample sampleOf(FloquetSolver::AtSpeed& here, double depth) {
+    Sample sample{depth, 0.0, here.multiplier(depth)};
+    sample.log_radius = std::log(std::max(1e-300, sample.multiplier.radius()));
+    return sample;
+  }
+
+  static double slopeOf(const Sample& a, const Sample& b) {
+    return (b.log_radius - a.log_radius) / std::log(b.depth / a.depth);
+  }
+
+  /// From zero, as the full search does, in larger steps.
+  void search(std::size_t i) {
+    const auto here = solver_.at(speeds_[i]);
+    constexpr int MOST = 8;
+    Sample low = sampleOf(*here, std::min(start_, max_depth_)), high = low;
+    for (int k = 0; k < MOST && low.log_radius > 0.0; ++k) {
+      high = low;
+      low = sampleOf(*here, 0.5 * low.depth);
+    }
+    double slope = 0.0;
+    while (high.log_radius <= 0.0 && low.depth < max_depth_) {
+      constexpr double OVERSHOOT = 1.2, LEAST = 1.04;
+      const double foretold = slope > 0.0 ? std::exp(-OVERSHOOT * low.log_radius / slope) : GROWTH;
+      high = sampleOf(*here, std::min(max_depth_, low.depth * std::clamp(foretold, LEAST, GROWTH)));
+      slope = slopeOf(low, high);
+      if (high.log_radius <= 0.0) low = high;
+    }
+    if (high.log_radius > 0.0) knots_[i] = refined(*here, low, high, NO_LIMIT);
+  }
+
+  /// Between a stable and an unstable depth. @param frequency [Hz] expected; not finite: unknown
+  static Knot refined(FloquetSolver::AtSpeed& here, Sample low, Sample high, double frequency) {
+    constexpr int MOST = 12;
+    for (int k = 0; k < MOST && high.depth > (1.0 + TOLERANCE) * low.depth; ++k) {
+      const double share = -low.log_radius / (high.log_radius - low.log_radius);
+      const Sample middle =
+          sampleOf(here, low.depth * std::pow(high.depth / low.depth, std::clamp(share, 0.03, 0.97)));
+      const double off = std::abs(middle.log_radius / slopeOf(low, high));
+      (middle.log_radius > 0.0 ? high : low) = middle;
+      if (off < TOLERANCE) return knotAt(here, middle, slopeOf(low, high), frequency);
+    }
+    return knotAt(here, high, slopeOf(low, high), frequency);
+  }
+
+  /// The limit from a sample close to it.
+  static Knot knotAt(FloquetSolver::AtSpeed& here, const Sample& sample, double slope, double frequency) {
+    Knot knot;
+    knot.solved = true;
+    knot.slope = slope;
+    knot.kind = sample.multiplier.kind();
+    knot.depth = sample.depth * std::exp(-sample.log_radius / slope);
+    // The motion holds the multiplier's frequency plus every multiple of the map's.
+    const double step = 1.0 / sample.multiplier.period;
+    const double base = std::abs(std::arg(sample.multiplier.value)) / units::TWO_PI * step;
+    for (const double sign : {1.0, -1.0}) {
+      const double here_near = sign * base + step * std::round((frequency - sign * base) / step);
+      if (close(here_near, frequency, SAME_LOBE) &&
+          !(std::abs(knot.frequency - frequency) < std::abs(here_near - frequency)))
+        knot.frequency = here_near;
+    }
+    if (std::isnan(knot.frequency)) knot.frequency = here.chatterFrequency((1.0 + TOLERANCE) * knot.depth);
+    return knot;
+  }
+
+  /// From a guess. @return false: the limit is not near it
+  bool follow(std::size_t i, const Knot& guess) {
+    constexpr int MOST = 5;
+    constexpr double NEAR = 0.003, CLOSE_BY = 0.03, FAR = 0.2, REACH = 1.4, LEAST_SLOPE = 0.05;
+    if (!(guess.depth > 0.0) || guess.depth > max_depth_) return false;
+    const auto here = solver_.at(speeds_[i]);
+    const Sample first = sampleOf(*here, guess.depth);
+    double slope = std::max(LEAST_SLOPE, guess.slope);
+    if (std::abs(first.log_radius) <= NEAR * slope) {
+      knots_[i] = knotAt(*here, first, slope, guess.frequency);
+      return true;
+    }
+    const double step = std::exp(std::clamp(-first.log_radius / slope, -FAR, FAR));
+    const Sample second = sampleOf(*here, std::min(max_depth_, step * guess.depth));
+    slope = slopeOf(first, second);
+    if (slope > LEAST_SLOPE && std::abs(second.log_radius) <= CLOSE_BY * slope * std::abs(step - 1.0)) {
+      knots_[i] = knotAt(*here, second, slope, guess.frequency);
+      return true;
+    }
+    Sample low = first.depth < second.depth ? first : second,
+           high = first.depth < second.depth ? second : first;
+    double reach = 1.05;
+    for (int k = 0; k < MOST && low.log_radius > 0.0; ++k, reach = std::min(reach * reach, REACH)) {
+      high = low;
+      low = sampleOf(*here, low.depth / reach);
+    }
+    for (int k = 0; k < MOST && high.log_radius <= 0.0; ++k, reach = std::min(reach * reach, REACH)) {
+      if (high.depth >= max_depth_) return false;
+      low = high;
+      high = sampleOf(*here, std::min(max_depth_, reach * high.depth));
+    }
+    if (low.log_radius > 0.0 || high.log_radius <= 0.0) return false;
+    knots_[i] = refined(*here, low, high, guess.frequency);
+    return true;
+  }
+
+  bool guessed(std::size_t i) const { return !guess_.depth.empty() && std::isfinite(guess_.depth[i]); }
+
+  /// The first guess at i belongs to the lobe that is there.
+  bool guessFits(std::size_t i, double frequency) const {
+    return guessed(i) && close(guess_.chatter_frequency[i], frequency, SAME_LOBE);
+  }
+
+  /// Interpolated speeds at which half a wave more than whole ones fits between two teeth: there a flip lobe
+  /// of a speed's width may stand in the flank of the other.
+  std::vector<std::size_t> besideFlips() const {
+    constexpr double NEAR = 0.03;
+    std::vector<std::size_t> found;
+    for (std::size_t i = 0; i < knots_.size(); ++i)
+      if (!knots_[i].solved && std::isfinite(knots_[i].depth) &&
+          std::abs(waves(i, knots_[i].frequency) - lobe(i, knots_[i].frequency) - 0.5) < NEAR)
+        found.push_back(i);
+    return found;
+  }
+
+  /// What a and b foretell between them; the first guess over the limit is carried on where it knows the
+  /// lobe.
+  Knot between(std::size_t a, std::size_t b, std::size_t i) const {
+    const Knot &from = knots_[a], &to = knots_[b];
     const double share = (speeds_[i] - speeds_[a]) / (speeds_[b] - speeds_[a]);
-    return values[a] + share * (values[b] - values[a]);
+    Knot knot;
+    knot.kind = from.kind;
+    knot.frequency = from.frequency + share * (to.frequency - from.frequency);
+    knot.slope = from.slope + share * (to.slope - from.slope);
+    knot.depth = from.depth + share * (to.depth - from.depth);
+    if (guessFits(a, from.frequency) && guessFits(b, to.frequency) && guessFits(i, knot.frequency)) {
+      const double at_a = from.depth / guess_.depth[a], at_b = to.depth / guess_.depth[b];
+      knot.depth = guess_.depth[i] * (at_a + share * (at_b - at_a));
+    }
+    return knot;
+  }
+
+  /// Where a and b stand in different lobes: the first guess, corrected by whichever of them knows its lobe.
+  Knot beyond(std::size_t a, std::size_t b, std::size_t i) const {
+    Knot knot = std::isfinite(knots_[a].depth) ? knots_[a] : knots_[b];
+    if (std::isfinite(knots_[a].depth) && std::isfinite(knots_[b].depth))
+      knot.depth = std::sqrt(knots_[a].depth * knots_[b].depth);
+    if (!guessed(i)) return knot;
+    const double frequency = guess_.chatter_frequency[i];
+    for (const std::size_t side : {a, b}) {
+      if (!close(knots_[side].frequency, frequency, 0.1) || !guessFits(side, knots_[side].frequency))
+        continue;
+      knot = knots_[side];
+      knot.depth *= guess_.depth[i] / guess_.depth[side];
+      knot.frequency = frequency;
+    }
+    return knot;
+  }
+
+  /// Waves between two teeth; whole ones are the number of the lobe.
+  double waves(std::size_t i, double frequency) const {
+    return teeth_ > 0 ? frequency * units::TWO_PI / (teeth_ * speeds_[i]) : 0.0;
+  }
+  double lobe(std::size_t i, double frequency) const { return std::floor(waves(i, frequency)); }
+
+  /// Near enough to each other for what is between them to be foretold.
+  bool alike(std::size_t a, std::size_t b) const {
+    constexpr double RATIO = 0.06, DEPTH = 0.3;
+    const Knot &from = knots_[a], &to = knots_[b];
+    if (guessFits(a, from.frequency) && guessFits(b, to.frequency))
+      return close(from.depth / guess_.depth[a], to.depth / guess_.depth[b], RATIO);
+    return close(from.depth, to.depth, DEPTH);
+  }
+
+  bool oneLobe(std::size_t a, std::size_t b) const {
+    const Knot &from = knots_[a], &to = knots_[b];
+    const double here = lobe(a, from.frequency);
+    if (from.kind != to.kind || !close(from.frequency, to.frequency, SAME_LOBE) ||
+        here != lobe(b, to.frequency))
+      return false;
+    if (!guessFits(a, from.frequency) || !guessFits(b, to.frequency)) return true;
+    for (std::size_t i = a + 1; i < b; ++i)
+      if (guessed(i) && (!guessFits(i, from.frequency) || lobe(i, guess_.chatter_frequency[i]) != here))
+        return false;
+    return true;
+  }
+
+  /// Stable as deep as is asked for, on both sides and by the first guess between them.
+  bool noneBetween(std::size_t a, std::size_t b) const {
+    if (std::isfinite(knots_[a].depth) || std::isfinite(knots_[b].depth)) return false;
+    for (std::size_t i = a + 1; i < b; ++i)
+      if (guessed(i) && guess_.depth[i] < max_depth_) return false;
+    return true;
+  }
+
+  bool stableTo(std::size_t i, double depth) const {
+    const auto here = solver_.at(speeds_[i]);
+    for (const double share : {1.0, 0.75, 0.5})
+      if (sampleOf(*here, share * depth).log_radius > 0.0) return false;
+    return true;
   }
 
   void fill(std::size_t a, std::size_t b) {
-    constexpr double STRAIGHT = 0.02;
     if (b - a < 2) return;
     const std::size_t middle = (a + b) / 2;
-    const double depth = between(a, b, middle, limit_.depth);
-    const double frequency = between(a, b, middle, limit_.chatter_frequency);
-    // Beside a jump of the frequency another lobe begins: what the neighbours say is no guess there.
-    const bool known = std::isfinite(depth) &&
-                       std::abs(limit_.chatter_frequency[a] - limit_.chatter_frequency[b]) < 0.03 * frequency;
-    if (!known || !follow(middle, depth)) solve(middle);
-    const bool straight = known && std::abs(limit_.depth[middle] - depth) <= STRAIGHT * depth &&
-                          std::abs(limit_.chatter_frequency[middle] - frequency) <= STRAIGHT * frequency;
-    if (!straight) {
+    if (noneBetween(a, b) && stableTo(middle, max_depth_)) return;
+    const bool one = oneLobe(a, b);
+    const Knot foretold = one ? between(a, b, middle) : beyond(a, b, middle);
+    if (!follow(middle, foretold)) search(middle);
+    const Knot& found = knots_[middle];
+    if (!one || !alike(a, b) || found.kind != knots_[a].kind ||
+        !close(found.depth, foretold.depth, STRAIGHT) ||
+        !close(found.frequency, foretold.frequency, STRAIGHT)) {
       fill(a, middle);
       fill(middle, b);
       return;
     }
-    for (const auto& [from, to] : {std::pair{a, middle}, {middle, b}}) {
-      for (std::size_t i = from + 1; i < to; ++i) {
-        limit_.depth[i] = between(from, to, i, limit_.depth);
-        limit_.chatter_frequency[i] = between(from, to, i, limit_.chatter_frequency);
-      }
-    }
-  }
-
-  /// @return false: the crossing is not near the guess
-  bool follow(std::size_t i, double guess) {
-    constexpr double REACH = 0.04, TOLERANCE = 2e-3;
-    constexpr int MOST = 6;
-    const auto here = solver_.at(speeds_[i]);
-    const auto logRadius = [&](double d) { return std::log(std::max(1e-300, here->multiplier(d).radius())); };
-    double low = guess, f_low = logRadius(guess), high = guess, f_high = f_low;
-    for (int k = 0; k < MOST && f_low > 0.0; ++k) {
-      high = low;
-      f_high = f_low;
-      low *= 1.0 - REACH * (1 << k);
-      if (low <= 0.0) return false;
-      f_low = logRadius(low);
-    }
-    for (int k = 0; k < MOST && f_high <= 0.0; ++k) {
-      low = high;
-      f_low = f_high;
-      high *= 1.0 + REACH * (1 << k);
-      if (high > max_depth_) return false;
-      f_high = logRadius(high);
-    }
-    if (f_low > 0.0 || f_high <= 0.0) return false;
-    double depth = low;
-    for (int k = 0; k < 2 * MOST && high - low > TOLERANCE * high; ++k) {
-      depth = std::clamp((low * f_high - high * f_low) / (f_high - f_low), low + 0.1 * (high - low),
-                         high - 0.1 * (high - low));
-      const double f = logRadius(depth);
-      (f > 0.0 ? high : low) = depth;
-      (f > 0.0 ? f_high : f_low) = f;
-    }
-    limit_.depth[i] = (low * f_high - high * f_low) / (f_high - f_low);
-    limit_.chatter_frequency[i] = here->chatterFrequency(high);
-    return true;
+    for (const auto& [from, to] : {std::pair{a, middle}, {middle, b}})
+      for (std::size_t i = from + 1; i < to; ++i) knots_[i] = between(from, to, i);
   }
 
   const FloquetSolver& solver_;
-  double max_depth_;
+  double max_depth_, start_ = 0.0;
+  int teeth_;
   const std::vector<double>& speeds_;
-  StabilityLimit limit_;
+  StabilityLimit guess_;
+  std::vector<Knot> knots_;
 };
 
 }  // namespace
@@ -144,21 +376,17 @@ std::vector<SystemMode> withOverhang(std::vector<SystemMode> modes, double overh
   return modes;
 }
 
-StabilityLimit followedLimits(const FloquetSolver& solver, const std::vector<double>& speeds,
+StabilityLimit followedLimits(const RegenerativeSystem& system, const std::vector<double>& speeds,
                               double max_depth) {
-  // Two halves at once: a solver is not changed by what it solves.
-  const std::size_t half = speeds.size() / 2;
-  const std::vector<double> slow(speeds.begin(), speeds.begin() + static_cast<std::ptrdiff_t>(half));
-  const std::vector<double> fast(speeds.begin() + static_cast<std::ptrdiff_t>(half), speeds.end());
-  if (slow.empty()) return Following(solver, fast, max_depth).run();
-  auto other = std::async(std::launch::async, [&] { return Following(solver, slow, max_depth).run(); });
-  const StabilityLimit high = Following(solver, fast, max_depth).run();
-  StabilityLimit limit = other.get();
-  limit.spindle_speed = speeds;
-  limit.depth.insert(limit.depth.end(), high.depth.begin(), high.depth.end());
-  limit.chatter_frequency.insert(limit.chatter_frequency.end(), high.chatter_frequency.begin(),
-                                 high.chatter_frequency.end());
-  return limit;
+  constexpr int NODES = 8;
+  SolverOptions options;
+  options.tolerance = 1e-3;
+  options.nodes = NODES;
+  options.many = true;
+  if (speeds.size() < 2) throw Error("what if: at least two speeds are due");
+  return Following(*makeFloquetSolver(Method::collocation, system, options), speeds, max_depth,
+                   system.evenPitch() ? system.teeth : 0, firstGuess(system, speeds))
+      .run();
 }
 
 int dominantMode(const std::vector<SystemMode>& modes, double frequency) {

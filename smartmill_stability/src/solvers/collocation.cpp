@@ -29,10 +29,11 @@ constexpr double PHASE = 9.0;
 constexpr int DEFAULT_NODES = 12, REFINEMENT = 4;
 constexpr double EIGENVALUE_TOLERANCE = 1e-9, COARSEST_EIGENVALUE = 1e-6;
 
-/// Of an eigenvalue of which a depth is to be known to a tolerance.
-double eigenvalueTolerance(double tolerance) {
-  constexpr double SHARE = 1e-3;
-  return std::clamp(SHARE * tolerance, EIGENVALUE_TOLERANCE, COARSEST_EIGENVALUE);
+/// Of an eigenvalue from which a depth is to be known to the options' tolerance.
+double eigenvalueTolerance(const SolverOptions& options) {
+  constexpr double SHARE = 1e-3, SHARE_OF_MANY = 0.1;
+  if (options.many) return SHARE_OF_MANY * options.tolerance;
+  return std::clamp(SHARE * options.tolerance, EIGENVALUE_TOLERANCE, COARSEST_EIGENVALUE);
 }
 
 /// What depends on the number of nodes alone, on the unit interval.
@@ -184,19 +185,104 @@ Shape shapeOf(const std::vector<SystemMode>& modes, const Axes& axes, const Refe
   return shape;
 }
 
+/// [rad/s] of the fastest vibration that elements resolve. @param stiffness [N/m] of the feedback
+double fastestOf(const std::vector<SystemMode>& modes, double stiffness) {
+  double fastest = 0.0;
+  // What a heavily damped mode far above the others adds (a residual compliance) follows the force at once.
+  constexpr double FOLLOWS = 0.4;
+  for (const SystemMode& mode : modes) {
+    if (mode.damping_ratio >= FOLLOWS && modes.size() > 1) continue;
+    const double w = units::TWO_PI * mode.frequency;
+    const double added =
+        stiffness * std::hypot(mode.input[0], mode.input[1]) * std::hypot(mode.output[0], mode.output[1]);
+    fastest = std::max(fastest, std::sqrt(w * w + added));
+  }
+  return fastest;
+}
+
+/// Shapes of every length up to the longest, as Chebyshev series in the length: all entries are sums of
+/// exponentials of it, so the terms fall as (r / 2)^k / k!, r the largest pole times half the longest.
+class ShapeTable {
+ public:
+  ShapeTable(const std::vector<SystemMode>& modes, const Reference& reference, bool with_velocity)
+      : longest_(PHASE / fastestOf(modes, 0.0)),
+        example_(shapeOf(modes, Axes(modes), reference, longest_, with_velocity)) {
+    constexpr double ERROR = 1e-9;
+    double half = 0.0, term = 1.0;
+    for (const SystemMode& mode : modes)
+      half = std::max(half, 0.5 * units::TWO_PI * mode.frequency * longest_);
+    int terms = 0;
+    while (term > ERROR || terms < half) term *= 0.5 * half / ++terms;
+    MatrixXd values(pack(example_).size(), terms), cosines(terms, terms);
+    for (int k = 0; k < terms; ++k) {
+      const double angle = units::PI * (k + 0.5) / terms;
+      values.col(k) = pack(
+          shapeOf(modes, Axes(modes), reference, 0.5 * longest_ * (1.0 + std::cos(angle)), with_velocity));
+      for (int j = 0; j < terms; ++j) cosines(k, j) = (j == 0 ? 1.0 : 2.0) / terms * std::cos(j * angle);
+    }
+    coefficients_ = values * cosines;
+  }
+
+  double longest() const { return longest_; }
+
+  Shape at(double length) const {
+    VectorXd series(coefficients_.cols());
+    const double x = 2.0 * length / longest_ - 1.0;
+    for (Index j = 0; j < series.size(); ++j)
+      series[j] = j == 0 ? 1.0 : j == 1 ? x : 2.0 * x * series[j - 1] - series[j - 2];
+    const VectorXd all = coefficients_ * series;
+    Shape shape = example_;
+    shape.length = length;
+    Index at = 0;
+    for (MatrixXd Shape::*part : PARTS) {
+      MatrixXd& matrix = shape.*part;
+      matrix = Eigen::Map<const MatrixXd>(all.data() + at, matrix.rows(), matrix.cols());
+      at += matrix.size();
+    }
+    return shape;
+  }
+
+ private:
+  static constexpr MatrixXd Shape::*PARTS[] = {&Shape::motion,         &Shape::velocity, &Shape::force_motion,
+                                               &Shape::force_velocity, &Shape::state,    &Shape::force_state};
+
+  static VectorXd pack(const Shape& shape) {
+    Index size = 0;
+    for (MatrixXd Shape::*part : PARTS) size += (shape.*part).size();
+    VectorXd all(size);
+    size = 0;
+    for (MatrixXd Shape::*part : PARTS) {
+      const MatrixXd& matrix = shape.*part;
+      all.segment(size, matrix.size()) = Eigen::Map<const VectorXd>(matrix.data(), matrix.size());
+      size += matrix.size();
+    }
+    return all;
+  }
+
+  double longest_;
+  Shape example_;
+  MatrixXd coefficients_;  ///< entries x terms
+};
+
 /// Shapes met at one speed; a cut without helix meets the same at every depth.
 class Shapes {
  public:
   Shapes(const std::vector<SystemMode>& of_modes, std::shared_ptr<const Reference> of_reference,
-         bool velocities)
-      : modes(of_modes), axes(of_modes), reference(std::move(of_reference)), with_velocity(velocities) {}
+         bool velocities, std::shared_ptr<const ShapeTable> of_table = nullptr)
+      : modes(of_modes),
+        axes(of_modes),
+        reference(std::move(of_reference)),
+        with_velocity(velocities),
+        table_(std::move(of_table)) {}
 
   std::shared_ptr<const Shape> of(double length) {
     for (const auto& shape : known_)
       if (std::abs(shape->length - length) <= 1e-13 * length) return shape;
     constexpr std::size_t MOST = 100;
     if (known_.size() >= MOST) known_.clear();
-    known_.push_back(std::make_shared<Shape>(shapeOf(modes, axes, *reference, length, with_velocity)));
+    known_.push_back(std::make_shared<Shape>(table_ && length <= table_->longest()
+                                                 ? table_->at(length)
+                                                 : shapeOf(modes, axes, *reference, length, with_velocity)));
     return known_.back();
   }
 
@@ -208,6 +294,7 @@ class Shapes {
   double eigenvalue_tolerance = EIGENVALUE_TOLERANCE;
 
  private:
+  std::shared_ptr<const ShapeTable> table_;
   std::vector<std::shared_ptr<const Shape>> known_;
 };
 
@@ -285,6 +372,9 @@ class PeriodMap {
     std::shared_ptr<const Shape> shape;
     bool cuts = false, looked_at = false, looked_back_to = false;
     Index slot = 0;
+    /// Where the delay is the period: [state; motion] at the end and the nodes from [state; motion a period
+    /// ago]; else empty, and the parts below are used.
+    MatrixXd step;
     MatrixXd from_state;                         // (n D) x 2M
     Eigen::PartialPivLU<MatrixXd> lu;            // of I - feedback x answer
     std::vector<std::vector<MatrixXd>> delayed;  // [delay][node] D x D, empty where zero
@@ -296,16 +386,7 @@ class PeriodMap {
     ends.push_back(0.0);
     ends.push_back(period_);
     std::sort(ends.begin(), ends.end());
-    double fastest = 0.0;
-    // What a heavily damped mode far above the others adds (a residual compliance) follows the force at once.
-    constexpr double FOLLOWS = 0.4;
-    for (const SystemMode& mode : system.modes) {
-      if (mode.damping_ratio >= FOLLOWS && system.modes.size() > 1) continue;
-      const double w = units::TWO_PI * mode.frequency;
-      const double added = system.stiffness * std::hypot(mode.input[0], mode.input[1]) *
-                           std::hypot(mode.output[0], mode.output[1]);
-      fastest = std::max(fastest, std::sqrt(w * w + added));
-    }
+    const double fastest = fastestOf(system.modes, system.stiffness);
     const double shortest_delay = *std::min_element(system.delays.begin(), system.delays.end());
     double begin = 0.0;
     for (const double end : ends) {
@@ -381,6 +462,7 @@ class PeriodMap {
         same.element = self;
         element.source[k].push_back(same);
         element.looked_at = element.looked_back_to = true;
+        if (system.delays.size() == 1) condense(element);
         continue;
       }
       for (Index i = 0; i < n_; ++i) {
@@ -390,12 +472,36 @@ class PeriodMap {
     }
   }
 
+  void condense(Element& element) {
+    const Shape& shape = *element.shape;
+    const Index nd = n_ * d_;
+    MatrixXd force(nd, m2_ + nd);
+    force.leftCols(m2_) = element.from_state;
+    force.rightCols(nd).setZero();
+    for (Index i = 0; i < n_; ++i)
+      force.block(i * d_, m2_ + i * d_, d_, d_) = element.delayed.front()[static_cast<std::size_t>(i)];
+    force = element.lu.solve(force).eval();
+    element.step.resize(m2_ + nd, m2_ + nd);
+    element.step.topRows(m2_).noalias() = shape.force_state * force;
+    element.step.bottomRows(nd).noalias() = shape.force_motion * force;
+    element.step.topLeftCorner(m2_, m2_) += shape.state;
+    element.step.bottomLeftCorner(nd, m2_) += shape.motion;
+  }
+
   void march(const VectorXd& in, VectorXd& out, bool everywhere) {
     out.resize(size_);
     state_ = in.head(m2_);
     for (std::size_t e = 0; e < elements_.size(); ++e) {
       const Element& element = elements_[e];
       const Shape& shape = *element.shape;
+      if (element.step.size() > 0) {
+        before_.resize(m2_ + n_ * d_);
+        before_ << state_, in.segment(element.slot, n_ * d_);
+        after_.noalias() = element.step * before_;
+        state_ = after_.head(m2_);
+        motion_[e] = after_.tail(n_ * d_);
+        continue;
+      }
       const bool wanted = everywhere || element.looked_at;
       if (wanted) motion_[e].noalias() = shape.motion * state_;
       if (element.cuts) {
@@ -437,7 +543,7 @@ class PeriodMap {
   Shapes& shapes_;
   std::vector<Element> elements_;
   std::vector<VectorXd> motion_;
-  VectorXd state_, next_, force_;
+  VectorXd state_, next_, force_, before_, after_;
   double delayed_[2] = {0.0, 0.0};
 };
 
@@ -445,16 +551,19 @@ class Collocation : public FloquetSolver {
  public:
   Collocation(const RegenerativeSystem& system, const SolverOptions& options)
       : FloquetSolver(system, options),
-        reference_(std::make_shared<Reference>(options.nodes > 0 ? options.nodes : DEFAULT_NODES)) {}
+        reference_(std::make_shared<Reference>(options.nodes > 0 ? options.nodes : DEFAULT_NODES)),
+        with_velocity_(system.damping_radial > 0.0 || system.damping_tangential > 0.0),
+        table_(options.many && fastestOf(system.modes, 0.0) > 0.0
+                   ? std::make_shared<ShapeTable>(system.modes, *reference_, with_velocity_)
+                   : nullptr) {}
 
   class Speed : public AtSpeed {
    public:
     Speed(const Collocation& solver, double speed)
         : system_(solver.system_),
           speed_(speed),
-          shapes_(system_.modes, solver.reference_,
-                  system_.damping_radial > 0.0 || system_.damping_tangential > 0.0) {
-      shapes_.eigenvalue_tolerance = eigenvalueTolerance(solver.options_.tolerance);
+          shapes_(system_.modes, solver.reference_, solver.with_velocity_, solver.table_) {
+      shapes_.eigenvalue_tolerance = eigenvalueTolerance(solver.options_);
     }
 
     CharacteristicMultiplier multiplier(double depth) override {
@@ -485,6 +594,8 @@ class Collocation : public FloquetSolver {
 
  private:
   std::shared_ptr<const Reference> reference_;
+  bool with_velocity_;
+  std::shared_ptr<const ShapeTable> table_;
 };
 
 }  // namespace

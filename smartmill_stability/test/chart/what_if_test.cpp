@@ -31,29 +31,35 @@ ChartMaker benchmarkMaker(double direct = 0.0) {
   return maker;
 }
 
-// What is followed from neighbour to neighbour against the solver that searches each speed from zero, six
-// digits: at slotting, and at a small immersion with its flip lobes. Interpolation may cost 0.5 % (a quarter
-// of what ends the refinement), at the very meeting of two lobes more: there 99 of 100 speeds are asked for.
+// What is followed from neighbour to neighbour against the solver that searches each of 300 speeds from zero,
+// six digits: at slotting, at a third and at a small immersion with its flip lobes. Interpolation may cost a
+// percent (what ends the refinement); 296 of 300 keep it, and where two lobes meet it is 15 % at most.
 TEST(WhatIf, FollowsTheLimitsOfTheFullSearch) {
-  for (const double exit_deg : {180.0, 60.0}) {
-    RegenerativeSystem system = *benchmarkMaker().system({0.0, units::radFromDeg(exit_deg), 0.0, 0.0});
+  for (const double exit_deg : {180.0, 60.0, 30.0}) {
+    const RegenerativeSystem system = *benchmarkMaker().system({0.0, units::radFromDeg(exit_deg), 0.0, 0.0});
     std::vector<double> speeds;
-    for (int i = 0; i < 100; ++i) speeds.push_back(units::radPerSecFromRpm(5000.0 + 150.0 * i));
+    for (int i = 0; i < 300; ++i) speeds.push_back(units::radPerSecFromRpm(5000.0 + 50.0 * i));
     constexpr double DEEPEST = 5e-3;
-    SolverOptions coarse;
-    coarse.tolerance = 1e-3;
-    coarse.nodes = 8;
-    const StabilityLimit found =
-        followedLimits(*makeFloquetSolver(Method::collocation, system, coarse), speeds, DEEPEST);
+    const StabilityLimit found = followedLimits(system, speeds, DEEPEST);
     const std::vector<Limit> exact = makeFloquetSolver(Method::collocation, system)->limits(speeds, DEEPEST);
     ASSERT_EQ(found.depth.size(), speeds.size());
     int off = 0;
     for (std::size_t k = 0; k < speeds.size(); ++k) {
-      if (std::isinf(found.depth[k]) && exact[k].depth > 0.98 * DEEPEST) continue;
-      off += !(std::abs(found.depth[k] / exact[k].depth - 1.0) <= 0.01);
+      if (std::isinf(found.depth[k]) && exact[k].depth > 0.97 * DEEPEST) continue;
+      const double ratio = found.depth[k] / exact[k].depth;
+      off += !(std::abs(ratio - 1.0) <= 0.01);
+      EXPECT_NEAR(ratio, 1.0, 0.05) << exit_deg << " deg, speed " << k;
     }
-    EXPECT_LE(off, 1) << exit_deg << " deg";
+    EXPECT_LE(off, 5) << exit_deg << " deg";
   }
+}
+
+// The same whatever thread takes which speed.
+TEST(WhatIf, TwoCallsAgreeToTheLastDigit) {
+  const RegenerativeSystem system = *benchmarkMaker().system({});
+  std::vector<double> speeds;
+  for (int i = 0; i < 101; ++i) speeds.push_back(units::radPerSecFromRpm(5000.0 + 150.0 * i));
+  EXPECT_EQ(followedLimits(system, speeds, 5e-3).depth, followedLimits(system, speeds, 5e-3).depth);
 }
 
 TEST(WhatIf, NothingChangedIsTheChart) {

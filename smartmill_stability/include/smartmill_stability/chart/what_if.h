@@ -42,10 +42,10 @@ struct WhatIfChart {
 /// The tool as it would vibrate with another overhang. @param overhang [1] as WhatIf::overhang
 std::vector<SystemMode> withOverhang(std::vector<SystemMode> modes, double overhang);
 
-/// Limits at rising speeds, fast enough to follow a slider: solved from zero at every eighth speed, between
-/// them from the depth that the neighbours foretell, and interpolated where that was right to a percent. What
-/// a neighbour's limit says is asked at each speed, so that a valley is not stepped over.
-StabilityLimit followedLimits(const FloquetSolver& solver, const std::vector<double>& speeds,
+/// Limits at rising speeds (two at least), fast enough to follow a slider: by collocation from zero at every
+/// tenth speed, between them from what the neighbours and the zero-order solution foretell, and interpolated
+/// where that was right to a percent. Where the lobe changes every speed is asked.
+StabilityLimit followedLimits(const RegenerativeSystem& system, const std::vector<double>& speeds,
                               double max_depth);
 
 /// The mode that answers most at a frequency [Hz]; -1 for NaN or without modes.

@@ -123,6 +123,9 @@ struct SolverOptions {
   int lines = 0;                ///< multi_frequency: chatter frequencies tried a speed (default by damping)
   double tolerance = 1e-6;      ///< [1] of the depth, relative
   bool estimate_error = false;  ///< limits carry an error estimate from a refinement
+  /// collocation: thousands of multipliers are due. What depends on an element's length alone then comes from
+  /// a table (relative error 1e-9) that costs as much as a few of them.
+  bool many = false;
 };
 
 /// A stability solver of one system.
