@@ -63,6 +63,8 @@ class CuttingMachine {
   /// @param time_step [s] > 0. @throws Error naming what of the model this twin cannot run.
   CuttingMachine(const MachineModel& model, double time_step, Feed feed = Feed::any);
 
+  /// As the effects left it.
+  const MachineModel& model() const { return model_; }
   /// Whether the tip has modes: the chip then regenerates.
   bool vibrates() const { return vibrates_; }
 
