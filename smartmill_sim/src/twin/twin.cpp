@@ -15,6 +15,7 @@
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/signal/window.h"
 #include "smartmill_core/units.h"
+#include "smartmill_sim/twin/burst_times.h"
 #include "smartmill_sim/twin/cut_traces.h"
 #include "smartmill_sim/twin/cutting_machine.h"
 #include "smartmill_sim/twin/guide.h"
@@ -78,6 +79,8 @@ CuttingMachine::Clock clockOf(const MachineModel& model, const CampaignTest& tes
     const bool shows = kind->stage != Stage::drive || record.has("load_meter");
     const char* lacks = nullptr;
     if (kind->has(EffectNeed::start_time) && shows && !test.start_time) lacks = "start_time_s";
+    const auto clock = effect.words.find("clock");
+    if (clock != effect.words.end() && clock->second == "machine" && !test.start_time) lacks = "start_time_s";
     if (kind->has(EffectNeed::cut_time) && !test.cut_time_before) lacks = "cut_time_before_s";
     if (lacks)
       throw Error("test " + test.name + ": " + lacks + " is missing (effect " + effect.name + " needs it)");
@@ -213,6 +216,7 @@ void run(const MachineModel& model, const CampaignTest& test, const SimulationOp
         tone->phase = std::uniform_real_distribution<double>(0.0, units::TWO_PI)(random);
     }
   }
+  findBursts(recorded && !options.random_phases ? recorded : nullptr, out, test.sample_rate, machine, random);
   for (std::size_t i = 0; i < record.size(); ++i) {
     ChannelValues values{};
     for (const std::size_t c : shown) values[c] = (*out[c])[i];
