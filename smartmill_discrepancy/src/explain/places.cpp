@@ -74,6 +74,7 @@ std::map<std::string, std::vector<Left>> leftByChannel(const TwinRunner& runner,
                                                        const std::vector<double>& residual) {
   std::map<std::string, std::vector<Left>> channels;
   for (const Block& b : runner.blocks()) {
+    if (b.slow) continue;
     const auto from = residual.begin() + static_cast<std::ptrdiff_t>(b.offset);
     Left left{&runner.data().tests[b.test], {from, from + static_cast<std::ptrdiff_t>(b.size)}, 0.0, b.noise};
     left.mean = std::accumulate(left.values.begin(), left.values.end(), 0.0) /
