@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "smartmill_core/error.h"
+#include "smartmill_sim/effects/shelf_filter.h"
 
 #include "effects_rig.h"
 
@@ -168,6 +169,121 @@ TEST(EffectsWithoutName, linesTakeTheirPhaseFromTheRecord) {
               TWO_PI * 36.8);
   expectFound(effectEntry("empirical:order", {{"order", 0.5}, {"amplitude", 3.5}}, {{"channel", "fz"}}),
               0.5 * EVEN_SPEED);
+}
+
+// Straight edges: one tooth at a time, by turns.
+TEST(EffectsWithoutName, eachToothHasItsFactor) {
+  const auto table = [](const char* of) {
+    return effectEntry("empirical:tooth_factor", {}, {{"of", of}}, {{"factor", {1.0, 1.3}}});
+  };
+  const CuttingCoefficients k = *mill(2, 0.0).cutting;
+  const Record chip = run(with(mill(2, 0.0), {table("chip")}), slotCut(EVEN_RPM, DEPTH, FEED), 0.1);
+  EXPECT_NEAR(at(chip, "fz", 0.5 * PI, EVEN_SPEED), (k.kac * FEED + k.kae) * DEPTH, 1e-6);
+  EXPECT_NEAR(at(chip, "fz", 1.5 * PI, EVEN_SPEED), (1.3 * k.kac * FEED + k.kae) * DEPTH, 1e-6);
+  const Record edge = run(with(mill(2, 0.0), {table("edge")}), slotCut(EVEN_RPM, DEPTH, FEED), 0.1);
+  EXPECT_NEAR(at(edge, "fz", 1.5 * PI, EVEN_SPEED), (k.kac * FEED + 1.3 * k.kae) * DEPTH, 1e-6);
+  // All alike is another coefficient.
+  const Record alike =
+      run(with(mill(3, 30.0),
+               {effectEntry("empirical:tooth_factor", {}, {{"of", "chip"}}, {{"factor", {0.8, 0.8, 0.8}}})}),
+          slotCut(EVEN_RPM, DEPTH, FEED), 0.1);
+  const Record less =
+      run(with(mill(3, 30.0), {chipEntry({40.0, 80.0}, {0.8, 0.8})}), slotCut(EVEN_RPM, DEPTH, FEED), 0.1);
+  for (std::size_t i = 0; i < alike.size(); i += 41) {
+    for (const char* c : {"fx", "fy", "fz"}) EXPECT_NEAR(alike.column(c)[i], less.column(c)[i], 2e-3) << c;
+  }
+  EXPECT_THROW(run(with(mill(4, 0.0), {table("chip")}), slotCut(EVEN_RPM), 0.1), Error);
+}
+
+TEST(EffectsWithoutName, theEdgeIsRunInWithTheTimeItHasCut) {
+  const MachineModel model =
+      with(mill(2, 0.0), {effectEntry("empirical:edge_life", {{"amplitude", 0.4}, {"time_constant_s", 90.0}},
+                                      {{"of", "chip"}})});
+  CampaignTest test = slotCut(EVEN_RPM, DEPTH, FEED);
+  test.cut_time_before = 120.0;
+  EXPECT_NEAR(at(run(model, test, 0.1), "fz", 0.5 * PI, EVEN_SPEED),
+              axialForce(model, FEED * (1.0 + 0.4 * (1.0 - std::exp(-120.0 / 90.0))), DEPTH), 1e-3);
+}
+
+TEST(EffectsWithoutName, channelsStepAndDriftByTheirClock) {
+  const auto shown = [](const EffectEntry& entry, std::size_t i) {
+    return run(with(mill(4, 30.0), {entry}), airCut(3000.0), 0.2).column("fy")[i];  // begins at 100 s
+  };
+  const auto time = [](std::size_t i) { return static_cast<double>(i) / RATE; };
+  const auto step = [](const char* clock, double at) {
+    return effectEntry("empirical:step", {{"at_s", at}, {"amplitude", 4.0}},
+                       {{"channel", "fy"}, {"clock", clock}});
+  };
+  EXPECT_EQ(shown(step("record", 0.1), 2559), 0.0);
+  EXPECT_EQ(shown(step("record", 0.1), 2561), 4.0);
+  EXPECT_EQ(shown(step("machine", 99.0), 0), 4.0);
+  EXPECT_EQ(shown(step("machine", 100.1), 2000), 0.0);
+  const auto ramp = [](const char* clock) {
+    return effectEntry("empirical:ramp", {{"per_min", -30.0}}, {{"channel", "fy"}, {"clock", clock}});
+  };
+  EXPECT_NEAR(shown(ramp("record"), 4000), -0.5 * time(4000), 1e-9);
+  EXPECT_NEAR(shown(ramp("machine"), 4000), -0.5 * (100.0 + time(4000)), 1e-9);
+  const EffectEntry approach =
+      effectEntry("empirical:approach", {{"amplitude", 6.0}, {"time_constant_s", 50.0}}, {{"channel", "fy"}});
+  EXPECT_NEAR(shown(approach, 4000), 6.0 * (1.0 - std::exp(-(100.0 + time(4000)) / 50.0)), 1e-9);
+  CampaignTest timeless = airCut(3000.0);
+  timeless.start_time.reset();
+  EXPECT_THROW(run(with(mill(4, 30.0), {ramp("machine")}), timeless, 0.1), Error);
+}
+
+// Above x + (below - above) / (1 + i f / corner) x.
+TEST(EffectsWithoutName, aShelfPassesSlowAndQuickWithGainsOfTheirOwn) {
+  const Shelf shelf{200.0, 0.7, 1.4};
+  for (const double f : {2.0, 60.0, 200.0, 900.0}) {
+    ShelfFilter filter(shelf, 1.0 / RATE);
+    const auto samples = static_cast<std::size_t>(std::lround(std::ceil(0.1 * f) / f * RATE));
+    double sine = 0.0, cosine = 0.0;
+    for (std::size_t i = 0; i < 2 * samples; ++i) {
+      const double angle = TWO_PI * f * static_cast<double>(i) / RATE, y = filter.step(std::sin(angle));
+      if (i < samples) continue;
+      sine += 2.0 * y * std::sin(angle) / static_cast<double>(samples);
+      cosine += 2.0 * y * std::cos(angle) / static_cast<double>(samples);
+    }
+    const double q = f / 200.0, low = 1.0 / (1.0 + q * q);
+    EXPECT_NEAR(sine, 1.4 - 0.7 * low, 3e-3) << f;
+    EXPECT_NEAR(cosine, 0.7 * q * low, 3e-3) << f;
+  }
+  const Record record =
+      run(with(mill(4, 30.0),
+               {effectEntry("empirical:transfer", {{"corner_hz", 200.0}, {"below", 0.5}, {"above", 0.5}},
+                            {{"channel", "fx"}})}),
+          slotCut(EVEN_RPM), 0.1);
+  const Record pure = run(mill(4, 30.0), slotCut(EVEN_RPM), 0.1);
+  for (std::size_t i = 0; i < pure.size(); i += 61) {
+    EXPECT_NEAR(record.column("fx")[i], 0.5 * pure.column("fx")[i], 1e-9);
+    EXPECT_EQ(record.column("fy")[i], pure.column("fy")[i]);
+  }
+}
+
+// When they come is no value of the model.
+TEST(EffectsWithoutName, burstsTakeTheirTimesFromTheRecord) {
+  const CampaignTest test = slotCut(EVEN_RPM);
+  const EffectEntry bursts =
+      effectEntry("empirical:bursts",
+                  {{"period_s", 0.0237}, {"frequency_hz", 900.0}, {"decay_s", 3e-3}, {"amplitude", 8.0}},
+                  {{"channel", "fz"}});
+  SimulationOptions options;
+  options.noise = false;
+  options.phase = 0.0;
+  const Record pure = run(mill(4, 30.0), test, 0.2);
+  for (const double first : {0.0013, 0.0112, 0.0229}) {
+    Record shown = pure;
+    std::vector<double>& fz = shown.add("fz");
+    fz = pure.column("fz");
+    for (std::size_t i = 0; i < fz.size(); ++i) {
+      const double since = std::fmod(static_cast<double>(i) / RATE - first + 0.0237, 0.0237);
+      fz[i] += 8.0 * std::exp(-since / 3e-3) * std::sin(TWO_PI * 900.0 * since);
+    }
+    const Record found = simulateTest(with(mill(4, 30.0), {bursts}), test, shown, options);
+    double squares = 0.0;
+    for (std::size_t i = 0; i < fz.size(); ++i) squares += std::pow(found.column("fz")[i] - fz[i], 2);
+    EXPECT_LT(std::sqrt(squares / static_cast<double>(fz.size())), 0.1) << first;
+  }
 }
 
 TEST(EffectsWithoutName, everyFormHasItsClassAndCanDoNothing) {

@@ -169,6 +169,45 @@ TEST(Twin, guidedByItsDisplacementTheStructureOnlyShows) {
   EXPECT_LT(std::sqrt(shift / displacement), 0.01);
 }
 
+// Without these channels the force that was measured, through sensor and structure, says where the tip was:
+// what is true of the cut follows the record, and what is wrong of it stays finite where it would run away.
+TEST(Twin, guidedByItsForcesNothingRunsAway) {
+  CampaignTest test = slot();
+  test.engage_time = 0.01;
+  MachineModel truth = flexibleMill();
+  truth.force_sensor.axis[0].modes = {{930.0, 0.03, 0.9}};
+  truth.force_sensor.axis[1].modes = {{1080.0, 0.03, 0.9}};
+  truth.force_sensor.axis[0].direct = truth.force_sensor.axis[1].direct = 0.1;
+  truth.force_sensor.noise_rms = Axes3{{1.0, 1.0, 1.0}};
+  SimulationOptions options;
+  options.phase = 1.0;
+  options.substeps = 8;
+  Record forces;
+  forces.time = blank().time;
+  for (const char* c : {"spindle_angle", "fx", "fy", "fz"}) forces.add(c).assign(forces.time.size(), 0.0);
+  const Record measured = simulateTest(truth, test, forces, options);
+  options.noise = false;
+  const auto left = [&](const MachineModel& model, bool guided) {
+    options.guided = guided;
+    const Record simulated = simulateTest(model, test, measured, options);
+    double squares = 0.0;
+    for (const char* c : {"fx", "fy"}) {
+      for (std::size_t i = 0; i < measured.size(); ++i)
+        squares += std::pow(simulated.column(c)[i] - measured.column(c)[i], 2);
+    }
+    return std::sqrt(squares / (2.0 * static_cast<double>(measured.size())));  // [N]
+  };
+  EXPECT_LT(left(truth, false), 1.05);
+  EXPECT_LT(left(truth, true), 1.5);
+  MachineModel wrong = truth;
+  wrong.cutting->ktc *= 4.0;
+  wrong.cutting->krc *= 4.0;
+  double size = 0.0;
+  for (const double f : measured.column("fx")) size = std::max(size, std::abs(f));
+  EXPECT_GT(left(wrong, false), 2.0 * left(wrong, true));
+  EXPECT_LT(left(wrong, true), 4.0 * size);
+}
+
 // A record out of the midst of a cut begins in the steady state: it comes again with every tooth from its
 // first sample on, and is what a record with the engagement in it settles to.
 TEST(Twin, aRecordOutOfARunningCutIsSteady) {

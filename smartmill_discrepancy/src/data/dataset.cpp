@@ -4,6 +4,7 @@
 #include <cmath>
 #include <set>
 
+#include "smartmill_core/campaign/slow_channels.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/signal/fourier.h"
@@ -98,6 +99,78 @@ std::map<std::string, double> noiseOf(const Dataset& data) {
   return noise;
 }
 
+// @param readings on the record's clock, which begins at `begin` [s] and lasts so long [s]
+SlowMeans meansOf(const std::string& channel, const Record& readings, double begin, double lasts) {
+  constexpr double PIECE = 0.25;  // [s]
+  const std::vector<double>& values = readings.column(channel);
+  const auto pieces = std::max<std::size_t>(1, static_cast<std::size_t>(lasts / PIECE));
+  SlowMeans slow;
+  slow.channel = channel;
+  std::vector<std::vector<double>> of_piece(pieces), times(pieces);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const double t = readings.time[i] - begin;
+    if (t < 0.0 || t > lasts) continue;
+    const auto k = std::min(pieces - 1, static_cast<std::size_t>(t / lasts * static_cast<double>(pieces)));
+    of_piece[k].push_back(values[i]);
+    times[k].push_back(t);
+  }
+  double variance = 0.0;
+  for (std::size_t k = 0; k < pieces; ++k) {
+    if (of_piece[k].empty()) continue;
+    slow.mean.push_back(mean(of_piece[k]));
+    slow.times.push_back(times[k]);
+    const double deviation = standardDeviation(of_piece[k]);
+    variance += deviation * deviation / static_cast<double>(of_piece[k].size());
+  }
+  if (slow.mean.empty()) throw Error(readings.file + ": no reading falls into the record of its test");
+  slow.scatter = std::sqrt(variance / static_cast<double>(slow.mean.size()));
+  std::vector<double> sorted = values;
+  std::sort(sorted.begin(), sorted.end());
+  for (std::size_t i = 1; i < sorted.size(); ++i) {
+    const double step = sorted[i] - sorted[i - 1];
+    if (step > 1e-9 * std::abs(sorted[i]) && (slow.step == 0.0 || step < slow.step)) slow.step = step;
+  }
+  return slow;
+}
+
+void addSlowChannels(Dataset& data) {
+  for (const SlowChannel& channel : readSlowChannels(data.campaign)) {
+    const auto test = std::find_if(data.tests.begin(), data.tests.end(),
+                                   [&](const TestData& t) { return t.test.name == channel.test; });
+    if (!data.nominal.spindle) {
+      const std::string note = channel.channel + " is not compared: the model has no spindle section";
+      if (std::count(data.notes.begin(), data.notes.end(), note) == 0) data.notes.push_back(note);
+      continue;
+    }
+    if (test->record.has(channel.channel))
+      throw Error(test->record.file + ": " + channel.channel + " stands in slow_channels too");
+    const Record readings = readRecord(data.campaign, channel);
+    test->slow.push_back(meansOf(channel.channel, readings, test->record.time.front(),
+                                 static_cast<double>(test->record.size()) / test->test.sample_rate));
+  }
+}
+
+// Of a mean: the scatter of its readings, which ripple in a cut, and the rounding that they share. Readings
+// never stand nearer than the step in which they are told.
+void addSlowNoise(Dataset& data) {
+  std::map<std::string, double> step, least;
+  for (const TestData& t : data.tests) {
+    for (const SlowMeans& slow : t.slow) {
+      double& told = step[slow.channel];
+      if (slow.step > 0.0 && (told == 0.0 || slow.step < told)) told = slow.step;
+    }
+  }
+  for (TestData& t : data.tests) {
+    for (SlowMeans& slow : t.slow) {
+      const double told = std::max(step[slow.channel], data.nominal.spindle->load_meter_resolution);
+      slow.noise = std::hypot(slow.scatter, told / std::sqrt(12.0));
+      double& noise = least[slow.channel];
+      if (noise == 0.0 || slow.noise < noise) noise = slow.noise;
+    }
+  }
+  data.noise.insert(least.begin(), least.end());
+}
+
 // No model follows the phase of chatter: such cuts say that there is some, and are not compared.
 void setChatterAside(Dataset& data) {
   for (std::size_t k = 0; k < data.tests.size();) {
@@ -120,7 +193,10 @@ void setChatterAside(Dataset& data) {
 
 std::size_t Dataset::samples() const {
   std::size_t sum = 0;
-  for (const TestData& t : tests) sum += t.channels.size() * t.record.size();
+  for (const TestData& t : tests) {
+    sum += t.channels.size() * t.record.size();
+    for (const SlowMeans& slow : t.slow) sum += slow.mean.size();
+  }
   return sum;
 }
 
@@ -229,7 +305,9 @@ Dataset loadDataset(const Campaign& campaign, const MachineModel& nominal) {
   }
   if (data.tests.empty()) throw Error(campaign.folder + ": no tests");
   data.notes.assign(aside.begin(), aside.end());
+  addSlowChannels(data);
   data.noise = noiseOf(data);
+  addSlowNoise(data);
   for (const std::string& note : estimatePhases(data)) data.notes.push_back(note);
   setChatterAside(data);
   chooseHeldout(data.tests);

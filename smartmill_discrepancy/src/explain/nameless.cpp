@@ -9,6 +9,7 @@
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/model/effect_catalogue.h"
 #include "smartmill_core/units.h"
+#include "smartmill_discrepancy/explain/places.h"
 #include "smartmill_discrepancy/search/evidence.h"
 #include "smartmill_discrepancy/search/refinement.h"
 #include "smartmill_discrepancy/search/screening.h"
@@ -19,61 +20,15 @@ namespace {
 
 constexpr FitOptions CLOSELY{8, 1e-4, true};
 
-// A line of the residual as a hypothesis, its place where the residual has it.
-void addLine(const std::vector<Hypothesis>& forms, const char* form, const Finding& f, double place,
-             std::vector<Hypothesis>* lines) {
-  const bool by_order = f.domain == "order";
-  for (const Hypothesis& h : forms) {
-    if (h.effect != std::string(EMPIRICAL) + ":" + form || h.variant.rfind(f.channel, 0) != 0) continue;
-    Hypothesis line = h;
-    line.named(h.variant + formatted(by_order ? ", order %.4g" : ", %.4g Hz", place));
-    const double size = std::max(f.amplitude, h.coordinates.back().step);
-    if (by_order) {
-      line.number("order", place).probe({0.0}, {{size}});
-    } else {
-      line.probe({place, 0.0}, {{place, size}});
-    }
-    lines->push_back(std::move(line));
-  }
-}
-
-double longestRecord(const Dataset& data) {
-  double longest = 0.0;
-  for (const TestData& t : data.tests) {
-    if (t.record.size() > 1) longest = std::max(longest, t.record.time.back() - t.record.time.front());
-  }
-  return longest;
-}
-
-// Whether a line can be told from a slow wander, which any sine of its own phase in each record follows, and
-// from a tone that a state has on that channel: together they would give each record an amplitude of its own.
-bool isTone(const Dataset& data, const FitState& state, const Finding& f) {
-  constexpr double LEAST_CYCLES = 4.0, RESOLVED = 2.0;
-  const double frequency = f.location.at("frequency_hz"), longest = longestRecord(data);
-  return frequency * longest > LEAST_CYCLES &&
-         std::none_of(state.members.begin(), state.members.end(), [&](const Member& m) {
-           const EffectEntry e = m.hypothesis->entry(m.values);
-           return e.name == std::string(EMPIRICAL) + ":tone" && e.words.at("channel") == f.channel &&
-                  std::abs(e.numbers.at("frequency_hz") - frequency) * longest < RESOLVED;
-         });
-}
-
-// What may act without a name, lines at the places where the residual shows some.
-std::vector<Hypothesis> formsFor(const Dataset& data, const FitState& state,
+// What may act without a name, at the places where the residual shows something.
+std::vector<Hypothesis> formsFor(const TwinRunner& runner, const Fit& now,
                                  const std::vector<Finding>& unexplained) {
-  constexpr std::size_t MOST_LINES = 12;
-  const std::vector<Hypothesis> all = empiricalHypotheses(data);
-  std::vector<Hypothesis> lines;
-  for (const Finding& f : unexplained) {
-    if (lines.size() >= MOST_LINES) break;
-    if (f.domain == "frequency" && isTone(data, state, f))
-      addLine(all, "tone", f, f.location.at("frequency_hz"), &lines);
-    if (f.domain == "order") addLine(all, "order", f, f.location.at("order"), &lines);
-  }
+  const std::vector<Hypothesis> all = empiricalHypotheses(runner.data());
+  const std::vector<Hypothesis> placed = placedForms(runner, all, now, unexplained);
   std::vector<Hypothesis> forms;
   std::copy_if(all.begin(), all.end(), std::back_inserter(forms),
                [](const Hypothesis& h) { return !h.probes.empty(); });
-  forms.insert(forms.end(), lines.begin(), lines.end());
+  forms.insert(forms.end(), placed.begin(), placed.end());
   return forms;
 }
 
@@ -244,7 +199,7 @@ bool Nameless::take(const Fit& start, const FitState& before, SearchResult* foun
 }
 
 bool Nameless::addOne(SearchResult* found, const std::vector<Finding>& unexplained) {
-  forms_.push_back(formsFor(bench_.data(), found->best.state, unexplained));
+  forms_.push_back(formsFor(bench_.quick().runner(), found->best, unexplained));
   const FitState before = found->best.state;
   const NominalTangents tangents = bench_.linearise(before);
   const double least =

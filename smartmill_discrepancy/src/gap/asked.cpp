@@ -12,6 +12,13 @@ namespace smartmill::discrepancy {
 
 // The mean square of the window is 3/8.
 std::vector<double> powerOf(const double* values, std::size_t size) {
+  // Of a few values a window would leave nothing, and no two of them are of one line.
+  constexpr std::size_t FEW = 16;
+  if (size < FEW) {
+    std::vector<double> each;
+    for (std::size_t i = 0; i < size; ++i) each.push_back(values[i] * values[i]);
+    return each;
+  }
   std::vector<double> part = hannWindow(size), squares;
   for (std::size_t i = 0; i < size; ++i) part[i] *= values[i];
   for (const std::complex<double>& x : fourier(part)) {

@@ -305,7 +305,7 @@ Channel channelOf(const TwinRunner& runner, const std::vector<double>& residual,
   constexpr std::size_t LEAST_SAMPLES = 32;
   Channel channel;
   for (const Block& block : runner.blocks()) {
-    if (block.channel != name) continue;
+    if (block.channel != name || block.slow) continue;
     const TestData& test = runner.data().tests[block.test];
     const std::size_t from = test.test.kind == TestKind::cut ? test.first_cut : 0;
     if (block.size < from + LEAST_SAMPLES) continue;
@@ -364,6 +364,43 @@ void keepSignificant(const std::vector<double>& looks, const StructureOptions& o
   if (found.size() > most) found.resize(most);
 }
 
+// A channel that was read now and then: whether its level stands where the model says, in all tests together.
+void lookAtMeans(const TwinRunner& runner, const std::vector<double>& residual, const std::string& name,
+                 const StructureOptions& options, double all_excess, std::vector<Finding>& found,
+                 std::vector<double>& looks) {
+  Finding f;
+  f.channel = name;
+  f.domain = "level";
+  std::vector<Shown> shown;
+  std::size_t count = 0;
+  double floor = 0.0;
+  for (const Block& b : runner.blocks()) {
+    if (b.channel != name || !b.slow) continue;
+    const TestData& test = runner.data().tests[b.test];
+    double sum = 0.0, squares = 0.0;
+    for (std::size_t i = b.offset; i < b.offset + b.size; ++i) {
+      sum += residual[i];
+      squares += residual[i] * residual[i];
+      floor += std::pow(options.twin_accuracy * runner.measured()[i], 2);
+    }
+    const auto n = static_cast<double>(b.size);
+    shown.push_back({&test, sum / n, 1.0 / std::sqrt(n)});
+    if (chiSquareTail(squares, b.size + b.size % 2) < 1e-4) f.tests.push_back(test.test.name);
+    f.amplitude = std::max(f.amplitude, std::abs(sum / n) * b.noise);
+    f.squares += squares;
+    count += b.size;
+  }
+  if (count == 0) return;
+  f.p_value = chiSquareTail(f.squares, count + count % 2);
+  if (f.p_value > options.p_value || f.squares < 2.0 * static_cast<double>(count) + floor) {
+    looks.push_back(f.p_value);
+    return;
+  }
+  f.share_of_gap = (f.squares - static_cast<double>(count)) / all_excess;
+  f.depends_on = dependence(shown);
+  found.push_back(std::move(f));
+}
+
 }  // namespace
 
 std::vector<Finding> findStructure(const TwinRunner& runner, const std::vector<double>& residual,
@@ -380,6 +417,7 @@ std::vector<Finding> findStructure(const TwinRunner& runner, const std::vector<d
   std::vector<double> looks;  // p-values of every look that found nothing, for the control of false discovery
   for (const std::string& name : channels) {
     Channel channel = channelOf(runner, residual, name, options.twin_accuracy);
+    lookAtMeans(runner, residual, name, options, all_excess, found, looks);
     if (channel.stretches.empty()) continue;
     const std::vector<double> last = takeApart(name, std::move(channel), options, all_excess, found);
     looks.insert(looks.end(), last.begin(), last.end());

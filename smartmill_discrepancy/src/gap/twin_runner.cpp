@@ -22,6 +22,22 @@ std::size_t tracesFor(int substeps) {
   return substeps > 2 ? 2 : 8;
 }
 
+// What a channel that is read now and then would have shown.
+std::vector<double> readAt(const SlowMeans& slow, const std::vector<double>& values, double sample_rate) {
+  std::vector<double> means;
+  for (const std::vector<double>& times : slow.times) {
+    double sum = 0.0;
+    for (const double t : times) {
+      const double at = std::min(t * sample_rate, static_cast<double>(values.size() - 1));
+      const auto before = static_cast<std::size_t>(at);
+      const double share = at - static_cast<double>(before);
+      sum += (1.0 - share) * values[before] + share * values[std::min(before + 1, values.size() - 1)];
+    }
+    means.push_back(sum / static_cast<double>(times.size()));
+  }
+  return means;
+}
+
 }  // namespace
 
 void runParallel(std::size_t count, int threads, const std::function<void(std::size_t)>& job) {
@@ -62,6 +78,12 @@ TwinRunner::TwinRunner(const Dataset& data, std::vector<std::size_t> tests, int 
       blocks_.push_back({t, channel, size_, test.record.size(), noise});
       size_ += test.record.size();
       for (const double v : test.record.column(channel)) measured_.push_back(v / noise);
+    }
+    for (const SlowMeans& slow : test.slow) {
+      blocks_.push_back({t, slow.channel, size_, slow.mean.size(), slow.noise, &slow});
+      size_ += slow.mean.size();
+      for (const double v : slow.mean) measured_.push_back(v / slow.noise);
+      kept.record.add(slow.channel).assign(test.record.size(), 0.0);
     }
   }
   first_block_.push_back(blocks_.size());
@@ -112,6 +134,7 @@ SimulatedBlocks TwinRunner::blocksOf(const MachineModel& model, std::size_t chos
   SimulatedBlocks result;
   for (std::size_t b = first_block_[chosen]; b < first_block_[chosen + 1]; ++b) {
     std::vector<double> values = record.column(blocks_[b].channel);
+    if (blocks_[b].slow) values = readAt(*blocks_[b].slow, values, test.sample_rate);
     for (double& v : values) v /= blocks_[b].noise;
     result.push_back(std::make_shared<const std::vector<double>>(std::move(values)));
   }

@@ -15,6 +15,7 @@ EffectScope scopeOf(const Dataset& data) {
   for (const TestData& t : data.tests) {
     const bool cut = t.test.kind == TestKind::cut;
     scope.channels.insert(t.channels.begin(), t.channels.end());
+    for (const SlowMeans& slow : t.slow) scope.channels.insert(slow.channel);
     scope.cuts = scope.cuts || cut;
     scope.start_times = scope.start_times && t.test.start_time;
     scope.cut_times = scope.cut_times && (!cut || t.test.cut_time_before);

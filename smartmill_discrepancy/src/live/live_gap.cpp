@@ -5,6 +5,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "smartmill_core/campaign/slow_channels.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/signal/interpolate.h"
@@ -103,13 +104,51 @@ LiveGap liveGap(const MachineModel& model, const Stretch& stretch, const LiveGap
   return result;
 }
 
+namespace {
+
+// The readings of a stretch on an even grid from the first to the last of them: polling is not quite even.
+Record readingsOf(const Stretch& stretch, double full_scale) {
+  Record record;
+  std::vector<double> load;
+  const std::vector<LoadReading>& read = stretch.load;
+  const double step = (read.back().time - read.front().time) / static_cast<double>(read.size() - 1);
+  std::size_t k = 0;
+  for (std::size_t i = 0; i < read.size(); ++i) {
+    const double t = read.front().time + static_cast<double>(i) * step;
+    while (k + 2 < read.size() && read[k + 1].time <= t) ++k;
+    // The nearer of two: what was told is not mixed.
+    const bool later = t - read[k].time > read[k + 1].time - t;
+    record.time.push_back(t);
+    load.push_back(full_scale * read[later ? k + 1 : k].load);
+  }
+  record.add("load_meter") = std::move(load);
+  return record;
+}
+
+void recordLoad(const MachineModel& model, const Stretch& stretch, const std::string& name,
+                const std::string& folder, std::vector<SlowChannel>* slow) {
+  const bool told = model.spindle && model.spindle->load_meter_full_scale;
+  if (!told || stretch.load.size() < LEAST_READINGS) return;
+  const Record readings = readingsOf(stretch, *model.spindle->load_meter_full_scale);
+  const double lasts = readings.time.back() - readings.time.front();
+  if (!(lasts > 0.0)) return;
+  SlowChannel channel{name, "load_meter", name + "_load.csv",
+                      static_cast<double>(readings.size() - 1) / lasts};
+  writeCsv(readings, folder + "/" + channel.file);
+  slow->push_back(std::move(channel));
+}
+
+}  // namespace
+
 void recordStretch(const MachineModel& model, const Stretch& stretch, const std::string& folder) {
   std::error_code failed;
   std::filesystem::create_directories(folder, failed);
   if (failed) throw Error(folder + ": " + failed.message());
   Campaign campaign;
+  std::vector<SlowChannel> slow;
   if (std::filesystem::exists(folder + "/campaign.yaml")) {
     campaign = readCampaign(folder);
+    slow = readSlowChannels(campaign);
   } else {
     campaign.model_file = "model.yaml";
     writeMachineModel(model, folder + "/model.yaml");
@@ -129,7 +168,8 @@ void recordStretch(const MachineModel& model, const Stretch& stretch, const std:
   test.file = test.name + ".csv";
   writeCsv(stretch.record, folder + "/" + test.file);
   campaign.tests.push_back(test);
-  writeCampaign(campaign, folder);
+  recordLoad(model, stretch, test.name, folder, &slow);
+  writeCampaign(campaign, slow, folder);
 }
 
 }  // namespace smartmill::discrepancy

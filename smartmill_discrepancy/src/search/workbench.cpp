@@ -4,6 +4,7 @@
 
 #include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_discrepancy/data/phase.h"
+#include "smartmill_sim/twin/guide.h"
 
 namespace smartmill::discrepancy {
 namespace {
@@ -19,7 +20,7 @@ std::vector<std::size_t> testsOf(const Dataset& data, bool heldout) {
 bool guides(const TestData& test, const MachineModel& nominal) {
   const bool modes = !nominal.tool_tip.x.modes.empty() || !nominal.tool_tip.y.modes.empty();
   return modes && test.test.kind == TestKind::cut && !test.heldout && !test.test.running_before &&
-         test.record.has("tool_x") && test.record.has("tool_y");
+         sim::Guide::canBe(test.record);
 }
 
 // One step of Gauss and Newton of where each record lies. @return the largest turn [rad]

@@ -1,68 +1,17 @@
 // Causes that no effect of the catalogue is, put into the records by hand: built from what is left where they
 // repeat, left alone where they do not.
 #include <cmath>
-#include <random>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
 #include "smartmill_core/io/text_file.h"
-#include "smartmill_core/model/effect_catalogue.h"
-#include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_discrepancy/report/report_json.h"
 
-#include "explain/small_campaign.h"
+#include "explain/nameless_campaign.h"
 
 namespace smartmill::discrepancy {
 namespace {
-
-const std::vector<const char*> FORCES_SHOWN{"fx", "fy", "fz"};
-
-// The machine without a hidden cause, without noise; its chip coefficients times a factor.
-Record pure(const CampaignTest& test, double chip_factor, std::uint64_t seed) {
-  MachineModel machine = real();
-  for (double CuttingCoefficients::*k :
-       {&CuttingCoefficients::ktc, &CuttingCoefficients::krc, &CuttingCoefficients::kac})
-    (*machine.cutting).*k *= chip_factor;
-  sim::SimulationOptions options;
-  options.substeps = 8;
-  options.noise = false;
-  options.seed = seed;
-  return sim::simulateTest(machine, test, 0.1, options);
-}
-
-void addNoise(Record& record, std::uint64_t seed) {
-  std::mt19937_64 random(seed);
-  std::normal_distribution<double> normal;
-  for (const char* c : FORCES_SHOWN) {
-    for (double& f : record.add(c)) f += normal(random);
-  }
-}
-
-double valueOf(const FoundEffect& effect, const std::string& key) {
-  for (const FoundParameter& p : effect.parameters) {
-    if (p.key == key) return p.value;
-  }
-  ADD_FAILURE() << key;
-  return 0.0;
-}
-
-// Names are not what is looked for here.
-ExplainOptions quickly() {
-  ExplainOptions options;
-  options.search.most_effects = 1;
-  options.search.fitted_per_round = 1;
-  return options;
-}
-
-void expectGapClosed(const Explanation& e) {
-  EXPECT_EQ(e.verdict, Verdict::unknown_effect);
-  ASSERT_TRUE(e.named_only);
-  EXPECT_LT(e.after.heldout, 0.5 * e.named_only->heldout);
-  EXPECT_LT(e.after.heldout, 1.05);
-  EXPECT_FALSE(e.unexplained.empty());  // by name
-  ASSERT_EQ(e.model.effects.size(), e.effects.size());
-}
 
 // A tone on a channel of the record, its phase another one each time.
 Record withTone(const CampaignTest& test, std::uint64_t seed, const char* channel, double frequency) {

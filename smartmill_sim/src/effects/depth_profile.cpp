@@ -18,7 +18,7 @@ class DepthProfile : public Effect {
     EdgeLayer lower;
     lower.height = height_;
     lower.from_surface = from_surface_;
-    lower.chip_only = true;
+    lower.share = EdgeLayer::Share::chip;
     lower.weight = from_surface_ ? -extra_ : extra_;
     setup.layers.push_back(lower);
     if (!from_surface_) return;

@@ -117,4 +117,12 @@ std::vector<Tone*> EffectSet::tones() {
   return tones;
 }
 
+std::vector<BurstTrain*> EffectSet::bursts() {
+  std::vector<BurstTrain*> all;
+  for (const Member& m : effects_) {
+    if (BurstTrain* bursts = m.effect->bursts()) all.push_back(bursts);
+  }
+  return all;
+}
+
 }  // namespace smartmill::sim

@@ -24,7 +24,7 @@ CuttingMachine::CuttingMachine(const MachineModel& model, double time_step, Feed
       time_step_(time_step),
       sign_(model.force_sensor.measures_workpiece ? -1.0 : 1.0) {
   model_.effects.clear();
-  TwinSetup setup{std::move(model_), {}, {}, 0.0, {}};
+  TwinSetup setup{std::move(model_), {}, {}, 0.0, {}, {}};
   if (setup.model.tool) setup.radius_offset.assign(static_cast<std::size_t>(setup.model.tool->teeth), 0.0);
   effects_.setUp(setup);
   model_ = std::move(setup.model);
@@ -46,6 +46,8 @@ CuttingMachine::CuttingMachine(const MachineModel& model, double time_step, Feed
     sensor_.emplace_back(axis, rate, Hold::first_order);
   }
   if (model_.spindle) drive_.emplace(*model_.spindle, time_step);
+  for (const auto& [channel, shelf] : setup.shelves)
+    shelves_.emplace_back(channel, ShelfFilter(shelf, time_step));
   for (std::size_t c = 0; c < CHANNELS; ++c) {
     if (setup.delay[c] > 0.0) delays_.emplace_back(c, DelayLine(setup.delay[c], time_step, 0.0));
   }
@@ -164,6 +166,7 @@ void CuttingMachine::step(const Input& input, Output& out) {
   jump_ = 0.0;
   engaged_ = false;
   if (effects_.has(Stage::sensor_output)) effects_.measure(Stage::sensor_output, now_, out.early);
+  for (auto& [channel, shelf] : shelves_) out.early[channel] = shelf.step(out.early[channel]);
   for (auto& [channel, line] : delays_) out.early[channel] = line.step(out.early[channel]);
   ChannelValues shown = out.early;
   if (effects_.has(Stage::signal)) effects_.measure(Stage::signal, now_, shown);

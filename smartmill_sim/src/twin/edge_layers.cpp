@@ -14,8 +14,10 @@ double depthOf(const EdgeLayer& layer, double depth) {
 }
 
 CuttingLaw lawOf(const EdgeLayer& layer, CuttingLaw law) {
-  if (!layer.chip_only) return law;
-  law.coefficients.kte = law.coefficients.kre = law.coefficients.kae = 0.0;
+  if (layer.share == EdgeLayer::Share::all) return law;
+  CuttingCoefficients& k = law.coefficients;
+  if (layer.share == EdgeLayer::Share::chip) k.kte = k.kre = k.kae = 0.0;
+  if (layer.share == EdgeLayer::Share::edge) k.ktc = k.krc = k.kac = 0.0;
   law.damping = 0.0;
   return law;
 }
@@ -28,10 +30,12 @@ EdgeLayers::EdgeLayers(const TwinSetup& setup, const CuttingLaw& law, double tim
     std::vector<double> radius = setup.radius_offset;
     if (of.missing_tooth >= 0) radius.at(static_cast<std::size_t>(of.missing_tooth)) -= GONE;
     Layer layer{of, {}, {}};
-    if (rigid) {
+    // Tables do not tell one tooth from the next.
+    if (rigid && of.only_tooth < 0) {
       layer.rigid.emplace(*setup.model.tool, lawOf(of, law), std::move(radius));
     } else {
       layer.process.emplace(*setup.model.tool, lawOf(of, law), time_step, std::move(radius));
+      if (of.only_tooth >= 0) layer.process->showOnly(of.only_tooth);
     }
     layers_.push_back(std::move(layer));
   }

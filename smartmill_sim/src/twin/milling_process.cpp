@@ -246,6 +246,7 @@ CuttingForce MillingProcess::step(const ToolMotion& now) {
     for (std::size_t i = 0; i < 2; ++i) damping_[i] = share * (now.displacement[i] - before[i]);
   }
   forEachEdgePart(arcs_, lag_, rule_.toothAngle(), now.angle, [&](const EdgePart& part) {
+    if (only_tooth_ >= 0 && part.tooth != only_tooth_) return;
     // A straight edge stands at one angle: any little spread gives the same.
     const double from = part.straight ? part.to : part.from,
                  to = part.straight ? part.to + LEAST_LAG : part.to;

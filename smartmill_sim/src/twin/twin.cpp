@@ -12,12 +12,13 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/effect_catalogue.h"
-#include "smartmill_core/signal/interpolate.h"
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/signal/window.h"
 #include "smartmill_core/units.h"
+#include "smartmill_sim/twin/burst_times.h"
 #include "smartmill_sim/twin/cut_traces.h"
 #include "smartmill_sim/twin/cutting_machine.h"
+#include "smartmill_sim/twin/guide.h"
 
 namespace smartmill::sim {
 namespace {
@@ -60,16 +61,6 @@ bool gives(const std::string& column, const CampaignTest& test) {
   return false;
 }
 
-// Smooth, exact at the samples, the last ones held beyond the ends.
-double interpolated(const std::vector<double>& samples, std::size_t i, double share) {
-  const auto at = [&](std::ptrdiff_t k) {
-    return samples[static_cast<std::size_t>(
-        std::clamp<std::ptrdiff_t>(k, 0, static_cast<std::ptrdiff_t>(samples.size()) - 1))];
-  };
-  const auto k = static_cast<std::ptrdiff_t>(i);
-  return catmullRom(at(k - 1), at(k), at(k + 1), at(k + 2), share);
-}
-
 // The force of a tap: zero outside the contact (Dunwoody section 4.3.1), where the record shows only noise,
 // which would ring in the sensor's modes. A record with further hits stays as it is.
 std::vector<double> contactForce(const std::vector<double>& hammer) {
@@ -88,6 +79,8 @@ CuttingMachine::Clock clockOf(const MachineModel& model, const CampaignTest& tes
     const bool shows = kind->stage != Stage::drive || record.has("load_meter");
     const char* lacks = nullptr;
     if (kind->has(EffectNeed::start_time) && shows && !test.start_time) lacks = "start_time_s";
+    const auto clock = effect.words.find("clock");
+    if (clock != effect.words.end() && clock->second == "machine" && !test.start_time) lacks = "start_time_s";
     if (kind->has(EffectNeed::cut_time) && !test.cut_time_before) lacks = "cut_time_before_s";
     if (lacks)
       throw Error("test " + test.name + ": " + lacks + " is missing (effect " + effect.name + " needs it)");
@@ -223,6 +216,7 @@ void run(const MachineModel& model, const CampaignTest& test, const SimulationOp
         tone->phase = std::uniform_real_distribution<double>(0.0, units::TWO_PI)(random);
     }
   }
+  findBursts(recorded && !options.random_phases ? recorded : nullptr, out, test.sample_rate, machine, random);
   for (std::size_t i = 0; i < record.size(); ++i) {
     ChannelValues values{};
     for (const std::size_t c : shown) values[c] = (*out[c])[i];
@@ -342,13 +336,9 @@ void fillAngle(Record& record, double phase, double speed) {
   }
 }
 
-bool isGuide(const CampaignTest& test, const Record* recorded, const CuttingMachine& machine) {
+bool isGuided(const CampaignTest& test, const Record* recorded, const CuttingMachine& machine) {
   return test.kind == TestKind::cut && !test.running_before && machine.vibrates() && recorded &&
-         recorded->has(TIP[0]) && recorded->has(TIP[1]);
-}
-
-std::array<double, 2> tipAt(const Record& recorded, std::size_t i, double share) {
-  return {{interpolated(recorded.column(TIP[0]), i, share), interpolated(recorded.column(TIP[1]), i, share)}};
+         Guide::canBe(*recorded);
 }
 
 Record simulateOn(CuttingMachine& machine, const MachineModel& model, const CampaignTest& test,
@@ -363,12 +353,14 @@ Record simulateOn(CuttingMachine& machine, const MachineModel& model, const Camp
     steady.lead();
   }
   const double dt = 1.0 / test.sample_rate;
-  const bool guided = options.guided && isGuide(test, recorded, machine);
+  std::optional<Guide> guide;
+  if (options.guided && isGuided(test, recorded, machine))
+    guide.emplace(machine.model(), *recorded, test.sample_rate);
   run(
       model, test, options, machine,
       [&](std::size_t i, double share) {
         CuttingMachine::Input input = steady.next(record.time[i] + share * dt);
-        if (guided) input.tip = tipAt(*recorded, i, share);
+        if (guide) input.tip = guide->at(i, share);
         return input;
       },
       recorded, record);
@@ -381,7 +373,8 @@ Record simulate(const MachineModel& model, const CampaignTest& test, const Recor
   CuttingMachine machine(model, 1.0 / (test.sample_rate * options.substeps), Feed::steady);
   const bool worth = options.traces && (test.kind == TestKind::cut || machine.vibrates());
   if (!worth) return simulateOn(machine, model, test, recorded, std::move(record), phase, options);
-  std::vector<double> values = valuesOfTrace(model, test.kind);
+  const bool by_force = options.guided && isGuided(test, recorded, machine) && Guide::byForce(*recorded);
+  std::vector<double> values = by_force ? valuesOfRecord(model, test.kind) : valuesOfTrace(model, test.kind);
   if (const auto held = options.traces->find(values)) {
     machine.follow(held.get());
     return simulateOn(machine, model, test, recorded, std::move(record), phase, options);

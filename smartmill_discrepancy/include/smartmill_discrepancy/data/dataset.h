@@ -16,12 +16,24 @@ namespace smartmill::discrepancy {
 /// Force channels in the order of the axes x, y, z.
 inline const std::array<std::string, 3> FORCES{{"fx", "fy", "fz"}};
 
+/// A channel that was read a few times a second, as means over pieces of the record longer than its lag:
+/// readings that follow upon another are rounded alike, so that each piece counts once.
+struct SlowMeans {
+  std::string channel;
+  std::vector<double> mean;                ///< [unit of the channel] of each piece
+  std::vector<std::vector<double>> times;  ///< [s] of its readings, since the record's first sample
+  double scatter = 0.0;                    ///< [unit of the channel] of a mean, by that of its readings
+  double noise = 0.0;  ///< [unit of the channel] of a mean, with the rounding that they share
+  double step = 0.0;   ///< [unit of the channel] the least by which readings differ; 0: none do
+};
+
 /// One test with its record as measured, ready to be compared with the twin.
 struct TestData {
   CampaignTest test;
   Record record;  ///< forces as the sensor shows them; has spindle_angle for cuts, estimated where the file
                   ///< has none
   std::vector<std::string> channels;  ///< that count and that the twin gives
+  std::vector<SlowMeans> slow;        ///< besides them, not in the record
   bool heldout = false;               ///< takes no part in any fit or choice
   bool phase_estimated = false;       ///< the record has no spindle angle
   double early_entry = 0.0;   ///< [samples] by which the force of the cut comes on earlier than stated

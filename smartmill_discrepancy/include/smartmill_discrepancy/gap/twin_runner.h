@@ -24,7 +24,8 @@ struct Block {
   std::string channel;
   std::size_t offset = 0;
   std::size_t size = 0;
-  double noise = 0.0;  ///< [unit of the channel]
+  double noise = 0.0;               ///< [unit of the channel]
+  const SlowMeans* slow = nullptr;  ///< values are these means, not the record's samples
 };
 
 /// What a model says of each block, over its noise. Where nothing that a test knows of has changed, models

@@ -41,8 +41,9 @@ struct LiveGap {
 /// @throws Error when the model lacks noise_rms_n or cannot simulate the stretch.
 LiveGap liveGap(const MachineModel& model, const Stretch& stretch, const LiveGapOptions& options);
 
-/// Adds a stretch to the campaign in a folder, which begins with the model: material for explain. Without the
-/// load meter: a few readings a second are no samples. Stretches get unique names. @throws Error.
+/// Adds a stretch to the campaign in a folder, which begins with the model: material for explain. Its load
+/// meter as a channel of its own rate, where the model knows its full scale. Stretches get unique names.
+/// @throws Error.
 void recordStretch(const MachineModel& model, const Stretch& stretch, const std::string& folder);
 
 }  // namespace smartmill::discrepancy

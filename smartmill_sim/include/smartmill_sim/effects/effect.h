@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "smartmill_core/campaign/campaign.h"
@@ -36,11 +37,21 @@ std::size_t channelOf(const std::string& name);
 
 /// A lower part of the cutter's edges that acts besides them.
 struct EdgeLayer {
+  /// Of its force: what the chip coefficients give, or those of the edge.
+  enum class Share { all, chip, edge };
+
   double weight = 1.0;  ///< [1] of its force
   double height = 0.0;  ///< [m] where it ends: above the tip, or below the work's surface
   bool from_surface = false;
-  bool chip_only = false;  ///< only what the chip coefficients give
+  Share share = Share::all;
   int missing_tooth = -1;  ///< does not cut there, counts from 0; -1: all do
+  int only_tooth = -1;     ///< its force alone, the others cut their chips unseen; -1: of all
+};
+
+/// Of a channel: above x + (below - above) L(x), L a low pass of first order.
+struct Shelf {
+  double corner = 0.0;              ///< [Hz]
+  double below = 1.0, above = 1.0;  ///< [1]
 };
 
 /// What the machine is before it starts; effects change it once.
@@ -50,6 +61,7 @@ struct TwinSetup {
   std::array<double, CHANNELS> delay;  ///< [s] of each channel
   double corner_radius = 0.0;          ///< [m] of the tool
   std::vector<EdgeLayer> layers;
+  std::vector<std::pair<std::size_t, Shelf>> shelves;  ///< of channels, before they are late
 };
 
 /// Now.
@@ -85,6 +97,20 @@ struct Tone {
   double rate(double speed) const { return order > 0.0 ? order * speed : units::TWO_PI * frequency; }
 };
 
+/// Decaying oscillations on a channel, one every period, at times that no model knows.
+struct BurstTrain {
+  std::size_t channel = 0;
+  double period = 1.0;     ///< [s]
+  double frequency = 1e3;  ///< [Hz]
+  double decay = 1e-3;     ///< [s]
+  double amplitude = 0.0;
+  double first = 0.0;  ///< [s] a burst begins here after the start of the record
+
+  double at(double time) const;
+  /// Of a burst of unit amplitude [1] so long after its begin [s] >= 0.
+  double shape(double since) const;
+};
+
 /// One physical cause that a nominal model may lack: an entry of a model's `effects:`. A class overrides the
 /// hooks of its stage; effects act in the order of the catalogue (smartmill_core/model/effect_catalogue.h),
 /// which declares them.
@@ -106,6 +132,8 @@ class Effect {
   virtual void limit(ChannelValues&) const {}
   /// Of an effect that is a tone in the signals, else nullptr.
   virtual Tone* tone() { return nullptr; }
+  /// Of an effect that is bursts in the signals, else nullptr.
+  virtual BurstTrain* bursts() { return nullptr; }
 };
 
 /// Whether a test of this kind knows of effects of a stage: a tap has no chip, no turning spindle.
@@ -131,6 +159,7 @@ class EffectSet {
   /// The size that each channel can show at most; infinity: any.
   ChannelValues limits() const;
   std::vector<Tone*> tones();
+  std::vector<BurstTrain*> bursts();
 
  private:
   struct Member {

@@ -10,6 +10,7 @@
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_sim/effects/delay_line.h"
 #include "smartmill_sim/effects/effect.h"
+#include "smartmill_sim/effects/shelf_filter.h"
 #include "smartmill_sim/twin/cutter.h"
 #include "smartmill_sim/twin/edge_layers.h"
 #include "smartmill_sim/twin/spindle_drive.h"
@@ -63,6 +64,8 @@ class CuttingMachine {
   /// @param time_step [s] > 0. @throws Error naming what of the model this twin cannot run.
   CuttingMachine(const MachineModel& model, double time_step, Feed feed = Feed::any);
 
+  /// As the effects left it.
+  const MachineModel& model() const { return model_; }
   /// Whether the tip has modes: the chip then regenerates.
   bool vibrates() const { return vibrates_; }
 
@@ -80,6 +83,8 @@ class CuttingMachine {
 
   /// Tones in the signals (mains hum), their phases to be set by who knows them.
   std::vector<Tone*> tones() { return effects_.tones(); }
+  /// Bursts in the signals, the same.
+  std::vector<BurstTrain*> bursts() { return effects_.bursts(); }
   /// Early channels to what is shown: drift, hum and saturation at a time since the record began [s].
   void finish(double record_time, ChannelValues& channels) const;
 
@@ -152,6 +157,7 @@ class CuttingMachine {
   std::vector<ModalFilter> sensor_;                  // x, y, z
   double sensor_frequency_ = 1.0;                    // of the first modes now, over the model's
   std::optional<SpindleDrive> drive_;
+  std::vector<std::pair<std::size_t, ShelfFilter>> shelves_;
   std::vector<std::pair<std::size_t, DelayLine>> delays_;
   std::array<std::array<double, 2>, 2> tip_history_{};  // [N] total force on the tip one and two steps ago
   std::array<double, 3> last_cut_{{0, 0, 0}};           // [N] force of the cut at the last step

@@ -45,6 +45,8 @@ class MillingProcess {
   /// Depth of each arc [m] > 0.
   void setDepths(const std::vector<double>& depths);
   void setLaw(const CuttingLaw& law) { law_ = law; }
+  /// The force of this tooth alone is given from here on; all of them cut.
+  void showOnly(int tooth) { only_tooth_ = tooth; }
 
   /// Force on the tool with its tip displaced as in this motion.
   CuttingForce step(const ToolMotion& now);
@@ -98,6 +100,7 @@ class MillingProcess {
   ChipRule rule_;
   CuttingLaw law_;
   double time_step_, lag_;
+  int only_tooth_ = -1;
   std::vector<ContactArc> arcs_;
   ToolMotion now_;
   std::array<double, 2> feed_{{0, 0}}, first_feed_{{0, 0}};  // [m/rad] now, when the material began

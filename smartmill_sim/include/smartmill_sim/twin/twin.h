@@ -22,7 +22,8 @@ struct SimulationOptions {
   /// engagementRise() say.
   double early_entry = 0.0;
   /// Of a tool with modes, where a cut's record shows tool_x and tool_y: chips are those of the displacement
-  /// that was measured, the structure only shows what these forces do to it. Nothing can run away, a
+  /// that was measured (or, without these channels, of the one to which the forces that were measured push
+  /// the tool, see Guide), the structure only shows what these forces do to it. Nothing can run away, a
   /// chattering cut is followed, and what is left is an error of prediction.
   bool guided = false;
   /// Tones (mains hum) with a phase of the seed, not with the one that the recorded signals show.

@@ -5,6 +5,7 @@
 #include <set>
 #include <sstream>
 
+#include "smartmill_core/campaign/slow_channels.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/strict_yaml.h"
 #include "smartmill_core/units.h"
@@ -28,12 +29,6 @@ bool insideFolder(const std::string& file) {
     if (part == "..") return false;
   }
   return true;
-}
-
-std::string fileInside(const StrictYaml& map) {
-  const std::string file = map.word("file");
-  if (!insideFolder(file)) map.fail("file", "'" + file + "' lies outside the campaign's folder");
-  return file;
 }
 
 CampaignTest readTest(const StrictYaml& map) {
@@ -96,6 +91,12 @@ const char* nameOf(TestKind kind) {
 
 }  // namespace
 
+std::string fileInside(const StrictYaml& map) {
+  const std::string file = map.word("file");
+  if (!insideFolder(file)) map.fail("file", "'" + file + "' lies outside the campaign's folder");
+  return file;
+}
+
 std::string Campaign::pathOf(const CampaignTest& test) const {
   return (fs::path(folder) / test.file).string();
 }
@@ -118,6 +119,7 @@ Campaign readCampaign(const std::string& path) {
       map.fail("name", "'" + campaign.tests.back().name + "' names two tests");
     }
   }
+  readSlowChannels(root, campaign.tests);
   root.finish();
   return campaign;
 }

@@ -18,8 +18,10 @@ using Stage = EffectStage;
 using Values = std::vector<double>;
 
 const std::vector<std::string> CHANNELS{"fx", "fy", "fz", "load_meter"};
-const std::vector<std::string> TIMES{"always", "turning"};  // of the spindle
-const FitRange LOGARITHM{-1.6, 1.6, 1e-4, 0.5};             // of a factor
+const std::vector<std::string> TIMES{"always", "turning"};   // of the spindle
+const std::vector<std::string> CLOCKS{"record", "machine"};  // that began with it, or when it was cold
+const std::vector<std::string> SHARES{"chip", "edge"};       // of the force
+const FitRange LOGARITHM{-1.6, 1.6, 1e-4, 0.5};              // of a factor
 
 EffectParameter key(const char* name, const char* unit, const Range& range = {},
                     EffectValue value = EffectValue::number) {
@@ -159,6 +161,58 @@ Forms lostEdges(const Scope& scope) {
   return forms;
 }
 
+// ---- teeth and the life of the edge
+
+// Factors as logarithms from this tooth on; those of the others are 1.
+EffectCoordinates factors(std::size_t teeth, std::size_t first, std::size_t count) {
+  EffectCoordinates c;
+  for (std::size_t k = 0; k < count; ++k)
+    c.coordinates.push_back({"ln factor of tooth " + std::to_string(first + k + 1), 0.0, -5.0, LOGARITHM.high,
+                             LOGARITHM.step, LOGARITHM.prior_std});
+  c.write = [=](const double* v, EffectEntry& e) {
+    Values& list = e.lists["factor"];
+    list.assign(teeth, 1.0);
+    for (std::size_t k = 0; k < count; ++k) list[first + k] = std::exp(v[k]);
+  };
+  c.read = [=](const EffectEntry& e, double* v) {
+    for (std::size_t k = 0; k < count; ++k) v[k] = std::log(e.lists.at("factor").at(first + k));
+  };
+  return c;
+}
+
+// One tooth that is not as the others; then any table, against the first tooth.
+Forms toothTables(const Scope& scope) {
+  const auto teeth = static_cast<std::size_t>(scope.nominal.tool->teeth);
+  Forms forms;
+  for (const std::string& of : SHARES) {
+    const auto add = [&](std::size_t first, std::size_t count, const std::string& name) {
+      EffectForm form({factors(teeth, first, count)});
+      forms.push_back(form.straight({0.02}).word("of", of).named(of + ", " + name));
+    };
+    for (std::size_t k = 0; k < teeth; ++k) add(k, 1, "tooth " + std::to_string(k + 1));
+    if (teeth > 2) add(1, teeth - 1, "all teeth");
+  }
+  return forms;
+}
+
+// A size and a time constant that a campaign sees from this time on.
+EffectForm comingOn(const FitRange& size, double reach, double time) {
+  EffectForm form({saturating("amplitude", "time_constant_s", time, size)});
+  for (const double constants : {0.2, 0.6, 2.0, 10.0}) {
+    const double share = std::exp(-1.0 / constants);
+    form.probe({0.0, share}, {{reach, share}});
+  }
+  return form;
+}
+
+Forms edgeLives(const Scope&) {
+  constexpr double SEEN = 60.0;  // [s] of cutting
+  Forms forms;
+  for (const std::string& of : SHARES)
+    forms.push_back(comingOn({-0.9, 3.0, 1e-4, 0.3}, 0.02, SEEN).word("of", of).named(of));
+  return forms;
+}
+
 // ---- channels
 
 Forms onChannels(const Scope& scope, const std::function<EffectForm(const std::string&)>& form) {
@@ -220,6 +274,72 @@ Forms settlings(const Scope& scope) {
   });
 }
 
+// Each clock that the campaign tells.
+Forms onClocks(const Scope& scope, const std::function<EffectForm(const std::string&)>& form) {
+  Forms forms;
+  for (const std::string& clock : CLOCKS) {
+    if (clock != CLOCKS.front() && !scope.start_times) continue;
+    for (EffectForm& one : onChannels(scope, form))
+      forms.push_back(one.word("clock", clock).named(one.variant + ", " + clock));
+  }
+  return forms;
+}
+
+// Where the step lies only the residual tells.
+Forms steps(const Scope& scope) {
+  return onClocks(scope, [](const std::string& channel) {
+    const double unit = unitOf(channel);
+    return EffectForm({amplitude("amplitude", {-1e3 * unit, 1e3 * unit, 1e-3 * unit, 10.0 * unit})})
+        .number("at_s", 0.0);
+  });
+}
+
+Forms ramps(const Scope& scope) {
+  return onClocks(scope, [](const std::string& channel) {
+    const double unit = unitOf(channel);
+    return EffectForm({amplitude("per_min", {-1e5 * unit, 1e5 * unit, 1e-2 * unit, 1e4 * unit})})
+        .straight({unit});
+  });
+}
+
+Forms approaches(const Scope& scope) {
+  return onChannels(scope, [&](const std::string& channel) {
+    const double unit = unitOf(channel);
+    return comingOn({-1e3 * unit, 1e3 * unit, 1e-3 * unit, 10.0 * unit}, unit, scope.first_cut);
+  });
+}
+
+// Where bursts come and how fast they ring only the residual tells.
+Forms burstTrains(const Scope& scope) {
+  return onChannels(scope, [](const std::string& channel) {
+    const double unit = unitOf(channel);
+    return EffectForm(
+        {logarithm("period_s", {std::log(2e-3), std::log(1.0), 1e-6, 1.0}, 1.0, std::log(0.03)),
+         logarithm("frequency_hz", {std::log(20.0), std::log(1e4), 1e-5, 1.0}, 1.0, std::log(1e3)),
+         logarithm("decay_s", {std::log(1e-4), std::log(0.1), 1e-3, 1.0}, 1.0, std::log(2e-3)),
+         amplitude("amplitude", {0.0, 1e3 * unit, 1e-3 * unit, 10.0 * unit})});
+  });
+}
+
+// A gain below and one above a corner, of which the other is 1.
+Forms transfers(const Scope& scope) {
+  Forms forms;
+  for (const bool above : {true, false}) {
+    for (EffectForm& form : onChannels(scope, [&](const std::string&) {
+           const Values corners = above ? Values{50.0, 200.0, 800.0, 2500.0} : Values{0.3, 2.0, 10.0, 50.0};
+           return EffectForm({amplitude(above ? "above" : "below", {-0.5, 3.0, 1e-4, 0.3}, 1.0),
+                              logarithm("corner_hz", {std::log(0.05), std::log(1e4), 1e-3, 1.0}, 1.0,
+                                        std::log(corners[1]))})
+               .scaled(0.02, corners)
+               .number(above ? "below" : "above", 1.0);
+         })) {
+      if (form.variant != "load_meter")
+        forms.push_back(form.named(form.variant + (above ? ", above" : ", below")));
+    }
+  }
+  return forms;
+}
+
 std::vector<EffectKind> makeCatalogue() {
   const Range positive = Range::positive(), not_negative = Range::notNegative();
   return {
@@ -248,6 +368,23 @@ std::vector<EffectKind> makeCatalogue() {
           {oneOf("from", {"tip", "surface"}), key("height_mm", "mm", not_negative),
            key("factor", "1", not_negative)},
           {Need::cuts}, profileForms),
+      empirical("law", "tooth_factor", Stage::cutting_law,
+                "chip or edge coefficients of each tooth times its factor", "a table over the teeth",
+                {oneOf("of", SHARES), key("factor", "1", not_negative, EffectValue::list)},
+                {Need::cuts, Need::several_teeth}, toothTables),
+      empirical("law", "edge_life", Stage::cutting_law,
+                "chip or edge coefficients times 1 + amplitude (1 - exp(-t / constant)), t the time that the "
+                "edge has cut",
+                "exponential approach",
+                {oneOf("of", SHARES), key("amplitude", "1", Range::above(-1.0)),
+                 key("time_constant_s", "s", positive)},
+                {Need::cuts, Need::cut_time}, edgeLives),
+      empirical("channel", "transfer", Stage::sensor_output,
+                "a channel shows above x + (below - above) L(x), L a low pass of first order at the corner",
+                "first-order shelf; below 0: high pass, above 0: low pass",
+                {oneOf("channel", CHANNELS), key("corner_hz", "Hz", positive), key("below", "1"),
+                 key("above", "1")},
+                {Need::forces}, transfers),
       empirical("channel", "curve", Stage::signal,
                 "a channel that should show f shows f + odd f|f| + even f^2 + cubic f^3, f in kN",
                 "static characteristic to third order",
@@ -273,6 +410,34 @@ std::vector<EffectKind> makeCatalogue() {
           "exponential approach",
           {oneOf("channel", CHANNELS), key("amplitude", "N or V"), key("time_constant_s", "s", positive)}, {},
           settlings),
+      empirical("channel", "step", Stage::signal,
+                "a channel is off by amplitude from this time on, since the record began or since the "
+                "machine was cold",
+                "a step",
+                {oneOf("channel", CHANNELS), oneOf("clock", CLOCKS), key("at_s", "s", not_negative),
+                 key("amplitude", "N or V")},
+                {}, steps),
+      empirical("channel", "ramp", Stage::signal,
+                "a channel is off by per_min times the time since the record began, or since the machine "
+                "was cold",
+                "a straight line",
+                {oneOf("channel", CHANNELS), oneOf("clock", CLOCKS), key("per_min", "N/min or V/min")}, {},
+                ramps),
+      empirical(
+          "channel", "approach", Stage::signal,
+          "a channel comes to be off by amplitude with 1 - exp(-t / constant), t since the machine was "
+          "cold",
+          "exponential approach",
+          {oneOf("channel", CHANNELS), key("amplitude", "N or V"), key("time_constant_s", "s", positive)},
+          {Need::start_time}, approaches),
+      empirical(
+          "channel", "bursts", Stage::signal,
+          "every period a channel rings with amplitude exp(-t / decay) sin(2 pi frequency t); when, is "
+          "found in each record",
+          "decaying oscillation that comes again",
+          {oneOf("channel", CHANNELS), key("period_s", "s", positive), key("frequency_hz", "Hz", positive),
+           key("decay_s", "s", positive), key("amplitude", "N or V", not_negative)},
+          {}, burstTrains),
   };
 }
 

@@ -7,7 +7,9 @@
 #include <gtest/gtest.h>
 
 #include "smartmill_core/campaign/record.h"
+#include "smartmill_core/campaign/slow_channels.h"
 #include "smartmill_core/cutting/regression.h"
+#include "smartmill_core/error.h"
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/testing/refusals.h"
 #include "smartmill_core/testing/shared_data.h"
@@ -53,6 +55,51 @@ void expectCampaign(const Campaign& c, const std::string& folder) {
   EXPECT_DOUBLE_EQ(*c.tests[1].running_before, 0.4);
   EXPECT_EQ(c.tests[2].direction, "z");
   EXPECT_EQ(c.tests[2].spindle_speed, 0.0);
+}
+
+const char* const SLOW =
+    "slow_channels:\n- {test: air, channel: load_meter, file: load.csv, sample_rate_hz: 50}\n";
+
+// A channel that is read at a rate of its own stands in a file of its own; files without it read as before.
+TEST(Campaign, channelsMayHaveARateOfTheirOwn) {
+  const TemporaryFolder folder;
+  folder.write("campaign.yaml", CAMPAIGN);
+  EXPECT_TRUE(readSlowChannels(readCampaign(folder.file("."))).empty());
+  folder.write("campaign.yaml", CAMPAIGN + std::string(SLOW));
+  folder.write("load.csv", "time[s],load_meter[V]\n0.013,0.1\n0.033,0.1\n0.053,0.103\n");
+  const Campaign campaign = readCampaign(folder.file("."));
+  std::vector<SlowChannel> slow = readSlowChannels(campaign);
+  ASSERT_EQ(slow.size(), 1u);
+  EXPECT_EQ(slow[0].test, "air");
+  const Record readings = readRecord(campaign, slow[0]);
+  EXPECT_DOUBLE_EQ(readings.time.front(), 0.013);
+  EXPECT_DOUBLE_EQ(readings.column("load_meter").at(2), 0.103);
+
+  const std::string copy = folder.file("copy");
+  writeCampaign(campaign, slow, copy);
+  slow = readSlowChannels(readCampaign(copy));
+  ASSERT_EQ(slow.size(), 1u);
+  EXPECT_EQ(slow[0].file, "load.csv");
+  EXPECT_DOUBLE_EQ(slow[0].sample_rate, 50.0);
+}
+
+TEST(Campaign, slowChannelsOfNoTestAreRefused) {
+  const TemporaryFolder folder;
+  const auto refuses = [&](const char* entry, const char* says) {
+    folder.write("campaign.yaml", CAMPAIGN + std::string("slow_channels:\n- {") + entry + "}\n");
+    try {
+      readCampaign(folder.file("."));
+      ADD_FAILURE() << entry;
+    } catch (const Error& error) {
+      EXPECT_THAT(error.what(), HasSubstr(says));
+    }
+  };
+  refuses("test: none, channel: load_meter, file: a.csv, sample_rate_hz: 50", "'none' is no test");
+  refuses("test: tap, channel: load_meter, file: a.csv, sample_rate_hz: 50", "is a tap");
+  refuses("test: air, channel: fx, file: a.csv, sample_rate_hz: 50", "'fx'");
+  refuses("test: air, channel: load_meter, file: ../a.csv, sample_rate_hz: 50", "outside");
+  refuses("test: air, channel: load_meter, file: a.csv, sample_rate_hz: 0", "sample_rate_hz");
+  refuses("test: air, channel: load_meter, file: a.csv, sample_rate_hz: 50, unit: V", "unit");
 }
 
 TEST(Campaign, readsAndWritesEveryKey) {

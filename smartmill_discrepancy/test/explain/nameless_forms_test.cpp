@@ -1,0 +1,184 @@
+// Every form that a cause without a name may have, put into the records by hand: told by stage, form, size
+// and sentence where it repeats.
+#include <array>
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "explain/nameless_campaign.h"
+
+namespace smartmill::discrepancy {
+namespace {
+
+// The cause is built in that form, and what it leaves is noise.
+void expectBuilt(const Explanation& e, const char* form, const char* says) {
+  expectGapClosed(e);
+  ASSERT_EQ(e.effects.size(), 1u);
+  EXPECT_EQ(e.effects[0].name, std::string("empirical:") + form);
+  EXPECT_NE(e.sentence.find(says), std::string::npos) << e.sentence;
+}
+
+using Extra = std::function<double(const CampaignTest&, double time, std::uint64_t seed)>;
+
+// Something added to a channel.
+Explanation withExtra(const TemporaryFolder& folder, const char* channel, const Extra& extra) {
+  return explained(
+      [&](const CampaignTest& test, std::uint64_t seed) {
+        Record record = pure(test, 1.0, seed);
+        std::vector<double>& f = record.add(channel);
+        for (std::size_t i = 0; i < f.size(); ++i) f[i] += extra(test, record.time[i], seed);
+        addNoise(record, seed);
+        return record;
+      },
+      folder.file("."), quickly());
+}
+
+// Slices of one helical tooth alone, its chip c sin(phi): what its chip coefficients give.
+void addTooth(const CampaignTest& test, int tooth, double share, Record& record) {
+  const MachineModel machine = real();
+  const CuttingCoefficients& k = *machine.cutting;
+  constexpr int SLICES = 400;
+  const double dz = test.engagement->axial_depth / SLICES, radius = machine.tool->radius();
+  std::array<std::vector<double>*, 3> force{{&record.add("fx"), &record.add("fy"), &record.add("fz")}};
+  for (std::size_t i = 0; i < record.size(); ++i) {
+    if (record.time[i] < *test.engage_time) continue;
+    const double tip = record.column("spindle_angle")[i] + units::TWO_PI / 4.0 * tooth;
+    for (int s = 0; s < SLICES; ++s) {
+      const double phi = tip - std::tan(machine.tool->helix) / radius * (s + 0.5) * dz;
+      const double sn = std::sin(phi), cs = std::cos(phi);
+      const double h = share * dz * test.engagement->feed_per_tooth * sn;
+      if (h <= 0.0) continue;
+      (*force[0])[i] += -k.ktc * h * cs - k.krc * h * sn;
+      (*force[1])[i] += k.ktc * h * sn - k.krc * h * cs;
+      (*force[2])[i] += k.kac * h;
+    }
+  }
+}
+
+TEST(NamelessForms, aToothThatCutsHarder) {
+  const TemporaryFolder folder;
+  const Explanation e = explained(
+      [](const CampaignTest& test, std::uint64_t seed) {
+        Record record = pure(test, 1.0, seed);
+        addTooth(test, 2, 0.25, record);
+        addNoise(record, seed);
+        return record;
+      },
+      folder.file("."), quickly());
+  expectBuilt(e, "tooth_factor", "one tooth is not as the others: the cutting force of tooth 3 is 25 % more");
+  EXPECT_NEAR(valueOf(e.effects[0], "factor[2]"), 1.25, 0.01);
+}
+
+TEST(NamelessForms, anEdgeThatIsRunIn) {
+  const TemporaryFolder folder;
+  const Explanation e = explained(
+      [](const CampaignTest& test, std::uint64_t seed) {
+        const double factor = 1.0 + 0.35 * (1.0 - std::exp(-*test.cut_time_before / 45.0));
+        Record record = pure(test, factor, seed);
+        addNoise(record, seed);
+        return record;
+      },
+      folder.file("."), quickly());
+  expectBuilt(e, "edge_life", "by the exponential approach");
+  EXPECT_NEAR(valueOf(e.effects[0], "time_constant_s"), 45.0, 8.0);
+}
+
+TEST(NamelessForms, aChannelThatJumpsInEachRecord) {
+  const TemporaryFolder folder;
+  const Explanation e = withExtra(folder, "fz", [](const CampaignTest&, double time, std::uint64_t) {
+    return time > 0.0613 ? 9.0 : 0.0;
+  });
+  expectBuilt(e, "step", "s after each record began");
+  EXPECT_NEAR(valueOf(e.effects[0], "amplitude"), 9.0, 0.1);
+}
+
+TEST(NamelessForms, aChannelThatDrifts) {
+  const TemporaryFolder folder;
+  const Explanation e =
+      withExtra(folder, "fz", [](const CampaignTest&, double time, std::uint64_t) { return -80.0 * time; });
+  expectBuilt(e, "ramp", "in a straight line as charge_drift does");
+  EXPECT_NEAR(valueOf(e.effects[0], "per_min"), -4800.0, 100.0);
+}
+
+TEST(NamelessForms, aChannelThatWarmsUp) {
+  const TemporaryFolder folder;
+  const Explanation e = withExtra(folder, "fz", [](const CampaignTest& test, double time, std::uint64_t) {
+    return 9.0 * (1.0 - std::exp(-(*test.start_time + time) / 240.0));
+  });
+  expectBuilt(e, "approach", "exponential approach of a time constant of 4 min");
+  EXPECT_NEAR(valueOf(e.effects[0], "amplitude"), 9.0, 0.5);
+}
+
+TEST(NamelessForms, aTrainOfBursts) {
+  const TemporaryFolder folder;
+  const Explanation e = withExtra(folder, "fy", [](const CampaignTest&, double time, std::uint64_t seed) {
+    const double period = 0.0173, since = std::fmod(time + 0.0047 * static_cast<double>(seed), period);
+    return 30.0 * std::exp(-since / 1.5e-3) * std::sin(units::TWO_PI * 1320.0 * since);
+  });
+  expectBuilt(e, "bursts", "fy rings every 0.0173 s");
+  EXPECT_NEAR(valueOf(e.effects[0], "frequency_hz"), 1320.0, 5.0);
+  EXPECT_NEAR(valueOf(e.effects[0], "amplitude"), 30.0, 0.6);
+}
+
+// A low pass of first order by its own recursion, at a finer rate.
+Record behindFilter(const CampaignTest& test, double corner, std::uint64_t seed) {
+  constexpr std::size_t FINE = 16;
+  CampaignTest finer = test;
+  finer.sample_rate *= FINE;
+  const Record fine = pure(finer, 1.0, seed);
+  Record record;
+  for (std::size_t i = 0; i < fine.size(); i += FINE) record.time.push_back(fine.time[i]);
+  const double share = units::TWO_PI * corner / finer.sample_rate;
+  for (const std::string& name : fine.names) {
+    std::vector<double>& values = record.add(name);
+    double low = 0.0, last = 0.0;
+    for (std::size_t i = 0; i < fine.size(); ++i) {
+      const double value = fine.column(name)[i];
+      low += share * (0.5 * (last + value) - low) / (1.0 + 0.5 * share);
+      last = value;
+      if (i % FINE == 0) values.push_back(name == "fy" ? low : value);
+    }
+  }
+  return record;
+}
+
+TEST(NamelessForms, aChannelBehindAFilter) {
+  const TemporaryFolder folder;
+  const Explanation e = explained(
+      [](const CampaignTest& test, std::uint64_t seed) {
+        Record record = behindFilter(test, 320.0, seed);
+        addNoise(record, seed);
+        return record;
+      },
+      folder.file("."), quickly());
+  expectBuilt(e, "transfer", "as a low pass of first order does");
+  EXPECT_NEAR(valueOf(e.effects[0], "corner_hz"), 320.0, 5.0);
+}
+
+// Each record jumps at another time: nothing of it comes again.
+TEST(NamelessForms, jumpsAtAnyTimeAreLeftAlone) {
+  const TemporaryFolder folder;
+  const Explanation e = withExtra(folder, "fz", [](const CampaignTest&, double time, std::uint64_t seed) {
+    return (seed % 2 ? 4.0 : -4.0) * (time > 0.03 + 0.013 * static_cast<double>(seed * seed % 5) ? 1.0 : 0.0);
+  });
+  EXPECT_EQ(e.verdict, Verdict::unknown_effect);
+  EXPECT_TRUE(e.effects.empty()) << e.sentence;
+}
+
+// Another tooth each time: as if it had been set anew for each cut.
+TEST(NamelessForms, aToothThatIsAnotherOneEachTimeIsLeftAlone) {
+  const TemporaryFolder folder;
+  const Explanation e = explained(
+      [](const CampaignTest& test, std::uint64_t seed) {
+        Record record = pure(test, 1.0, seed);
+        addTooth(test, static_cast<int>(seed % 4), 0.25, record);
+        addNoise(record, seed);
+        return record;
+      },
+      folder.file("."), quickly());
+  EXPECT_EQ(e.verdict, Verdict::unknown_effect);
+  EXPECT_TRUE(e.effects.empty()) << e.sentence;
+}
+
+}  // namespace
+}  // namespace smartmill::discrepancy

@@ -1,0 +1,84 @@
+#include "smartmill_sim/twin/burst_times.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace smartmill::sim {
+namespace {
+
+constexpr double BINS_A_CYCLE = 24.0;  // of the ringing
+constexpr double MOST_BINS = 8192.0;
+constexpr double DECAYS = 5.0;  // that a burst is looked at
+
+// What is left of a record, folded at a period.
+struct Folded {
+  std::vector<double> sum, count;
+};
+
+Folded fold(const std::vector<double>& left, double rate, double period, std::size_t bins) {
+  Folded folded{std::vector<double>(bins, 0.0), std::vector<double>(bins, 0.0)};
+  const double scale = static_cast<double>(bins) / period;
+  for (std::size_t i = 0; i < left.size(); ++i) {
+    const double at = std::fmod(static_cast<double>(i) / rate, period) * scale;
+    const std::size_t bin = std::min(static_cast<std::size_t>(at), bins - 1);
+    folded.sum[bin] += left[i];
+    folded.count[bin] += 1.0;
+  }
+  return folded;
+}
+
+// [s] at which bursts begin that take most squares from what is left.
+double bestFirst(const std::vector<double>& left, double rate, const BurstTrain& train) {
+  const auto bins = static_cast<std::size_t>(
+      std::clamp(std::ceil(BINS_A_CYCLE * train.frequency * train.period), 16.0, MOST_BINS));
+  const double width = train.period / static_cast<double>(bins);
+  const Folded folded = fold(left, rate, train.period, bins);
+  std::vector<double> shape;
+  for (double t = 0.5 * width; t < std::min(DECAYS * train.decay, train.period); t += width)
+    shape.push_back(train.shape(t));
+  std::vector<double> gain(bins, 0.0);
+  for (std::size_t first = 0; first < bins; ++first) {
+    double product = 0.0, squares = 1e-300;
+    for (std::size_t k = 0; k < shape.size(); ++k) {
+      const std::size_t bin = first + k < bins ? first + k : first + k - bins;
+      product += shape[k] * folded.sum[bin];
+      squares += shape[k] * shape[k] * folded.count[bin];
+    }
+    gain[first] = product > 0.0 ? product * product / squares : 0.0;
+  }
+  const auto best = static_cast<std::size_t>(std::max_element(gain.begin(), gain.end()) - gain.begin());
+  const double before = gain[best > 0 ? best - 1 : bins - 1], at = gain[best],
+               after = gain[best + 1 < bins ? best + 1 : 0];
+  const double bend = 2.0 * at - before - after;
+  const double share = bend > 0.0 ? std::clamp(0.5 * (after - before) / bend, -0.5, 0.5) : 0.0;
+  return (static_cast<double>(best) + share) * width;
+}
+
+}  // namespace
+
+void findBursts(const Record* recorded, const std::array<std::vector<double>*, CHANNELS>& early, double rate,
+                CuttingMachine& machine, std::mt19937_64& random) {
+  for (BurstTrain* train : machine.bursts()) {
+    const std::size_t c = train->channel;
+    if (!recorded) {
+      train->first = std::uniform_real_distribution<double>(0.0, train->period)(random);
+    } else if (early[c] && recorded->has(channelName(c))) {
+      const double amplitude = train->amplitude;
+      train->amplitude = 0.0;
+      std::vector<double> left = recorded->column(channelName(c));
+      for (std::size_t i = 0; i < left.size(); ++i) {
+        ChannelValues values{};
+        values[c] = (*early[c])[i];
+        machine.finish(static_cast<double>(i) / rate, values);
+        left[i] -= values[c];
+      }
+      const double mean = std::accumulate(left.begin(), left.end(), 0.0) / static_cast<double>(left.size());
+      for (double& v : left) v -= mean;
+      train->first = bestFirst(left, rate, *train);
+      train->amplitude = amplitude;
+    }
+  }
+}
+
+}  // namespace smartmill::sim
