@@ -1,6 +1,5 @@
 #include "dnc_stream.h"
 
-#include <linux/sockios.h>
 #include <poll.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
@@ -22,7 +21,7 @@ constexpr int ARRIVAL_MS = 50;      // longer than TCP puts off saying that some
 bool hasArrived(int fd) {
   for (int i = 0; i < ARRIVAL_MS; ++i) {
     int waiting = 0;
-    if (::ioctl(fd, SIOCOUTQ, &waiting) != 0 || waiting == 0) {
+    if (::ioctl(fd, TIOCOUTQ, &waiting) != 0 || waiting == 0) {
       return true;
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
