@@ -2,6 +2,7 @@
 
 #include <arpa/inet.h>
 #include <gtest/gtest.h>
+#include <linux/filter.h>
 #include <netinet/in.h>
 #include <poll.h>
 #include <sys/socket.h>
@@ -56,6 +57,9 @@ class FaultProxy {
   std::uint16_t port = 0;
   std::atomic<bool> stalled{false};  ///< takes all and hands nothing on: half-open
   std::atomic<bool> byte_by_byte{false};
+  /// The bridge's oldest connection, its DNC circuit: what comes on it from now on the kernel throws away
+  /// unseen, as if the other computer had gone.
+  std::atomic<bool> deaf{false};
 
  private:
   struct Pair {
@@ -115,6 +119,12 @@ class FaultProxy {
           ::close(pair.client);
           ::close(pair.server);
         }
+      }
+      if (deaf.exchange(false) && !pairs.empty()) {
+        sock_filter none = BPF_STMT(BPF_RET | BPF_K, 0);
+        const sock_fprog program{1, &none};
+        EXPECT_EQ(::setsockopt(pairs.front().client, SOL_SOCKET, SO_ATTACH_FILTER, &program, sizeof program),
+                  0);
       }
       pairs.remove_if([&](Pair& pair) {
         if (serve(pair)) {

@@ -321,6 +321,67 @@ TEST_F(FaultTest, AHalfOpenConnectionIsFoundWithinTwoSeconds) {
   EXPECT_NE(outcome->message.find("no answer in time"), std::string::npos) << outcome->message;
 }
 
+/// The DNC circuit leads nowhere any more, the data circuit answers.
+TEST_F(FaultTest, AHalfOpenDncCircuitIsFound) {
+  for (const bool in_motion : {false, true}) {
+    const std::string what = in_motion ? "in a motion" : "idle";
+    FaultProxy proxy(port_);
+    connectBridge(proxy.port, 0.5);  // as shipped
+    ASSERT_TRUE(cycleUntil([&] { return bridge_->state().connected; }));
+    arm();
+    if (in_motion) {
+      ASSERT_FALSE(bridge_->runProgram("slow", "G91 G1 X0.5 F1\nX-0.5\n", {}));
+      cycleUntil([&] { return bridge_->state().motion; });
+    }
+    notes_.clear();
+    // What is on its way arrives: one who has gone does not send it again and again.
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+    proxy.deaf = true;
+    // The kernel's own time, 2.2 s, of which this test's does not know.
+    const auto began = std::chrono::steady_clock::now();
+    while (bridge_->state().connected && std::chrono::steady_clock::now() - began < std::chrono::minutes(1)) {
+      cycle();
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    }
+    RecordProperty(
+        in_motion ? "found_in_motion_ms" : "found_idle_ms",
+        static_cast<int>((std::chrono::steady_clock::now() - began) / std::chrono::milliseconds(1)));
+    EXPECT_TRUE(noted("nothing comes back on its DNC circuit")) << what;
+    EXPECT_FALSE(bridge_->state().armed) << what;
+    if (in_motion) {
+      EXPECT_EQ(finish().code, MotionCode::lost);
+    }
+    expectStandsStill(what);
+    expectWorksAgain(what);
+  }
+}
+
+/// Text that is swallowed on its way moves nothing, and the cancel goes the other way.
+TEST_F(FaultTest, ADncCircuitThatSwallowsItsTextIsTold) {
+  std::atomic<bool> swallows{false};
+  FaultProxy proxy(port_, [&](const Frame& frame) {
+    const bool streamed = frame.type >= focas::FRAME_DNC_START && frame.type <= focas::FRAME_DNC_CANCEL;
+    return swallows && streamed ? FaultProxy::Verdict{} : FaultProxy::handOn(frame);
+  });
+  connectBridge(proxy.port);
+  ASSERT_TRUE(cycleUntil([&] { return bridge_->state().connected; }));
+  arm();
+  swallows = true;
+  ASSERT_FALSE(bridge_->runProgram("there", "G91 G1 X2 F600\n", {}));
+  Outcome outcome = finish();
+  EXPECT_EQ(outcome.code, MotionCode::cancelled);
+  EXPECT_NE(outcome.message.find("nothing has moved for"), std::string::npos) << outcome.message;
+  swallows = false;
+  ASSERT_FALSE(bridge_->runProgram("there and back", "G91 G1 X2 F600\nX-2\n", {}));
+  cycleUntil([&] { return bridge_->state().motion; });
+  swallows = true;
+  bridge_->cancel();
+  outcome = finish();
+  EXPECT_EQ(outcome.code, MotionCode::cancelled) << outcome.message;
+  EXPECT_NE(outcome.message.find("stopped at"), std::string::npos) << outcome.message;
+  expectStandsStill("swallowed");
+}
+
 TEST_F(FaultTest, AClockThatJumpsEndsNothingAndHangsNothing) {
   for (const double jump : {3600.0, -3600.0, 1e9, -1e9}) {
     cycle();

@@ -260,6 +260,7 @@ TEST(Memory, ClockIsSetAndGoesOn) {
 
 TEST(Memory, ParametersFollowTheMachine) {
   Machine m;
+  EXPECT_EQ(m.controller.servoLoopGain(), m.controller.parameters(1825, 1825).at(0).values);
   const std::vector<focas::NumberedValue> limits = m.controller.parameters(1320, 1321);
   ASSERT_EQ(limits.size(), 2u);
   EXPECT_EQ(limits[0].values, (std::vector<double>{250.0, 200.0, 0.0}));

@@ -133,6 +133,12 @@ class FocasController : public Controller {
   bool programsOpen() const override { return open_ && client_.connected(); }
 
   Status checkPrograms() override {
+    if (client_.dncDeaf()) {
+      // What it has of the text it would still run; the data circuit stops it.
+      const Status reset = attempt(plainLine, [&] { client_.reset(); });
+      return lost("connection to the " + name() + " lost: nothing comes back on its DNC circuit; " +
+                  (reset ? "it was reset" : "it could not be reset: USE THE PANEL"));
+    }
     const Status status = attempt(endedLine, [&] { client_.dncCheck(); });
     open_ = open_ && status;
     return status;

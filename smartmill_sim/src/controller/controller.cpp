@@ -255,6 +255,10 @@ std::vector<double> Controller::servoCurrent() const {
   return {impl_->machine.servo_current.begin(), impl_->machine.servo_current.end()};
 }
 
+std::vector<double> Controller::servoLoopGain() const {
+  return {LOOP_GAIN, LOOP_GAIN, LOOP_GAIN};
+}
+
 std::vector<double> Controller::servoSpeed() const {
   const Lock lock(impl_->mutex);
   std::vector<double> speeds;

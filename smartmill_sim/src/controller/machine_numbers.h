@@ -6,6 +6,8 @@
 
 namespace smartmill::sim {
 
+constexpr double LOOP_GAIN = 3000.0;  ///< [0.01/s] of the axes' position loops, as machines of this kind have
+
 /// What the diagnosis numbers tell of now.
 struct DiagnosisState {
   bool waits_for_m = false, moves = false, dwells = false, at_zero_feed = false;

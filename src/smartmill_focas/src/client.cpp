@@ -150,6 +150,10 @@ void Client::dncCancel(DncResult result) {
 bool Client::dncOpen() const {
   return impl_->dnc.isOpen();
 }
+bool Client::dncDeaf() const {
+  return impl_->dnc.deaf();
+}
+
 void Client::dncCheck() {
   impl_->dnc.check();
 }

@@ -21,6 +21,7 @@ class DncStream {
   void cancel(DncResult result);
   void check();
   bool isOpen() const { return open_ && connection_.valid(); }
+  bool deaf() const { return isOpen() && isDeaf(connection_.stream.socket.get()); }
 
  private:
   void needSession(const std::string& call);

@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -34,6 +35,21 @@ void keepAlive(int fd) {
   ::setsockopt(fd, IPPROTO_TCP, TCP_KEEPIDLE, &idle, sizeof idle);
   ::setsockopt(fd, IPPROTO_TCP, TCP_KEEPINTVL, &interval, sizeof interval);
   ::setsockopt(fd, IPPROTO_TCP, TCP_KEEPCNT, &probes, sizeof probes);
+}
+
+bool isDeaf(int fd) {
+  constexpr std::uint32_t UNACKNOWLEDGED_MS = 1900, IDLE_MS = 2200;
+  tcp_info info{};
+  socklen_t size = sizeof info;
+  int waiting = 0;
+  if (::getsockopt(fd, IPPROTO_TCP, TCP_INFO, &info, &size) != 0 || ::ioctl(fd, TIOCOUTQ, &waiting) != 0) {
+    return false;
+  }
+  if (info.tcpi_unacked > 0) {
+    return info.tcpi_last_ack_recv > UNACKNOWLEDGED_MS;
+  }
+  // With text held back the other side is asked ever more rarely whether it has room.
+  return waiting == 0 && info.tcpi_last_ack_recv > IDLE_MS;
 }
 
 Transfer readSome(int fd, FrameReader& reader, std::size_t max_bytes) {

@@ -41,6 +41,11 @@ void prepareSocket(int fd);
 /// none.
 void keepAlive(int fd);
 
+/// Nothing comes back from the other side any more: no word that what was sent has arrived for 1.9 s, or none
+/// to the questions of keepAlive() for 2.2 s (one lost packet is none). A side that takes nothing for want of
+/// room still answers.
+bool isDeaf(int fd);
+
 /// Reads at most max_bytes into the reader.
 Transfer readSome(int fd, FrameReader& reader, std::size_t max_bytes);
 

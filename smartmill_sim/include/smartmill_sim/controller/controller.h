@@ -106,6 +106,7 @@ class Controller : public focas::ControllerInterface {
   std::vector<double> servoLoad() const override;
   std::vector<double> servoCurrent() const override;
   std::vector<double> servoSpeed() const override;
+  std::vector<double> servoLoopGain() const override;
   /// Variables 1..33, 100..199, 500..999 and 1133, vacant in the beginning; work offsets 5221..5323,
   /// positions 5001.., 5021.., 5041.., which cannot be written.
   focas::EwCode readMacro(int number, std::optional<double>* value) const override;

@@ -123,6 +123,8 @@ class Client {
   bool dncOpen() const;
   /// Looks for an error frame of the controller. @throws FocasError as dncSend.
   void dncCheck();
+  /// Nothing comes back on the DNC circuit of an open session any more; the data circuit may be well.
+  bool dncDeaf() const;
 
  private:
   class Impl;
