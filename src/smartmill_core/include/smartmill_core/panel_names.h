@@ -11,6 +11,7 @@ constexpr const char* TWIN_FORCE = "discrepancy/force";
 constexpr const char* REPLAY_STATE = "replay/state";
 constexpr const char* REPLAY_CONTROL = "replay/control";
 constexpr const char* SESSION_STATE = "session/state";
+constexpr const char* FEED_HOLD = "cnc/feed_hold";
 constexpr const char* WHAT_IF = "stability/what_if";
 
 }  // namespace smartmill::names
