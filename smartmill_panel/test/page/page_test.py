@@ -332,7 +332,8 @@ def hits_taken_and_refused_are_told(browser, machine):
         time.sleep(0.05)
     browser.js("(location.hash = 'dynamics', 1)")
     becomes(lambda: browser.js("[...document.querySelectorAll('#hits .word')].map(e => e.textContent)"),
-            ["1 taken", "2 refused: a second blow after 1.3 ms", "3 taken"])
+            ["hit 2 refused: a second blow after 1.3 ms"])
+    equal(browser.js("document.querySelectorAll('#hits i').length"), 2)
     becomes(lambda: "Hits tool x: 2 taken, 1 refused" in browser.text("#hits"), True)
 
 
