@@ -96,7 +96,7 @@ export class WhatIf {
     const held = new Map();
     for (const mode of found.mode) held.set(mode, (held.get(mode) ?? 0) + 1);
     const most = [...held].filter(([mode]) => mode >= 0).sort((a, b) => b[1] - a[1])[0];
-    this.answer.textContent = `${fixed(this.value.depth, 1)} mm is stable at ${fixed(100 * found.stable_share)} % of the speeds. ` +
-      (most ? `The mode ${found.modes[most[0]]} holds the limit at ${fixed(100 * most[1] / found.mode.length)} % of them. ` : '') + `Computed in ${fixed(1e3 * found.seconds)} ms.`;
+    this.answer.textContent = `${fixed(this.value.depth, 1)} mm is stable at ${fixed(100 * found.stable_share)} % of the speeds` +
+      (most ? `, ${found.modes[most[0]]} holds the limit at ${fixed(100 * most[1] / found.mode.length)} %` : '') + ` (${fixed(1e3 * found.seconds)} ms).`;
   }
 }
