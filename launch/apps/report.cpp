@@ -112,6 +112,12 @@ void write(const fs::path& file, const std::string& text) {
   if (!out) throw Error(file.string() + ": cannot be written");
 }
 
+std::string captionOf(const std::string& picture) {
+  if (picture == "frf.png") return "The tool's measured FRF beside the true one, with the coherence";
+  if (picture == "chart.png") return "Stability limit, measured and true, and the two cuts that check it";
+  return "Force over three revolutions, teeth passing at the sensor's resonance: raw, compensated, true";
+}
+
 int run(const Request& request) {
   const std::string session = request.session.empty() ? "" : readAll(request.session);
   const bool terminal = isatty(STDERR_FILENO) != 0;
@@ -144,8 +150,12 @@ int run(const Request& request) {
   std::fputs(text.c_str(), stdout);
   std::string files = "summary.md, summary.json";
   if (request.pictures) {
-    for (const std::string& picture : drawPictures(recording, report, true_chart, folder))
+    std::string pictures;
+    for (const std::string& picture : drawPictures(recording, report, true_chart, folder)) {
       files += ", " + picture;
+      pictures += "\n![" + captionOf(picture) + "](" + picture + ")\n";
+    }
+    write(folder / "summary.md", text + pictures);
   }
   std::printf("written to %s: %s\n", folder.string().c_str(), files.c_str());
   return request.check && report.met() < report.targets() ? 1 : 0;

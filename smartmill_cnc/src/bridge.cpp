@@ -82,6 +82,21 @@ Answer<ArmCode> Bridge::arm(bool on) {
   return {ArmCode::not_connected, "motion is not armed: " + answer.failure().message};
 }
 
+Answer<HoldCode> Bridge::hold() {
+  if (!controller_->connected()) {
+    return {HoldCode::not_connected, "no connection to the " + controller_->name()};
+  }
+  if (!motion_.armed()) {
+    return {HoldCode::not_armed, "motion is not armed: the machine's own feed hold is due"};
+  }
+  const Status held = controller_->hold();
+  notice(held);
+  if (held) {
+    return {HoldCode::ok, "feed hold: the axes stand, it goes on at the machine's own key"};
+  }
+  return {held.lost() ? HoldCode::not_connected : HoldCode::refused, held.failure().message};
+}
+
 Answer<MacroCode> Bridge::setMacro(int number, double value) {
   if (!controller_->connected()) {
     return {MacroCode::not_connected, "no connection to the " + controller_->name()};

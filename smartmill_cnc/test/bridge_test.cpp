@@ -117,6 +117,18 @@ TEST_F(BridgeTest, JogAndOrient) {
   EXPECT_EQ(bridge_->orient(NAN)->code, MotionCode::bad_goal);
 }
 
+// FOCAS has no feed hold: it says so, and what runs goes on.
+TEST_F(BridgeTest, FeedHoldIsForArmedMotionAndForControllersThatHaveIt) {
+  EXPECT_EQ(bridge_->hold().code, HoldCode::not_connected);
+  cycle();
+  EXPECT_EQ(bridge_->hold().code, HoldCode::not_armed);
+  arm();
+  const Answer<HoldCode> answer = bridge_->hold();
+  EXPECT_EQ(answer.code, HoldCode::refused);
+  EXPECT_NE(answer.message.find("its own key"), std::string::npos) << answer.message;
+  EXPECT_TRUE(bridge_->state().armed);
+}
+
 TEST_F(BridgeTest, RefusalsSendNothing) {
   EXPECT_EQ(bridge_->jog("x", 0.01, 0.0)->code, MotionCode::not_connected);
   EXPECT_EQ(bridge_->arm(true).code, ArmCode::not_connected);

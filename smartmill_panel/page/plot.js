@@ -277,6 +277,7 @@ export class Plot {
     c.textBaseline = 'middle'; c.textAlign = 'left';
     let at = LEFT;
     for (const s of named) {
+      if (at + 19 + c.measureText(s.label).width > g.width) continue;
       c.fillStyle = s.color;
       c.fillRect(at, g.height - 13, 14, 4);
       c.fillStyle = colour('dim');

@@ -47,6 +47,8 @@ class Bridge {
   double positionIncrement() const { return increment_; }
 
   Answer<ArmCode> arm(bool on);
+  /// Feed hold, while motion is armed.
+  Answer<HoldCode> hold();
   Answer<MacroCode> setMacro(int number, double value);
 
   /// Starts a motion; an Outcome now is a refusal, nothing was sent (MotionMachine).

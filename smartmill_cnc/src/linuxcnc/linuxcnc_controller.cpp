@@ -165,6 +165,7 @@ class LinuxCncController : public Controller {
     return tell({Word::abort, 0, 0.0, {}});
   }
   Status abort() override { return abandonPrograms(); }
+  Status hold() override { return tell({Word::hold, 0, 0.0, {}}); }
 
  private:
   Failure lost(const std::string& why) {

@@ -83,6 +83,7 @@ CncNode::CncNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
   condition_publisher_.publish(toMsg(none));
   serveActions(nh);
   arm_service_ = nh.advertiseService(names::ARM_MOTION, &CncNode::armMotion, this);
+  hold_service_ = nh.advertiseService(names::FEED_HOLD, &CncNode::feedHold, this);
   macro_service_ = nh.advertiseService(names::SET_MACRO, &CncNode::setMacro, this);
   shell_.diagnose("controller", [this](auto& status) { diagnose(status); });
   thread_ = std::thread([this] { run(); });
@@ -307,6 +308,13 @@ bool CncNode::armMotion(smartmill_msgs::ArmMotion::Request& request,
   const bool on = request.arm != 0;
   const auto answer = ask<Answer<ArmCode>>([this, on] { return bridge_.arm(on); });
   response.code = static_cast<std::uint8_t>(answer ? answer->code : ArmCode::not_connected);
+  response.message = answer ? answer->message : "the controller does not answer";
+  return true;
+}
+
+bool CncNode::feedHold(smartmill_msgs::FeedHold::Request&, smartmill_msgs::FeedHold::Response& response) {
+  const auto answer = ask<Answer<HoldCode>>([this] { return bridge_.hold(); });
+  response.code = static_cast<std::uint8_t>(answer ? answer->code : HoldCode::not_connected);
   response.message = answer ? answer->message : "the controller does not answer";
   return true;
 }

@@ -15,6 +15,7 @@
 #include "node/servo_publisher.h"
 #include "smartmill_cnc/bridge.h"
 #include "smartmill_msgs/ArmMotion.h"
+#include "smartmill_msgs/FeedHold.h"
 #include "smartmill_msgs/JogAction.h"
 #include "smartmill_msgs/OrientSpindleAction.h"
 #include "smartmill_msgs/RunProgramAction.h"
@@ -60,6 +61,7 @@ class CncNode {
   void publishAlarms(const ros::Time& stamp);
   void log();
   bool armMotion(smartmill_msgs::ArmMotion::Request& request, smartmill_msgs::ArmMotion::Response& response);
+  bool feedHold(smartmill_msgs::FeedHold::Request& request, smartmill_msgs::FeedHold::Response& response);
   bool setMacro(smartmill_msgs::SetMacro::Request& request, smartmill_msgs::SetMacro::Response& response);
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
@@ -72,7 +74,7 @@ class CncNode {
 
   ros::Publisher state_publisher_, load_publisher_, condition_publisher_, alarms_publisher_;
   tf2_ros::TransformBroadcaster broadcaster_;
-  ros::ServiceServer arm_service_, macro_service_;
+  ros::ServiceServer arm_service_, hold_service_, macro_service_;
   std::unique_ptr<Server<smartmill_msgs::RunProgramAction>> run_program_;
   std::unique_ptr<Server<smartmill_msgs::JogAction>> jog_;
   std::unique_ptr<Server<smartmill_msgs::OrientSpindleAction>> orient_;

@@ -296,7 +296,8 @@ TEST_F(LinuxCncMachine, NothingBeyondALimitMoves) {
 
 TEST_F(LinuxCncMachine, FeedHoldStandsAndGoesOnWhereItStood) {
   cut();
-  ASSERT_EQ(atPanel(Word::hold).code, Reply::Code::done);
+  const Answer<HoldCode> answer = bridge_->hold();
+  ASSERT_EQ(answer.code, HoldCode::ok) << answer.message;
   EXPECT_LT(took([&] { return bridge_->state().run == CncRun::hold; }), soon());
   ASSERT_TRUE(until([&] { return samples_.back().velocity == 0.0; }, soon()));
   const std::array<double, 3> held = samples_.back().position;

@@ -1,37 +1,16 @@
 #include "smartmill_discrepancy/report/report_html.h"
 
-#include <fstream>
-#include <iterator>
 #include <map>
-#include <sstream>
+#include <ostream>
 
-#include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
+#include "smartmill_core/io/report_page.h"
 
 namespace smartmill::discrepancy {
 namespace {
 
-std::string escaped(const std::string& text) {
-  std::string out;
-  for (const char c : text)
-    out += c == '<' ? "&lt;" : c == '>' ? "&gt;" : c == '&' ? "&amp;" : std::string(1, c);
-  return out;
-}
-
 std::string number(double value, const char* format = "%.4g") {
   return formatted(format, value);
-}
-
-std::string base64(const std::string& bytes) {
-  const char* const digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string out;
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    unsigned v = 0;
-    for (std::size_t k = 0; k < 3; ++k)
-      v = v << 8 | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0u);
-    for (std::size_t k = 0; k < 4; ++k) out += i + k > bytes.size() ? '=' : digits[v >> (18 - 6 * k) & 63u];
-  }
-  return out;
 }
 
 std::string joined(const std::vector<std::string>& words) {
@@ -50,7 +29,7 @@ void findings(std::ostream& out, const char* title, const std::vector<Finding>& 
     for (const auto& [key, value] : f.location) out << key << " " << number(value, "%.5g") << " ";
     out << "<td>" << number(f.amplitude) << "<td>" << number(f.share_of_gap) << "<td>"
         << number(f.p_value, "%.1e") << "<td>" << joined(f.depends_on) << "<td>" << f.tests.size() << ": "
-        << escaped(joined(f.tests)) << "</tr>\n";
+        << escapedHtml(joined(f.tests)) << "</tr>\n";
   }
   out << "</table>\n";
 }
@@ -73,22 +52,9 @@ const std::map<std::string, std::string> CAPTIONS{
     {"ladder.png", "Evidence of the hypotheses tried"},
     {"remains.png", "Gap after, test by test"}};
 
-void head(std::ostream& out, const std::string& campaign) {
-  out << "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>Discrepancy report: "
-      << escaped(campaign)
-      << "</title>\n<style>body{font-family:sans-serif;max-width:78em;margin:2em auto;padding:0 "
-         "1em;color:#222}"
-         "table{border-collapse:collapse;margin:1em 0;font-size:90%}td,th{border:1px solid "
-         "#ccc;padding:.25em .6em;text-align:left;"
-         "vertical-align:top}th{background:#f0f0f0}img{max-width:100%}.verdict{font-size:130%;padding:.5em;"
-         "background:#eef5ee}"
-         "</style></head><body>\n<h1>Where simulation and measurement disagree: "
-      << escaped(campaign) << "</h1>\n";
-}
-
 void verdict(std::ostream& out, const Explanation& e) {
   out << "<p class=\"verdict\"><b>" << nameOf(e.verdict) << "</b>. " << sentenceOf(e.verdict) << "</p>\n";
-  if (!e.sentence.empty()) out << "<p><b>" << escaped(e.sentence) << "</b></p>\n";
+  if (!e.sentence.empty()) out << "<p><b>" << escapedHtml(e.sentence) << "</b></p>\n";
   if (e.interrupted) out << "<p>The search was interrupted: this is what was found until then.</p>\n";
   out << "<table><tr><th>gap<th>before<th>after</tr><tr><td>fit tests<td>" << number(e.before.fit) << "<td>"
       << number(e.after.fit) << "</tr><tr><td>held-out tests<td>" << number(e.before.heldout) << "<td>"
@@ -103,7 +69,7 @@ void effects(std::ostream& out, const Explanation& e) {
            "of the held-out gap<th>alternatives (evidence)</tr>\n";
     for (const FoundEffect& f : e.effects) {
       out << "<tr><td><b>" << f.name << "</b><td>";
-      for (const auto& [key, word] : f.words) out << key << " " << escaped(word) << "<br>";
+      for (const auto& [key, word] : f.words) out << key << " " << escapedHtml(word) << "<br>";
       for (const FoundParameter& p : f.parameters)
         out << p.key << " = " << number(p.value, "%.5g") << " &plusmn; " << number(p.std_dev, "%.2g")
             << "<br>";
@@ -115,13 +81,13 @@ void effects(std::ostream& out, const Explanation& e) {
   }
   for (const Resemblance& r : e.resembles) {
     out << "<p>Not named: <b>" << r.name << "</b>"
-        << (r.variant.empty() ? "" : " (" + escaped(r.variant) + ")") << ", " << escaped(r.reason)
+        << (r.variant.empty() ? "" : " (" + escapedHtml(r.variant) + ")") << ", " << escapedHtml(r.reason)
         << ".</p>\n";
   }
   for (const auto& group : e.not_separable)
     out << "<p>Not to be told apart on this campaign: " << joined(group) << ".</p>\n";
   if (e.suggested_test)
-    out << "<p>A test that would tell them apart: " << escaped(*e.suggested_test) << ".</p>\n";
+    out << "<p>A test that would tell them apart: " << escapedHtml(*e.suggested_test) << ".</p>\n";
 }
 
 void shares(std::ostream& out, const std::vector<ChannelShare>& channels) {
@@ -140,13 +106,10 @@ void shares(std::ostream& out, const std::vector<ChannelShare>& channels) {
   out << "</table>\n";
 }
 
-void images(std::ostream& out, const std::vector<std::string>& pictures, const std::string& folder) {
+void images(ReportPage& page, const std::vector<std::string>& pictures, const std::string& folder) {
   for (const std::string& name : pictures) {
-    std::ifstream png(folder + "/" + name, std::ios::binary);
-    const std::string bytes((std::istreambuf_iterator<char>(png)), std::istreambuf_iterator<char>());
     const auto caption = CAPTIONS.find(name);
-    out << "<h2>" << (caption != CAPTIONS.end() ? caption->second : name) << "</h2>\n<img alt=\"" << name
-        << "\" src=\"data:image/png;base64," << base64(bytes) << "\">\n";
+    page.picture(folder + "/" + name, caption != CAPTIONS.end() ? caption->second : name);
   }
 }
 
@@ -166,7 +129,7 @@ void ladder(std::ostream& out, const std::vector<TriedEffect>& tried) {
 void notes(std::ostream& out, const std::vector<std::string>& lines) {
   if (lines.empty()) return;
   out << "<h2>Notes</h2>\n<ul>";
-  for (const std::string& note : lines) out << "<li>" << escaped(note) << "</li>";
+  for (const std::string& note : lines) out << "<li>" << escapedHtml(note) << "</li>";
   out << "</ul>\n";
 }
 
@@ -174,19 +137,18 @@ void notes(std::ostream& out, const std::vector<std::string>& lines) {
 
 void writeHtml(const Explanation& e, const std::string& campaign, const std::vector<std::string>& pictures,
                const std::string& folder) {
-  const std::string file = folder + "/report.html";
-  std::ofstream out(file);
-  head(out, campaign);
+  ReportPage page("Where simulation and measurement disagree: " + campaign);
+  std::ostream& out = page.html();
   verdict(out, e);
   effects(out, e);
   shares(out, e.channels);
+  images(page, pictures, folder);
   findings(out, "What remains unexplained", e.unexplained);
   findings(out, "Where the nominal model differs", e.where);
-  images(out, pictures, folder);
   ladder(out, e.ladder);
   notes(out, e.notes);
-  out << "<p>" << number(e.seconds, "%.0f") << " s.</p></body></html>\n";
-  if (!out) throw Error(file + ": cannot be written");
+  out << "<p>" << number(e.seconds, "%.0f") << " s.</p>\n";
+  page.write(folder + "/report.html");
 }
 
 }  // namespace smartmill::discrepancy

@@ -85,7 +85,9 @@ TEST(KeptLoad, saysNothingWhereNothingIsHidden) {
   const Explanation e = explained(believed(), folder.file("kept"));
   EXPECT_EQ(e.verdict, Verdict::no_disagreement);
   for (const BlockGap& gap : e.gaps) {
-    if (gap.channel == "load_meter") EXPECT_LT(gap.before, 3.0) << gap.test;
+    if (gap.channel == "load_meter") {
+      EXPECT_LT(gap.before, 3.0) << gap.test;
+    }
   }
 }
 

@@ -9,7 +9,7 @@ export class Commands {
     this.place = make('div');
     card.append(this.place);
     if (!config.commands) {
-      this.place.append(make('p', { class: 'dim' }, 'This panel only shows. Started with allow_commands and a token file, it can cancel, disarm, measure and install a model.'));
+      this.place.append(make('p', { class: 'dim' }, 'This panel only shows. Started with allow_commands and a token file, it can hold the feed, cancel, disarm, measure and install a model.'));
       return;
     }
     for (const topic of ['cut/condition', 'panel/log']) link.on(topic, () => {});
@@ -23,7 +23,7 @@ export class Commands {
     const cut = () => this.link.message('cut/condition');
     this.locked = make('div', { class: 'row' }, this.who, this.word, make('button', { id: 'unlock', onclick: () => this.unlock() }, 'Unlock for a minute'));
     this.open = make('div', { hidden: true }, make('div', { class: 'row' },
-      command('cancel', 'Cancel what runs', undefined, false), command('disarm', 'Disarm motion', undefined, false),
+      command('hold', 'Feed hold', undefined, false), command('cancel', 'Cancel what runs', undefined, false), command('disarm', 'Disarm motion', undefined, false),
       command('measure_frf', 'Measure the FRF in x', () => ({ direction: 'x', tool: cut()?.tool ?? '' })),
       command('measure_frf', 'Measure the FRF in y', () => ({ direction: 'y', tool: cut()?.tool ?? '' })),
       command('identify', 'Identify coefficients', () => ({ tool: cut()?.tool ?? '', material: cut()?.material ?? '' }))),

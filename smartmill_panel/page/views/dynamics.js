@@ -35,11 +35,10 @@ export class Dynamics {
     this.parts = make('span', { class: 'choice row' }, ...Object.entries(PARTS).map(([key, p]) => make('button', { 'data-part': key, onclick: () => { store.part = key; this.draw(); } }, p.name)));
     this.blows = make('div', { class: 'hits', id: 'hits' });
     big.append(make('div', { class: 'choices' }, this.measured, this.parts));
-    small.append(this.blows);
     this.plot = new Plot(big, { name: 'frf', group: 'frf', x: { label: 'Frequency [Hz]', low: 0 }, y: { label: '' }, empty: 'No FRF measured yet', read: (x, y) => [`${fixed(x, 1)} Hz`, digits(y)] });
     this.coherence = new Plot(small, { name: 'coherence', group: 'frf', x: { label: 'Frequency [Hz]', low: 0 }, y: { label: 'Coherence', low: 0, high: 1 }, empty: 'Coherence needs two hits', read: (x, y) => [`${fixed(x, 1)} Hz`, fixed(y, 3)] });
     this.list = make('div', { class: 'dim' }, 'No modes yet');
-    side.append(this.list);
+    side.append(this.list, this.blows);
     const key = nameOf;
     link.on('tool/frf', m => { this.frfs[key(m)] = m; this.picked ??= key(m); this.news = true; });
     link.on('tool/modes', m => { this.models[key(m)] = m; this.news = true; });
@@ -79,9 +78,10 @@ export class Dynamics {
     const found = this.hits.of(this.picked);
     if (!found) return this.blows.replaceChildren();
     const taken = found.blows.filter(b => b.taken).length;
-    this.blows.replaceChildren(make('span', { class: 'dim' }, `Hits ${found.name}: ${taken} taken` + (taken < found.blows.length ? `, ${found.blows.length - taken} refused` : '')),
-      ...found.blows.map((b, k) => make('span', { class: `word ${b.taken ? 'good' : 'bad'}`, title: clock(b.time) }, b.taken ? `${k + 1} taken` : `${k + 1} refused: ${b.why}`)),
-      found.stage ? make('span', { class: 'dim' }, found.stage) : '');
+    this.blows.replaceChildren(make('div', { class: 'dim' }, `Hits ${found.name}: ${taken} taken` + (taken < found.blows.length ? `, ${found.blows.length - taken} refused` : '')),
+      ...found.blows.map((b, k) => b.taken ? make('i', { title: `hit ${k + 1} at ${clock(b.time)}: taken` }) :
+        make('span', { class: 'word bad', title: clock(b.time) }, `hit ${k + 1} refused: ${b.why}`)),
+      found.stage ? make('div', { class: 'dim' }, found.stage) : '');
   }
   refresh() {
     if (this.news) { this.news = false; this.draw(); }
@@ -97,7 +97,12 @@ class Hits {
     for (const action of ['hammer/measure_frf', 'kalman/measure_frf']) {
       link.on(`${action}/goal`, m => { Object.assign(this.goal(m.goal_id), { name: nameOf(m.goal) }); this.news = true; });
       link.on(`${action}/feedback`, m => this.take(m));
-      link.on(`${action}/result`, m => { Object.assign(this.goal(m.status.goal_id), { stage: m.result.code ? m.result.message : '', ended: true }); this.news = true; });
+      link.on(`${action}/result`, m => {
+        const goal = this.goal(m.status.goal_id);
+        Object.assign(goal, { stage: m.result.code ? m.result.message : '', ended: true });
+        this.fill(goal, m.result.frf.averages, m.header.stamp);
+        this.news = true;
+      });
     }
   }
   goal(id) {
@@ -112,7 +117,12 @@ class Hits {
       goal.blows.push({ taken: !why, why, time });
       goal.blows.sort((a, b) => a.time - b.time);
     }
+    if (time >= goal.heard) this.fill(goal, m.feedback.hits_done, time);
     this.news = true;
+  }
+  // Feedback tells the newest alone: what it has passed over was taken.
+  fill(goal, taken, time) {
+    for (let missing = taken - goal.blows.filter(b => b.taken).length; missing > 0; --missing) goal.blows.push({ taken: true, time });
   }
   // Of the newest measurement at a place, or of what runs.
   of(name) {

@@ -18,7 +18,10 @@ export class StatusLine {
     if (!state) return [['warn', 'No word of the controller yet']];
     if (!state.connected) return [['bad', 'Controller not connected']];
     const words = [];
-    if (old > OLD) words.push(['bad', 'Controller silent']);
+    const replay = link.message('replay/state');
+    if (old > OLD && replay && (replay.paused || replay.position >= replay.length - OLD))
+      words.push(['warn', replay.paused ? 'Recording paused' : 'Recording at its end']);
+    else if (old > OLD) words.push(['bad', 'Controller silent']);
     if (state.emergency) words.push(['bad', 'EMERGENCY STOP']);
     if (state.alarm) words.push(['bad', `Alarm ${state.alarm_text}`]);
     if (!this.short) {

@@ -19,6 +19,8 @@ export class WhatIf {
     this.changed = new Set();
     this.down = true;
     this.inputs = {};
+    this.answer = make('p', { class: 'dim', id: 'what-if-answer' }, 'Move a slider: the chart follows.');
+    card.append(this.answer);
     for (const s of SLIDERS) {
       const shown = make('b');
       const input = make('input', { type: 'range', min: s.low, max: s.high, step: s.step, id: `what-if-${s.key}`, 'aria-label': s.name,
@@ -27,8 +29,7 @@ export class WhatIf {
       card.append(make('label', {}, s.name, shown, input));
     }
     this.side = make('button', { 'aria-pressed': 'true', onclick: () => { this.down = !this.down; this.side.textContent = this.down ? 'Down-milling' : 'Up-milling'; this.changed.add('width'); this.ask(); } }, 'Down-milling');
-    this.answer = make('p', { class: 'dim', id: 'what-if-answer' }, 'Move a slider: the chart follows.');
-    card.append(make('div', { class: 'row' }, this.side, make('button', { onclick: () => this.reset() }, 'As it is')), this.answer);
+    card.append(make('div', { class: 'row' }, this.side, make('button', { onclick: () => this.reset() }, 'As it is')));
     for (const s of SLIDERS) this.label(s);
     link.on('stability/chart', message => {
       this.base.feed = 1e3 * message.feed_per_tooth;
@@ -95,7 +96,7 @@ export class WhatIf {
     const held = new Map();
     for (const mode of found.mode) held.set(mode, (held.get(mode) ?? 0) + 1);
     const most = [...held].filter(([mode]) => mode >= 0).sort((a, b) => b[1] - a[1])[0];
-    this.answer.textContent = `${fixed(this.value.depth, 1)} mm is stable at ${fixed(100 * found.stable_share)} % of the speeds. ` +
-      (most ? `The mode ${found.modes[most[0]]} holds the limit at ${fixed(100 * most[1] / found.mode.length)} % of them. ` : '') + `Computed in ${fixed(1e3 * found.seconds)} ms.`;
+    this.answer.textContent = `${fixed(this.value.depth, 1)} mm is stable at ${fixed(100 * found.stable_share)} % of the speeds` +
+      (most ? `, ${found.modes[most[0]]} holds the limit at ${fixed(100 * most[1] / found.mode.length)} %` : '') + ` (${fixed(1e3 * found.seconds)} ms).`;
   }
 }

@@ -5,6 +5,7 @@
 #include <ros/topic.h>
 #include <smartmill_msgs/ArmMotion.h>
 #include <smartmill_msgs/CncState.h>
+#include <smartmill_msgs/FeedHold.h>
 #include <smartmill_msgs/IdentifyCoefficientsActionGoal.h>
 #include <smartmill_msgs/InstallModel.h>
 #include <smartmill_msgs/MeasureFrfActionGoal.h>
@@ -77,6 +78,8 @@ Answer Commands::run(const Question& command) {
       outcome = cancel();
     else if (name == "disarm")
       outcome = disarm();
+    else if (name == "hold")
+      outcome = hold();
     else if (name == "install_model")
       outcome = install(word("file"));
     else if (name == "measure_frf")
@@ -103,6 +106,14 @@ std::string Commands::disarm() {
   smartmill_msgs::ArmMotion service;
   service.request.arm = false;
   if (!nh_.serviceClient<smartmill_msgs::ArmMotion>(names::ARM_MOTION).call(service))
+    throw Error("the controller's node does not answer");
+  if (service.response.code != service.response.OK) throw Error(service.response.message);
+  return service.response.message;
+}
+
+std::string Commands::hold() {
+  smartmill_msgs::FeedHold service;
+  if (!nh_.serviceClient<smartmill_msgs::FeedHold>(names::FEED_HOLD).call(service))
     throw Error("the controller's node does not answer");
   if (service.response.code != service.response.OK) throw Error(service.response.message);
   return service.response.message;

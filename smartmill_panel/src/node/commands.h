@@ -37,6 +37,7 @@ class Commands {
  private:
   std::string cancel();
   std::string disarm();
+  std::string hold();
   std::string install(const std::string& file);
   std::string measure(const std::string& direction, const std::string& tool);
   std::string identify(const std::string& tool, const std::string& material);

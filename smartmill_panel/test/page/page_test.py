@@ -332,7 +332,8 @@ def hits_taken_and_refused_are_told(browser, machine):
         time.sleep(0.05)
     browser.js("(location.hash = 'dynamics', 1)")
     becomes(lambda: browser.js("[...document.querySelectorAll('#hits .word')].map(e => e.textContent)"),
-            ["1 taken", "2 refused: a second blow after 1.3 ms", "3 taken"])
+            ["hit 2 refused: a second blow after 1.3 ms"])
+    equal(browser.js("document.querySelectorAll('#hits i').length"), 2)
     becomes(lambda: "Hits tool x: 2 taken, 1 refused" in browser.text("#hits"), True)
 
 
@@ -403,7 +404,7 @@ def reports_sort_and_zoom_without_a_server(browser):
     scale = "new DOMMatrix(getComputedStyle(document.querySelector('dialog img')).transform).a"
     before = browser.wait(scale + " > 5 && " + scale)  # a small picture fills the window
     browser.js("document.querySelector('dialog').dispatchEvent(new WheelEvent('wheel', {deltaY: -100, clientX: 200, clientY: 200})) || 1")
-    assert abs(browser.js(scale) / before - 1.25) < 1e-6
+    assert abs(browser.js(scale) / before - 1.25) < 1e-4  # printed with six digits
     for name, (width, height) in SIZES.items():
         browser.resize(width, height)
         browser.picture(f"{OUT}/report_{name}.png")

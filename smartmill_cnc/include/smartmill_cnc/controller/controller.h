@@ -126,6 +126,11 @@ class Controller {
   virtual Transfer transfer() const = 0;
   /// Stops the axes at once, then abandonPrograms().
   virtual Status abort() = 0;
+  /// Feed hold: the axes stand where they are, the program goes on at the machine's own key. Not every wire
+  /// has it.
+  virtual Status hold() {
+    return Failure{Failure::Kind::refused, name() + " takes no feed hold from outside: its own key is due"};
+  }
 };
 
 }  // namespace smartmill::cnc

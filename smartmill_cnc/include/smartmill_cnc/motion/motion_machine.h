@@ -57,6 +57,7 @@ enum class MotionCode : std::uint8_t {
   bad_goal = 9
 };
 /// Codes of the service ArmMotion.
+enum class HoldCode : std::uint8_t { ok = 0, not_connected = 1, not_armed = 2, refused = 3 };
 enum class ArmCode : std::uint8_t { ok = 0, not_connected = 1, wrong_mode = 2, alarm = 3 };
 /// Codes of the service SetMacro.
 enum class MacroCode : std::uint8_t { ok = 0, not_connected = 1, refused = 2 };

@@ -56,6 +56,7 @@ constexpr const char* ORIENT_SPINDLE = "cnc/orient_spindle";
 constexpr const char* STRIKE = "daq/strike";
 constexpr const char* ARM_MOTION = "cnc/arm_motion";
 constexpr const char* INSTALL_MODEL = "discrepancy/install_model";
+constexpr const char* FEED_HOLD = "cnc/feed_hold";
 constexpr const char* SET_MACRO = "cnc/set_macro";
 constexpr const char* FIND_COEFFICIENTS = "loadmeter/find_coefficients";
 constexpr const char* PREDICT_STABILITY = "stability/predict";

@@ -1,0 +1,22 @@
+// rosrun smartmill_launch report_page results/summary.md -o results/summary.html
+
+#include <filesystem>
+#include <string>
+
+#include "smartmill_core/io/report_page.h"
+#include "smartmill_core/io/text_file.h"
+#include "smartmill_core/program.h"
+
+int main(int argc, char** argv) {
+  std::string file, out;
+  smartmill::CommandLine line{
+      "Makes one HTML file, which needs no other, of a report in Markdown and its pictures."};
+  line.option("report", file, "Markdown file").required().existingFile();
+  line.option("-o,--out", out, "HTML file").required();
+  return smartmill::runProgram(line, argc, argv, [&] {
+    smartmill::ReportPage page(std::filesystem::path(file).stem().string());
+    page.markdown(smartmill::readText(file), std::filesystem::absolute(file).parent_path().string());
+    page.write(out);
+    return 0;
+  });
+}

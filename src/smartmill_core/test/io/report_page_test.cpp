@@ -1,0 +1,52 @@
+#include "smartmill_core/io/report_page.h"
+
+#include <gtest/gtest.h>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/io/text_file.h"
+#include "smartmill_core/testing/temporary_folder.h"
+
+namespace smartmill {
+namespace {
+
+TEST(ReportPage, MarkdownBecomesHtml) {
+  const TemporaryFolder folder;
+  folder.write("p.png", "Man");
+  ReportPage page("nameless");
+  page.markdown(
+      "# A session\n\n## Forces & moments\n\n| axis | **N** |\n|---|---:|\n| x | 1 < 2 |\n| y | `3` |\n"
+      "- one\n- two\n\nTwo lines\nof text.\n\n![how it went](p.png)\n",
+      folder.file("."));
+  const std::string text = page.text();
+  for (const char* part :
+       {"<title>A session</title>", "<h2>Forces &amp; moments</h2>", "<tr><th>axis<th><b>N</b></tr>",
+        "<tr><td>x<td>1 &lt; 2</tr>", "<td><code>3</code></tr>", "<ul><li>one</li>\n<li>two</li>",
+        "<p>Two lines\nof text.\n</p>", "src=\"data:image/png;base64,TWFu\"", "<figcaption>how it went"})
+    EXPECT_NE(text.find(part), std::string::npos) << part << " is missing in\n" << page.text();
+  EXPECT_EQ(text.find("<td>---"), std::string::npos);  // the line under a table's head
+}
+
+// Whatever stands in a campaign's name is no markup.
+TEST(ReportPage, NamesAreNoMarkup) {
+  EXPECT_EQ(escapedHtml("<a href=\"x\">&"), "&lt;a href=&quot;x&quot;&gt;&amp;");
+  ReportPage page("<script>alert(1)</script>");
+  page.markdown("<b>no</b>\n", ".");
+  EXPECT_EQ(page.text().find("<script>alert"), std::string::npos);
+  EXPECT_EQ(page.text().find("<b>no"), std::string::npos);
+}
+
+// It opens without a server and without a network: nothing in it comes from elsewhere.
+TEST(ReportPage, NeedsNothingElse) {
+  const std::string text = ReportPage("t").text();
+  for (const char* from : {"http:", "https:", "src=\"/", "@import", "url("})
+    EXPECT_EQ(text.find(from), std::string::npos) << from;
+}
+
+TEST(ReportPage, SaysWhatCannotBe) {
+  ReportPage page("t");
+  EXPECT_THROW(page.picture("/nowhere/p.png", "p"), Error);
+  EXPECT_THROW(page.write("/nowhere/r.html"), Error);
+}
+
+}  // namespace
+}  // namespace smartmill
