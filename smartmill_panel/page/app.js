@@ -25,6 +25,9 @@ function card(title, extra = '') {
   return element;
 }
 
+// A machine without a name of its own has that of its namespace.
+const nameOf = namespace => namespace.replace(/\/smartmill$/, '').slice(1) || 'SmartMill';
+
 class Page {
   constructor(config) {
     this.config = config;
@@ -32,7 +35,7 @@ class Page {
     const scheme = location.protocol === 'https:' ? 'wss' : 'ws';
     this.link = new Link(`${scheme}://${location.host}/`, config.namespace);
     this.store = kept('layout', { view: 'overview', axis: 'x', source: 1, part: 'magnitude' });
-    this.status = new StatusLine(document.querySelector('#status'), this.link, config.name);
+    this.status = new StatusLine(document.querySelector('#status'), this.link, config.name === 'SmartMill' ? nameOf(config.namespace) : config.name);
     this.parts.push(this.status);
     this.buildMachines();
     this.build();
@@ -52,8 +55,7 @@ class Page {
       const namespace = topic.match(/^(.+)\/cnc\/state$/)?.[1];
       if (!namespace || found.has(namespace)) return;
       found.add(namespace);
-      const name = namespace.replace(/\/smartmill$/, '').slice(1) || 'SmartMill';
-      this.addMachine(name, new Beside(this.link, namespace), async () => (await (await fetch('api/config')).json()).panels[namespace]);
+      this.addMachine(nameOf(namespace), new Beside(this.link, namespace), async () => (await (await fetch('api/config')).json()).panels[namespace]);
     };
   }
 

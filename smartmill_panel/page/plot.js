@@ -144,11 +144,8 @@ export class Plot {
     this.empty.hidden = something;
     this.canvas.dataset.drawn = something ? 'yes' : 'no';
     c.font = `${FONT}px ${getComputedStyle(document.body).fontFamily}`;
+    if (!something) return this.showNote(g);
     this.drawAxes(c, g);
-    if (!something) {
-      this.labelX(c, g, 0);
-      return this.showNote(g);
-    }
     c.save();
     c.beginPath();
     c.rect(LEFT, TOP, g.width - LEFT - RIGHT, g.height - TOP - this.bottom);
