@@ -3,6 +3,7 @@
 #include "smartmill_ros/bag_reader.h"
 
 #include <gtest/gtest.h>
+#include <rosbag/bag.h>
 #include <smartmill_msgs/CncState.h>
 #include <smartmill_msgs/SampleBlock.h>
 
