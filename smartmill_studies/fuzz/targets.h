@@ -21,13 +21,14 @@ void model(const std::uint8_t* data, std::size_t size);      ///< machine model 
 void campaign(const std::uint8_t* data, std::size_t size);   ///< campaign file
 void dynoware(const std::uint8_t* data, std::size_t size);   ///< Kistler DynoWare's text
 void uff(const std::uint8_t* data, std::size_t size);        ///< universal files 58 and 58b
+void bag(const std::uint8_t* data, std::size_t size);        ///< recorded ROS bag
 
 /// By name; the corpus of each is the folder corpus/NAME.
 inline const std::map<std::string, Target>& targets() {
   static const std::map<std::string, Target> TARGETS{
       {"replies", replies},     {"requests", requests}, {"nc", nc},
       {"recording", recording}, {"model", model},       {"campaign", campaign},
-      {"dynoware", dynoware},   {"uff", uff},           {"gateway", gateway}};
+      {"dynoware", dynoware},   {"uff", uff},           {"gateway", gateway}, {"bag", bag}};
   return TARGETS;
 }
 

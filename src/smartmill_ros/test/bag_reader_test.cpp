@@ -3,9 +3,12 @@
 #include "smartmill_ros/bag_reader.h"
 
 #include <gtest/gtest.h>
+#include <rosbag/bag.h>
 #include <smartmill_msgs/CncState.h>
 #include <smartmill_msgs/SampleBlock.h>
+#include <smartmill_msgs/SpindleAngle.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -60,6 +63,45 @@ TEST_F(DamagedBag, ALengthBeyondTheFileIsRefusedBeforeMemoryIsTaken) {
     bytes[i] = '\x7f';
   }
   EXPECT_EQ(fault(bytes), file_ + ": is no bag, or damaged: a record tells of 2139062143 bytes");
+}
+
+TEST_F(DamagedBag, PackedBagsAreReadTheSame) {
+  for (const rosbag::compression::CompressionType packing :
+       {rosbag::compression::BZ2, rosbag::compression::LZ4}) {
+    {
+      rosbag::Bag bag(file_, rosbag::bagmode::Write);
+      bag.setCompression(packing);
+      bag.setChunkThreshold(2000);  // several chunks
+      smartmill_msgs::SpindleAngle angle;
+      for (int i = 0; i < 500; ++i) {
+        angle.angle = i;
+        bag.write(names::absolute(names::SPINDLE_ANGLE), ros::Time(1.0 + (i ^ 1)), angle);
+      }
+      bag.close();
+    }
+    // In the order of their reception, not of the file.
+    BagReader reader(file_);
+    std::vector<double> seen;
+    reader.on<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE, [&](const auto& m, double time) {
+      EXPECT_EQ(time, 2.0 + static_cast<double>(seen.size()) - 1.0);
+      seen.push_back(m.angle);
+    });
+    reader.run();
+    ASSERT_EQ(seen.size(), 500u);
+    for (int i = 0; i < 500; ++i) {
+      ASSERT_EQ(seen[static_cast<std::size_t>(i)], i ^ 1);
+    }
+  }
+}
+
+TEST_F(DamagedBag, AVectorLongerThanItsMessageTakesNoMemory) {
+  // The samples' count is the last of its kind in the message: four doubles follow.
+  std::vector<char> bytes = bytes_;
+  const std::vector<char> count{4, 0, 0, 0, 0, 0, 0, 0, 0, 0, '\xf0', '\x3f'};  // 4, then 1.0
+  const auto at = std::search(bytes.begin(), bytes.end(), count.begin(), count.end());
+  ASSERT_NE(at, bytes.end());
+  at[3] = '\x7f';
+  EXPECT_NE(fault(bytes).find("the bag ends too early or is damaged"), std::string::npos) << fault(bytes);
 }
 
 TEST_F(DamagedBag, AnyDamagedByteIsReadOrRefusedWithTheFilesName) {

@@ -5,11 +5,11 @@
 #include <memory>
 #include <string>
 
-#include <rosbag/bag.h>
-#include <rosbag/message_instance.h>
+#include <ros/message_traits.h>
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/names.h"
+#include "smartmill_ros/bag_file.h"
 
 namespace smartmill {
 
@@ -19,19 +19,26 @@ class BagReader {
  public:
   /// @throws Error of one line naming the file: missing, truncated, not indexed, no bag.
   explicit BagReader(const std::string& path);
+  /// @param name for messages
+  BagReader(BagBytes bytes, const std::string& name);
+  BagReader(const BagReader&) = delete;
+  BagReader& operator=(const BagReader&) = delete;
 
   /// @param topic relative to /smartmill, or absolute. The handler gets the message and the time of its
   /// reception [s].
   template <class Message>
   void on(const std::string& topic, std::function<void(const Message&, double)> handler) {
     const std::string name = names::absolute(topic);
-    handlers_[name] = [this, name, handler](const rosbag::MessageInstance& instance) {
-      const boost::shared_ptr<Message> message = instance.instantiate<Message>();
-      if (!message) {
-        throw Error(path_ + ": topic " + name + " holds " + instance.getDataType() +
+    handlers_[name] = [this, name, handler](const Instance& instance) {
+      const std::string md5sum = ros::message_traits::MD5Sum<Message>::value();
+      if (md5sum != "*" && md5sum != instance.connection.md5sum) {
+        throw Error(path_ + ": topic " + name + " holds " + instance.connection.type +
                     " where another type is due");
       }
-      handler(*message, instance.getTime().toSec());
+      Message message;
+      CheckedStream stream(instance.data, instance.size);
+      ros::serialization::deserialize(stream, message);
+      handler(message, instance.time);
     };
   }
 
@@ -44,9 +51,16 @@ class BagReader {
   double duration() const;  ///< [s] first to last message
 
  private:
+  struct Instance {
+    const BagFile::Connection& connection;
+    const std::uint8_t* data;
+    std::uint32_t size;
+    double time;  // [s]
+  };
+
   std::string path_;
-  rosbag::Bag bag_;
-  std::map<std::string, std::function<void(const rosbag::MessageInstance&)>> handlers_;
+  std::unique_ptr<BagFile> file_;
+  std::map<std::string, std::function<void(const Instance&)>> handlers_;
 };
 
 }  // namespace smartmill
