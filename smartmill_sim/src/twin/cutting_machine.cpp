@@ -1,5 +1,6 @@
 #include "smartmill_sim/twin/cutting_machine.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "smartmill_core/error.h"
@@ -106,6 +107,14 @@ void CuttingMachine::setDepth(double depth, double passed_over) {
   for (ContactArc& a : arcs_) a.depth = depth;
   feed_path_ += passed_over;
   setActualDepths();
+}
+
+void CuttingMachine::showOnly(const std::vector<std::size_t>& channels) {
+  const auto asked = [&](std::size_t channel) {
+    return std::find(channels.begin(), channels.end(), channel) != channels.end();
+  };
+  shows_force_ = {{asked(FX), asked(FY), asked(FZ)}};
+  shows_load_ = asked(LOAD_METER);
 }
 
 void CuttingMachine::resetLoadMeter(double spindle_speed) {
@@ -246,6 +255,7 @@ void CuttingMachine::settleTip(const Input& input, Output& out) {
 void CuttingMachine::showForce(Output& out) {
   const std::array<double, 3> cut{{out.force.fx, out.force.fy, out.force.fz}};
   for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (!shows_force_[axis]) continue;
     const double before = out.applied[axis] - jump_ * (cut[axis] - last_cut_[axis]);
     out.early[FX + axis] =
         sign_ * (jump_ != 0.0 ? sensor_[axis].jump(before, out.applied[axis]) : sensor_[axis].step(before));
@@ -255,7 +265,7 @@ void CuttingMachine::showForce(Output& out) {
 
 void CuttingMachine::showLoad(double speed, Output& out) {
   out.early[LOAD_METER] = 0.0;
-  if (!drive_) return;
+  if (!drive_ || !shows_load_) return;
   const double mean_torque = last_torque_ + 0.5 * (1.0 - jump_) * (out.force.torque - last_torque_);
   out.early[LOAD_METER] = drive_->step(mean_torque, speed);
   last_torque_ = out.force.torque;

@@ -197,6 +197,7 @@ void run(const MachineModel& model, const CampaignTest& test, const SimulationOp
     out[c] = &record.add(channelName(c));
     shown.push_back(c);
   }
+  if (options.channels) machine.showOnly(shown);
   CuttingMachine::Output now;
   CuttingMachine::Output between;
   for (std::size_t i = 0; i < record.size(); ++i) {
@@ -418,8 +419,12 @@ Record simulateTest(const MachineModel& model, const CampaignTest& test, const R
   // The grid of the sample rate; a file's times are rounded to its printed digits.
   for (std::size_t i = 0; i < recorded.size(); ++i)
     record.time.push_back(recorded.time[0] + static_cast<double>(i) / test.sample_rate);
+  const auto asked = [&](const std::string& name) {
+    return name == "hammer" || !options.channels ||
+           std::find(options.channels->begin(), options.channels->end(), name) != options.channels->end();
+  };
   for (const std::string& name : recorded.names) {
-    if (gives(name, test)) record.add(name) = recorded.column(name);
+    if (gives(name, test) && asked(name)) record.add(name) = recorded.column(name);
   }
   const double phase = options.phase ? *options.phase : recordedPhase(test, recorded);
   return simulate(model, test, &recorded, std::move(record), phase, options);

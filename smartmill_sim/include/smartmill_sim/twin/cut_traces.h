@@ -17,6 +17,12 @@ namespace smartmill::sim {
 /// give the same record. @param model of effects that the catalogue knows
 std::vector<double> valuesOfRecord(const MachineModel& model, TestKind kind);
 
+/// Whether each channel of a record shows what no other one has a part in (cross talk mixes them).
+bool channelsApart(const MachineModel& model);
+
+/// As valuesOfRecord(), of one channel (ChannelIndex) of a record whose channels are apart.
+std::vector<double> valuesOfChannel(const MachineModel& model, TestKind kind, std::size_t channel);
+
 /// The same of what cut and tool do in it (CutTrace).
 std::vector<double> valuesOfTrace(const MachineModel& model, TestKind kind);
 

@@ -101,6 +101,9 @@ class CuttingMachine {
     if (rigid()) cutter_->follow(&trace->sums);
   }
 
+  /// Of forces and load meter only these are asked for; what the others show means nothing from here on.
+  void showOnly(const std::vector<std::size_t>& channels);
+
   /// The load meter stands at the steady value of cutting air.
   void resetLoadMeter(double spindle_speed);
 
@@ -143,6 +146,8 @@ class CuttingMachine {
   const CutTrace* followed_ = nullptr;
   std::size_t place_ = 0;  // in what is followed
   std::optional<std::size_t> probe_;
+  std::array<bool, 3> shows_force_{{true, true, true}};
+  bool shows_load_ = true;
   std::vector<ContactArc> arcs_;                     // as commanded
   double depth_extra_ = 0.0;                         // [m] that the depths hold now
   double feed_path_ = 0.0;                           // [m] since engagement
