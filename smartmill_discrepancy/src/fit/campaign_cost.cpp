@@ -16,10 +16,6 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using Values = std::vector<double>;
 
-Eigen::Map<const VectorXd> asVector(const Values& v) {
-  return Eigen::Map<const VectorXd>(v.data(), static_cast<Index>(v.size()));
-}
-
 bool same(const std::optional<VectorXd>& a, const VectorXd& b) {
   return a && *a == b;
 }

@@ -21,6 +21,20 @@ using Values = std::vector<double>;
 using Eigen::Index;
 using Eigen::MatrixXd;
 
+// Squares, priors included, that an undamped step at a point promises to take away.
+double promisedAt(const CampaignCost& cost, const Eigen::VectorXd& at) {
+  const CampaignCost::Linear* point = cost.linearise(at);
+  if (!point) return 0.0;
+  MatrixXd information = point->information;
+  Eigen::VectorXd gradient = point->gradient;
+  for (Index c = 0; c < at.size(); ++c) {
+    const auto coordinate = static_cast<std::size_t>(c);
+    information(c, c) += cost.precision(coordinate);
+    gradient[c] += cost.precision(coordinate) * (at[c] - cost.coordinates()[coordinate].null);
+  }
+  return gradient.dot(linear::solveSymmetric(information, gradient));
+}
+
 // Damped steps first, which cross what is curved; then undamped ones: an effect beside the nominal value that
 // it resembles leaves a narrow valley, in which damping would creep.
 // @return no value: the twin gives no numbers at the start
@@ -35,6 +49,7 @@ std::optional<Eigen::VectorXd> solve(const CampaignCost& cost, const FitOptions&
   solver.finish_at_bounds = false;  // simulations are dear, and the next round comes back
   solver.progress = [&](const fit::Progress&) { return !cancelled || !cancelled(); };
   std::vector<fit::Parameter> parameters = cost.parameters();
+  Eigen::VectorXd at(static_cast<Index>(parameters.size()));
   for (const double radius : {1e4, 1e10}) {
     solver.trust_radius = radius;
     fit::Result result;
@@ -44,14 +59,14 @@ std::optional<Eigen::VectorXd> solve(const CampaignCost& cost, const FitOptions&
       return {};
     }
     if (!result.usable()) return {};
-    for (std::size_t c = 0; c < parameters.size(); ++c)
-      parameters[c].start = result.value[static_cast<Index>(c)];
+    at = result.value;
+    for (std::size_t c = 0; c < parameters.size(); ++c) parameters[c].start = at[static_cast<Index>(c)];
     // A step that gains less than the tolerance is not taken: near the noise only the excess over it counts.
-    const double excess = std::max(result.squares - samples, 20.0);
-    solver.function_tolerance = options.tolerance * std::min(excess / result.squares, 1.0);
+    const double least =
+        options.tolerance * std::min(std::max(result.squares - samples, 20.0), result.squares);
+    solver.function_tolerance = least / result.squares;
+    if (options.iterations == 0 || promisedAt(cost, at) < least) break;
   }
-  Eigen::VectorXd at(static_cast<Index>(parameters.size()));
-  for (std::size_t c = 0; c < parameters.size(); ++c) at[static_cast<Index>(c)] = parameters[c].start;
   return at;
 }
 

@@ -25,6 +25,11 @@ std::string describe(const Member& m) {
   return line;
 }
 
+bool isMember(const FitState& state, const std::string& effect) {
+  return std::any_of(state.members.begin(), state.members.end(),
+                     [&](const Member& m) { return m.hypothesis->effect == effect; });
+}
+
 using Pieces = std::map<std::string, std::vector<double>>;  // values by the name of a piece
 
 // The form of an effect that is put together of just these pieces, with their values.
@@ -112,7 +117,8 @@ class Search {
   void finish();
   bool takeBetterRivals();
 
-  NominalTangents linearise(const FitState& where);
+  FitState near(const FitState& where) const;
+  NominalTangents linearise(const FitState& where) { return bench_.linearise(near(where)); }
   Fit refit(const Fit& from, const FitOptions& options) const;
   Fit withPhasesTurned(Fit fit);
   // Squares above the noise.
@@ -136,7 +142,7 @@ class Search {
 
 // What is missing pulls the nominal values far away, but they belong near to what is stated: there the
 // tangents are taken.
-NominalTangents Search::linearise(const FitState& where) {
+FitState Search::near(const FitState& where) const {
   constexpr double NEAR = 2.5;  // standard deviations
   FitState at = where;
   const std::vector<Coordinate>& free = bench_.freedom().coordinates();
@@ -144,7 +150,7 @@ NominalTangents Search::linearise(const FitState& where) {
     const double reach = NEAR * free[c].prior_std;
     at.nominal[c] = std::clamp(at.nominal[c], free[c].null - reach, free[c].null + reach);
   }
-  return bench_.linearise(at);
+  return at;
 }
 
 // Where the twin gives no numbers the fit stays what it was.
@@ -166,6 +172,7 @@ Fit Search::withPhasesTurned(Fit fit) {
 }
 
 void Search::fitNominalHere() {
+  constexpr int FRESH = 2;
   now_ = Fit{};
   now_.state.nominal.assign(bench_.freedom().coordinates().size(), 0.0);
   // Nominal values that are off far: tangents are taken anew where the fit went. Where records lie is told
@@ -174,7 +181,9 @@ void Search::fitNominalHere() {
   const double share =
       bench_.phasesEstimated() ? 1e-6 : 1e-3;  // of the cost, by which the last pass may gain
   for (int pass = 0; pass < passes; ++pass) {
-    tangents_ = linearise(now_.state);
+    // Where the first passes went the tangents are much alike.
+    tangents_ =
+        pass < FRESH ? linearise(now_.state) : bench_.lineariseBy(std::move(tangents_), near(now_.state));
     Fit fit = quick_.fit(now_.state, &tangents_, {8, 1e-5, true});
     if (!fit.converged && pass == 0)
       throw Error(bench_.data().campaign.folder + ": the twin gives no numbers for the nominal model");
@@ -343,6 +352,10 @@ bool Search::addEffect(std::size_t number) {
   const Fit before = now_;
   settle(std::move(round.best));
   dropNeedless();
+  if (!isMember(now_.state, newest->effect)) {
+    refuse(before, newest);
+    return in_vain_ < MOST_IN_VAIN;
+  }
   const double exact_squares = bench_.exactSquares(now_.state);
   if (!(exact_squares < exact_now_)) {
     options_.say(gapText(exact_squares) + " when simulated exactly, not taken: " + newest->title());

@@ -99,14 +99,26 @@ void Workbench::turnFitted(const FitState& state) {
   guided_runner_.readPhases();
 }
 
-NominalTangents Workbench::linearise(const FitState& state, double* exact_squares) {
+void Workbench::correctAt(const FitState& state, double* exact_squares) {
   const MachineModel model = quick_.model(state);
   turnFitted(state);
   quick_runner_.readPhases();
   const std::vector<double> simulated = fitted().simulate(model);
   if (exact_squares) *exact_squares = squaresLeft(fitted(), simulated);
   quick_runner_.correctTo(model, simulated);
+}
+
+NominalTangents Workbench::linearise(const FitState& state, double* exact_squares) {
+  correctAt(state, exact_squares);
   return quick_.nominalTangents(state);
+}
+
+NominalTangents Workbench::lineariseBy(NominalTangents tangents, const FitState& state) {
+  correctAt(state, nullptr);
+  tangents.at = state.nominal;
+  tangents.turns = state.turns;
+  tangents.turns.resize(quick_.turns().size(), 0.0);
+  return tangents;
 }
 
 double Workbench::exactSquares(const FitState& state) {

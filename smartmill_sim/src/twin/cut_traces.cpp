@@ -115,21 +115,23 @@ Values valuesOfChannel(const MachineModel& model, TestKind kind, std::size_t cha
   return values;
 }
 
-Values valuesOfTrace(const MachineModel& model, TestKind kind) {
+Values valuesOfTrace(const MachineModel& model, TestKind kind, bool guided) {
   Values values;
   const bool cut = kind == TestKind::cut;
   bool rigid = model.tool_tip.x.modes.empty() && model.tool_tip.y.modes.empty();
   for (const EffectEntry& effect : model.effects)
     rigid = rigid && effect.flexibility.x.modes.empty() && effect.flexibility.y.modes.empty();
-  values.push_back(rigid ? 1.0 : 0.0);
+  const bool sums = rigid || guided;
+  values.push_back(sums ? 1.0 : 0.0);
   if (cut) appendTool(values, model);
-  if (cut && !rigid) appendCutting(values, model);
-  append(values, model.tool_tip.x);
-  append(values, model.tool_tip.y);
+  if (cut && !sums) appendCutting(values, model);
+  if (!guided) append(values, model.tool_tip.x);
+  if (!guided) append(values, model.tool_tip.y);
   for (const EffectEntry& effect : model.effects) {
     const EffectKind* known = findEffect(effect.name);
     if (known && (!ofTheTool(known->stage) || !touches(known->stage, kind))) continue;
-    if (rigid && known && known->stage == Stage::cutting_law && makeEffect(effect)->scalesForce()) continue;
+    if (known && guided && known->stage == Stage::structure) continue;
+    if (sums && known && known->stage == Stage::cutting_law && makeEffect(effect)->scalesForce()) continue;
     append(values, effect);
   }
   return values;

@@ -198,13 +198,10 @@ CuttingForce CuttingMachine::cut(const Input& input) {
   if (replayed()) return followed_->steps.at(place_).force;
   if (!cutter_) return {};
   ToolMotion motion = fed(input.motion);
-  if (input.tip) {
-    motion.displacement = *input.tip;
-    return cutter_->step(motion);
-  }
+  if (input.tip) motion.displacement = *input.tip;
   // The tip's place needs this step's force and the force needs the place: the force is first taken to go
   // on in a straight line, which errs by the square of the step.
-  for (std::size_t axis = 0; axis < 2 && vibrates_; ++axis) {
+  for (std::size_t axis = 0; axis < 2 && vibrates_ && !input.tip; ++axis) {
     const std::array<double, 2>& f = tip_history_[axis];
     motion.displacement[axis] = tip_[axis].peek(2.0 * f[0] - f[1]);
   }
@@ -217,7 +214,7 @@ void CuttingMachine::moveTip(const Input& input, Output& out) {
   if (rigid()) return;
   ChannelValues& channels = out.early;
   double acceleration = 0.0;
-  if (followed_) {
+  if (replayed()) {
     const CutTrace::Step& step = followed_->steps.at(place_++);
     channels[TOOL_X] = step.displacement[0];
     channels[TOOL_Y] = step.displacement[1];
@@ -225,7 +222,8 @@ void CuttingMachine::moveTip(const Input& input, Output& out) {
   } else {
     settleTip(input, out);
     if (probe_) acceleration = tip_[*probe_].acceleration();
-    if (kept_) kept_->steps.push_back({out.force, {{channels[TOOL_X], channels[TOOL_Y]}}, acceleration});
+    if (kept_ && !guided_)
+      kept_->steps.push_back({out.force, {{channels[TOOL_X], channels[TOOL_Y]}}, acceleration});
   }
   if (!probe_) return;
   channels[DISPLACEMENT] = channels[TOOL_X + *probe_];

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <random>
 #include <string>
 #include <utility>
@@ -343,17 +344,26 @@ void fillAngle(Record& record, double phase, double speed) {
   }
 }
 
-bool isGuide(const CampaignTest& test, const Record* recorded, const CuttingMachine& machine) {
-  return test.kind == TestKind::cut && !test.running_before && machine.vibrates() && recorded &&
-         recorded->has(TIP[0]) && recorded->has(TIP[1]);
-}
+// What guides a tool: the displacements of its tip that a record shows.
+struct Guide {
+  const std::vector<double>*x, *y;
 
-std::array<double, 2> tipAt(const Record& recorded, std::size_t i, double share) {
-  return {{interpolated(recorded.column(TIP[0]), i, share), interpolated(recorded.column(TIP[1]), i, share)}};
+  std::array<double, 2> at(std::size_t i, double share) const {
+    return {{interpolated(*x, i, share), interpolated(*y, i, share)}};
+  }
+};
+
+std::optional<Guide> guideOf(const CampaignTest& test, const Record* recorded,
+                             const SimulationOptions& options, const CuttingMachine& machine) {
+  if (!options.guided || test.kind != TestKind::cut || test.running_before || !machine.vibrates() ||
+      !recorded || !recorded->has(TIP[0]) || !recorded->has(TIP[1]))
+    return {};
+  return Guide{&recorded->column(TIP[0]), &recorded->column(TIP[1])};
 }
 
 Record simulateOn(CuttingMachine& machine, const MachineModel& model, const CampaignTest& test,
-                  const Record* recorded, Record record, double phase, const SimulationOptions& options) {
+                  const Record* recorded, Record record, double phase, const std::optional<Guide>& guide,
+                  const SimulationOptions& options) {
   if (test.kind == TestKind::tap)
     return simulateTap(model, test, recorded, std::move(record), options, machine);
   fillAngle(record, phase, test.spindle_speed);
@@ -364,12 +374,11 @@ Record simulateOn(CuttingMachine& machine, const MachineModel& model, const Camp
     steady.lead();
   }
   const double dt = 1.0 / test.sample_rate;
-  const bool guided = options.guided && isGuide(test, recorded, machine);
   run(
       model, test, options, machine,
       [&](std::size_t i, double share) {
         CuttingMachine::Input input = steady.next(record.time[i] + share * dt);
-        if (guided) input.tip = tipAt(*recorded, i, share);
+        if (guide) input.tip = guide->at(i, share);
         return input;
       },
       recorded, record);
@@ -380,18 +389,22 @@ Record simulate(const MachineModel& model, const CampaignTest& test, const Recor
                 double phase, const SimulationOptions& options) {
   if (options.substeps < 1) throw Error("simulation: substeps below 1");
   CuttingMachine machine(model, 1.0 / (test.sample_rate * options.substeps), Feed::steady);
-  const bool worth = options.traces && (test.kind == TestKind::cut || machine.vibrates());
-  if (!worth) return simulateOn(machine, model, test, recorded, std::move(record), phase, options);
-  std::vector<double> values = valuesOfTrace(model, test.kind);
+  const std::optional<Guide> guide = guideOf(test, recorded, options, machine);
+  if (guide) machine.guide();
+  const auto simulated = [&] {
+    return simulateOn(machine, model, test, recorded, std::move(record), phase, guide, options);
+  };
+  if (!options.traces || !(test.kind == TestKind::cut || machine.vibrates())) return simulated();
+  std::vector<double> values = valuesOfTrace(model, test.kind, guide.has_value());
   if (const auto held = options.traces->find(values)) {
     machine.follow(held.get());
-    return simulateOn(machine, model, test, recorded, std::move(record), phase, options);
+    return simulated();
   }
   const auto kept = std::make_shared<CutTrace>();
   machine.keep(kept.get());
-  Record simulated = simulateOn(machine, model, test, recorded, std::move(record), phase, options);
+  Record result = simulated();
   options.traces->hold(std::move(values), kept);
-  return simulated;
+  return result;
 }
 
 }  // namespace

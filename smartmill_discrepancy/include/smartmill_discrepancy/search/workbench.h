@@ -43,6 +43,8 @@ class Workbench {
   /// Makes the quick twin equal to the exact one at a state and takes the nominal tangents there.
   /// @param exact_squares receives what the exact twin leaves there; may be nullptr
   NominalTangents linearise(const FitState& state, double* exact_squares = nullptr);
+  /// The same with the tangents of another state, which serve a fit on its way.
+  NominalTangents lineariseBy(NominalTangents tangents, const FitState& state);
 
   /// Whether some cut of a tool with modes shows its displacement: such tools are searched guided by it, so
   /// that no candidate runs away, and judged freely.
@@ -71,6 +73,7 @@ class Workbench {
 
  private:
   void turnFitted(const FitState& state);
+  void correctAt(const FitState& state, double* exact_squares);
 
   Dataset data_;                  // its records without spindle angle are turned as the model becomes better
   std::vector<TestData> loaded_;  // those to be fitted, as they were loaded
