@@ -40,6 +40,8 @@ double promisedAt(const CampaignCost& cost, const Eigen::VectorXd& at) {
 // @return no value: the twin gives no numbers at the start
 std::optional<Eigen::VectorXd> solve(const CampaignCost& cost, const FitOptions& options, double samples,
                                      const std::function<bool()>& cancelled) {
+  constexpr double HOPE = 10.0;  // times what a step gains or promises, that later ones may bring
+  constexpr int PATIENCE = 3;
   fit::Options solver;
   solver.name = "fit of a campaign";
   solver.iterations = options.iterations;
@@ -47,7 +49,13 @@ std::optional<Eigen::VectorXd> solve(const CampaignCost& cost, const FitOptions&
   solver.parameter_tolerance = 1e-7;
   solver.dear_derivatives = true;
   solver.finish_at_bounds = false;  // simulations are dear, and the next round comes back
-  solver.progress = [&](const fit::Progress&) { return !cancelled || !cancelled(); };
+  double before = std::numeric_limits<double>::infinity();
+  solver.progress = [&](const fit::Progress& now) {
+    const bool hopeless =
+        now.iteration >= PATIENCE && now.squares - options.to_beat > HOPE * (before - now.squares);
+    before = now.squares;
+    return !hopeless && !(cancelled && cancelled());
+  };
   std::vector<fit::Parameter> parameters = cost.parameters();
   Eigen::VectorXd at(static_cast<Index>(parameters.size()));
   for (const double radius : {1e4, 1e10}) {
@@ -65,7 +73,8 @@ std::optional<Eigen::VectorXd> solve(const CampaignCost& cost, const FitOptions&
     const double least =
         options.tolerance * std::min(std::max(result.squares - samples, 20.0), result.squares);
     solver.function_tolerance = least / result.squares;
-    if (options.iterations == 0 || promisedAt(cost, at) < least) break;
+    const double promised = options.iterations > 0 ? promisedAt(cost, at) : 0.0;
+    if (promised < least || result.squares - HOPE * promised > options.to_beat) break;
   }
   return at;
 }

@@ -87,7 +87,10 @@ class Search {
   Search(Workbench& bench, const std::vector<Hypothesis>& hypotheses, const SearchOptions& options)
       : bench_(bench), quick_(bench.quick()), hypotheses_(hypotheses), options_(options) {}
 
-  SearchResult run();
+  /// Rounds until nothing more is found.
+  void look();
+  /// @param brief that has looked at less of the same records; nullptr: none
+  SearchResult run(const Search* brief);
 
  private:
   // A round's fits, one effect more than before.
@@ -101,8 +104,10 @@ class Search {
   };
 
   void fitNominal();
+  void beginFrom(const Search& brief);
+  void rounds();
   void keepStatedWhereBetter();
-  void fitNominalHere();
+  void fitNominalHere(const std::vector<double>& from);
   bool addEffect(std::size_t number);
   Round fitPromises(std::size_t number);
   bool worthFitting(const Round& round, const Promise& promise, double largest) const;
@@ -137,6 +142,7 @@ class Search {
   std::vector<const Hypothesis*> refused_;
   std::size_t repeated_ = 0;  // rounds that did not count
   std::size_t in_vain_ = 0;   // of them one after the other
+  std::size_t rounds_ = 0;
   SearchResult result_;
 };
 
@@ -171,10 +177,10 @@ Fit Search::withPhasesTurned(Fit fit) {
   return fit;
 }
 
-void Search::fitNominalHere() {
+void Search::fitNominalHere(const std::vector<double>& from) {
   constexpr int FRESH = 2;
   now_ = Fit{};
-  now_.state.nominal.assign(bench_.freedom().coordinates().size(), 0.0);
+  now_.state.nominal = from;
   // Nominal values that are off far: tangents are taken anew where the fit went. Where records lie is told
   // from what the nominal values do to their last noise.
   const int passes = bench_.phasesEstimated() ? 8 : 3;
@@ -214,11 +220,12 @@ void Search::keepStatedWhereBetter() {
 }
 
 void Search::fitNominal() {
-  fitNominalHere();
+  const std::vector<double> stated(bench_.freedom().coordinates().size(), 0.0);
+  fitNominalHere(stated);
   if (!bench_.canGuide() || excess(now_) < 0.02 * bench_.samples() || bench_.cancelled()) return;
   const Fit free = now_;
   bench_.guide(true);
-  fitNominalHere();
+  fitNominalHere(stated);
   if (now_.chi2 < free.chi2) {
     options_.say("  guided by the displacement of the tool");
     return;
@@ -231,7 +238,10 @@ void Search::fitNominal() {
 
 bool Search::worthFitting(const Round& round, const Promise& promise, double largest) const {
   const std::size_t fitted = round.rungs.size();
-  if (promise.gain < round.least && !(round.strained && promise.gain > 4.0 * options_.least_prior_gain))
+  // What nominal values can nearly stand for leaves them along a curve, of which tangents say little.
+  constexpr double HARDLY_APART = 0.02, HINT = 0.25;
+  const double least = promise.apart < HARDLY_APART ? HINT * round.least : round.least;
+  if (promise.gain < least && !(round.strained && promise.gain > 4.0 * options_.least_prior_gain))
     return false;
   if (fitted >= options_.fitted_per_round) return false;
   if (fitted >= 2 && promise.gain < 0.02 * largest) return false;
@@ -245,7 +255,9 @@ void Search::fitPromise(const Promise& promise, Round& round) {
   const auto begin = std::chrono::steady_clock::now();
   const std::size_t simulations = quick_.runner().simulations();
   const NominalTangents turns = tangents_.ofTurns();
-  const Fit tried = quick_.fit(with, round.strained ? &turns : &tangents_, {6, 1e-3, true});
+  FitOptions options{6, 1e-3, true};
+  options.to_beat = round.best.chi2 + round.best.penalty;
+  const Fit tried = quick_.fit(with, round.strained ? &turns : &tangents_, options);
   const Member& newest = tried.state.members.back();
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   round.rungs.push_back({{round.number, promise.hypothesis->effect, promise.hypothesis->variant, promise.gain,
@@ -272,8 +284,8 @@ Search::Round Search::fitPromises(std::size_t number) {
   round.strained = excess(now_) < 0.01 * bench_.samples() && now_.penalty > 4.0 * options_.least_prior_gain;
   for (const Promise& p : promises) {
     if (std::find(refused_.begin(), refused_.end(), p.hypothesis) != refused_.end()) continue;
-    if (!worthFitting(round, p, promises.front().gain) || bench_.cancelled()) break;
-    fitPromise(p, round);
+    if (bench_.cancelled()) break;
+    if (worthFitting(round, p, promises.front().gain)) fitPromise(p, round);
   }
   return round;
 }
@@ -424,11 +436,48 @@ void Search::letGo() {
   if (free < FOLLOWS * guided) bench_.guide(false);
 }
 
-SearchResult Search::run() {
-  fitNominal();
-  for (std::size_t round = 0; round < options_.most_effects + repeated_ && !bench_.cancelled(); ++round) {
-    if (!addEffect(round)) break;
+void Search::rounds() {
+  while (rounds_ < options_.most_effects + repeated_ && !bench_.cancelled()) {
+    if (!addEffect(rounds_++)) break;
   }
+}
+
+// All of the records take up what the beginnings of them said.
+void Search::beginFrom(const Search& brief) {
+  options_.say("with whole records");
+  bench_.guide(brief.bench_.guided());
+  fitNominalHere(brief.result_.null.state.nominal);
+  result_.ladder = brief.result_.ladder;
+  result_.refused = brief.result_.refused;
+  refused_ = brief.refused_;
+  rounds_ = brief.rounds_;
+  repeated_ = brief.repeated_ + 1;  // a round to see that nothing more is there
+  if (brief.now_.state.members.empty()) return;
+  const Fit null = now_;
+  Fit begin = null;
+  begin.state = brief.now_.state;
+  settle(begin);
+  const double exact_squares = bench_.exactSquares(now_.state);
+  if (exact_squares < exact_now_) {
+    exact_now_ = exact_squares;
+    return;
+  }
+  now_ = null;
+  tangents_ = linearise(now_.state);
+}
+
+void Search::look() {
+  fitNominal();
+  rounds();
+}
+
+SearchResult Search::run(const Search* brief) {
+  if (brief) {
+    beginFrom(*brief);
+  } else {
+    fitNominal();
+  }
+  rounds();
   if (bench_.guided()) letGo();
   finish();
   return std::move(result_);
@@ -445,7 +494,14 @@ void SearchResult::tellSwapped(const Hypothesis& old, const Hypothesis& better) 
 
 SearchResult search(Workbench& bench, const std::vector<Hypothesis>& hypotheses,
                     const SearchOptions& options) {
-  return Search(bench, hypotheses, options).run();
+  const MachineModel& nominal = bench.data().nominal;
+  const bool vibrates = !nominal.tool_tip.x.modes.empty() || !nominal.tool_tip.y.modes.empty();
+  const std::optional<Dataset> part = vibrates ? briefOf(bench.data()) : std::nullopt;
+  if (!part) return Search(bench, hypotheses, options).run(nullptr);
+  Workbench brief_bench(*part, bench.options());
+  Search brief(brief_bench, hypotheses, options);
+  brief.look();
+  return Search(bench, hypotheses, options).run(&brief);
 }
 
 }  // namespace smartmill::discrepancy

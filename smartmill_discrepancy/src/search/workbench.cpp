@@ -65,11 +65,11 @@ double turnOnce(const TwinRunner& runner, const MachineModel& model, Dataset* da
 }  // namespace
 
 Workbench::Workbench(const Dataset& data, const WorkbenchOptions& options)
-    : data_(data),
+    : options_(options),
+      data_(data),
       freedom_(data.nominal),
       phases_estimated_(std::any_of(data.tests.begin(), data.tests.end(),
                                     [](const TestData& t) { return t.phase_estimated; })),
-      cancelled_(options.cancelled),
       can_guide_(std::any_of(data.tests.begin(), data.tests.end(),
                              [&](const TestData& t) { return guides(t, data.nominal); })),
       quick_runner_(data_, testsOf(data_, false), options.threads, options.screening_substeps),

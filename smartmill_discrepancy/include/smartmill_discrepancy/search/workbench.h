@@ -35,7 +35,8 @@ class Workbench {
   /// Exact twin of the fit tests, guided where fits are.
   const TwinRunner& fitted() const { return guided_ ? guided_runner_ : exact_runner_; }
   const TwinRunner& heldout() const { return heldout_runner_; }  ///< exact twin of the held-out tests
-  bool cancelled() const { return cancelled_ && cancelled_(); }
+  const WorkbenchOptions& options() const { return options_; }
+  bool cancelled() const { return options_.cancelled && options_.cancelled(); }
 
   /// Samples of the fit tests.
   double samples() const { return static_cast<double>(exact_runner_.size()); }
@@ -75,11 +76,11 @@ class Workbench {
   void turnFitted(const FitState& state);
   void correctAt(const FitState& state, double* exact_squares);
 
+  WorkbenchOptions options_;
   Dataset data_;                  // its records without spindle angle are turned as the model becomes better
   std::vector<TestData> loaded_;  // those to be fitted, as they were loaded
   NominalFreedom freedom_;
   bool phases_estimated_;
-  std::function<bool()> cancelled_;
   bool can_guide_, guided_ = false;
   TwinRunner quick_runner_, exact_runner_, guided_runner_, heldout_runner_;
   Fitter quick_, exact_;
