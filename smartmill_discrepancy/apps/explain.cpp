@@ -55,9 +55,15 @@ int run(const Arguments& arguments) {
   ExplainOptions options;
   options.bench.threads = arguments.threads;
   options.bench.cancelled = [] { return interrupted.load(); };
+  const auto elapsed = [&] {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  };
   options.search.progress = [&](const std::string& line) {
-    const double t = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    std::fprintf(stderr, "[%5.1f s] %s\n", t, line.c_str());
+    std::fprintf(stderr, "[%5.1f s] %s\n", elapsed(), line.c_str());
+  };
+  options.search.course = [&](double share) {
+    const double t = elapsed();
+    std::fprintf(stderr, "[%5.1f s] about %.0f s more, should nothing else be found\n", t, t / share - t);
   };
   std::error_code failed;
   std::filesystem::create_directories(arguments.out, failed);

@@ -99,17 +99,20 @@ class Search {
     Fit best;
     double best_promise = 0.0;
     double least = 0.0;     // gain of BIC that an effect must bring
+    std::size_t hints = 0;  // fitted on a hint
     bool strained = false;  // next to nothing is left but nominal values far off
     std::vector<Rung> rungs;
   };
 
   void fitNominal();
   void beginFrom(const Search& brief);
+  void tellCourse() const;
   void rounds();
   void keepStatedWhereBetter();
   void fitNominalHere(const std::vector<double>& from);
   bool addEffect(std::size_t number);
   Round fitPromises(std::size_t number);
+  bool isHint(const Round& round, const Promise& promise) const;
   bool worthFitting(const Round& round, const Promise& promise, double largest) const;
   void fitPromise(const Promise& promise, Round& round);
   bool isBetter(const Round& round) const;
@@ -143,6 +146,7 @@ class Search {
   std::size_t repeated_ = 0;  // rounds that did not count
   std::size_t in_vain_ = 0;   // of them one after the other
   std::size_t rounds_ = 0;
+  bool all_ = false;  // of the records are looked at
   SearchResult result_;
 };
 
@@ -236,14 +240,20 @@ void Search::fitNominal() {
   exact_now_ = bench_.exactSquares(now_.state);
 }
 
-bool Search::worthFitting(const Round& round, const Promise& promise, double largest) const {
-  const std::size_t fitted = round.rungs.size();
-  // What nominal values can nearly stand for leaves them along a curve, of which tangents say little.
+// What nominal values can nearly stand for leaves them along a curve, of which tangents say little.
+bool Search::isHint(const Round& round, const Promise& promise) const {
   constexpr double HARDLY_APART = 0.02, HINT = 0.25;
-  const double least = promise.apart < HARDLY_APART ? HINT * round.least : round.least;
-  if (promise.gain < least && !(round.strained && promise.gain > 4.0 * options_.least_prior_gain))
+  return promise.gain < round.least && promise.gain > HINT * round.least && promise.apart < HARDLY_APART;
+}
+
+bool Search::worthFitting(const Round& round, const Promise& promise, double largest) const {
+  constexpr std::size_t MOST_HINTS = 4;
+  const std::size_t fitted = round.rungs.size();
+  const bool hint = isHint(round, promise);
+  if (promise.gain < round.least && !hint &&
+      !(round.strained && promise.gain > 4.0 * options_.least_prior_gain))
     return false;
-  if (fitted >= options_.fitted_per_round) return false;
+  if (hint ? round.hints >= MOST_HINTS : fitted - round.hints >= options_.fitted_per_round) return false;
   if (fitted >= 2 && promise.gain < 0.02 * largest) return false;
   // One that leaves next to nothing can be bettered only by one that promises about as much.
   return !(excess(round.best) < 0.02 * excess(now_) && promise.gain < 0.5 * round.best_promise);
@@ -285,7 +295,9 @@ Search::Round Search::fitPromises(std::size_t number) {
   for (const Promise& p : promises) {
     if (std::find(refused_.begin(), refused_.end(), p.hypothesis) != refused_.end()) continue;
     if (bench_.cancelled()) break;
-    if (worthFitting(round, p, promises.front().gain)) fitPromise(p, round);
+    if (!worthFitting(round, p, promises.front().gain)) continue;
+    if (isHint(round, p)) ++round.hints;
+    fitPromise(p, round);
   }
   return round;
 }
@@ -436,9 +448,19 @@ void Search::letGo() {
   if (free < FOLLOWS * guided) bench_.guide(false);
 }
 
+// In units of what a fit of the nominal values takes, as seen on many campaigns.
+void Search::tellCourse() const {
+  constexpr double ROUND = 2.0, LAST_ROUND = 1.0, WHOLE = 2.0, AFTER = 4.0;
+  const double done = 1.0 + ROUND * static_cast<double>(rounds_) + (all_ ? WHOLE : 0.0);
+  const double left = AFTER + LAST_ROUND + (all_ ? 0.0 : WHOLE);
+  options_.tell(done / (done + left));
+}
+
 void Search::rounds() {
+  tellCourse();
   while (rounds_ < options_.most_effects + repeated_ && !bench_.cancelled()) {
     if (!addEffect(rounds_++)) break;
+    tellCourse();
   }
 }
 
@@ -472,6 +494,7 @@ void Search::look() {
 }
 
 SearchResult Search::run(const Search* brief) {
+  all_ = true;
   if (brief) {
     beginFrom(*brief);
   } else {
