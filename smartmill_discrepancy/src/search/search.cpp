@@ -376,14 +376,11 @@ bool Search::addEffect(std::size_t number) {
   const Fit before = now_;
   settle(std::move(round.best));
   dropNeedless();
-  if (!isMember(now_.state, newest->effect)) {
-    refuse(before, newest);
-    return in_vain_ < MOST_IN_VAIN;
-  }
   const double exact_squares = bench_.exactSquares(now_.state);
   if (!(exact_squares < exact_now_)) {
     options_.say(gapText(exact_squares) + " when simulated exactly, not taken: " + newest->title());
-    if (bench_.refineQuick()) {
+    // What was not needed beside the others is not for want of small steps.
+    if (isMember(now_.state, newest->effect) && bench_.refineQuick()) {
       options_.say("  again with smaller steps");
       stepBack(before);
     } else {
