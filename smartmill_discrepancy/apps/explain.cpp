@@ -9,6 +9,8 @@
 #include <iostream>
 #include <string>
 
+#include <unistd.h>
+
 #include "node/bag_campaign.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/program.h"
@@ -30,6 +32,8 @@ static_assert(std::atomic<bool>::is_always_lock_free);
 
 // The first Ctrl-C asks for what has been found, the second ends at once.
 void interrupt(int) {
+  constexpr char HEARD[] = "cancelled: what was found until now is judged and written (again: end at once)\n";
+  [[maybe_unused]] const auto written = write(STDERR_FILENO, HEARD, sizeof(HEARD) - 1);
   interrupted = true;
   std::signal(SIGINT, SIG_DFL);
 }

@@ -240,14 +240,17 @@ void Search::fitNominal() {
   exact_now_ = bench_.exactSquares(now_.state);
 }
 
-// What nominal values can nearly stand for leaves them along a curve, of which tangents say little.
+// Where nothing that promises outright takes much, what promises nearly enough may be more than tangents say,
+// unless nominal values stand for it.
 bool Search::isHint(const Round& round, const Promise& promise) const {
-  constexpr double HARDLY_APART = 0.02, HINT = 0.25;
-  return promise.gain < round.least && promise.gain > HINT * round.least && promise.apart < HARDLY_APART;
+  constexpr double APART = 0.02, HINT = 0.25;
+  constexpr double MOST = 0.9;  // of the excess is left by what promised outright
+  return all_ && excess(round.best) > MOST * excess(now_) && promise.gain < round.least &&
+         promise.gain > HINT * round.least && promise.apart > APART;
 }
 
 bool Search::worthFitting(const Round& round, const Promise& promise, double largest) const {
-  constexpr std::size_t MOST_HINTS = 4;
+  constexpr std::size_t MOST_HINTS = 2;
   const std::size_t fitted = round.rungs.size();
   const bool hint = isHint(round, promise);
   if (promise.gain < round.least && !hint &&
@@ -421,7 +424,7 @@ void Search::finish() {
 // @return false: the twin gives no numbers there
 bool Search::takeBetterRivals() {
   constexpr int SWAPS = 3;
-  for (int swap = 0; swap < SWAPS; ++swap) {
+  for (int swap = 0; swap < SWAPS && !bench_.cancelled(); ++swap) {
     const auto ahead = [&](const Rival& r) { return r.delta_bic - result_.contribution[r.member]; };
     const auto best = std::max_element(result_.rivals.begin(), result_.rivals.end(),
                                        [&](const Rival& a, const Rival& b) { return ahead(a) < ahead(b); });

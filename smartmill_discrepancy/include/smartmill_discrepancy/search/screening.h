@@ -11,8 +11,8 @@ namespace smartmill::discrepancy {
 struct Promise {
   const Hypothesis* hypothesis = nullptr;
   double gain = 0.0;  ///< chi2 that it takes away in linear approximation
-  /// [1] Share of what it does that nominal values and members cannot stand for: where it is small the gain
-  /// is hardly more than a hint.
+  /// [1] Share of what it does that nominal values and members cannot stand for: where it is small, a gain
+  /// says that they are off.
   double apart = 1.0;
   std::vector<double> start;  ///< coordinates to start a fit from
   std::vector<double>
