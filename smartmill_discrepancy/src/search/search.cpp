@@ -143,8 +143,10 @@ class Search {
   Fit now_;
   double exact_now_ = 0.0;  // squares that the exact twin leaves
   std::vector<const Hypothesis*> refused_;
-  std::size_t repeated_ = 0;  // rounds that did not count
-  std::size_t in_vain_ = 0;   // of them one after the other
+  std::vector<Promise> promises_;  // of the last round
+  bool stepped_back_ = false;      // to where they were made
+  std::size_t repeated_ = 0;       // rounds that did not count
+  std::size_t in_vain_ = 0;        // of them one after the other
   std::size_t rounds_ = 0;
   bool all_ = false;  // of the records are looked at
   SearchResult result_;
@@ -286,7 +288,8 @@ void Search::fitPromise(const Promise& promise, Round& round) {
 }
 
 Search::Round Search::fitPromises(std::size_t number) {
-  const std::vector<Promise> promises = screen(quick_, now_, tangents_, hypotheses_);
+  if (!stepped_back_) promises_ = screen(quick_, now_, tangents_, hypotheses_);
+  stepped_back_ = false;
   Round round;
   round.number = number;
   round.best = now_;
@@ -295,10 +298,10 @@ Search::Round Search::fitPromises(std::size_t number) {
   // With next to nothing left but nominal values far off, an effect may do what they do; only all values
   // moved together go along that valley.
   round.strained = excess(now_) < 0.01 * bench_.samples() && now_.penalty > 4.0 * options_.least_prior_gain;
-  for (const Promise& p : promises) {
+  for (const Promise& p : promises_) {
     if (std::find(refused_.begin(), refused_.end(), p.hypothesis) != refused_.end()) continue;
     if (bench_.cancelled()) break;
-    if (!worthFitting(round, p, promises.front().gain)) continue;
+    if (!worthFitting(round, p, promises_.front().gain)) continue;
     if (isHint(round, p)) ++round.hints;
     fitPromise(p, round);
   }
@@ -365,6 +368,7 @@ void Search::refuse(const Fit& before, const Hypothesis* newest) {
   ++in_vain_;
   refused_.push_back(newest);
   stepBack(before);
+  stepped_back_ = true;
 }
 
 // @return false: nothing more is to be added
