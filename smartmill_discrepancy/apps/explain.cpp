@@ -9,6 +9,8 @@
 #include <iostream>
 #include <string>
 
+#include <unistd.h>
+
 #include "node/bag_campaign.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/program.h"
@@ -30,6 +32,8 @@ static_assert(std::atomic<bool>::is_always_lock_free);
 
 // The first Ctrl-C asks for what has been found, the second ends at once.
 void interrupt(int) {
+  constexpr char HEARD[] = "cancelled: what was found until now is judged and written (again: end at once)\n";
+  [[maybe_unused]] const auto written = write(STDERR_FILENO, HEARD, sizeof(HEARD) - 1);
   interrupted = true;
   std::signal(SIGINT, SIG_DFL);
 }
@@ -55,9 +59,15 @@ int run(const Arguments& arguments) {
   ExplainOptions options;
   options.bench.threads = arguments.threads;
   options.bench.cancelled = [] { return interrupted.load(); };
+  const auto elapsed = [&] {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  };
   options.search.progress = [&](const std::string& line) {
-    const double t = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    std::fprintf(stderr, "[%5.1f s] %s\n", t, line.c_str());
+    std::fprintf(stderr, "[%5.1f s] %s\n", elapsed(), line.c_str());
+  };
+  options.search.course = [&](double share) {
+    const double t = elapsed();
+    std::fprintf(stderr, "[%5.1f s] about %.0f s more, should nothing else be found\n", t, t / share - t);
   };
   std::error_code failed;
   std::filesystem::create_directories(arguments.out, failed);

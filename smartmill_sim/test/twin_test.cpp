@@ -141,6 +141,69 @@ TEST(Twin, heldTracesChangeNothing) {
   }
 }
 
+// The same of a tool that its displacement guides: in coefficients, wear, damping and the tool's own modes.
+// Damping and geometry are the cut's: none of the others stands for them.
+TEST(Twin, heldSumsOfAGuidedToolChangeNothing) {
+  CampaignTest test = slot();
+  test.engage_time = 0.01;
+  test.cut_time_before = 10.0;
+  SimulationOptions alone;
+  alone.noise = false;
+  alone.phase = 1.0;
+  const Record measured = simulateTest(flexibleMill(), test, blank(), alone);
+  MachineModel harder = flexibleMill(), softer = harder, worn = harder, damped = harder, cornered = harder;
+  harder.cutting->ktc *= 1.2;
+  softer.tool_tip.x.modes.front().gain *= 2.0;
+  worn.effects = {effectEntry("tool_wear", {{"edge_growth_per_min", 2.0}})};
+  damped.effects = {effectEntry("process_damping", {{"coefficient_n_per_mm", 20.0}})};
+  cornered.effects = {effectEntry("corner_radius", {{"corner_radius_mm", 1.0}})};
+  CutTraces traces(8);
+  alone.guided = true;
+  SimulationOptions held = alone;
+  held.traces = &traces;
+  for (const MachineModel& model : {flexibleMill(), harder, softer, worn, damped, cornered, harder}) {
+    const Record a = simulateTest(model, test, measured, alone),
+                 b = simulateTest(model, test, measured, held);
+    for (const char* c : {"fx", "fy", "fz", "tool_x", "tool_y"}) EXPECT_EQ(a.column(c), b.column(c)) << c;
+  }
+  EXPECT_EQ(valuesOfTrace(flexibleMill(), TestKind::cut, true), valuesOfTrace(worn, TestKind::cut, true));
+  EXPECT_EQ(valuesOfTrace(harder, TestKind::cut, true), valuesOfTrace(softer, TestKind::cut, true));
+  EXPECT_NE(valuesOfTrace(harder, TestKind::cut, true), valuesOfTrace(damped, TestKind::cut, true));
+  EXPECT_NE(valuesOfTrace(harder, TestKind::cut, true), valuesOfTrace(cornered, TestKind::cut, true));
+}
+
+// A channel asked for alone shows what it shows among all; its values tell when it shows something else.
+TEST(Twin, channelsAskedForAloneAreThoseOfTheRecord) {
+  CampaignTest test = slot();
+  test.engage_time = 0.01;
+  const MachineModel first = flexibleMill();
+  MachineModel sensor = first, delayed = first, mixed = first;
+  sensor.force_sensor.axis[0].modes.front().frequency *= 1.1;
+  delayed.effects = {effectEntry("channel_delay", {{"delay_us", 30.0}}, {{"channel", "fy"}})};
+  mixed.effects = {effectEntry("cross_talk", {{"xy", 0.1}})};
+  EXPECT_FALSE(channelsApart(mixed));
+  SimulationOptions options;
+  options.noise = false;
+  options.phase = 1.0;
+  const std::vector<std::string> channels{"fx", "fy", "fz", "tool_x", "tool_y"};
+  const Record nominal = simulateTest(first, test, blank(), options);
+  for (const MachineModel& model : {sensor, delayed}) {
+    ASSERT_TRUE(channelsApart(model));
+    options.channels = nullptr;
+    const Record all = simulateTest(model, test, blank(), options);
+    for (const std::string& c : channels) {
+      const std::vector<std::string> only{c};
+      options.channels = &only;
+      const Record one = simulateTest(model, test, blank(), options);
+      EXPECT_EQ(one.column(c), all.column(c)) << c;
+      EXPECT_FALSE(one.has(c == "fx" ? "fy" : "fx"));
+      const bool same_values =
+          valuesOfChannel(model, test.kind, channelOf(c)) == valuesOfChannel(first, test.kind, channelOf(c));
+      EXPECT_EQ(same_values, all.column(c) == nominal.column(c)) << c;
+    }
+  }
+}
+
 // Guided by the displacement that was measured, forces are those of the cut whatever is believed of the
 // structure, which shows in the displacement alone; with what is true of it that is the measured one.
 TEST(Twin, guidedByItsDisplacementTheStructureOnlyShows) {

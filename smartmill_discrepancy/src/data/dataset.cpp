@@ -9,6 +9,7 @@
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/signal/fourier.h"
 #include "smartmill_core/signal/statistics.h"
+#include "smartmill_core/units.h"
 #include "smartmill_discrepancy/data/phase.h"
 
 namespace smartmill::discrepancy {
@@ -223,6 +224,23 @@ double noiseBetweenLines(const std::vector<double>& values) {
   }
   // Median of an exponential distribution: mean times ln 2.
   return std::sqrt(median(power) / std::log(2.0) / window_power);
+}
+
+std::optional<Dataset> briefOf(const Dataset& data) {
+  constexpr double TURNS = 6.0;
+  constexpr double WORTH = 0.75;  // [1] of the samples
+  Dataset brief = data;
+  for (TestData& t : brief.tests) {
+    if (t.test.kind != TestKind::cut || t.heldout || t.phase_estimated) continue;
+    const double turn = units::TWO_PI / t.test.spindle_speed * t.test.sample_rate;  // [samples]
+    const std::size_t size = std::max(LEAST_SAMPLES, t.first_cut + static_cast<std::size_t>(TURNS * turn));
+    if (size >= t.record.size()) continue;
+    t.record.time.resize(size);
+    for (std::vector<double>& column : t.record.columns) column.resize(size);
+  }
+  const auto share = static_cast<double>(brief.samples()) / static_cast<double>(data.samples());
+  if (share > WORTH) return {};
+  return brief;
 }
 
 void chooseHeldout(std::vector<TestData>& tests) {

@@ -16,12 +16,8 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using Values = std::vector<double>;
 
-Eigen::Map<const VectorXd> asVector(const Values& v) {
-  return Eigen::Map<const VectorXd>(v.data(), static_cast<Index>(v.size()));
-}
-
-bool same(const VectorXd& a, const VectorXd& b) {
-  return a.size() == b.size() && a == b;
+bool same(const std::optional<VectorXd>& a, const VectorXd& b) {
+  return a && *a == b;
 }
 
 }  // namespace
@@ -90,28 +86,54 @@ double CampaignCost::precision(std::size_t coordinate) const {
   return prior_weight_ / (std_dev * std_dev);
 }
 
+VectorXd CampaignCost::ownOf(const VectorXd& at) const {
+  return at(own_places_);
+}
+
+// Blocks that are what they were leave what is known of them.
+void CampaignCost::compare(SimulatedBlocks simulated) const {
+  const TwinRunner& runner = fitter_.runner();
+  const std::vector<Block>& blocks = runner.blocks();
+  const auto count = static_cast<Index>(blocks.size());
+  const Index frozen = frozen_places_.empty() ? 0 : frozen_->columns.cols();
+  const bool first = simulated_.empty();
+  if (first) {
+    apart_.resize(static_cast<Index>(runner.size()));
+    block_squares_.resize(count);
+    block_along_.resize(frozen, count);
+  }
+  for (Index b = 0; b < count; ++b) {
+    const auto block = static_cast<std::size_t>(b);
+    if (!first && simulated[block] == simulated_[block]) continue;
+    auto segment =
+        apart_.segment(static_cast<Index>(blocks[block].offset), static_cast<Index>(blocks[block].size));
+    runner.compare(simulated, block, segment.data());
+    block_squares_[b] = segment.squaredNorm();
+    if (frozen > 0) block_along_.col(b) = frozen_->columns.along(block, apart_);
+  }
+  simulated_ = std::move(simulated);
+  apart_squares_ = block_squares_.sum();
+  if (frozen > 0) frozen_along_ = block_along_.rowwise().sum();
+}
+
 // @return false where the twin refuses or gives no numbers
 bool CampaignCost::simulate(const VectorXd& at) const {
-  if (same(simulated_at_, at)) return true;
-  const TwinRunner& runner = fitter_.runner();
+  const VectorXd own = ownOf(at);
+  if (same(simulated_at_, own)) return std::isfinite(apart_squares_);
   try {
-    simulated_ = std::move(runner.simulateBlocks({modelAt(at)}).front());
+    compare(std::move(fitter_.runner().simulateBlocks({modelAt(at)}).front()));
   } catch (const Error&) {
     return false;  // a point that the twin refuses is no better point
   }
-  apart_ = asVector(runner.joined(simulated_)) - asVector(runner.measured());
-  apart_squares_ = apart_.squaredNorm();
-  if (!std::isfinite(apart_squares_)) {
-    simulated_at_.resize(0);
-    return false;
-  }
-  if (!frozen_places_.empty()) frozen_along_ = frozen_->columns.along(apart_);
-  simulated_at_ = at;
-  return true;
+  simulated_at_ = own;
+  return std::isfinite(apart_squares_);
 }
 
-// Columns along what is not frozen. simulate() stands at the point.
-bool CampaignCost::tangentsAt(const VectorXd& at, BlockColumns* own) const {
+// Columns along what is not frozen, and their products. simulate() stands at the point.
+bool CampaignCost::takeTangents(const VectorXd& at) const {
+  const VectorXd here = ownOf(at);
+  if (same(tangents_at_, here)) return true;
+  tangents_at_.reset();
   std::vector<MachineModel> models;
   Values step;
   for (const Index c : own_places_) {
@@ -122,11 +144,16 @@ bool CampaignCost::tangentsAt(const VectorXd& at, BlockColumns* own) const {
     models.push_back(modelAt(moved));
   }
   try {
-    *own = BlockColumns(fitter_.runner(), simulated_, fitter_.runner().simulateBlocks(models), step);
+    own_columns_ = BlockColumns(fitter_.runner(), simulated_, fitter_.runner().simulateBlocks(models), step);
   } catch (const Error&) {
     return false;
   }
-  return own->allFinite();
+  if (!own_columns_.allFinite()) return false;
+  own_gram_ = own_columns_.gram();
+  own_along_ = own_columns_.along(apart_);
+  if (!frozen_places_.empty()) frozen_own_ = frozen_->columns.cross(own_columns_);
+  tangents_at_ = here;
+  return true;
 }
 
 // Of what is frozen from where its tangents were taken.
@@ -147,21 +174,20 @@ double CampaignCost::squaresAt(const VectorXd& at) const {
   return apart_squares_ + shift.dot(2.0 * frozen_along_ + frozen_->information * shift);
 }
 
-void CampaignCost::normalEquations(const VectorXd& at, const BlockColumns& own, Linear* linear) const {
+void CampaignCost::normalEquations(const VectorXd& at, Linear* linear) const {
   const auto all = static_cast<Index>(coordinates_.size());
   linear->squares = squaresAt(at);
   linear->information.setZero(all, all);
   linear->gradient.resize(all);
-  linear->gradient(own_places_) = own.along(apart_);
-  linear->information(own_places_, own_places_) = own.gram();
+  linear->gradient(own_places_) = own_along_;
+  linear->information(own_places_, own_places_) = own_gram_;
   if (frozen_places_.empty()) return;
-  const MatrixXd cross = frozen_->columns.cross(own);
   const VectorXd shift = shiftAt(at);
   linear->information(frozen_places_, frozen_places_) = frozen_->information;
-  linear->information(frozen_places_, own_places_) = cross;
-  linear->information(own_places_, frozen_places_) = cross.transpose();
+  linear->information(frozen_places_, own_places_) = frozen_own_;
+  linear->information(own_places_, frozen_places_) = frozen_own_.transpose();
   linear->gradient(frozen_places_) = frozen_along_ + frozen_->information * shift;
-  linear->gradient(own_places_) += cross.transpose() * shift;
+  linear->gradient(own_places_) += frozen_own_.transpose() * shift;
 }
 
 VectorXd CampaignCost::residual(const VectorXd& at) const {
@@ -178,10 +204,12 @@ VectorXd CampaignCost::influence(const VectorXd& amplitudes) const {
 }
 
 const CampaignCost::Linear* CampaignCost::linearise(const VectorXd& at) const {
+  // Where a step was refused the twin stands elsewhere: residual() and influence() are of this point.
+  if (!simulate(at)) return nullptr;
   if (same(linearised_at_, at)) return &linear_;
-  linearised_at_.resize(0);
-  if (!simulate(at) || !tangentsAt(at, &own_columns_)) return nullptr;
-  normalEquations(at, own_columns_, &linear_);
+  linearised_at_.reset();
+  if (!takeTangents(at)) return nullptr;
+  normalEquations(at, &linear_);
   linearised_at_ = at;
   return &linear_;
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -53,12 +54,14 @@ class CampaignCost : public fit::Residuals {
 
  private:
   void addTurns();
+  Eigen::VectorXd ownOf(const Eigen::VectorXd& at) const;
   MachineModel modelAt(const Eigen::VectorXd& at) const;
   bool simulate(const Eigen::VectorXd& at) const;
-  bool tangentsAt(const Eigen::VectorXd& at, BlockColumns* own) const;
+  void compare(SimulatedBlocks simulated) const;
+  bool takeTangents(const Eigen::VectorXd& at) const;
   Eigen::VectorXd shiftAt(const Eigen::VectorXd& at) const;
   double squaresAt(const Eigen::VectorXd& at) const;
-  void normalEquations(const Eigen::VectorXd& at, const BlockColumns& own, Linear* linear) const;
+  void normalEquations(const Eigen::VectorXd& at, Linear* linear) const;
 
   const Fitter& fitter_;
   FitState start_;
@@ -67,13 +70,18 @@ class CampaignCost : public fit::Residuals {
   std::size_t nominal_ = 0, turns_ = 0;
   std::vector<Coordinate> coordinates_;                   // nominal ones, members', turns
   std::vector<Eigen::Index> frozen_places_, own_places_;  // of the coordinates
-  // The solver comes back to the points where it is.
-  mutable Eigen::VectorXd simulated_at_, linearised_at_;
+  // The solver comes back to the points where it is, and what is frozen moves without a simulation: own
+  // values where the twin has run, where own tangents were taken; all values of the normal equations.
+  mutable std::optional<Eigen::VectorXd> simulated_at_, tangents_at_, linearised_at_;
   mutable SimulatedBlocks simulated_;
   mutable Eigen::VectorXd apart_;  // (simulated - measured) / noise, of frozen nominal values where they are
+  mutable Eigen::VectorXd block_squares_;  // of apart
+  mutable Eigen::MatrixXd block_along_;    // frozen tangents' * apart, a column each block
   mutable double apart_squares_ = 0.0;
-  mutable Eigen::VectorXd frozen_along_;  // frozen tangents' * apart
-  mutable BlockColumns own_columns_;      // tangents of what is not frozen
+  mutable Eigen::VectorXd frozen_along_;           // frozen tangents' * apart
+  mutable BlockColumns own_columns_;               // tangents of what is not frozen
+  mutable Eigen::MatrixXd own_gram_, frozen_own_;  // own' * own, frozen' * own
+  mutable Eigen::VectorXd own_along_;              // own' * apart
   mutable Linear linear_;
 };
 

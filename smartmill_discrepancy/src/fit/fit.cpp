@@ -21,11 +21,27 @@ using Values = std::vector<double>;
 using Eigen::Index;
 using Eigen::MatrixXd;
 
+// Squares, priors included, that an undamped step at a point promises to take away.
+double promisedAt(const CampaignCost& cost, const Eigen::VectorXd& at) {
+  const CampaignCost::Linear* point = cost.linearise(at);
+  if (!point) return 0.0;
+  MatrixXd information = point->information;
+  Eigen::VectorXd gradient = point->gradient;
+  for (Index c = 0; c < at.size(); ++c) {
+    const auto coordinate = static_cast<std::size_t>(c);
+    information(c, c) += cost.precision(coordinate);
+    gradient[c] += cost.precision(coordinate) * (at[c] - cost.coordinates()[coordinate].null);
+  }
+  return gradient.dot(linear::solveSymmetric(information, gradient));
+}
+
 // Damped steps first, which cross what is curved; then undamped ones: an effect beside the nominal value that
 // it resembles leaves a narrow valley, in which damping would creep.
 // @return no value: the twin gives no numbers at the start
 std::optional<Eigen::VectorXd> solve(const CampaignCost& cost, const FitOptions& options, double samples,
                                      const std::function<bool()>& cancelled) {
+  constexpr double HOPE = 10.0;  // times what a step gains or promises, that later ones may bring
+  constexpr int PATIENCE = 3;
   fit::Options solver;
   solver.name = "fit of a campaign";
   solver.iterations = options.iterations;
@@ -33,8 +49,15 @@ std::optional<Eigen::VectorXd> solve(const CampaignCost& cost, const FitOptions&
   solver.parameter_tolerance = 1e-7;
   solver.dear_derivatives = true;
   solver.finish_at_bounds = false;  // simulations are dear, and the next round comes back
-  solver.progress = [&](const fit::Progress&) { return !cancelled || !cancelled(); };
+  double before = std::numeric_limits<double>::infinity();
+  solver.progress = [&](const fit::Progress& now) {
+    const bool hopeless =
+        now.iteration >= PATIENCE && now.squares - options.to_beat > HOPE * (before - now.squares);
+    before = now.squares;
+    return !hopeless && !(cancelled && cancelled());
+  };
   std::vector<fit::Parameter> parameters = cost.parameters();
+  Eigen::VectorXd at(static_cast<Index>(parameters.size()));
   for (const double radius : {1e4, 1e10}) {
     solver.trust_radius = radius;
     fit::Result result;
@@ -44,14 +67,15 @@ std::optional<Eigen::VectorXd> solve(const CampaignCost& cost, const FitOptions&
       return {};
     }
     if (!result.usable()) return {};
-    for (std::size_t c = 0; c < parameters.size(); ++c)
-      parameters[c].start = result.value[static_cast<Index>(c)];
+    at = result.value;
+    for (std::size_t c = 0; c < parameters.size(); ++c) parameters[c].start = at[static_cast<Index>(c)];
     // A step that gains less than the tolerance is not taken: near the noise only the excess over it counts.
-    const double excess = std::max(result.squares - samples, 20.0);
-    solver.function_tolerance = options.tolerance * std::min(excess / result.squares, 1.0);
+    const double least =
+        options.tolerance * std::min(std::max(result.squares - samples, 20.0), result.squares);
+    solver.function_tolerance = least / result.squares;
+    const double promised = options.iterations > 0 ? promisedAt(cost, at) : 0.0;
+    if (promised < least || result.squares - HOPE * promised > options.to_beat) break;
   }
-  Eigen::VectorXd at(static_cast<Index>(parameters.size()));
-  for (std::size_t c = 0; c < parameters.size(); ++c) at[static_cast<Index>(c)] = parameters[c].start;
   return at;
 }
 

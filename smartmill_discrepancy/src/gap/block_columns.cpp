@@ -86,11 +86,16 @@ MatrixXd BlockColumns::cross(const BlockColumns& other) const {
 
 VectorXd BlockColumns::along(const Eigen::Ref<const VectorXd>& vector) const {
   VectorXd sum = VectorXd::Zero(cols_);
-  for (const Part& p : parts_) {
-    const auto segment = vector.segment(p.offset, p.size);
-    for (std::size_t k = 0; k < p.columns.size(); ++k)
-      sum[p.columns[k]] += p.values.col(static_cast<Index>(k)).dot(segment);
-  }
+  for (std::size_t b = 0; b < parts_.size(); ++b) sum += along(b, vector);
+  return sum;
+}
+
+VectorXd BlockColumns::along(std::size_t block, const Eigen::Ref<const VectorXd>& vector) const {
+  VectorXd sum = VectorXd::Zero(cols_);
+  const Part& p = parts_[block];
+  const auto segment = vector.segment(p.offset, p.size);
+  for (std::size_t k = 0; k < p.columns.size(); ++k)
+    sum[p.columns[k]] = p.values.col(static_cast<Index>(k)).dot(segment);
   return sum;
 }
 

@@ -9,12 +9,13 @@
 #include <utility>
 
 #include "smartmill_sim/effects/effect.h"
+#include "smartmill_sim/twin/guide.h"
 #include "smartmill_sim/twin/twin.h"
 
 namespace smartmill::discrepancy {
 namespace {
 
-constexpr std::size_t KEPT_RESULTS = 4;  // of each test
+constexpr std::size_t KEPT_RESULTS = 4;  // of each channel of a test
 
 // Traces of a test that are held: that of a state must outlast those of the tangents of its cutting
 // coefficients. Fine steps are for few models.
@@ -72,6 +73,7 @@ TwinRunner::TwinRunner(const Dataset& data, std::vector<std::size_t> tests, int 
     for (const std::string& name : test.record.names) {
       if (name != "spindle_angle") kept.record.add(name) = test.record.column(name);
     }
+    kept.shown.resize(test.channels.size() + test.slow.size());
     first_block_.push_back(blocks_.size());
     for (const std::string& channel : test.channels) {
       const double noise = data_.noise.at(channel);
@@ -90,6 +92,11 @@ TwinRunner::TwinRunner(const Dataset& data, std::vector<std::size_t> tests, int 
   readPhases();
 }
 
+void TwinRunner::Kept::forget() {
+  for (Shown& of_channel : shown) of_channel.clear();
+  traces->clear();
+}
+
 void TwinRunner::readPhases() {
   for (std::size_t k = 0; k < tests_.size(); ++k) {
     const TestData& test = data_.tests[tests_[k]];
@@ -101,9 +108,7 @@ void TwinRunner::readPhases() {
     kept.phase = phase;
     kept.early_entry = test.early_entry;
     kept.test = test.test;
-    if (same) continue;
-    kept.results.clear();
-    kept.traces->clear();
+    if (!same) kept.forget();
   }
 }
 
@@ -113,8 +118,7 @@ void TwinRunner::setGuided(bool guided) {
   correction_.clear();
   for (Kept& kept : kept_) {
     const std::lock_guard<std::mutex> lock(kept.mutex);
-    kept.results.clear();
-    kept.traces->clear();
+    kept.forget();
   }
 }
 
@@ -122,34 +126,48 @@ void TwinRunner::setSubsteps(int substeps) {
   substeps_ = substeps;
   for (Kept& kept : kept_) {
     const std::lock_guard<std::mutex> lock(kept.mutex);
-    kept.results.clear();
+    kept.forget();
     kept.traces = std::make_unique<sim::CutTraces>(tracesFor(substeps));
   }
 }
 
+// Empty where a channel was not asked for.
 SimulatedBlocks TwinRunner::blocksOf(const MachineModel& model, std::size_t chosen, const CampaignTest& test,
                                      const sim::SimulationOptions& options) const {
   const Record record = sim::simulateTest(model, test, kept_[chosen].record, options);
   ++simulations_;
   SimulatedBlocks result;
   for (std::size_t b = first_block_[chosen]; b < first_block_[chosen + 1]; ++b) {
+    result.emplace_back();
+    if (!record.has(blocks_[b].channel)) continue;
     std::vector<double> values = record.column(blocks_[b].channel);
     if (blocks_[b].slow) values = readAt(*blocks_[b].slow, values, test.sample_rate);
     for (double& v : values) v /= blocks_[b].noise;
-    result.push_back(std::make_shared<const std::vector<double>>(std::move(values)));
+    result.back() = std::make_shared<const std::vector<double>>(std::move(values));
   }
   return result;
 }
 
 SimulatedBlocks TwinRunner::simulateOne(const MachineModel& model, std::size_t chosen) const {
   Kept& kept = kept_[chosen];
-  std::vector<double> key = sim::valuesOfRecord(model, kept.test.kind);
-  {
+  const std::size_t first = first_block_[chosen], count = first_block_[chosen + 1] - first;
+  // Channels that are not apart are as much as the record; forces that guide the tool lead from one to the
+  // next.
+  const bool apart = sim::channelsApart(model) && !(guided_ && sim::Guide::byForce(kept.record));
+  SimulatedBlocks result(count);
+  std::vector<std::vector<double>> keys;
+  std::vector<std::string> missing;
+  for (std::size_t c = 0; c < count; ++c) {
+    const std::string& channel = blocks_[first + c].channel;
+    keys.push_back(apart ? sim::valuesOfChannel(model, kept.test.kind, sim::channelOf(channel))
+                         : sim::valuesOfRecord(model, kept.test.kind));
     const std::lock_guard<std::mutex> lock(kept.mutex);
-    for (const auto& [values, result] : kept.results) {
-      if (values == key) return result;
+    for (const auto& [values, shown] : kept.shown[c]) {
+      if (values == keys[c]) result[c] = shown;
     }
+    if (!result[c]) missing.push_back(channel);
   }
+  if (missing.empty()) return result;
   sim::SimulationOptions options;
   options.noise = false;
   options.substeps = substeps_;
@@ -157,10 +175,15 @@ SimulatedBlocks TwinRunner::simulateOne(const MachineModel& model, std::size_t c
   options.phase = kept.phase;
   options.early_entry = kept.early_entry;
   options.traces = kept.traces.get();
-  SimulatedBlocks result = blocksOf(model, chosen, kept.test, options);
+  if (apart) options.channels = &missing;
+  const SimulatedBlocks fresh = blocksOf(model, chosen, kept.test, options);
   const std::lock_guard<std::mutex> lock(kept.mutex);
-  kept.results.emplace_front(std::move(key), result);
-  if (kept.results.size() > KEPT_RESULTS) kept.results.pop_back();
+  for (std::size_t c = 0; c < count; ++c) {
+    if (result[c]) continue;
+    result[c] = fresh[c];
+    kept.shown[c].emplace_front(std::move(keys[c]), fresh[c]);
+    if (kept.shown[c].size() > KEPT_RESULTS) kept.shown[c].pop_back();
+  }
   return result;
 }
 
@@ -197,6 +220,13 @@ std::vector<double> TwinRunner::joined(const SimulatedBlocks& blocks) const {
   for (const auto& block : blocks) all.insert(all.end(), block->begin(), block->end());
   for (std::size_t i = 0; i < correction_.size(); ++i) all[i] += correction_[i];
   return all;
+}
+
+void TwinRunner::compare(const SimulatedBlocks& simulated, std::size_t block, double* apart) const {
+  const Block& b = blocks_[block];
+  const std::vector<double>& values = *simulated[block];
+  for (std::size_t i = 0; i < b.size; ++i) apart[i] = values[i] - measured_[b.offset + i];
+  for (std::size_t i = 0; i < b.size && !correction_.empty(); ++i) apart[i] += correction_[b.offset + i];
 }
 
 std::vector<std::vector<double>> TwinRunner::simulate(const std::vector<MachineModel>& models) const {

@@ -44,12 +44,14 @@ class Projection {
 
   const SimulatedBlocks& base() const { return base_; }
 
-  // Chi2 that these columns take away, with the amplitudes that do it.
-  double gain(const BlockColumns& columns, Eigen::VectorXd* amplitudes) const {
+  // Chi2 that these columns take away, with the amplitudes that do it. @param apart receives the share of
+  // them that nothing else can stand for
+  double gain(const BlockColumns& columns, Eigen::VectorXd* amplitudes, double* apart) const {
     const Eigen::MatrixXd cross = crossWith(columns);
     const Eigen::MatrixXd solved = linear::solveSymmetric(information_, cross);
     Eigen::MatrixXd own = columns.gram() - cross.transpose() * solved;
     const Eigen::VectorXd raw = columns.squares();
+    *apart = own.trace() / raw.sum();
     for (Index k = 0; k < own.rows(); ++k) own(k, k) += 1e-9 * raw[k] + 1e-30;
     const Eigen::VectorXd score = columns.along(residual_) - cross.transpose() * solved_residual_;
     *amplitudes = linear::solveSymmetric(own, score);
@@ -302,6 +304,7 @@ std::vector<Promise> screen(const Fitter& fitter, const Fit& now, const NominalT
   Seeker seeker(projection, fitter.runner(), model, now);
   std::vector<Promise> promises;
   for (const Hypothesis& h : tried) {
+    if (fitter.cancelled()) break;
     if (isMember(now.state, h.effect, h.variant) ||
         (!h.after.empty() && !isMember(now.state, h.effect, h.after)))
       continue;
@@ -311,11 +314,13 @@ std::vector<Promise> screen(const Fitter& fitter, const Fit& now, const NominalT
       const BlockColumns columns = columnsOf(fitter, now.state, h, probe, projection.base());
       if (!columns.allFinite() || columns.squares().sum() == 0.0) continue;
       Eigen::VectorXd amplitudes;
-      const double gain = projection.gain(columns, &amplitudes);
+      double apart = 1.0;
+      const double gain = projection.gain(columns, &amplitudes, &apart);
       if (gain <= best.gain) continue;
       std::vector<double> start = startOf(h, probe, amplitudes);
       if (start == probe.null) continue;  // the data ask for what cannot be
       best.gain = gain;
+      best.apart = apart;
       best.start = std::move(start);
       best.null = probe.from_points ? std::vector<double>{} : probe.null;
     }

@@ -25,6 +25,11 @@ std::string describe(const Member& m) {
   return line;
 }
 
+bool isMember(const FitState& state, const std::string& effect) {
+  return std::any_of(state.members.begin(), state.members.end(),
+                     [&](const Member& m) { return m.hypothesis->effect == effect; });
+}
+
 using Pieces = std::map<std::string, std::vector<double>>;  // values by the name of a piece
 
 // The form of an effect that is put together of just these pieces, with their values.
@@ -82,7 +87,10 @@ class Search {
   Search(Workbench& bench, const std::vector<Hypothesis>& hypotheses, const SearchOptions& options)
       : bench_(bench), quick_(bench.quick()), hypotheses_(hypotheses), options_(options) {}
 
-  SearchResult run();
+  /// Rounds until nothing more is found.
+  void look();
+  /// @param brief that has looked at less of the same records; nullptr: none
+  SearchResult run(const Search* brief);
 
  private:
   // A round's fits, one effect more than before.
@@ -91,15 +99,20 @@ class Search {
     Fit best;
     double best_promise = 0.0;
     double least = 0.0;     // gain of BIC that an effect must bring
+    std::size_t hints = 0;  // fitted on a hint
     bool strained = false;  // next to nothing is left but nominal values far off
     std::vector<Rung> rungs;
   };
 
   void fitNominal();
+  void beginFrom(const Search& brief);
+  void tellCourse() const;
+  void rounds();
   void keepStatedWhereBetter();
-  void fitNominalHere();
+  void fitNominalHere(const std::vector<double>& from);
   bool addEffect(std::size_t number);
   Round fitPromises(std::size_t number);
+  bool isHint(const Round& round, const Promise& promise) const;
   bool worthFitting(const Round& round, const Promise& promise, double largest) const;
   void fitPromise(const Promise& promise, Round& round);
   bool isBetter(const Round& round) const;
@@ -112,7 +125,8 @@ class Search {
   void finish();
   bool takeBetterRivals();
 
-  NominalTangents linearise(const FitState& where);
+  FitState near(const FitState& where) const;
+  NominalTangents linearise(const FitState& where) { return bench_.linearise(near(where)); }
   Fit refit(const Fit& from, const FitOptions& options) const;
   Fit withPhasesTurned(Fit fit);
   // Squares above the noise.
@@ -129,14 +143,18 @@ class Search {
   Fit now_;
   double exact_now_ = 0.0;  // squares that the exact twin leaves
   std::vector<const Hypothesis*> refused_;
-  std::size_t repeated_ = 0;  // rounds that did not count
-  std::size_t in_vain_ = 0;   // of them one after the other
+  std::vector<Promise> promises_;  // of the last round
+  bool stepped_back_ = false;      // to where they were made
+  std::size_t repeated_ = 0;       // rounds that did not count
+  std::size_t in_vain_ = 0;        // of them one after the other
+  std::size_t rounds_ = 0;
+  bool all_ = false;  // of the records are looked at
   SearchResult result_;
 };
 
 // What is missing pulls the nominal values far away, but they belong near to what is stated: there the
 // tangents are taken.
-NominalTangents Search::linearise(const FitState& where) {
+FitState Search::near(const FitState& where) const {
   constexpr double NEAR = 2.5;  // standard deviations
   FitState at = where;
   const std::vector<Coordinate>& free = bench_.freedom().coordinates();
@@ -144,7 +162,7 @@ NominalTangents Search::linearise(const FitState& where) {
     const double reach = NEAR * free[c].prior_std;
     at.nominal[c] = std::clamp(at.nominal[c], free[c].null - reach, free[c].null + reach);
   }
-  return bench_.linearise(at);
+  return at;
 }
 
 // Where the twin gives no numbers the fit stays what it was.
@@ -165,16 +183,19 @@ Fit Search::withPhasesTurned(Fit fit) {
   return fit;
 }
 
-void Search::fitNominalHere() {
+void Search::fitNominalHere(const std::vector<double>& from) {
+  constexpr int FRESH = 2;
   now_ = Fit{};
-  now_.state.nominal.assign(bench_.freedom().coordinates().size(), 0.0);
+  now_.state.nominal = from;
   // Nominal values that are off far: tangents are taken anew where the fit went. Where records lie is told
   // from what the nominal values do to their last noise.
   const int passes = bench_.phasesEstimated() ? 8 : 3;
   const double share =
       bench_.phasesEstimated() ? 1e-6 : 1e-3;  // of the cost, by which the last pass may gain
   for (int pass = 0; pass < passes; ++pass) {
-    tangents_ = linearise(now_.state);
+    // Where the first passes went the tangents are much alike.
+    tangents_ =
+        pass < FRESH ? linearise(now_.state) : bench_.lineariseBy(std::move(tangents_), near(now_.state));
     Fit fit = quick_.fit(now_.state, &tangents_, {8, 1e-5, true});
     if (!fit.converged && pass == 0)
       throw Error(bench_.data().campaign.folder + ": the twin gives no numbers for the nominal model");
@@ -205,11 +226,12 @@ void Search::keepStatedWhereBetter() {
 }
 
 void Search::fitNominal() {
-  fitNominalHere();
+  const std::vector<double> stated(bench_.freedom().coordinates().size(), 0.0);
+  fitNominalHere(stated);
   if (!bench_.canGuide() || excess(now_) < 0.02 * bench_.samples() || bench_.cancelled()) return;
   const Fit free = now_;
   bench_.guide(true);
-  fitNominalHere();
+  fitNominalHere(stated);
   if (now_.chi2 < free.chi2) {
     options_.say("  guided by the displacement of the tool");
     return;
@@ -220,11 +242,23 @@ void Search::fitNominal() {
   exact_now_ = bench_.exactSquares(now_.state);
 }
 
+// Where nothing that promises outright takes much, what promises nearly enough may be more than tangents say,
+// unless nominal values stand for it.
+bool Search::isHint(const Round& round, const Promise& promise) const {
+  constexpr double APART = 0.02, HINT = 0.25;
+  constexpr double MOST = 0.9;  // of the excess is left by what promised outright
+  return all_ && excess(round.best) > MOST * excess(now_) && promise.gain < round.least &&
+         promise.gain > HINT * round.least && promise.apart > APART;
+}
+
 bool Search::worthFitting(const Round& round, const Promise& promise, double largest) const {
+  constexpr std::size_t MOST_HINTS = 2;
   const std::size_t fitted = round.rungs.size();
-  if (promise.gain < round.least && !(round.strained && promise.gain > 4.0 * options_.least_prior_gain))
+  const bool hint = isHint(round, promise);
+  if (promise.gain < round.least && !hint &&
+      !(round.strained && promise.gain > 4.0 * options_.least_prior_gain))
     return false;
-  if (fitted >= options_.fitted_per_round) return false;
+  if (hint ? round.hints >= MOST_HINTS : fitted - round.hints >= options_.fitted_per_round) return false;
   if (fitted >= 2 && promise.gain < 0.02 * largest) return false;
   // One that leaves next to nothing can be bettered only by one that promises about as much.
   return !(excess(round.best) < 0.02 * excess(now_) && promise.gain < 0.5 * round.best_promise);
@@ -236,7 +270,9 @@ void Search::fitPromise(const Promise& promise, Round& round) {
   const auto begin = std::chrono::steady_clock::now();
   const std::size_t simulations = quick_.runner().simulations();
   const NominalTangents turns = tangents_.ofTurns();
-  const Fit tried = quick_.fit(with, round.strained ? &turns : &tangents_, {6, 1e-3, true});
+  FitOptions options{6, 1e-3, true};
+  options.to_beat = round.best.chi2 + round.best.penalty;
+  const Fit tried = quick_.fit(with, round.strained ? &turns : &tangents_, options);
   const Member& newest = tried.state.members.back();
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   round.rungs.push_back({{round.number, promise.hypothesis->effect, promise.hypothesis->variant, promise.gain,
@@ -252,7 +288,8 @@ void Search::fitPromise(const Promise& promise, Round& round) {
 }
 
 Search::Round Search::fitPromises(std::size_t number) {
-  const std::vector<Promise> promises = screen(quick_, now_, tangents_, hypotheses_);
+  if (!stepped_back_) promises_ = screen(quick_, now_, tangents_, hypotheses_);
+  stepped_back_ = false;
   Round round;
   round.number = number;
   round.best = now_;
@@ -261,9 +298,11 @@ Search::Round Search::fitPromises(std::size_t number) {
   // With next to nothing left but nominal values far off, an effect may do what they do; only all values
   // moved together go along that valley.
   round.strained = excess(now_) < 0.01 * bench_.samples() && now_.penalty > 4.0 * options_.least_prior_gain;
-  for (const Promise& p : promises) {
+  for (const Promise& p : promises_) {
     if (std::find(refused_.begin(), refused_.end(), p.hypothesis) != refused_.end()) continue;
-    if (!worthFitting(round, p, promises.front().gain) || bench_.cancelled()) break;
+    if (bench_.cancelled()) break;
+    if (!worthFitting(round, p, promises_.front().gain)) continue;
+    if (isHint(round, p)) ++round.hints;
     fitPromise(p, round);
   }
   return round;
@@ -329,6 +368,7 @@ void Search::refuse(const Fit& before, const Hypothesis* newest) {
   ++in_vain_;
   refused_.push_back(newest);
   stepBack(before);
+  stepped_back_ = true;
 }
 
 // @return false: nothing more is to be added
@@ -346,7 +386,8 @@ bool Search::addEffect(std::size_t number) {
   const double exact_squares = bench_.exactSquares(now_.state);
   if (!(exact_squares < exact_now_)) {
     options_.say(gapText(exact_squares) + " when simulated exactly, not taken: " + newest->title());
-    if (bench_.refineQuick()) {
+    // What was not needed beside the others is not for want of small steps.
+    if (isMember(now_.state, newest->effect) && bench_.refineQuick()) {
       options_.say("  again with smaller steps");
       stepBack(before);
     } else {
@@ -387,7 +428,7 @@ void Search::finish() {
 // @return false: the twin gives no numbers there
 bool Search::takeBetterRivals() {
   constexpr int SWAPS = 3;
-  for (int swap = 0; swap < SWAPS; ++swap) {
+  for (int swap = 0; swap < SWAPS && !bench_.cancelled(); ++swap) {
     const auto ahead = [&](const Rival& r) { return r.delta_bic - result_.contribution[r.member]; };
     const auto best = std::max_element(result_.rivals.begin(), result_.rivals.end(),
                                        [&](const Rival& a, const Rival& b) { return ahead(a) < ahead(b); });
@@ -411,11 +452,59 @@ void Search::letGo() {
   if (free < FOLLOWS * guided) bench_.guide(false);
 }
 
-SearchResult Search::run() {
-  fitNominal();
-  for (std::size_t round = 0; round < options_.most_effects + repeated_ && !bench_.cancelled(); ++round) {
-    if (!addEffect(round)) break;
+// In units of what a fit of the nominal values takes, as seen on many campaigns.
+void Search::tellCourse() const {
+  constexpr double ROUND = 2.0, LAST_ROUND = 1.0, WHOLE = 2.0, AFTER = 4.0;
+  const double done = 1.0 + ROUND * static_cast<double>(rounds_) + (all_ ? WHOLE : 0.0);
+  const double left = AFTER + LAST_ROUND + (all_ ? 0.0 : WHOLE);
+  options_.tell(done / (done + left));
+}
+
+void Search::rounds() {
+  tellCourse();
+  while (rounds_ < options_.most_effects + repeated_ && !bench_.cancelled()) {
+    if (!addEffect(rounds_++)) break;
+    tellCourse();
   }
+}
+
+// All of the records take up what the beginnings of them said.
+void Search::beginFrom(const Search& brief) {
+  options_.say("with whole records");
+  bench_.guide(brief.bench_.guided());
+  fitNominalHere(brief.result_.null.state.nominal);
+  result_.ladder = brief.result_.ladder;
+  result_.refused = brief.result_.refused;
+  refused_ = brief.refused_;
+  rounds_ = brief.rounds_;
+  repeated_ = brief.repeated_ + 1;  // a round to see that nothing more is there
+  if (brief.now_.state.members.empty()) return;
+  const Fit null = now_;
+  Fit begin = null;
+  begin.state = brief.now_.state;
+  settle(begin);
+  const double exact_squares = bench_.exactSquares(now_.state);
+  if (exact_squares < exact_now_) {
+    exact_now_ = exact_squares;
+    return;
+  }
+  now_ = null;
+  tangents_ = linearise(now_.state);
+}
+
+void Search::look() {
+  fitNominal();
+  rounds();
+}
+
+SearchResult Search::run(const Search* brief) {
+  all_ = true;
+  if (brief) {
+    beginFrom(*brief);
+  } else {
+    fitNominal();
+  }
+  rounds();
   if (bench_.guided()) letGo();
   finish();
   return std::move(result_);
@@ -432,7 +521,14 @@ void SearchResult::tellSwapped(const Hypothesis& old, const Hypothesis& better) 
 
 SearchResult search(Workbench& bench, const std::vector<Hypothesis>& hypotheses,
                     const SearchOptions& options) {
-  return Search(bench, hypotheses, options).run();
+  const MachineModel& nominal = bench.data().nominal;
+  const bool vibrates = !nominal.tool_tip.x.modes.empty() || !nominal.tool_tip.y.modes.empty();
+  const std::optional<Dataset> part = vibrates ? briefOf(bench.data()) : std::nullopt;
+  if (!part) return Search(bench, hypotheses, options).run(nullptr);
+  Workbench brief_bench(*part, bench.options());
+  Search brief(brief_bench, hypotheses, options);
+  brief.look();
+  return Search(bench, hypotheses, options).run(&brief);
 }
 
 }  // namespace smartmill::discrepancy

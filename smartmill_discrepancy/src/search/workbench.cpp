@@ -66,11 +66,11 @@ double turnOnce(const TwinRunner& runner, const MachineModel& model, Dataset* da
 }  // namespace
 
 Workbench::Workbench(const Dataset& data, const WorkbenchOptions& options)
-    : data_(data),
+    : options_(options),
+      data_(data),
       freedom_(data.nominal),
       phases_estimated_(std::any_of(data.tests.begin(), data.tests.end(),
                                     [](const TestData& t) { return t.phase_estimated; })),
-      cancelled_(options.cancelled),
       can_guide_(std::any_of(data.tests.begin(), data.tests.end(),
                              [&](const TestData& t) { return guides(t, data.nominal); })),
       quick_runner_(data_, testsOf(data_, false), options.threads, options.screening_substeps),
@@ -100,14 +100,26 @@ void Workbench::turnFitted(const FitState& state) {
   guided_runner_.readPhases();
 }
 
-NominalTangents Workbench::linearise(const FitState& state, double* exact_squares) {
+void Workbench::correctAt(const FitState& state, double* exact_squares) {
   const MachineModel model = quick_.model(state);
   turnFitted(state);
   quick_runner_.readPhases();
   const std::vector<double> simulated = fitted().simulate(model);
   if (exact_squares) *exact_squares = squaresLeft(fitted(), simulated);
   quick_runner_.correctTo(model, simulated);
+}
+
+NominalTangents Workbench::linearise(const FitState& state, double* exact_squares) {
+  correctAt(state, exact_squares);
   return quick_.nominalTangents(state);
+}
+
+NominalTangents Workbench::lineariseBy(NominalTangents tangents, const FitState& state) {
+  correctAt(state, nullptr);
+  tangents.at = state.nominal;
+  tangents.turns = state.turns;
+  tangents.turns.resize(quick_.turns().size(), 0.0);
+  return tangents;
 }
 
 double Workbench::exactSquares(const FitState& state) {

@@ -70,5 +70,41 @@ TEST(Fitter, priorWeightIsThatOfItsSquares) {
   EXPECT_NEAR(a.bic, b.bic, 1e-3 * b.bic);
 }
 
+// What a fit says of itself holds where it stands, also after a step that was refused.
+TEST(Fitter, whatIsLeftIsThatOfItsState) {
+  std::mt19937_64 random(11);
+  const MachineModel nominal = spindleOnly();
+  MachineModel machine = nominal;
+  machine.effects.push_back(stribeckFriction(0.4, 2500.0));
+  const Dataset data = airCuts(machine, nominal, random);
+  const std::vector<Hypothesis> hypotheses = catalogueHypotheses(data, nullptr);
+  const TwinRunner runner(data, {0, 1, 2, 3, 4, 5}, 1, 1);
+  const NominalFreedom freedom(nominal);
+  const Fitter fitter(runner, freedom);
+  const FitState at_nominal{std::vector<double>(freedom.coordinates().size(), 0.0), {}, {}};
+  const NominalTangents tangents = fitter.nominalTangents(at_nominal);
+  for (const Hypothesis& h : hypotheses) {
+    if (h.effect != "stribeck_friction" && h.effect != "load_meter_lag") continue;
+    for (const int iterations : {1, 2, 3, 5, 8}) {
+      FitState start = at_nominal;
+      start.members.push_back({&h, h.probes.front().points.front()});
+      const Fit fit = fitter.fit(start, nullptr, {iterations, 1e-9, true});
+      const double left = squaresLeft(runner, runner.simulate(fitter.model(fit.state)));
+      EXPECT_NEAR(fit.chi2, left, 1e-9 * left) << h.title() << " after " << iterations;
+      // Along frozen tangents only what they are taken from is simulated.
+      const Fit along = fitter.fit(start, &tangents, {iterations, 1e-9, true});
+      FitState shown = along.state;
+      shown.nominal = at_nominal.nominal;
+      Eigen::VectorXd there = Eigen::Map<const Eigen::VectorXd>(runner.measured().data(), runner.size());
+      const std::vector<double> simulated = runner.simulate(fitter.model(shown));
+      there -= Eigen::Map<const Eigen::VectorXd>(simulated.data(), there.size());
+      const Eigen::VectorXd shift = -Eigen::Map<const Eigen::VectorXd>(
+          along.state.nominal.data(), static_cast<Eigen::Index>(along.state.nominal.size()));
+      tangents.columns.addTo(shift, &there);
+      EXPECT_NEAR(along.chi2, there.squaredNorm(), 1e-6 * along.chi2) << h.title() << " after " << iterations;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace smartmill::discrepancy

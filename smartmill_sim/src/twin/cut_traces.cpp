@@ -1,5 +1,6 @@
 #include "smartmill_sim/twin/cut_traces.h"
 
+#include <algorithm>
 #include <functional>
 #include <string>
 
@@ -44,26 +45,47 @@ void appendCutting(Values& values, const MachineModel& model) {
     values.insert(values.end(), {c->ktc, c->krc, c->kac, c->kte, c->kre, c->kae});
 }
 
-bool ofTheTool(Stage stage) {
-  return stage == Stage::geometry || stage == Stage::motion || stage == Stage::cutting_law ||
-         stage == Stage::structure;
+void appendSpindle(Values& values, const MachineModel& model) {
+  if (const auto& s = model.spindle)
+    values.insert(values.end(), {s->viscous, s->coulomb, s->load_meter_gain, s->load_meter_bandwidth,
+                                 s->load_meter_resolution, s->friction_zero_below});
 }
 
-}  // namespace
-
-Values valuesOfRecord(const MachineModel& model, TestKind kind) {
-  Values values;
+void appendCut(Values& values, const MachineModel& model, TestKind kind) {
   if (kind == TestKind::cut) {
     appendTool(values, model);
     appendCutting(values, model);
   }
   append(values, model.tool_tip.x);
   append(values, model.tool_tip.y);
+}
+
+bool ofTheTool(Stage stage) {
+  return stage == Stage::geometry || stage == Stage::motion || stage == Stage::cutting_law ||
+         stage == Stage::structure;
+}
+
+// Whether an effect may act on a channel, of effects that leave the channels apart.
+bool actsOn(const EffectEntry& effect, Stage stage, std::size_t channel) {
+  const auto says = [&](const char* key, const std::string& word) {
+    const auto found = effect.words.find(key);
+    return found == effect.words.end() || found->second == word;
+  };
+  const bool force = channel <= FZ;
+  if (ofTheTool(stage)) return true;
+  if (stage == Stage::drive) return channel == LOAD_METER;
+  if (stage == Stage::sensor || stage == Stage::sensor_force)
+    return force && says("axis", std::string(1, "xyz"[channel]));
+  return says("channel", channelName(channel));
+}
+
+}  // namespace
+
+Values valuesOfRecord(const MachineModel& model, TestKind kind) {
+  Values values;
+  appendCut(values, model, kind);
   for (const ModalModel& a : model.force_sensor.axis) append(values, a);
-  if (const auto& s = model.spindle; s && kind != TestKind::tap) {
-    values.insert(values.end(), {s->viscous, s->coulomb, s->load_meter_gain, s->load_meter_bandwidth,
-                                 s->load_meter_resolution, s->friction_zero_below});
-  }
+  if (kind != TestKind::tap) appendSpindle(values, model);
   for (const EffectEntry& effect : model.effects) {
     const EffectKind* known = findEffect(effect.name);
     if (!known || touches(known->stage, kind)) append(values, effect);
@@ -71,21 +93,45 @@ Values valuesOfRecord(const MachineModel& model, TestKind kind) {
   return values;
 }
 
-Values valuesOfTrace(const MachineModel& model, TestKind kind) {
+bool channelsApart(const MachineModel& model) {
+  return std::none_of(model.effects.begin(), model.effects.end(), [](const EffectEntry& effect) {
+    const EffectKind* known = findEffect(effect.name);
+    if (!known) return true;
+    const bool shown =
+        known->stage == Stage::sensor_output || known->stage == Stage::delay || known->stage == Stage::signal;
+    return shown && effect.words.count("channel") == 0;
+  });
+}
+
+Values valuesOfChannel(const MachineModel& model, TestKind kind, std::size_t channel) {
+  Values values;
+  appendCut(values, model, kind);
+  if (channel <= FZ) append(values, model.force_sensor.axis[channel]);
+  if (channel == LOAD_METER && kind != TestKind::tap) appendSpindle(values, model);
+  for (const EffectEntry& effect : model.effects) {
+    const EffectKind& known = *findEffect(effect.name);
+    if (touches(known.stage, kind) && actsOn(effect, known.stage, channel)) append(values, effect);
+  }
+  return values;
+}
+
+Values valuesOfTrace(const MachineModel& model, TestKind kind, bool guided) {
   Values values;
   const bool cut = kind == TestKind::cut;
   bool rigid = model.tool_tip.x.modes.empty() && model.tool_tip.y.modes.empty();
   for (const EffectEntry& effect : model.effects)
     rigid = rigid && effect.flexibility.x.modes.empty() && effect.flexibility.y.modes.empty();
-  values.push_back(rigid ? 1.0 : 0.0);
+  const bool sums = rigid || guided;
+  values.push_back(sums ? 1.0 : 0.0);
   if (cut) appendTool(values, model);
-  if (cut && !rigid) appendCutting(values, model);
-  append(values, model.tool_tip.x);
-  append(values, model.tool_tip.y);
+  if (cut && !sums) appendCutting(values, model);
+  if (!guided) append(values, model.tool_tip.x);
+  if (!guided) append(values, model.tool_tip.y);
   for (const EffectEntry& effect : model.effects) {
     const EffectKind* known = findEffect(effect.name);
     if (known && (!ofTheTool(known->stage) || !touches(known->stage, kind))) continue;
-    if (rigid && known && known->stage == Stage::cutting_law && makeEffect(effect)->scalesForce()) continue;
+    if (known && guided && known->stage == Stage::structure) continue;
+    if (sums && known && known->stage == Stage::cutting_law && makeEffect(effect)->scalesForce()) continue;
     append(values, effect);
   }
   return values;

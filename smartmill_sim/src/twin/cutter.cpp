@@ -80,10 +80,17 @@ void Cutter::setLaw(const CuttingLaw& law) {
   }
 }
 
-CuttingForce Cutter::fromTables(Part& part, double angle) {
-  const EdgeSums sums = followed_ ? followed_->at(place_++) : part.rigid->sumsAt(angle);
+CuttingForce Cutter::forceOf(Part& part, const ToolMotion& motion) {
+  CutSums sums;
+  if (followed_) {
+    sums = followed_->at(place_++);
+  } else if (part.rigid) {
+    sums.edges = part.rigid->sumsAt(motion.angle);
+  } else {
+    sums = part.process->sumsAt(motion);
+  }
   if (kept_) kept_->push_back(sums);
-  return part.rigid->force(sums);
+  return part.rigid ? part.rigid->force(sums.edges) : part.process->force(sums);
 }
 
 CuttingForce Cutter::step(const ToolMotion& now) {
@@ -91,8 +98,7 @@ CuttingForce Cutter::step(const ToolMotion& now) {
   CuttingForce sum;
   for (Part& part : parts_) {
     if (part.arcs == 0) continue;
-    const ToolMotion motion = motionOf(part, now);
-    const CuttingForce force = part.rigid ? fromTables(part, motion.angle) : part.process->step(motion);
+    const CuttingForce force = forceOf(part, motionOf(part, now));
     sum.fx += force.fx;
     sum.fy += force.fy;
     sum.fz += force.fz;
@@ -103,7 +109,7 @@ CuttingForce Cutter::step(const ToolMotion& now) {
 
 void Cutter::settle(const std::array<double, 2>& displacement) {
   for (Part& part : parts_) {
-    if (part.process) part.process->settle(displacement);
+    if (part.process && !followed_) part.process->settle(displacement);
   }
 }
 

@@ -1,5 +1,6 @@
 #include "smartmill_sim/twin/cutting_machine.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "smartmill_core/error.h"
@@ -110,6 +111,14 @@ void CuttingMachine::setDepth(double depth, double passed_over) {
   setActualDepths();
 }
 
+void CuttingMachine::showOnly(const std::vector<std::size_t>& channels) {
+  const auto asked = [&](std::size_t channel) {
+    return std::find(channels.begin(), channels.end(), channel) != channels.end();
+  };
+  shows_force_ = {{asked(FX), asked(FY), asked(FZ)}};
+  shows_load_ = asked(LOAD_METER);
+}
+
 void CuttingMachine::resetLoadMeter(double spindle_speed) {
   if (!drive_) return;
   Input input;
@@ -192,13 +201,10 @@ CuttingForce CuttingMachine::cut(const Input& input) {
   if (replayed()) return followed_->steps.at(place_).force;
   if (!cutter_) return {};
   ToolMotion motion = fed(input.motion);
-  if (input.tip) {
-    motion.displacement = *input.tip;
-    return cutter_->step(motion);
-  }
+  if (input.tip) motion.displacement = *input.tip;
   // The tip's place needs this step's force and the force needs the place: the force is first taken to go
   // on in a straight line, which errs by the square of the step.
-  for (std::size_t axis = 0; axis < 2 && vibrates_; ++axis) {
+  for (std::size_t axis = 0; axis < 2 && vibrates_ && !input.tip; ++axis) {
     const std::array<double, 2>& f = tip_history_[axis];
     motion.displacement[axis] = tip_[axis].peek(2.0 * f[0] - f[1]);
   }
@@ -211,7 +217,7 @@ void CuttingMachine::moveTip(const Input& input, Output& out) {
   if (rigid()) return;
   ChannelValues& channels = out.early;
   double acceleration = 0.0;
-  if (followed_) {
+  if (replayed()) {
     const CutTrace::Step& step = followed_->steps.at(place_++);
     channels[TOOL_X] = step.displacement[0];
     channels[TOOL_Y] = step.displacement[1];
@@ -219,7 +225,8 @@ void CuttingMachine::moveTip(const Input& input, Output& out) {
   } else {
     settleTip(input, out);
     if (probe_) acceleration = tip_[*probe_].acceleration();
-    if (kept_) kept_->steps.push_back({out.force, {{channels[TOOL_X], channels[TOOL_Y]}}, acceleration});
+    if (kept_ && !guided_)
+      kept_->steps.push_back({out.force, {{channels[TOOL_X], channels[TOOL_Y]}}, acceleration});
   }
   if (!probe_) return;
   channels[DISPLACEMENT] = channels[TOOL_X + *probe_];
@@ -249,6 +256,7 @@ void CuttingMachine::settleTip(const Input& input, Output& out) {
 void CuttingMachine::showForce(Output& out) {
   const std::array<double, 3> cut{{out.force.fx, out.force.fy, out.force.fz}};
   for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (!shows_force_[axis]) continue;
     const double before = out.applied[axis] - jump_ * (cut[axis] - last_cut_[axis]);
     out.early[FX + axis] =
         sign_ * (jump_ != 0.0 ? sensor_[axis].jump(before, out.applied[axis]) : sensor_[axis].step(before));
@@ -258,7 +266,7 @@ void CuttingMachine::showForce(Output& out) {
 
 void CuttingMachine::showLoad(double speed, Output& out) {
   out.early[LOAD_METER] = 0.0;
-  if (!drive_) return;
+  if (!drive_ || !shows_load_) return;
   const double mean_torque = last_torque_ + 0.5 * (1.0 - jump_) * (out.force.torque - last_torque_);
   out.early[LOAD_METER] = drive_->step(mean_torque, speed);
   last_torque_ = out.force.torque;

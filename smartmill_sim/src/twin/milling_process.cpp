@@ -220,23 +220,41 @@ bool MillingProcess::gather(int tooth, const Stretch& cell, bool& certain) {
   return true;
 }
 
-/// Adds what one edge gets over a cell of it, integrated over the immersion angle.
-void MillingProcess::cut(int tooth, const Stretch& cell, EdgeForce& edge) {
+/// Adds what a stretch of an edge in contact with one shape gives, integrated over the immersion angle.
+void MillingProcess::add(const ChipShape& shape, const Stretch& over, double height, CutSums& sums) const {
+  constexpr double LEAST_CHIP = 1e-15;  // [m] at the ends of a contact, which still rub
+  gauss(over, [&](double weight, double s, double c) {
+    const double chip = std::max(shape.at(s, c), LEAST_CHIP), w = height * weight;
+    const double h = w * effectiveChip(law_, chip), e = w * edgeShare(law_, chip);
+    sums.edges.chip_sine += h * s;
+    sums.edges.chip_cosine += h * c;
+    sums.edges.chip += h;
+    sums.edges.edge_sine += e * s;
+    sums.edges.edge_cosine += e * c;
+    sums.edges.edge += e;
+    if (law_.damping == 0.0) return;
+    const double d = w * (damping_[0] * s + damping_[1] * c);
+    sums.damping_sine += d * s;
+    sums.damping_cosine += d * c;
+    sums.damping += d;
+  });
+}
+
+/// Adds what one edge gives over a cell of it.
+void MillingProcess::cut(int tooth, const Stretch& cell, double height, CutSums& sums) {
   bool certain = false;
   if (!gather(tooth, cell, certain)) return;
-  const auto add = [&](const ChipShape& shape, const Stretch& over) {
-    addForce(law_, shape, over, damping_[0], damping_[1], edge);
-  };
   if (certain) {
-    add(shapes_[0], cell);
+    add(shapes_[0], cell, height, sums);
   } else {
-    leastPositive(shapes_.data(), shapes_.size(), cell, add);
+    leastPositive(shapes_.data(), shapes_.size(), cell,
+                  [&](const ChipShape& shape, const Stretch& over) { add(shape, over, height, sums); });
   }
 }
 
-CuttingForce MillingProcess::step(const ToolMotion& now) {
-  CuttingForce sum;
-  if (arcs_.empty()) return sum;
+CutSums MillingProcess::sumsAt(const ToolMotion& now) {
+  CutSums sums;
+  if (arcs_.empty()) return sums;
   advance(now);
   damping_ = {{0.0, 0.0}};
   if (law_.damping != 0.0) {
@@ -251,14 +269,26 @@ CuttingForce MillingProcess::step(const ToolMotion& now) {
     const double from = part.straight ? part.to : part.from,
                  to = part.straight ? part.to + LEAST_LAG : part.to;
     const double height = part.straight ? part.height / LEAST_LAG : part.height;
-    EdgeForce edge;
-    forEachCell(from, to, [&](const Stretch& cell) { cut(part.tooth, cell, edge); });
-    sum.fx += height * edge.fx;
-    sum.fy += height * edge.fy;
-    sum.fz += height * edge.fz;
-    sum.torque += height * edge.ft * tool_.radius();
+    forEachCell(from, to, [&](const Stretch& cell) { cut(part.tooth, cell, height, sums); });
   });
-  return sum;
+  return sums;
+}
+
+CuttingForce MillingProcess::force(const CutSums& sums) const {
+  const CuttingCoefficients& k = law_.coefficients;
+  const EdgeSums& at = sums.edges;
+  const double chip = law_.chip_factor, edge = law_.edge_factor;
+  const auto of = [&](double chips, double edges, double damping) {
+    return std::array<double, 3>{
+        {chip * k.ktc * chips + edge * k.kte * edges + TANGENTIAL_DAMPING * damping,
+         chip * k.krc * chips + edge * k.kre * edges + law_.damping_radial * damping,
+         chip * k.kac * chips + edge * k.kae * edges + law_.damping_axial * damping}};
+  };
+  // Tangential, radial and axial, as in EdgeForce::add().
+  const std::array<double, 3> sine = of(at.chip_sine, at.edge_sine, sums.damping_sine),
+                              cosine = of(at.chip_cosine, at.edge_cosine, sums.damping_cosine),
+                              plain = of(at.chip, at.edge, sums.damping);
+  return {-cosine[0] - sine[1], sine[0] - cosine[1], plain[2], plain[0] * tool_.radius()};
 }
 
 void MillingProcess::settle(const std::array<double, 2>& displacement) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <random>
 #include <string>
 #include <utility>
@@ -190,6 +191,7 @@ void run(const MachineModel& model, const CampaignTest& test, const SimulationOp
     out[c] = &record.add(channelName(c));
     shown.push_back(c);
   }
+  if (options.channels) machine.showOnly(shown);
   CuttingMachine::Output now;
   CuttingMachine::Output between;
   for (std::size_t i = 0; i < record.size(); ++i) {
@@ -336,13 +338,17 @@ void fillAngle(Record& record, double phase, double speed) {
   }
 }
 
-bool isGuided(const CampaignTest& test, const Record* recorded, const CuttingMachine& machine) {
-  return test.kind == TestKind::cut && !test.running_before && machine.vibrates() && recorded &&
-         Guide::canBe(*recorded);
+std::optional<Guide> guideOf(const CampaignTest& test, const Record* recorded,
+                             const SimulationOptions& options, const CuttingMachine& machine) {
+  if (!options.guided || test.kind != TestKind::cut || test.running_before || !machine.vibrates() ||
+      !recorded || !Guide::canBe(*recorded))
+    return {};
+  return Guide(machine.model(), *recorded, test.sample_rate);
 }
 
 Record simulateOn(CuttingMachine& machine, const MachineModel& model, const CampaignTest& test,
-                  const Record* recorded, Record record, double phase, const SimulationOptions& options) {
+                  const Record* recorded, Record record, double phase, const std::optional<Guide>& guide,
+                  const SimulationOptions& options) {
   if (test.kind == TestKind::tap)
     return simulateTap(model, test, recorded, std::move(record), options, machine);
   fillAngle(record, phase, test.spindle_speed);
@@ -353,9 +359,6 @@ Record simulateOn(CuttingMachine& machine, const MachineModel& model, const Camp
     steady.lead();
   }
   const double dt = 1.0 / test.sample_rate;
-  std::optional<Guide> guide;
-  if (options.guided && isGuided(test, recorded, machine))
-    guide.emplace(machine.model(), *recorded, test.sample_rate);
   run(
       model, test, options, machine,
       [&](std::size_t i, double share) {
@@ -371,19 +374,25 @@ Record simulate(const MachineModel& model, const CampaignTest& test, const Recor
                 double phase, const SimulationOptions& options) {
   if (options.substeps < 1) throw Error("simulation: substeps below 1");
   CuttingMachine machine(model, 1.0 / (test.sample_rate * options.substeps), Feed::steady);
-  const bool worth = options.traces && (test.kind == TestKind::cut || machine.vibrates());
-  if (!worth) return simulateOn(machine, model, test, recorded, std::move(record), phase, options);
-  const bool by_force = options.guided && isGuided(test, recorded, machine) && Guide::byForce(*recorded);
-  std::vector<double> values = by_force ? valuesOfRecord(model, test.kind) : valuesOfTrace(model, test.kind);
+  const std::optional<Guide> guide = guideOf(test, recorded, options, machine);
+  if (guide) machine.guide();
+  const auto simulated = [&] {
+    return simulateOn(machine, model, test, recorded, std::move(record), phase, guide, options);
+  };
+  if (!options.traces || !(test.kind == TestKind::cut || machine.vibrates())) return simulated();
+  // Where forces tell the place of the tip, the sensor and the tool's modes enter it.
+  std::vector<double> values = guide && Guide::byForce(*recorded)
+                                   ? valuesOfRecord(model, test.kind)
+                                   : valuesOfTrace(model, test.kind, guide.has_value());
   if (const auto held = options.traces->find(values)) {
     machine.follow(held.get());
-    return simulateOn(machine, model, test, recorded, std::move(record), phase, options);
+    return simulated();
   }
   const auto kept = std::make_shared<CutTrace>();
   machine.keep(kept.get());
-  Record simulated = simulateOn(machine, model, test, recorded, std::move(record), phase, options);
+  Record result = simulated();
   options.traces->hold(std::move(values), kept);
-  return simulated;
+  return result;
 }
 
 }  // namespace
@@ -411,8 +420,12 @@ Record simulateTest(const MachineModel& model, const CampaignTest& test, const R
   // The grid of the sample rate; a file's times are rounded to its printed digits.
   for (std::size_t i = 0; i < recorded.size(); ++i)
     record.time.push_back(recorded.time[0] + static_cast<double>(i) / test.sample_rate);
+  const auto asked = [&](const std::string& name) {
+    return name == "hammer" || !options.channels ||
+           std::find(options.channels->begin(), options.channels->end(), name) != options.channels->end();
+  };
   for (const std::string& name : recorded.names) {
-    if (gives(name, test)) record.add(name) = recorded.column(name);
+    if (gives(name, test) && asked(name)) record.add(name) = recorded.column(name);
   }
   const double phase = options.phase ? *options.phase : recordedPhase(test, recorded);
   return simulate(model, test, &recorded, std::move(record), phase, options);

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -65,6 +66,10 @@ struct Dataset {
 /// @throws Error on what cannot be worked with, one line naming file and cause: missing file or column, wrong
 /// unit, clipped channel, no noise estimate possible.
 Dataset loadDataset(const Campaign& campaign, const MachineModel& nominal);
+
+/// The same with only the first turns of each fit cut that has its spindle angle: what a tool with modes does
+/// comes again from turn to turn. Nothing where that leaves most of the samples.
+std::optional<Dataset> briefOf(const Dataset& data);
 
 /// Marks the held-out tests: about a quarter of the cuts and one air cut, at conditions inside the range of
 /// the others.

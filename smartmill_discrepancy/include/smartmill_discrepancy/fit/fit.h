@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <limits>
 #include <vector>
 
 #include <Eigen/Core>
@@ -60,6 +61,8 @@ struct FitOptions {
   double tolerance = 1e-4;  ///< relative change of the cost that ends a fit
   bool nominal_free = true;
   double prior_weight = 1.0;  ///< [1] of the priors' squares: the residual's variance where structure is left
+  /// [1] Squares that another fit leaves: one that cannot come near to them ends early.
+  double to_beat = std::numeric_limits<double>::infinity();
 };
 
 /// Fits models to a campaign by Ceres: nominal values under their Gaussian priors, effects within bounds and
@@ -94,6 +97,7 @@ class Fitter {
   Eigen::MatrixXd sandwichCovariance(const FitState& state, const NominalTangents& tangents,
                                      double prior_weight) const;
 
+  bool cancelled() const { return cancelled_ && cancelled_(); }
   const TwinRunner& runner() const { return runner_; }
   const NominalFreedom& freedom() const { return freedom_; }
 

@@ -29,6 +29,8 @@ class BlockColumns {
   Eigen::MatrixXd gram() const;
   Eigen::MatrixXd cross(const BlockColumns& other) const;
   Eigen::VectorXd along(const Eigen::Ref<const Eigen::VectorXd>& vector) const;
+  /// What one block gives to this' * vector.
+  Eigen::VectorXd along(std::size_t block, const Eigen::Ref<const Eigen::VectorXd>& vector) const;
   /// Squared length of each column.
   Eigen::VectorXd squares() const;
   /// vector += this * amplitudes

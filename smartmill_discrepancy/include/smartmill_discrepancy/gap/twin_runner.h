@@ -7,6 +7,7 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "smartmill_core/campaign/record.h"
@@ -74,22 +75,28 @@ class TwinRunner {
   /// What a model says when one of the chosen tests lies elsewhere, beside what it says of all of them.
   SimulatedBlocks turned(const MachineModel& model, const SimulatedBlocks& base, std::size_t chosen,
                          const Turn& by) const;
+  /// Of one block, with it: (simulated - measured) over noise.
+  void compare(const SimulatedBlocks& simulated, std::size_t block, double* apart) const;
   /// In one vector, with it.
   std::vector<double> joined(const SimulatedBlocks& blocks) const;
 
   std::size_t simulations() const { return simulations_; }  ///< tests simulated so far
 
  private:
-  // Of one test: what the twin needs of its record, its last results by the values they depend on, and what
-  // the tool did in it. A tap says nothing of a cutting coefficient, a sensor's mode nothing of the cut: what
-  // a fit moves leaves much as it was.
+  // What a channel shows, by the values that it depends on, the newest first.
+  using Shown = std::deque<std::pair<std::vector<double>, std::shared_ptr<const std::vector<double>>>>;
+  // Of one test: what the twin needs of its record, its last results channel by channel, and what the tool
+  // did in it. A tap says nothing of a cutting coefficient, a sensor's mode nothing of the cut nor of another
+  // axis: what a fit moves leaves much as it was.
   struct Kept {
     Record record;
     CampaignTest test;
     double phase = 0.0, early_entry = 0.0;
     std::mutex mutex;
-    std::deque<std::pair<std::vector<double>, SimulatedBlocks>> results;
+    std::vector<Shown> shown;  // of each channel
     std::unique_ptr<sim::CutTraces> traces;
+
+    void forget();
   };
   SimulatedBlocks simulateOne(const MachineModel& model, std::size_t chosen) const;
   SimulatedBlocks blocksOf(const MachineModel& model, std::size_t chosen, const CampaignTest& test,

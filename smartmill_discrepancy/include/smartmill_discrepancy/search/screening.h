@@ -10,7 +10,10 @@ namespace smartmill::discrepancy {
 /// so far.
 struct Promise {
   const Hypothesis* hypothesis = nullptr;
-  double gain = 0.0;          ///< chi2 that it takes away in linear approximation
+  double gain = 0.0;  ///< chi2 that it takes away in linear approximation
+  /// [1] Share of what it does that nominal values and members cannot stand for: where it is small, a gain
+  /// says that they are off.
+  double apart = 1.0;
   std::vector<double> start;  ///< coordinates to start a fit from
   std::vector<double>
       null;  ///< the point without effect that the start was reached from; empty: the start stands
@@ -19,6 +22,7 @@ struct Promise {
 /// Score test of each hypothesis at a fitted state. Best first; hypotheses without any trace in the data come
 /// last.
 /// @param tangents of the nominal values at the state
+/// Cancelled, it ends with those that it has come to.
 /// @param tried simulated one by one or in groups; may hold effects that are members already: those are
 /// passed over
 std::vector<Promise> screen(const Fitter& fitter, const Fit& now, const NominalTangents& tangents,

@@ -20,9 +20,14 @@ struct SearchOptions {
   double twin_accuracy = 2e-4;  ///< [1] of the signal, by which two faithful simulations differ
   double least_share = 0.05;    ///< [1] of the squares above the noise that an effect must take
   std::function<void(const std::string&)> progress;
+  /// Told after each stage which share of the work is done, should nothing more be found.
+  std::function<void(double share)> course;
 
   void say(const std::string& line) const {
     if (progress) progress(line);
+  }
+  void tell(double share) const {
+    if (course) course(share);
   }
 };
 

@@ -35,7 +35,8 @@ class Workbench {
   /// Exact twin of the fit tests, guided where fits are.
   const TwinRunner& fitted() const { return guided_ ? guided_runner_ : exact_runner_; }
   const TwinRunner& heldout() const { return heldout_runner_; }  ///< exact twin of the held-out tests
-  bool cancelled() const { return cancelled_ && cancelled_(); }
+  const WorkbenchOptions& options() const { return options_; }
+  bool cancelled() const { return options_.cancelled && options_.cancelled(); }
 
   /// Samples of the fit tests.
   double samples() const { return static_cast<double>(exact_runner_.size()); }
@@ -43,6 +44,8 @@ class Workbench {
   /// Makes the quick twin equal to the exact one at a state and takes the nominal tangents there.
   /// @param exact_squares receives what the exact twin leaves there; may be nullptr
   NominalTangents linearise(const FitState& state, double* exact_squares = nullptr);
+  /// The same with the tangents of another state, which serve a fit on its way.
+  NominalTangents lineariseBy(NominalTangents tangents, const FitState& state);
 
   /// Whether some cut of a tool with modes shows its displacement: such tools are searched guided by it, so
   /// that no candidate runs away, and judged freely.
@@ -71,12 +74,13 @@ class Workbench {
 
  private:
   void turnFitted(const FitState& state);
+  void correctAt(const FitState& state, double* exact_squares);
 
+  WorkbenchOptions options_;
   Dataset data_;                  // its records without spindle angle are turned as the model becomes better
   std::vector<TestData> loaded_;  // those to be fitted, as they were loaded
   NominalFreedom freedom_;
   bool phases_estimated_;
-  std::function<bool()> cancelled_;
   bool can_guide_, guided_ = false;
   TwinRunner quick_runner_, exact_runner_, guided_runner_, heldout_runner_;
   Fitter quick_, exact_;

@@ -17,8 +17,14 @@ namespace smartmill::sim {
 /// give the same record. @param model of effects that the catalogue knows
 std::vector<double> valuesOfRecord(const MachineModel& model, TestKind kind);
 
-/// The same of what cut and tool do in it (CutTrace).
-std::vector<double> valuesOfTrace(const MachineModel& model, TestKind kind);
+/// Whether each channel of a record shows what no other one has a part in (cross talk mixes them).
+bool channelsApart(const MachineModel& model);
+
+/// As valuesOfRecord(), of one channel (ChannelIndex) of a record whose channels are apart.
+std::vector<double> valuesOfChannel(const MachineModel& model, TestKind kind, std::size_t channel);
+
+/// The same of what cut and tool do in it (CutTrace). @param guided CuttingMachine::guide()
+std::vector<double> valuesOfTrace(const MachineModel& model, TestKind kind, bool guided);
 
 /// What cut and tool did in one test, for the last few models: most models of a search differ from the one
 /// before them in what comes after. For many threads.

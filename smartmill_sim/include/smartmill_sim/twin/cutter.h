@@ -32,11 +32,11 @@ class Cutter {
   void setLaw(const CuttingLaw& law);
 
   Way way() const { return way_; }
-  /// Of tables: from here on the sums of each step are kept, or taken from what was kept over the same steps
-  /// by a cutter that differed in coefficients and factors of the law only. @param sums must outlive the
-  /// steps
-  void keep(std::vector<EdgeSums>* sums) { kept_ = sums; }
-  void follow(const std::vector<EdgeSums>* sums) { followed_ = sums; }
+  /// Of tables, or where something else displaces the tip: from here on the sums of each step are kept, or
+  /// taken from what was kept over the same steps by a cutter that differed in coefficients and factors of
+  /// the law only. @param sums must outlive the steps
+  void keep(std::vector<CutSums>* sums) { kept_ = sums; }
+  void follow(const std::vector<CutSums>* sums) { followed_ = sums; }
 
   /// Force on the tool with its tip displaced as in this motion.
   CuttingForce step(const ToolMotion& now);
@@ -54,7 +54,7 @@ class Cutter {
   };
   void place(Part& part);
   ToolMotion motionOf(const Part& part, const ToolMotion& now) const;
-  CuttingForce fromTables(Part& part, double angle);
+  CuttingForce forceOf(Part& part, const ToolMotion& motion);
 
   Way way_;
   double corner_radius_, lag_;
@@ -62,8 +62,8 @@ class Cutter {
   std::vector<Part> parts_;
   std::vector<ContactArc> arcs_;
   ToolMotion now_;
-  std::vector<EdgeSums>* kept_ = nullptr;
-  const std::vector<EdgeSums>* followed_ = nullptr;
+  std::vector<CutSums>* kept_ = nullptr;
+  const std::vector<CutSums>* followed_ = nullptr;
   std::size_t place_ = 0;  // in what is followed
   bool fresh_ = false;     // the arcs are other ones than those of the last step
 };

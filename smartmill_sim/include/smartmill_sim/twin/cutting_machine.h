@@ -28,8 +28,10 @@ struct CutTrace {
     std::array<double, 2> displacement{{0, 0}};  ///< [m] of the tip
     double acceleration = 0.0;                   ///< [m/s2] where a probe stands
   };
-  std::vector<EdgeSums> sums;  ///< of a tool without modes: coefficients and factors of the law act later
-  std::vector<Step> steps;     ///< of one with modes
+  /// Of a tool without modes, or one that is guided: coefficients and factors of the law act later, and what
+  /// forces do to the tip.
+  std::vector<CutSums> sums;
+  std::vector<Step> steps;  ///< of one with modes
 };
 
 /// Process, tool structure, force sensor, spindle drive and measuring chain of one machine with the effects
@@ -94,17 +96,23 @@ class CuttingMachine {
   /// Displacement and acceleration sensors stand at the tip, in x (0) or y (1).
   void setProbe(std::size_t axis) { probe_ = axis; }
 
+  /// Every step's input will tell where the tip is.
+  void guide() { guided_ = true; }
+
   /// From here on what cut and tool do is kept; or is taken from what another machine kept over the same
-  /// steps, which differed behind the tool only (of a tool without modes: in coefficients and factors of the
-  /// law too). @param trace must outlive the steps
+  /// steps, which differed behind the tool only (of a tool without modes, or a guided one: in coefficients
+  /// and factors of the law and in the tool's modes too). @param trace must outlive the steps
   void keep(CutTrace* trace) {
     kept_ = trace;
-    if (rigid()) cutter_->keep(&trace->sums);
+    if (keepsSums()) cutter_->keep(&trace->sums);
   }
   void follow(const CutTrace* trace) {
     followed_ = trace;
-    if (rigid()) cutter_->follow(&trace->sums);
+    if (keepsSums()) cutter_->follow(&trace->sums);
   }
+
+  /// Of forces and load meter only these are asked for; what the others show means nothing from here on.
+  void showOnly(const std::vector<std::size_t>& channels);
 
   /// The load meter stands at the steady value of cutting air.
   void resetLoadMeter(double spindle_speed);
@@ -128,8 +136,9 @@ class CuttingMachine {
   void passTime(const ToolMotion& motion);
 
   bool rigid() const { return cutter_ && cutter_->way() == Cutter::Way::tables; }
+  bool keepsSums() const { return cutter_ && (rigid() || guided_); }
   // Cut and tool are taken from a trace, step by step.
-  bool replayed() const { return followed_ && !rigid(); }
+  bool replayed() const { return followed_ && !keepsSums(); }
   double actualDepth(double commanded) const;  // [m]
   void setActualDepths();
   ToolMotion fed(const ToolMotion& commanded) const;
@@ -143,11 +152,13 @@ class CuttingMachine {
   int steps_to_update_ = 0;
   std::optional<Cutter> cutter_;
   EdgeLayers layers_;
-  bool vibrates_ = false;
+  bool vibrates_ = false, guided_ = false;
   CutTrace* kept_ = nullptr;
   const CutTrace* followed_ = nullptr;
   std::size_t place_ = 0;  // in what is followed
   std::optional<std::size_t> probe_;
+  std::array<bool, 3> shows_force_{{true, true, true}};
+  bool shows_load_ = true;
   std::vector<ContactArc> arcs_;                     // as commanded
   double depth_extra_ = 0.0;                         // [m] that the depths hold now
   double feed_path_ = 0.0;                           // [m] since engagement

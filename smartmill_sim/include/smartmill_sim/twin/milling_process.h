@@ -22,6 +22,13 @@ struct ToolMotion {
   std::array<double, 2> displacement{{0, 0}};  ///< [m] vibration of the tip
 };
 
+/// What of the edges is in contact at a step, in which the force is linear: sums that no coefficient nor
+/// factor of the law enters, and those of process damping, with d of CuttingLaw.
+struct CutSums {
+  EdgeSums edges;
+  double damping_sine = 0.0, damping_cosine = 0.0, damping = 0.0;  ///< [N] of d sin(phi), d cos(phi), d
+};
+
 /// [m/rad] Feed of a turn of the spindle. @throws Error when the spindle stands.
 std::array<double, 2> feedOf(const ToolMotion& motion);
 
@@ -49,7 +56,10 @@ class MillingProcess {
   void showOnly(int tooth) { only_tooth_ = tooth; }
 
   /// Force on the tool with its tip displaced as in this motion.
-  CuttingForce step(const ToolMotion& now);
+  CuttingForce step(const ToolMotion& now) { return force(sumsAt(now)); }
+  /// The same in two steps.
+  CutSums sumsAt(const ToolMotion& now);
+  CuttingForce force(const CutSums& sums) const;
   /// Ends the step with the tip there [m].
   void settle(const std::array<double, 2>& displacement);
 
@@ -93,7 +103,8 @@ class MillingProcess {
   void search(Delay& delay);
   void shapePass(int tooth, int n, Pass& pass);
   bool gather(int tooth, const Stretch& cell, bool& certain);
-  void cut(int tooth, const Stretch& cell, EdgeForce& edge);
+  void cut(int tooth, const Stretch& cell, double height, CutSums& sums);
+  void add(const ChipShape& shape, const Stretch& over, double height, CutSums& sums) const;
   void grow();
 
   ToolGeometry tool_;

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "smartmill_core/campaign/campaign.h"
@@ -28,6 +29,8 @@ struct SimulationOptions {
   bool guided = false;
   /// Tones (mains hum) with a phase of the seed, not with the one that the recorded signals show.
   bool random_phases = false;
+  /// Channels to give, of those that the record has; nullptr: all. Only where channelsApart().
+  const std::vector<std::string>* channels = nullptr;
   /// What cut and tool did in this very test (record, phase, substeps) under other models: taken from there
   /// where the model has the same values, and put there. nullptr: each simulation by itself.
   CutTraces* traces = nullptr;
