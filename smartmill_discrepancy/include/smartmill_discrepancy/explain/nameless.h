@@ -12,7 +12,7 @@ namespace smartmill::discrepancy {
 /// When a cause without a name is taken into the model. Everything is asked of tests that took no part in its
 /// fit, since a form without a name fits whatever it is shown.
 struct NamelessOptions {
-  std::size_t most = 2;
+  std::size_t most = 6;
   std::size_t fitted = 4, fitted_instead = 3, examined = 2;  ///< forms a round
   double least_share = 0.05;  ///< [1] of the squares above the noise of the fit tests
   /// [1] of that share it must take of the held-out tests, and of what it changes in them; of the gain there
