@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <utility>
 
@@ -32,6 +33,39 @@ std::vector<Hypothesis> formsFor(const TwinRunner& runner, const Fit& now,
   return forms;
 }
 
+// The form without a name that has the shape of an effect with one; nothing where there is none.
+std::optional<Member> shapeOf(const Member& member, const std::vector<Hypothesis>& forms) {
+  const EffectEntry named = member.hypothesis->entry(member.values);
+  const auto as = [&](const char* form, const std::string& variant,
+                      const std::function<void(EffectEntry&)>& fill) -> std::optional<Member> {
+    for (const Hypothesis& h : forms) {
+      if (h.effect != std::string(EMPIRICAL) + ":" + form || h.variant != variant) continue;
+      std::vector<double> values;
+      for (const Coordinate& c : h.coordinates) values.push_back(c.null);
+      EffectEntry entry = h.entry(values);
+      fill(entry);
+      values = h.values(entry);
+      for (std::size_t c = 0; c < values.size(); ++c)
+        values[c] = std::clamp(values[c], h.coordinates[c].low, h.coordinates[c].high);
+      return Member{&h, values};
+    }
+    return {};
+  };
+  if (named.name == "extra_mode") {
+    const std::string channel = "f" + named.words.at("axis");
+    return as("resonance", channel + " from " + channel, [&](EffectEntry& e) { e.numbers = named.numbers; });
+  }
+  if (named.name == "size_effect") {
+    const double exponent = named.numbers.at("exponent"), reference = named.numbers.at("reference_chip_um");
+    return as("chip_thickness", "course", [&](EffectEntry& e) {
+      const std::vector<double>& h = e.lists.at("h_um");
+      for (std::size_t k = 0; k < h.size(); ++k)
+        e.lists.at("factor")[k] = std::pow(h[k] / reference, -exponent);
+    });
+  }
+  return {};
+}
+
 // What one test says of a change of the model, in squares over noise.
 struct Said {
   double gain = 0.0;      // by which the residual's squares fall
@@ -52,9 +86,10 @@ double varianceOf(const std::vector<double>& pieces) {
   return std::max(squares - sum * sum / n, 0.0) * n / (n - 1.0);
 }
 
-std::vector<Said> saidBy(const TwinRunner& runner, const MachineModel& before, const MachineModel& after) {
+// @param before, after what two models leave
+std::vector<Said> saidBy(const TwinRunner& runner, const std::vector<double>& before,
+                         const std::vector<double>& after) {
   constexpr std::size_t LEAST_PIECE = 64;
-  const auto simulated = runner.simulate({before, after});
   std::map<std::size_t, Said> tests;
   std::map<std::size_t, std::vector<double>> pieces;
   for (const Block& b : runner.blocks()) {
@@ -67,7 +102,7 @@ std::vector<Said> saidBy(const TwinRunner& runner, const MachineModel& before, c
     of_test.resize(std::max(of_test.size(), b.size / turn + 1), 0.0);
     for (std::size_t i = 0; i < b.size; ++i) {
       const std::size_t k = b.offset + i;
-      const double r = runner.measured()[k] - simulated[0][k], s = runner.measured()[k] - simulated[1][k];
+      const double r = before[k], s = after[k];
       of_test[i / turn] += r * r - s * s;
       said.gain += r * r - s * s;
       said.change += (r - s) * (r - s);
@@ -104,13 +139,26 @@ double contradiction(const std::vector<Said>& tests, double deviations) {
 
 }  // namespace
 
+// What a state leaves of the fit tests and of those held out, records whose angle nobody measured laid where
+// it fits them: a mode turns its phases.
+std::pair<std::vector<double>, std::vector<double>> Nameless::leftOf(const FitState& state) const {
+  if (bench_.phasesEstimated()) bench_.turnTo(state);
+  const MachineModel model = bench_.exact().model(state);
+  const auto left = [&](const TwinRunner& runner) {
+    std::vector<double> values = runner.simulate(model);
+    for (std::size_t i = 0; i < values.size(); ++i) values[i] = runner.measured()[i] - values[i];
+    return values;
+  };
+  return {left(bench_.fitted()), left(bench_.heldout())};
+}
+
 // A cause that is real shows the same in every test: it takes from tests that it never saw what it takes from
 // those it was fitted to.
 bool Nameless::repeats(const FitState& before, const Fit& with) const {
-  const Fitter& exact = bench_.exact();
-  const MachineModel less = exact.model(before), more = exact.model(with.state);
-  const std::vector<Said> fitted = saidBy(bench_.fitted(), less, more);
-  const std::vector<Said> heldout = saidBy(bench_.heldout(), less, more);
+  const auto [fit_before, held_before] = leftOf(before);
+  const auto [fit_after, held_after] = leftOf(with.state);
+  const std::vector<Said> fitted = saidBy(bench_.fitted(), fit_before, fit_after);
+  const std::vector<Said> heldout = saidBy(bench_.heldout(), held_before, held_after);
   const Said fit = sumOf(fitted), held = sumOf(heldout);
   const double against = std::max(contradiction(fitted, rule_.least_deviations) / std::max(fit.gain, 1.0),
                                   contradiction(heldout, rule_.least_deviations) / std::max(held.gain, 1.0));
@@ -232,10 +280,41 @@ Fit Nameless::fitted(const FitState& state) const {
   return bench_.quick().fit(once.state, &there, CLOSELY);
 }
 
-std::optional<FitState> Nameless::extend(SearchResult* found, std::vector<Finding>* unexplained) {
+// Several names may stand together for what is there though the tests dispute how much of each alone: then
+// they are no names, but the model is nearer with their shapes.
+bool Nameless::takeDisputed(const FitState& searched, SearchResult* found) {
+  forms_.push_back(empiricalHypotheses(bench_.data()));
+  const FitState before = found->best.state;
+  FitState together = searched;
+  together.members = before.members;
+  for (const Member& m : searched.members) {
+    const bool named = std::any_of(before.members.begin(), before.members.end(),
+                                   [&](const Member& n) { return n.hypothesis == m.hypothesis; });
+    const std::optional<Member> shape = named ? std::nullopt : shapeOf(m, forms_.back());
+    if (shape) together.members.push_back(*shape);
+  }
+  if (together.members.size() == before.members.size()) return false;
+  options_.search.say(
+      formatted("  %zu names that do not hold each by itself, together as forms without a name",
+                together.members.size() - before.members.size()));
+  const Fit fit = fitted(together);
+  if (!fit.converged || !repeats(before, fit)) return false;
+  SearchResult more = *found;
+  if (!refine(bench_, fit.state, options_.search, &more) || !repeats(before, more.best)) return false;
+  if (more.best.bic > found->best.bic - options_.search.least_gain) return false;
+  *found = std::move(more);
+  return true;
+}
+
+std::optional<FitState> Nameless::extend(const FitState& searched, SearchResult* found,
+                                         std::vector<Finding>* unexplained) {
   FitState named = found->best.state;
   std::vector<Finding> left = *unexplained;
   std::size_t added = 0;
+  if (!left.empty() && !bench_.cancelled() && takeDisputed(searched, found)) {
+    ++added;
+    left = findStructure(bench_.fitted(), found->best.residual, structure_);
+  }
   for (; added < rule_.most && !left.empty() && !bench_.cancelled(); ++added) {
     if (!addOne(found, left)) break;
     left = findStructure(bench_.fitted(), found->best.residual, structure_);
