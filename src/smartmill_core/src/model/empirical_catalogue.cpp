@@ -358,7 +358,8 @@ Forms resonances(const Scope& scope) {
   return forms;
 }
 
-std::vector<EffectKind> makeCatalogue() {
+// Of teeth, chips and the law.
+std::vector<EffectKind> cuttingForms() {
   const Range positive = Range::positive(), not_negative = Range::notNegative();
   return {
       empirical("geometry", "lost_edge", Stage::geometry,
@@ -397,6 +398,13 @@ std::vector<EffectKind> makeCatalogue() {
                 {oneOf("of", SHARES), key("amplitude", "1", Range::above(-1.0)),
                  key("time_constant_s", "s", positive)},
                 {Need::cuts, Need::cut_time}, edgeLives),
+  };
+}
+
+// Of what channels make of a signal, and lines in them.
+std::vector<EffectKind> channelForms() {
+  const Range positive = Range::positive(), not_negative = Range::notNegative();
+  return {
       empirical(
           "channel", "resonance", Stage::sensor_output,
           "gain times what a mode makes of another force channel is added to a channel; from itself, of "
@@ -430,6 +438,13 @@ std::vector<EffectKind> makeCatalogue() {
           "line at a spindle order that keeps no phase",
           {oneOf("channel", CHANNELS), key("order", "1", positive), key("amplitude", "N or V", not_negative)},
           {}, orders),
+  };
+}
+
+// Of courses over time in them.
+std::vector<EffectKind> courseForms() {
+  const Range positive = Range::positive(), not_negative = Range::notNegative();
+  return {
       empirical(
           "channel", "settling", Stage::signal,
           "a channel begins each record off by amplitude and comes back with exp(-t / constant)",
@@ -465,6 +480,13 @@ std::vector<EffectKind> makeCatalogue() {
            key("decay_s", "s", positive), key("amplitude", "N or V", not_negative)},
           {}, burstTrains),
   };
+}
+
+std::vector<EffectKind> makeCatalogue() {
+  std::vector<EffectKind> all;
+  for (const auto& group : {cuttingForms(), channelForms(), courseForms()})
+    all.insert(all.end(), group.begin(), group.end());
+  return all;
 }
 
 }  // namespace
