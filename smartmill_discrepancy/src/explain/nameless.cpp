@@ -142,7 +142,11 @@ double contradiction(const std::vector<Said>& tests, double deviations) {
 // What a state leaves of the fit tests and of those held out, records whose angle nobody measured laid where
 // it fits them: a mode turns its phases.
 std::pair<std::vector<double>, std::vector<double>> Nameless::leftOf(const FitState& state) const {
-  if (bench_.phasesEstimated()) bench_.turnTo(state);
+  if (bench_.phasesEstimated()) {
+    FitState there = state;
+    bench_.turnPhases(there);  // perhaps by another tooth
+    bench_.turnTo(there);
+  }
   const MachineModel model = bench_.exact().model(state);
   const auto left = [&](const TwinRunner& runner) {
     std::vector<double> values = runner.simulate(model);
@@ -257,7 +261,8 @@ bool Nameless::addOne(SearchResult* found, const std::vector<Finding>& unexplain
     return !findEffect(m.hypothesis->effect)->empirical();
   });
   // One cause in the place of several names is the simpler answer.
-  if (named && forms_.size() == 1) {
+  if (named && !tried_instead_) {
+    tried_instead_ = true;
     const std::vector<Fit> instead = fitsInstead(found);
     if (takeOne(instead, {before.nominal, {}, before.turns}, found)) return true;
   }

@@ -57,6 +57,7 @@ class Nameless {
   const ExplainOptions& options_;
   const StructureOptions& structure_;
   NamelessOptions rule_;
+  bool tried_instead_ = false;                 // a form in the place of all names
   std::deque<std::vector<Hypothesis>> forms_;  // of each round: states point to them
 };
 
