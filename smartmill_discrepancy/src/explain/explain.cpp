@@ -107,12 +107,11 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
   StructureOptions structure = options.structure;
   structure.squares_of_gap = std::max(found.null.chi2 - bench.samples(), 1.0);
   result.where = findStructure(bench.fitted(), found.null.residual, structure);
-  const FitState promised = found.best.state;
   challenge(bench, searched, &found, &result.resembles);
   result.unexplained = findStructure(bench.fitted(), found.best.residual, structure);
   Nameless nameless(bench, options, structure);
   const FitState named = found.best.state;
-  const std::optional<FitState> named_only = nameless.extend(promised, &found, &result.unexplained);
+  const std::optional<FitState> named_only = nameless.extend(&found, &result.unexplained);
   tellFallen(named, found.best.state, &result.resembles);
   result.interrupted = bench.cancelled();
   found.best.covariance = settledCovariance(bench, found.best);

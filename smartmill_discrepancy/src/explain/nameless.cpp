@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <functional>
 #include <map>
 #include <utility>
 
@@ -31,39 +30,6 @@ std::vector<Hypothesis> formsFor(const TwinRunner& runner, const Fit& now,
                [](const Hypothesis& h) { return !h.probes.empty(); });
   forms.insert(forms.end(), placed.begin(), placed.end());
   return forms;
-}
-
-// The form without a name that has the shape of an effect with one; nothing where there is none.
-std::optional<Member> shapeOf(const Member& member, const std::vector<Hypothesis>& forms) {
-  const EffectEntry named = member.hypothesis->entry(member.values);
-  const auto as = [&](const char* form, const std::string& variant,
-                      const std::function<void(EffectEntry&)>& fill) -> std::optional<Member> {
-    for (const Hypothesis& h : forms) {
-      if (h.effect != std::string(EMPIRICAL) + ":" + form || h.variant != variant) continue;
-      std::vector<double> values;
-      for (const Coordinate& c : h.coordinates) values.push_back(c.null);
-      EffectEntry entry = h.entry(values);
-      fill(entry);
-      values = h.values(entry);
-      for (std::size_t c = 0; c < values.size(); ++c)
-        values[c] = std::clamp(values[c], h.coordinates[c].low, h.coordinates[c].high);
-      return Member{&h, values};
-    }
-    return {};
-  };
-  if (named.name == "extra_mode") {
-    const std::string channel = "f" + named.words.at("axis");
-    return as("resonance", channel + " from " + channel, [&](EffectEntry& e) { e.numbers = named.numbers; });
-  }
-  if (named.name == "size_effect") {
-    const double exponent = named.numbers.at("exponent"), reference = named.numbers.at("reference_chip_um");
-    return as("chip_thickness", "course", [&](EffectEntry& e) {
-      const std::vector<double>& h = e.lists.at("h_um");
-      for (std::size_t k = 0; k < h.size(); ++k)
-        e.lists.at("factor")[k] = std::pow(h[k] / reference, -exponent);
-    });
-  }
-  return {};
 }
 
 // What one test says of a change of the model, in squares over noise.
@@ -285,41 +251,10 @@ Fit Nameless::fitted(const FitState& state) const {
   return bench_.quick().fit(once.state, &there, CLOSELY);
 }
 
-// Several names may stand together for what is there though the tests dispute how much of each alone: then
-// they are no names, but the model is nearer with their shapes.
-bool Nameless::takeDisputed(const FitState& searched, SearchResult* found) {
-  forms_.push_back(empiricalHypotheses(bench_.data()));
-  const FitState before = found->best.state;
-  FitState together = searched;
-  together.members = before.members;
-  for (const Member& m : searched.members) {
-    const bool named = std::any_of(before.members.begin(), before.members.end(),
-                                   [&](const Member& n) { return n.hypothesis == m.hypothesis; });
-    const std::optional<Member> shape = named ? std::nullopt : shapeOf(m, forms_.back());
-    if (shape) together.members.push_back(*shape);
-  }
-  if (together.members.size() == before.members.size()) return false;
-  options_.search.say(
-      formatted("  %zu names that do not hold each by itself, together as forms without a name",
-                together.members.size() - before.members.size()));
-  const Fit fit = fitted(together);
-  if (!fit.converged || !repeats(before, fit)) return false;
-  SearchResult more = *found;
-  if (!refine(bench_, fit.state, options_.search, &more) || !repeats(before, more.best)) return false;
-  if (more.best.bic > found->best.bic - options_.search.least_gain) return false;
-  *found = std::move(more);
-  return true;
-}
-
-std::optional<FitState> Nameless::extend(const FitState& searched, SearchResult* found,
-                                         std::vector<Finding>* unexplained) {
+std::optional<FitState> Nameless::extend(SearchResult* found, std::vector<Finding>* unexplained) {
   FitState named = found->best.state;
   std::vector<Finding> left = *unexplained;
   std::size_t added = 0;
-  if (!left.empty() && !bench_.cancelled() && takeDisputed(searched, found)) {
-    ++added;
-    left = findStructure(bench_.fitted(), found->best.residual, structure_);
-  }
   for (; added < rule_.most && !left.empty() && !bench_.cancelled(); ++added) {
     if (!addOne(found, left)) break;
     left = findStructure(bench_.fitted(), found->best.residual, structure_);

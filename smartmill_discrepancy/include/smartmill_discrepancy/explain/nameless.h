@@ -31,17 +31,12 @@ class Nameless {
   Nameless(Workbench& bench, const ExplainOptions& options, const StructureOptions& structure)
       : bench_(bench), options_(options), structure_(structure) {}
 
-  /// Adds what repeats: first, all in one, what names were found that do not hold each by itself, as forms of
-  /// the same shape; then one form after the other. An effect with a name that is not needed beside it any
-  /// more falls away.
-  /// @param searched the state before names that do not hold were taken away
+  /// Adds what repeats; an effect with a name that is not needed beside it any more falls away.
   /// @param found receives the effects @param unexplained what effects with a name leave of the fit tests
   /// @return the state with these alone; nothing when none was added
-  std::optional<FitState> extend(const FitState& searched, SearchResult* found,
-                                 std::vector<Finding>* unexplained);
+  std::optional<FitState> extend(SearchResult* found, std::vector<Finding>* unexplained);
 
  private:
-  bool takeDisputed(const FitState& searched, SearchResult* found);
   bool addOne(SearchResult* found, const std::vector<Finding>& unexplained);
   std::vector<Fit> fitsBeside(const Fit& now, const NominalTangents& tangents, double promised, double least,
                               std::size_t most, SearchResult* found) const;
