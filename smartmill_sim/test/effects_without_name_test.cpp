@@ -1,6 +1,7 @@
 // Forms of effects without a name against their closed forms.
 
 #include <cmath>
+#include <complex>
 
 #include <gtest/gtest.h>
 
@@ -257,6 +258,34 @@ TEST(EffectsWithoutName, aShelfPassesSlowAndQuickWithGainsOfTheirOwn) {
   for (std::size_t i = 0; i < pure.size(); i += 61) {
     EXPECT_NEAR(record.column("fx")[i], 0.5 * pure.column("fx")[i], 1e-9);
     EXPECT_EQ(record.column("fy")[i], pure.column("fy")[i]);
+  }
+}
+
+// Beside the channel: gain / (1 - q^2 + 2 i zeta q) of the other one.
+TEST(EffectsWithoutName, aModePassesOneForceOnToAnother) {
+  const auto resonance = [](const char* to) {
+    return effectEntry("empirical:resonance",
+                       {{"frequency_hz", 640.0}, {"damping_ratio", 0.05}, {"gain", 0.8}},
+                       {{"channel", to}, {"from", "fx"}});
+  };
+  const MachineModel model = mill(3, 30.0);
+  const Record pure = run(model, slotCut(EVEN_RPM), 0.4);
+  const auto line = [](const Record& record, const char* c, int order) {  // over the last revolutions
+    std::complex<double> sum;
+    const std::size_t turn = 512, from = record.size() - 4 * turn;
+    for (std::size_t i = from; i < record.size(); ++i)
+      sum += record.column(c)[i] * std::polar(1.0, -TWO_PI * order * static_cast<double>(i) / 512.0);
+    return sum / (2.0 * static_cast<double>(turn));
+  };
+  const Record other = run(with(model, {resonance("fz")}), slotCut(EVEN_RPM), 0.4),
+               itself = run(with(model, {resonance("fx")}), slotCut(EVEN_RPM), 0.4);
+  for (const int order : {3, 6, 9, 15}) {
+    const double q = order * RATE / 512.0 / 640.0;
+    const std::complex<double> mode = 0.8 / std::complex<double>(1.0 - q * q, 2.0 * 0.05 * q);
+    const std::complex<double> x = line(pure, "fx", order), z = line(pure, "fz", order);
+    EXPECT_LT(std::abs(line(other, "fz", order) - (z + mode * x)), 0.01 * std::abs(mode * x)) << order;
+    EXPECT_LT(std::abs(line(itself, "fx", order) - (0.2 + mode) * x), 0.01 * std::abs(mode * x)) << order;
+    EXPECT_EQ(line(other, "fx", order), x);
   }
 }
 

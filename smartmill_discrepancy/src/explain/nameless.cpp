@@ -52,9 +52,10 @@ double varianceOf(const std::vector<double>& pieces) {
   return std::max(squares - sum * sum / n, 0.0) * n / (n - 1.0);
 }
 
-std::vector<Said> saidBy(const TwinRunner& runner, const MachineModel& before, const MachineModel& after) {
+// @param before, after what two models leave
+std::vector<Said> saidBy(const TwinRunner& runner, const std::vector<double>& before,
+                         const std::vector<double>& after) {
   constexpr std::size_t LEAST_PIECE = 64;
-  const auto simulated = runner.simulate({before, after});
   std::map<std::size_t, Said> tests;
   std::map<std::size_t, std::vector<double>> pieces;
   for (const Block& b : runner.blocks()) {
@@ -67,7 +68,7 @@ std::vector<Said> saidBy(const TwinRunner& runner, const MachineModel& before, c
     of_test.resize(std::max(of_test.size(), b.size / turn + 1), 0.0);
     for (std::size_t i = 0; i < b.size; ++i) {
       const std::size_t k = b.offset + i;
-      const double r = runner.measured()[k] - simulated[0][k], s = runner.measured()[k] - simulated[1][k];
+      const double r = before[k], s = after[k];
       of_test[i / turn] += r * r - s * s;
       said.gain += r * r - s * s;
       said.change += (r - s) * (r - s);
@@ -104,13 +105,30 @@ double contradiction(const std::vector<Said>& tests, double deviations) {
 
 }  // namespace
 
+// What a state leaves of the fit tests and of those held out, records whose angle nobody measured laid where
+// it fits them: a mode turns its phases.
+std::pair<std::vector<double>, std::vector<double>> Nameless::leftOf(const FitState& state) const {
+  if (bench_.phasesEstimated()) {
+    FitState there = state;
+    bench_.turnPhases(there);  // perhaps by another tooth
+    bench_.turnTo(there);
+  }
+  const MachineModel model = bench_.exact().model(state);
+  const auto left = [&](const TwinRunner& runner) {
+    std::vector<double> values = runner.simulate(model);
+    for (std::size_t i = 0; i < values.size(); ++i) values[i] = runner.measured()[i] - values[i];
+    return values;
+  };
+  return {left(bench_.fitted()), left(bench_.heldout())};
+}
+
 // A cause that is real shows the same in every test: it takes from tests that it never saw what it takes from
 // those it was fitted to.
 bool Nameless::repeats(const FitState& before, const Fit& with) const {
-  const Fitter& exact = bench_.exact();
-  const MachineModel less = exact.model(before), more = exact.model(with.state);
-  const std::vector<Said> fitted = saidBy(bench_.fitted(), less, more);
-  const std::vector<Said> heldout = saidBy(bench_.heldout(), less, more);
+  const auto [fit_before, held_before] = leftOf(before);
+  const auto [fit_after, held_after] = leftOf(with.state);
+  const std::vector<Said> fitted = saidBy(bench_.fitted(), fit_before, fit_after);
+  const std::vector<Said> heldout = saidBy(bench_.heldout(), held_before, held_after);
   const Said fit = sumOf(fitted), held = sumOf(heldout);
   const double against = std::max(contradiction(fitted, rule_.least_deviations) / std::max(fit.gain, 1.0),
                                   contradiction(heldout, rule_.least_deviations) / std::max(held.gain, 1.0));
@@ -209,7 +227,8 @@ bool Nameless::addOne(SearchResult* found, const std::vector<Finding>& unexplain
     return !findEffect(m.hypothesis->effect)->empirical();
   });
   // One cause in the place of several names is the simpler answer.
-  if (named && forms_.size() == 1) {
+  if (named && !tried_instead_) {
+    tried_instead_ = true;
     const std::vector<Fit> instead = fitsInstead(found);
     if (takeOne(instead, {before.nominal, {}, before.turns}, found)) return true;
   }

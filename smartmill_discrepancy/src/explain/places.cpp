@@ -9,6 +9,7 @@
 #include <string>
 
 #include "smartmill_core/formatted.h"
+#include "smartmill_core/modal/modal_filter.h"
 #include "smartmill_core/model/effect_catalogue.h"
 #include "smartmill_core/signal/fourier.h"
 #include "smartmill_core/units.h"
@@ -256,6 +257,17 @@ double periodOf(const std::vector<double>& echo, double rate) {
   return lag;
 }
 
+// What comes with the spindle or its teeth is no beat of its own.
+bool turnsWith(const std::vector<Left>& tests, double period) {
+  constexpr double ALIKE = 0.02;
+  return std::all_of(tests.begin(), tests.end(), [&](const Left& t) {
+    const double turns = period * t.test->test.spindle_speed / units::TWO_PI;
+    return t.test->test.kind == TestKind::tap ||
+           (std::abs(turns - std::round(turns)) < ALIKE * turns ||
+            std::abs(1.0 / turns - std::round(1.0 / turns)) < ALIKE / turns);
+  });
+}
+
 std::optional<Bursts> burstsOf(std::vector<Left> tests) {
   const double rate = tests.front().test->test.sample_rate;
   tests.erase(std::remove_if(tests.begin(), tests.end(),
@@ -265,7 +277,7 @@ std::optional<Bursts> burstsOf(std::vector<Left> tests) {
   found.frequency = strongestBand(tests, rate);
   if (found.frequency == 0.0) return {};
   found.period = periodOf(echoes(tests, found.frequency, rate), rate) / rate;
-  if (found.period == 0.0) return {};
+  if (found.period == 0.0 || turnsWith(tests, found.period)) return {};
   double squares = 0.0, count = 0.0;
   for (const Left& t : tests) {
     for (const double v : t.values) squares += v * v;
@@ -293,6 +305,89 @@ void addBursts(const std::vector<Hypothesis>& all, const std::string& channel, c
   }
 }
 
+// ---- resonances
+
+// A force channel of one test: what the model shows, and what is left, over the noise.
+struct Shown {
+  double rate = 0.0, noise = 1.0;
+  std::vector<double> model, left;
+};
+
+std::map<std::string, std::map<std::size_t, Shown>> forcesShown(const TwinRunner& runner,
+                                                                const std::vector<double>& residual) {
+  std::map<std::string, std::map<std::size_t, Shown>> shown;
+  for (const Block& b : runner.blocks()) {
+    if (std::find(FORCES.begin(), FORCES.end(), b.channel) == FORCES.end() || b.slow) continue;
+    Shown& s = shown[b.channel][b.test];
+    s.rate = runner.data().tests[b.test].test.sample_rate;
+    s.noise = b.noise;
+    for (std::size_t i = b.offset; i < b.offset + b.size; ++i) {
+      s.model.push_back(runner.measured()[i] - residual[i]);
+      s.left.push_back(residual[i]);
+    }
+  }
+  return shown;
+}
+
+struct Place {
+  double frequency = 0.0, gain = 0.0, squares = 0.0;  // [Hz], of the path, that it takes from what is left
+};
+
+constexpr double MODE_DAMPING = 0.04;  // with which modes are looked for
+
+// What a mode of one share of the path takes.
+Place resonanceAt(double frequency, const std::map<std::size_t, Shown>& to,
+                  const std::map<std::size_t, Shown>& from, bool itself) {
+  ModalModel path;
+  path.modes.resize(1);
+  path.modes.front().frequency = frequency;
+  path.modes.front().damping_ratio = MODE_DAMPING;
+  path.modes.front().gain = 1.0;
+  double product = 0.0, squares = 1e-300;
+  for (const auto& [test, source] : from) {
+    const auto target = to.find(test);
+    if (target == to.end() || frequency > 0.45 * source.rate) continue;
+    ModalFilter mode(path, source.rate, Hold::first_order);
+    const double scale = source.noise / target->second.noise;
+    for (std::size_t i = 0; i < source.model.size(); ++i) {
+      const double x = source.model[i], column = scale * (mode.step(x) - (itself ? x : 0.0));
+      product += column * target->second.left[i];
+      squares += column * column;
+    }
+  }
+  return {frequency, product / squares, product * product / squares};
+}
+
+void addResonances(const std::vector<Hypothesis>& all, const TwinRunner& runner,
+                   const std::vector<double>& residual, std::vector<Hypothesis>* placed) {
+  constexpr double RATIO = 1.05, LOWEST = 60.0, HIGHEST = 0.42, LEAST = 100.0;
+  const auto shown = forcesShown(runner, residual);
+  double rate = 0.0;
+  for (const TestData& t : runner.data().tests) rate = std::max(rate, t.test.sample_rate);
+  for (const auto& [to, left] : shown) {
+    for (const auto& [from, source] : shown) {
+      const std::string variant = to + " from " + from;
+      for (const Hypothesis& h : all) {
+        if (!isForm(h, "resonance", variant)) continue;
+        std::vector<double> frequencies;
+        for (double f = LOWEST; f < HIGHEST * rate; f *= RATIO) frequencies.push_back(f);
+        std::vector<Place> places(frequencies.size());
+        runParallel(frequencies.size(), runner.threads(), [&](std::size_t k) {
+          places[k] = resonanceAt(frequencies[k], left, source, to == from);
+        });
+        const Place best =
+            *std::max_element(places.begin(), places.end(),
+                              [](const Place& a, const Place& b) { return a.squares < b.squares; });
+        if (best.squares < LEAST) continue;
+        Hypothesis at = h;
+        const double f = std::log(best.frequency), d = std::log(MODE_DAMPING);
+        at.probe({f, d, 0.0}, {{f, d, std::clamp(best.gain, -1.0, 1.0)}});
+        placed->push_back(at.named(variant + formatted(", %.4g Hz", best.frequency)));
+      }
+    }
+  }
+}
+
 }  // namespace
 
 std::vector<Hypothesis> placedForms(const TwinRunner& runner, const std::vector<Hypothesis>& all,
@@ -309,6 +404,7 @@ std::vector<Hypothesis> placedForms(const TwinRunner& runner, const std::vector<
     addSteps(all, channel, tests, &placed);
     addBursts(all, channel, tests, &placed);
   }
+  addResonances(all, runner, now.residual, &placed);
   return placed;
 }
 

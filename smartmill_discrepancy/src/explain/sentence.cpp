@@ -238,6 +238,16 @@ std::string ofTransfer(const FoundEffect& effect) {
                    above != 1.0 ? "quicker" : "slower", corner, above != 1.0 ? above : below);
 }
 
+std::string ofResonance(const FoundEffect& effect) {
+  const std::string &channel = effect.words.at("channel"), &from = effect.words.at("from");
+  const std::string path = channel == from ? "beside itself" : "of what " + from + " carries";
+  return formatted(
+      "%s shows a resonance %s at %.4g Hz (damping %.2g %%, share %.2g): its sensor, or what it is "
+      "bolted to, has a mode that the model lacks",
+      channel.c_str(), path.c_str(), valueOf(effect, "frequency_hz"),
+      100.0 * valueOf(effect, "damping_ratio"), valueOf(effect, "gain"));
+}
+
 }  // namespace
 
 std::string sentenceOf(const FoundEffect& effect) {
@@ -246,7 +256,8 @@ std::string sentenceOf(const FoundEffect& effect) {
       {"lost_edge", ofLostEdge},  {"curve", ofCurve},       {"tone", ofTone},
       {"order", ofOrder},         {"settling", ofSettling}, {"tooth_factor", ofTeeth},
       {"edge_life", ofLife},      {"step", ofStep},         {"ramp", ofRamp},
-      {"approach", ofApproach},   {"bursts", ofBursts},     {"transfer", ofTransfer}};
+      {"approach", ofApproach},   {"bursts", ofBursts},     {"transfer", ofTransfer},
+      {"resonance", ofResonance}};
   const EffectKind* kind = findEffect(effect.name);
   if (!kind || !kind->empirical()) return "";
   return SENTENCES.at(kind->form)(effect);

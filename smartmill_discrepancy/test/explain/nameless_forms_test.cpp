@@ -120,39 +120,70 @@ TEST(NamelessForms, aTrainOfBursts) {
   EXPECT_NEAR(valueOf(e.effects[0], "amplitude"), 30.0, 0.6);
 }
 
-// A low pass of first order by its own recursion, at a finer rate.
-Record behindFilter(const CampaignTest& test, double corner, std::uint64_t seed) {
+// A record made at a finer rate, where something is done to it, of which each sixteenth sample is kept.
+Record finely(const CampaignTest& test, std::uint64_t seed,
+              const std::function<void(Record&, double step)>& change) {
   constexpr std::size_t FINE = 16;
   CampaignTest finer = test;
   finer.sample_rate *= FINE;
-  const Record fine = pure(finer, 1.0, seed);
-  Record record;
+  Record fine = pure(finer, 1.0, seed), record;
+  change(fine, 1.0 / finer.sample_rate);
   for (std::size_t i = 0; i < fine.size(); i += FINE) record.time.push_back(fine.time[i]);
-  const double share = units::TWO_PI * corner / finer.sample_rate;
   for (const std::string& name : fine.names) {
     std::vector<double>& values = record.add(name);
-    double low = 0.0, last = 0.0;
-    for (std::size_t i = 0; i < fine.size(); ++i) {
-      const double value = fine.column(name)[i];
-      low += share * (0.5 * (last + value) - low) / (1.0 + 0.5 * share);
-      last = value;
-      if (i % FINE == 0) values.push_back(name == "fy" ? low : value);
-    }
+    for (std::size_t i = 0; i < fine.size(); i += FINE) values.push_back(fine.column(name)[i]);
   }
+  addNoise(record, seed);
   return record;
 }
 
+// A low pass of first order by its own recursion.
 TEST(NamelessForms, aChannelBehindAFilter) {
   const TemporaryFolder folder;
   const Explanation e = explained(
       [](const CampaignTest& test, std::uint64_t seed) {
-        Record record = behindFilter(test, 320.0, seed);
-        addNoise(record, seed);
-        return record;
+        return finely(test, seed, [](Record& record, double step) {
+          const double share = units::TWO_PI * 320.0 * step;
+          double low = 0.0, last = 0.0;
+          for (double& value : record.add("fy")) {
+            low += share * (0.5 * (last + value) - low) / (1.0 + 0.5 * share);
+            last = value;
+            value = low;
+          }
+        });
       },
       folder.file("."), quickly());
   expectBuilt(e, "transfer", "as a low pass of first order does");
   EXPECT_NEAR(valueOf(e.effects[0], "corner_hz"), 320.0, 5.0);
+}
+
+// By the recursion of a mode: what fx carries shows in fz.
+TEST(NamelessForms, aModeThatPassesOneForceOnToAnother) {
+  const TemporaryFolder folder;
+  const Explanation e = explained(
+      [](const CampaignTest& test, std::uint64_t seed) {
+        return finely(test, seed, [](Record& record, double step) {
+          const std::vector<double> fx = record.column("fx");
+          std::vector<double>& fz = record.add("fz");
+          const double w = units::TWO_PI * 870.0;
+          double x = 0.0, v = 0.0;
+          constexpr int INNER = 8;
+          const double dt = step / INNER;
+          for (std::size_t i = 1; i < fz.size(); ++i) {
+            for (int k = 0; k < INNER; ++k) {
+              const double f = fx[i - 1] + (fx[i] - fx[i - 1]) * (k + 0.5) / INNER;
+              x += 0.5 * dt * v;
+              v = (v * (1.0 - 0.03 * w * dt) + dt * w * w * (0.3 * f - x)) / (1.0 + 0.03 * w * dt);
+              x += 0.5 * dt * v;
+            }
+            fz[i] += x;
+          }
+        });
+      },
+      folder.file("."), quickly());
+  expectBuilt(e, "resonance", "fz shows a resonance of what fx carries at 8");
+  EXPECT_NEAR(valueOf(e.effects[0], "frequency_hz"), 870.0, 1.0);
+  EXPECT_NEAR(valueOf(e.effects[0], "gain"), 0.3, 0.01);
 }
 
 // Each record jumps at another time: nothing of it comes again.

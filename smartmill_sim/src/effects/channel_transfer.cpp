@@ -19,7 +19,27 @@ class ChannelTransfer : public Effect {
   Shelf shelf_;
 };
 
-const EffectClass<ChannelTransfer> REGISTERED("empirical:transfer");
+/// Without a name: a mode on the way from one force channel to another, or within one.
+class ChannelResonance : public Effect {
+ public:
+  explicit ChannelResonance(const EffectEntry& entry) {
+    resonance_.channel = channelOf(wordOf(entry, "channel"));
+    resonance_.from = channelOf(wordOf(entry, "from"));
+    resonance_.mode.frequency = valueOf(entry, "frequency_hz");
+    resonance_.mode.damping_ratio = valueOf(entry, "damping_ratio");
+    resonance_.mode.gain = valueOf(entry, "gain");
+  }
+
+  void setUp(TwinSetup& setup) const override {
+    if (resonance_.mode.gain != 0.0) setup.resonances.push_back(resonance_);
+  }
+
+ private:
+  Resonance resonance_;
+};
+
+const EffectClass<ChannelTransfer> TRANSFER("empirical:transfer");
+const EffectClass<ChannelResonance> RESONANCE("empirical:resonance");
 
 }  // namespace
 }  // namespace smartmill::sim

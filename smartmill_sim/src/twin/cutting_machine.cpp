@@ -25,7 +25,7 @@ CuttingMachine::CuttingMachine(const MachineModel& model, double time_step, Feed
       time_step_(time_step),
       sign_(model.force_sensor.measures_workpiece ? -1.0 : 1.0) {
   model_.effects.clear();
-  TwinSetup setup{std::move(model_), {}, {}, 0.0, {}, {}};
+  TwinSetup setup{std::move(model_), {}, {}, 0.0, {}, {}, {}};
   if (setup.model.tool) setup.radius_offset.assign(static_cast<std::size_t>(setup.model.tool->teeth), 0.0);
   effects_.setUp(setup);
   model_ = std::move(setup.model);
@@ -47,6 +47,11 @@ CuttingMachine::CuttingMachine(const MachineModel& model, double time_step, Feed
     sensor_.emplace_back(axis, rate, Hold::first_order);
   }
   if (model_.spindle) drive_.emplace(*model_.spindle, time_step);
+  for (const Resonance& resonance : setup.resonances) {
+    ModalModel path;
+    path.modes = {resonance.mode};
+    resonances_.emplace_back(resonance, ModalFilter(path, rate, Hold::first_order));
+  }
   for (const auto& [channel, shelf] : setup.shelves)
     shelves_.emplace_back(channel, ShelfFilter(shelf, time_step));
   for (std::size_t c = 0; c < CHANNELS; ++c) {
@@ -175,8 +180,7 @@ void CuttingMachine::step(const Input& input, Output& out) {
   jump_ = 0.0;
   engaged_ = false;
   if (effects_.has(Stage::sensor_output)) effects_.measure(Stage::sensor_output, now_, out.early);
-  for (auto& [channel, shelf] : shelves_) out.early[channel] = shelf.step(out.early[channel]);
-  for (auto& [channel, line] : delays_) out.early[channel] = line.step(out.early[channel]);
+  passOn(out);
   ChannelValues shown = out.early;
   if (effects_.has(Stage::signal)) effects_.measure(Stage::signal, now_, shown);
   out.sensor = {{shown[FX], shown[FY], shown[FZ]}};
@@ -270,6 +274,19 @@ void CuttingMachine::showLoad(double speed, Output& out) {
   const double mean_torque = last_torque_ + 0.5 * (1.0 - jump_) * (out.force.torque - last_torque_);
   out.early[LOAD_METER] = drive_->step(mean_torque, speed);
   last_torque_ = out.force.torque;
+}
+
+void CuttingMachine::passOn(Output& out) {
+  if (!resonances_.empty()) {
+    const ChannelValues before = out.early;
+    for (auto& [resonance, filter] : resonances_) {
+      const double itself =
+          resonance.channel == resonance.from ? resonance.mode.gain * before[resonance.from] : 0.0;
+      out.early[resonance.channel] += filter.step(before[resonance.from]) - itself;
+    }
+  }
+  for (auto& [channel, shelf] : shelves_) out.early[channel] = shelf.step(out.early[channel]);
+  for (auto& [channel, line] : delays_) out.early[channel] = line.step(out.early[channel]);
 }
 
 void CuttingMachine::passTime(const ToolMotion& motion) {

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <deque>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "smartmill_discrepancy/explain/explain.h"
@@ -12,7 +13,7 @@ namespace smartmill::discrepancy {
 /// When a cause without a name is taken into the model. Everything is asked of tests that took no part in its
 /// fit, since a form without a name fits whatever it is shown.
 struct NamelessOptions {
-  std::size_t most = 2;
+  std::size_t most = 6;
   std::size_t fitted = 4, fitted_instead = 3, examined = 2;  ///< forms a round
   double least_share = 0.05;  ///< [1] of the squares above the noise of the fit tests
   /// [1] of that share it must take of the held-out tests, and of what it changes in them; of the gain there
@@ -43,6 +44,7 @@ class Nameless {
   bool takeOne(std::vector<Fit> fits, const FitState& before, SearchResult* found) const;
   bool take(const Fit& start, const FitState& before, SearchResult* found) const;
   Fit fitted(const FitState& state) const;
+  std::pair<std::vector<double>, std::vector<double>> leftOf(const FitState& state) const;
   bool repeats(const FitState& before, const Fit& with) const;
   Fit withoutNeedless(Fit fit, const NominalTangents& tangents) const;
 
@@ -50,6 +52,7 @@ class Nameless {
   const ExplainOptions& options_;
   const StructureOptions& structure_;
   NamelessOptions rule_;
+  bool tried_instead_ = false;                 // a form in the place of all names
   std::deque<std::vector<Hypothesis>> forms_;  // of each round: states point to them
 };
 

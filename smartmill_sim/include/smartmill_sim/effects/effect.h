@@ -54,6 +54,13 @@ struct Shelf {
   double below = 1.0, above = 1.0;  ///< [1]
 };
 
+/// A mode through which one force channel shows in another, or beside itself: gain (mode(x) - x) is added
+/// then.
+struct Resonance {
+  std::size_t channel = 0, from = 0;
+  Mode mode;  ///< its gain is that of the path
+};
+
 /// What the machine is before it starts; effects change it once.
 struct TwinSetup {
   MachineModel model;                  ///< without effects
@@ -61,6 +68,7 @@ struct TwinSetup {
   std::array<double, CHANNELS> delay;  ///< [s] of each channel
   double corner_radius = 0.0;          ///< [m] of the tool
   std::vector<EdgeLayer> layers;
+  std::vector<Resonance> resonances;                   ///< of channels, before shelves
   std::vector<std::pair<std::size_t, Shelf>> shelves;  ///< of channels, before they are late
 };
 

@@ -133,6 +133,7 @@ class CuttingMachine {
   void settleTip(const Input& input, Output& out);
   void showForce(Output& out);
   void showLoad(double speed, Output& out);
+  void passOn(Output& out);  // what effects on channels make of them, in time
   void passTime(const ToolMotion& motion);
 
   bool rigid() const { return cutter_ && cutter_->way() == Cutter::Way::tables; }
@@ -168,6 +169,7 @@ class CuttingMachine {
   std::vector<ModalFilter> sensor_;                  // x, y, z
   double sensor_frequency_ = 1.0;                    // of the first modes now, over the model's
   std::optional<SpindleDrive> drive_;
+  std::vector<std::pair<Resonance, ModalFilter>> resonances_;
   std::vector<std::pair<std::size_t, ShelfFilter>> shelves_;
   std::vector<std::pair<std::size_t, DelayLine>> delays_;
   std::array<std::array<double, 2>, 2> tip_history_{};  // [N] total force on the tip one and two steps ago

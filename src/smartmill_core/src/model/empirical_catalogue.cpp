@@ -18,6 +18,7 @@ using Stage = EffectStage;
 using Values = std::vector<double>;
 
 const std::vector<std::string> CHANNELS{"fx", "fy", "fz", "load_meter"};
+const std::vector<std::string> FORCES{"fx", "fy", "fz"};
 const std::vector<std::string> TIMES{"always", "turning"};   // of the spindle
 const std::vector<std::string> CLOCKS{"record", "machine"};  // that began with it, or when it was cold
 const std::vector<std::string> SHARES{"chip", "edge"};       // of the force
@@ -340,7 +341,25 @@ Forms transfers(const Scope& scope) {
   return forms;
 }
 
-std::vector<EffectKind> makeCatalogue() {
+// A mode between two force channels, or within one. Where it lies only the residual tells.
+Forms resonances(const Scope& scope) {
+  Forms forms;
+  for (const std::string& to : FORCES) {
+    for (const std::string& from : FORCES) {
+      if (!scope.channels.count(to) || !scope.channels.count(from)) continue;
+      EffectForm form(
+          {logarithm("frequency_hz", {std::log(20.0), std::log(1e4), 1e-5, 1.0}, 1.0, std::log(800.0)),
+           logarithm("damping_ratio", {std::log(1e-3), std::log(0.5), 1e-3, 1.0}, 1.0, std::log(0.04)),
+           amplitude("gain", {-3.0, 3.0, 1e-5, 0.5})});
+      form.word("channel", to).word("from", from);
+      forms.push_back(form.named(to + " from " + from));
+    }
+  }
+  return forms;
+}
+
+// Of teeth, chips and the law.
+std::vector<EffectKind> cuttingForms() {
   const Range positive = Range::positive(), not_negative = Range::notNegative();
   return {
       empirical("geometry", "lost_edge", Stage::geometry,
@@ -379,6 +398,21 @@ std::vector<EffectKind> makeCatalogue() {
                 {oneOf("of", SHARES), key("amplitude", "1", Range::above(-1.0)),
                  key("time_constant_s", "s", positive)},
                 {Need::cuts, Need::cut_time}, edgeLives),
+  };
+}
+
+// Of what channels make of a signal, and lines in them.
+std::vector<EffectKind> channelForms() {
+  const Range positive = Range::positive(), not_negative = Range::notNegative();
+  return {
+      empirical(
+          "channel", "resonance", Stage::sensor_output,
+          "gain times what a mode makes of another force channel is added to a channel; from itself, of "
+          "what the mode changes",
+          "one mode of a transfer matrix",
+          {oneOf("channel", FORCES), oneOf("from", FORCES), key("frequency_hz", "Hz", positive),
+           key("damping_ratio", "1", Range::open(0.0, 1.0)), key("gain", "1")},
+          {Need::forces}, resonances),
       empirical("channel", "transfer", Stage::sensor_output,
                 "a channel shows above x + (below - above) L(x), L a low pass of first order at the corner",
                 "first-order shelf; below 0: high pass, above 0: low pass",
@@ -404,6 +438,13 @@ std::vector<EffectKind> makeCatalogue() {
           "line at a spindle order that keeps no phase",
           {oneOf("channel", CHANNELS), key("order", "1", positive), key("amplitude", "N or V", not_negative)},
           {}, orders),
+  };
+}
+
+// Of courses over time in them.
+std::vector<EffectKind> courseForms() {
+  const Range positive = Range::positive(), not_negative = Range::notNegative();
+  return {
       empirical(
           "channel", "settling", Stage::signal,
           "a channel begins each record off by amplitude and comes back with exp(-t / constant)",
@@ -439,6 +480,13 @@ std::vector<EffectKind> makeCatalogue() {
            key("decay_s", "s", positive), key("amplitude", "N or V", not_negative)},
           {}, burstTrains),
   };
+}
+
+std::vector<EffectKind> makeCatalogue() {
+  std::vector<EffectKind> all;
+  for (const auto& group : {cuttingForms(), channelForms(), courseForms()})
+    all.insert(all.end(), group.begin(), group.end());
+  return all;
 }
 
 }  // namespace
