@@ -157,14 +157,12 @@ void keep(ModalEstimate& estimate, std::size_t count) {
 }
 
 ToolBeam beamOf(const TipOptions& tip) {
-  const bool carbide = tip.material == "carbide";
   ToolBeam tool;
   tool.stickout = {tip.stickout * units::MM, tip.stickout_std * units::MM};
   tool.diameter = {tip.diameter * units::MM, 0.02 * units::MM};
   tool.fluted_length = {tip.fluted * units::MM, tip.fluted_std * units::MM};
   tool.flute_ratio = {tip.flute_ratio, tip.flute_ratio_std};
-  tool.young = carbide ? Known{5.8e11, 1.5e10} : Known{2.1e11, 5e9};
-  tool.density = carbide ? Known{14300.0, 200.0} : Known{7850.0, 50.0};
+  setMaterial(tool, tip.material);
   return tool;
 }
 
@@ -247,6 +245,8 @@ void runBag(const Options& options) {
         result.frf.frf};
     write(options, "_" + result.frf.direction, {frf}, estimate);
     if (++good == 1) write(options, "", {frf}, estimate);
+    if (result.cross.frf.size() > 0)
+      writeFrfCsv(result.cross.frf, options.out + "/frf_" + result.cross.direction + ".csv");
   }
   std::filesystem::create_directories(options.out);
   writeHitsCsv(verdicts, options.out + "/hits.csv");

@@ -13,7 +13,6 @@
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/signal/streams.h"
 #include "smartmill_core/units.h"
-#include "smartmill_hammer/analysis/offset_factor.h"
 #include "smartmill_hammer/sequence/hammer_sequence.h"
 
 namespace smartmill {
@@ -55,6 +54,7 @@ class ClosedFormMachine {
   double mounting = 0.3;  // [rad] angle by which the cutter sits in the spindle, unknown to the sequence
   double force_noise = 0.2, volt_noise = 0.002;
   double peak = 200.0, contact = 0.4e-3;
+  double pivot = 0.25;  // [m] above the tip, about which the tool turns
   double latency = 0.05;
   double time = 1000.0;
   bool tool_present = true;
@@ -151,10 +151,12 @@ class ClosedFormMachine {
       const double t = time + static_cast<double>(i) / rate;
       double force = 0.0, away = 0.0;
       if (dir >= 0) {
-        if (filter_direction != dir) {
+        const double height = h.position.at(dir == 0 ? "x" : "y")[2] - position[2];
+        if (filter_direction != dir || (path.empty() && std::abs(filter_height - height) > 1e-7)) {
           filter_direction = dir;
+          filter_height = height;
           filter.clear();
-          filter.emplace_back(crossModel(dir), rate * SUB, Hold::first_order);
+          filter.emplace_back(crossModel(dir, height), rate * SUB, Hold::first_order);
           filter[0].reset();
         }
         for (int s = SUB - 1; s >= 0; --s) away = filter[0].step(blow(t - s / (rate * SUB)));
@@ -196,18 +198,19 @@ class ClosedFormMachine {
     }
   }
 
+  /// What the sensor, so high above the tip, sees of a blow at the hammer's height: a rigid tool that turns
+  /// about a point far above.
+  ModalModel crossModel(int dir, double height) const {
+    const auto share = [&](double h) { return 1.0 - h / pivot; };
+    ModalModel m = tip[dir];
+    for (Mode& mode : m.modes) mode.gain *= share(height) * share(height + model.hammer->offset);
+    return m;
+  }
+
   std::mt19937 random;
 
  private:
   static constexpr int SUB = 8;
-
-  /// What the sensor sees of a blow at the hammer's height (the inverse of eq. 4.44).
-  ModalModel crossModel(int dir) const {
-    ModalModel m = tip[dir];
-    const double factor = model.stickout ? offsetFactor(*model.stickout, model.hammer->offset) : 1.0;
-    for (Mode& mode : m.modes) mode.gain /= factor;
-    return m;
-  }
 
   double blow(double t) const {
     double f = 0.0;
@@ -255,6 +258,7 @@ class ClosedFormMachine {
   std::uint64_t index = 5000;
   std::vector<ModalFilter> filter;
   int filter_direction = -1;
+  double filter_height = 0.0;  // [m]
   std::deque<Waypoint> path;
   Axes3 unseen{};  // [m] beyond the shown position
   double path_from = 0.0, orient_from = 0.0, orient_to = 0.0, hit_at = -1.0;

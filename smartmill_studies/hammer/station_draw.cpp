@@ -136,6 +136,8 @@ DrawnStation drawStation(std::uint64_t seed, int number) {
   for (double& off : d.set_up) off = std::clamp(dice.normal(40e-6), -100e-6, 100e-6);
   // A tool of another length or none: nothing stands before the sensor.
   d.out_of_range = dice.chance(0.03);
+  d.stickout_error = std::clamp(dice.normal(0.4e-3), -1e-3, 1e-3);
+  d.fluted_error = std::clamp(dice.normal(0.8e-3), -2e-3, 2e-3);
   d.true_model = d.believed;
   for (auto& [name, place] : d.true_model.hammer->position) {
     for (std::size_t axis = 0; axis < 2; ++axis)

@@ -17,6 +17,8 @@ struct DrawnStation {
   double mounting = 0.0;                 ///< [rad] of the tool in the spindle
   std::array<double, 2> set_up{{0, 0}};  ///< [m] by which the sensors stand off where they are believed
   bool out_of_range = false;             ///< nothing stands before the sensor
+  double stickout_error = 0.0;           ///< [m] of what the operator says
+  double fluted_error = 0.0;             ///< [m]
   std::string direction = "x";
 };
 

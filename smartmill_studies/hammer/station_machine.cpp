@@ -37,6 +37,7 @@ void StationMachine::obey(const Command& c) {
       orient_from_ = begin;
       orient_to_ = c.angle;
       orienting_ = true;
+      search_moves_ += strikes_ == 0;
       break;
     case Command::Kind::jog: {
       Axes3 to = path_.empty() ? position_ : path_.back().position;

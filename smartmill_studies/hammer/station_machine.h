@@ -35,7 +35,8 @@ class StationMachine {
   bool touched() const { return touched_; }         ///< a collision with a sensor
   double struckRetreat() const { return struck_; }  ///< [m] behind the cutting circle, largest over the blows
   int strikes() const { return strikes_; }
-  double restVolt() const { return rest_volt_; }  ///< [V] of the sensor when the last blow was asked for
+  int searchMoves() const { return search_moves_; }  ///< of the spindle before the first blow
+  double restVolt() const { return rest_volt_; }     ///< [V] of the sensor when the last blow was asked for
 
  private:
   void moveOn(double dt);
@@ -53,7 +54,7 @@ class StationMachine {
   bool orienting_ = false;
   double closest_ = 1.0, struck_ = 0.0;
   bool touched_ = false;
-  int strikes_ = 0;
+  int strikes_ = 0, search_moves_ = 0;
   double rest_volt_ = 0.0, volt_ = 0.0;
 };
 

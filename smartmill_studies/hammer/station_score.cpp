@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <complex>
 #include <functional>
 #include <optional>
 
@@ -16,9 +17,10 @@ namespace {
 using nlohmann::json;
 
 constexpr double BAND_LOW = 250.0, BAND_HIGH = 4900.0;  // [Hz] of the modes that count
-constexpr double FIT_HIGH = 8000.0;  // [Hz] a mode above the band that counts bends its upper end
-constexpr double SAME_MODE = 0.015;  // [1] of the frequency
-constexpr double SHOWS = 0.05;       // [1] of the largest peak: a mode that counts
+constexpr double FIT_HIGH = 8000.0;     // [Hz] a mode above the band that counts bends its upper end
+constexpr double SAME_MODE = 0.015;     // [1] of the frequency
+constexpr double HEIGHT_STEP = 0.5e-3;  // [m] to which the sensor's height is told
+constexpr double SHOWS = 0.05;          // [1] of the largest peak: a mode that counts
 
 struct Truth {
   ModalModel tip, measured;  // the same modes
@@ -52,7 +54,16 @@ std::optional<std::size_t> shownAs(const Truth& truth, std::size_t k, const std:
   return best;
 }
 
-json modeLines(const Truth& truth, const std::vector<Mode>& fitted, double factor, json& line) {
+/// The corrected mode that a measured one has become.
+const Mode* atTip(const std::vector<Mode>& tip, const Mode& measured) {
+  for (const Mode& m : tip) {
+    if (m.frequency == measured.frequency) return &m;
+  }
+  return nullptr;
+}
+
+json modeLines(const Truth& truth, const MeasureFrfResult& result, double factor, json& line) {
+  const std::vector<Mode>& fitted = result.measured.modes;
   json modes = json::array();
   const double tip_peak = largestPeak(truth.tip), shown_peak = largestPeak(truth.measured);
   std::vector<bool> used(fitted.size(), false);
@@ -70,6 +81,7 @@ json modeLines(const Truth& truth, const std::vector<Mode>& fitted, double facto
       continue;
     }
     const Mode& fit = fitted[*found];
+    const Mode* corrected = atTip(result.modes.model.modes, fit);
     modes.push_back({{"f", tip.frequency},
                      {"zeta", tip.damping_ratio},
                      {"f_error", fit.frequency / tip.frequency - 1.0},
@@ -79,6 +91,12 @@ json modeLines(const Truth& truth, const std::vector<Mode>& fitted, double facto
                      {"gain_z", (fit.gain - measured.gain) / fit.gain_std},
                      {"measured_error", fit.gain / measured.gain - 1.0},
                      {"k_none", tip.gain / fit.gain - 1.0},
+                     {"k_tip", corrected ? json(tip.gain / corrected->gain - 1.0) : json()},
+                     {"tip_z", corrected ? json((corrected->gain - tip.gain) / corrected->gain_std) : json()},
+                     {"tip_std", corrected ? json(corrected->gain_std / corrected->gain) : json()},
+                     {"f_std", fit.frequency_std / fit.frequency},
+                     {"zeta_std", fit.damping_ratio_std / fit.damping_ratio},
+                     {"gain_std", fit.gain_std / fit.gain},
                      {"k_444", tip.gain / (factor * fit.gain) - 1.0},
                      {"weight", peak(measured) / shown_peak}});
   }
@@ -90,6 +108,63 @@ json modeLines(const Truth& truth, const std::vector<Mode>& fitted, double facto
   }
   line["spurious"] = spurious;
   return modes;
+}
+
+/// [1] rms of what a scaled FRF is off the truth over the truth's, and how far its least real part is off,
+/// to which the least depth of a slot is inverse (what figure 4.8 compares); 100 Hz up to the band's end.
+struct FrfError {
+  double frf = 0.0, depth = 0.0;
+};
+FrfError errorOf(const FrequencyResponse& frf, double factor, const ModalModel& truth) {
+  double off = 0.0, all = 0.0, softest = 0.0, due = 0.0;
+  for (std::size_t i = 0; i < frf.size(); ++i) {
+    const double f = frf.frequency[i];
+    if (f < 100.0 || f > BAND_HIGH) continue;
+    const std::complex<double> is = factor * frf.value[i], should = truth.response(f);
+    off += std::norm(is - should);
+    all += std::norm(should);
+    softest = std::min(softest, is.real());
+    due = std::min(due, should.real());
+  }
+  return {std::sqrt(off / all), due / softest - 1.0};
+}
+
+/// [1] rms over the band's lines of the error in stated deviations, less a common scale, which is the
+/// sensor's.
+double lineScatter(const FrequencyResponse& frf, const ModalModel& truth) {
+  std::complex<double> both;
+  double own = 0.0;
+  int lines = 0;
+  const auto each = [&](const auto& use) {
+    for (std::size_t i = 0; i < frf.size(); ++i) {
+      const double f = frf.frequency[i];
+      if (f > BAND_LOW && f < BAND_HIGH) use(frf.value[i], truth.response(f), std::pow(frf.std_dev[i], 2));
+    }
+  };
+  each([&](std::complex<double> is, std::complex<double> should, double variance) {
+    both += std::conj(should) * is / variance;
+    own += std::norm(should) / variance;
+  });
+  const double scale = both.real() / own;
+  double sum = 0.0;
+  each([&](std::complex<double> is, std::complex<double> should, double variance) {
+    sum += std::norm(is - scale * should) / variance;
+    ++lines;
+  });
+  return std::sqrt(sum / lines);
+}
+
+void frfLines(const Truth& truth, const MeasureFrfResult& result, double factor, json& line) {
+  const FrfError none = errorOf(result.measured_frf, 1.0, truth.tip),
+                 thesis = errorOf(result.measured_frf, factor, truth.tip),
+                 tip = errorOf(result.frf.frf, 1.0, truth.tip);
+  line["frf_none"] = none.frf;
+  line["frf_444"] = thesis.frf;
+  line["frf_tip"] = tip.frf;
+  line["depth_none"] = none.depth;
+  line["depth_444"] = thesis.depth;
+  line["depth_tip"] = tip.depth;
+  line["line_scatter"] = lineScatter(result.measured_frf, truth.measured);
 }
 
 /// [1] spindle moves of the thesis's search: golden section alone.
@@ -129,6 +204,11 @@ json runStation(const StationStudy& study, int number) {
   goal.direction = drawn.direction;
   goal.hits = study.hits;
   goal.teeth = drawn.believed.tool->teeth;
+  goal.stickout = *drawn.believed.stickout + drawn.stickout_error;
+  // Of the tool the catalogue tells, of the sensor's height whoever set it up.
+  parameters.tool_material = drawn.traits.young > 4e11 ? "carbide" : "steel";
+  parameters.tool_fluted_length = drawn.traits.flute_length + drawn.fluted_error;
+  parameters.read_height = std::round(drawn.traits.read_height / HEIGHT_STEP) * HEIGHT_STEP;
   StationMachine machine(drawn, study.seed + 7919u * static_cast<std::uint64_t>(number));
   double seconds = 0.0;
   const MeasureFrfResult result = measure(machine, parameters, drawn.believed, goal, seconds);
@@ -137,7 +217,7 @@ json runStation(const StationStudy& study, int number) {
             {"out_of_range", drawn.out_of_range},
             {"code", static_cast<int>(result.code)},
             {"message", result.message},
-            {"moves", result.spindle_moves},
+            {"moves", machine.searchMoves()},
             {"sure", std::isfinite(result.flute_sure) ? json(result.flute_sure) : json()},
             {"seconds", seconds},
             {"strikes", machine.strikes()},
@@ -153,10 +233,11 @@ json runStation(const StationStudy& study, int number) {
     const sim::HammerStation station(drawn.true_model, drawn.traits, 0.0, 1e-5);
     const sim::ToolStructure structure(drawn.traits, *drawn.believed.tool, *drawn.believed.stickout);
     const Truth truth{structure.between(axis, 0.0, axis, 0.0), station.measured(axis, axis)};
-    const double factor = offsetFactor(*drawn.believed.stickout, drawn.believed.hammer->offset);
+    const double factor = offsetFactor(goal.stickout, drawn.believed.hammer->offset);
     line["sensitivity_std"] = result.sensitivity_std / result.sensitivity;
     line["cross"] = result.cross.frf.size() > 0;
-    line["modes"] = modeLines(truth, result.modes.model.modes, factor, line);
+    line["modes"] = modeLines(truth, result, factor, line);
+    frfLines(truth, result, factor, line);
   }
   line["cpu"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
   return line;
@@ -177,7 +258,9 @@ double quantile(std::vector<double> values, double share) {
 json spread(const std::vector<json>& modes, const char* key) {
   std::vector<double> sizes;
   for (const json& mode : modes) {
-    if (mode[key].is_number()) sizes.push_back(std::abs(mode[key].get<double>()));
+    // A machine whose truth has no limit in the band has no error of it.
+    if (mode[key].is_number() && std::isfinite(mode[key].get<double>()))
+      sizes.push_back(std::abs(mode[key].get<double>()));
   }
   return {{"median", quantile(sizes, 0.5)}, {"95", quantile(sizes, 0.95)}, {"count", sizes.size()}};
 }
@@ -195,7 +278,7 @@ double within(const std::vector<json>& modes, const char* key) {
 }  // namespace
 
 json scoreStations(const std::vector<json>& lines) {
-  std::vector<json> modes;
+  std::vector<json> modes, measured;
   std::vector<double> moves, thesis, seconds, cpu, closest;
   int good = 0, due = 0, told = 0, away = 0, touched = 0, missed = 0, unseen = 0, spurious = 0, gullet = 0;
   for (const json& line : lines) {
@@ -218,6 +301,7 @@ json scoreStations(const std::vector<json>& lines) {
     unseen += line["unseen"].get<int>();
     spurious += line["spurious"].get<int>();
     for (const json& mode : line["modes"]) modes.push_back(mode);
+    measured.push_back(line);
   }
   json score{{"machines", lines.size()},  {"due", due},
              {"measured", good},          {"out_of_range", away},
@@ -229,9 +313,12 @@ json scoreStations(const std::vector<json>& lines) {
   for (const auto& [name, values] : {std::pair{"spindle_moves", &moves}, std::pair{"thesis_moves", &thesis},
                                      std::pair{"seconds", &seconds}, std::pair{"cpu_seconds", &cpu}})
     score[name] = {{"median", quantile(*values, 0.5)}, {"95", quantile(*values, 0.95)}};
-  for (const char* key : {"f_error", "zeta_error", "measured_error", "k_none", "k_444"})
+  for (const char* key : {"f_error", "zeta_error", "measured_error", "k_none", "k_444", "k_tip"})
     score[key] = spread(modes, key);
-  for (const char* key : {"f_z", "zeta_z", "gain_z"}) score["coverage"][key] = within(modes, key);
+  for (const char* key :
+       {"frf_none", "frf_444", "frf_tip", "depth_none", "depth_444", "depth_tip", "line_scatter"})
+    score[key] = spread(measured, key);
+  for (const char* key : {"f_z", "zeta_z", "gain_z", "tip_z"}) score["coverage"][key] = within(modes, key);
   return score;
 }
 

@@ -11,6 +11,7 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/fit/least_squares.h"
+#include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_core/parameters/parameter_table.h"
 #include "smartmill_core/signal/statistics.h"
 #include "tool_in_holder.h"
@@ -35,11 +36,15 @@ constexpr double TOOL_LOW = 0.35, TOOL_HIGH = 1.5;
 constexpr std::size_t MOST_TOOL_MODES = 2;
 /// A seat as hard as that is rigid; the diameter [m] that the prior's is meant for.
 constexpr double HARD = 0.01, SEAT_START = 0.3, SEAT_DIAMETER = 0.012;
+/// A spindle mode without the tool lies somewhere about a measured one: so far, as logarithms.
+constexpr double WIDE_FREQUENCY = 0.4, WIDE_GAIN = 2.0;
 constexpr int ROUNDS = 3, ITERATIONS = 40;
+/// Of an unknown, for derivatives; the modes beside it are those of first order.
+constexpr double STEP = 1e-5;
 /// Damping of a mode that is not seen is known to this share.
 constexpr double UNSEEN_DAMPING = 0.5;
 
-enum Unknown : Index { YOUNG, DENSITY, STICKOUT, DIAMETER, FLUTED, RATIO, ACROSS, TURNING, SHARED };
+enum Unknown : Index { YOUNG, DENSITY, STICKOUT, DIAMETER, FLUTED, RATIO, ACROSS, TURNING, HEIGHT, SHARED };
 
 /// Which of the measured modes are the tool's; the others stand for one spindle mode each.
 using ToolModes = std::set<std::size_t>;
@@ -53,7 +58,15 @@ struct Problem {
 
   const std::vector<Mode>& modes() const { return measurements.front().modes.modes; }
   std::size_t spindleModes() const { return modes().size() - of_tool.size(); }
-  Index unknowns() const { return SHARED + 3 * static_cast<Index>(spindleModes()); }
+  /// Of a further measurement: its scale over the first's.
+  Index scaleOf(std::size_t measurement) const {
+    return SHARED + static_cast<Index>(3 * spindleModes() + measurement - 1);
+  }
+  Index unknowns() const { return scaleOf(measurements.size()); }
+  double shift(const VectorXd& z) const { return prior.height * z[HEIGHT]; }
+  double gainOf(const HeldMode& mode, const OffsetMeasurement& at, const VectorXd& z) const {
+    return mode.gain(at.struck + shift(z), at.read + shift(z));
+  }
   double largestGain() const {
     double largest = 0.0;
     for (const Mode& m : modes()) largest = std::max(largest, std::abs(m.gain));
@@ -134,18 +147,39 @@ class TipResiduals : public fit::Residuals {
 
   Index count() const override {
     const auto modes = static_cast<Index>(problem_.modes().size());
-    return SHARED + static_cast<Index>(problem_.spindleModes()) +
-           modes * (1 + static_cast<Index>(problem_.measurements.size())) + static_cast<Index>(held_modes_);
+    const auto further = static_cast<Index>(problem_.measurements.size()) - 1;
+    return SHARED + 3 * static_cast<Index>(problem_.spindleModes()) + further + modes * (2 + further) +
+           static_cast<Index>(held_modes_);
   }
-  bool hasJacobian() const override { return false; }
 
-  bool evaluate(const VectorXd& z, VectorXd* residual, Eigen::MatrixXd*) const override {
-    const std::vector<HeldMode> held = heldModes(built(problem_, z));
-    if (held.size() < held_modes_) return false;
+  bool evaluate(const VectorXd& z, VectorXd* residual, Eigen::MatrixXd* jacobian) const override {
+    const HeldTool tool(built(problem_, z));
+    if (tool.modes().size() < held_modes_) return false;
+    leave(z, tool.modes(), residual);
+    if (jacobian) {
+      VectorXd there(count());
+      for (Index k = 0; k < z.size(); ++k) {
+        VectorXd near = z;
+        near[k] += STEP;
+        leave(near, tool.modesOf(built(problem_, near)), &there);
+        jacobian->col(k) = (there - *residual) / STEP;
+      }
+    }
+    return residual->allFinite();
+  }
+
+ private:
+  void leave(const VectorXd& z, const std::vector<HeldMode>& held, VectorXd* residual) const {
     Index row = 0;
     const auto add = [&](double value) { (*residual)[row++] = value; };
     for (Index k = 0; k < SHARED; ++k) add(z[k]);
-    for (std::size_t i = 0; i < problem_.spindleModes(); ++i) add(z[SHARED + 3 * static_cast<Index>(i) + 2]);
+    for (std::size_t i = 0; i < problem_.spindleModes(); ++i) {
+      const Index at = SHARED + 3 * static_cast<Index>(i);
+      add(z[at] / WIDE_FREQUENCY);
+      add(z[at + 1] / WIDE_GAIN);
+      add(z[at + 2]);
+    }
+    for (std::size_t i = 1; i < problem_.measurements.size(); ++i) add(z[problem_.scaleOf(i)]);
     const double small = MODEL_SMALL * problem_.largestGain();
     for (std::size_t r = 0; r < match_.size(); ++r) {
       const Mode& m = problem_.modes()[r];
@@ -153,15 +187,16 @@ class TipResiduals : public fit::Residuals {
       add(std::log(h.frequency / m.frequency) /
           std::hypot(MODEL_FREQUENCY, orZero(m.frequency_std) / m.frequency));
       const OffsetMeasurement& first = problem_.measurements.front();
-      const double here = h.gain(first.struck, first.read);
+      const double here = problem_.gainOf(h, first, z);
       add((here - m.gain) / std::hypot(MODEL_GAIN * m.gain, small, orZero(m.gain_std)));
       for (std::size_t i = 1; i < problem_.measurements.size(); ++i) {
         // From height to height the beam is told more closely than itself.
         const OffsetMeasurement& at = problem_.measurements[i];
         const Mode* seen = nearestMode(at.modes, m.frequency);
         const double ratio = seen ? seen->gain / m.gain : 1.0;
+        const double scale = 1.0 + std::hypot(first.scale_std, at.scale_std) * z[problem_.scaleOf(i)];
         add(seen
-                ? (h.gain(at.struck, at.read) - here * ratio) /
+                ? (scale * problem_.gainOf(h, at, z) - here * ratio) /
                       std::hypot(MODEL_RATIO * seen->gain, orZero(seen->gain_std), ratio * orZero(m.gain_std))
                 : 0.0);
       }
@@ -170,12 +205,10 @@ class TipResiduals : public fit::Residuals {
       const bool stands = std::find(match_.begin(), match_.end(), k) != match_.end();
       const OffsetMeasurement& at = problem_.measurements.front();
       const bool due = !stands && held[k].frequency < problem_.high;
-      add(due ? held[k].gain(at.struck, at.read) / (UNSEEN * problem_.largestGain()) : 0.0);
+      add(due ? problem_.gainOf(held[k], at, z) / (UNSEEN * problem_.largestGain()) : 0.0);
     }
-    return residual->allFinite();
   }
 
- private:
   const Problem& problem_;
   std::vector<std::size_t> match_;
   std::size_t held_modes_;
@@ -208,7 +241,7 @@ Fitted fitted(const Problem& problem) {
   options.iterations = ITERATIONS;
   options.function_tolerance = 1e-8;
   for (int round = 0; round < ROUNDS; ++round) {
-    const std::vector<HeldMode> held = heldModes(built(problem, best.z));
+    const std::vector<HeldMode> held = HeldTool(built(problem, best.z)).modes();
     const std::vector<std::size_t> match = matched(problem, held);
     if (std::count(match.begin(), match.end(), held.size()) > 0) return {};
     const TipResiduals residuals(problem, match, modesBelow(held, problem.high));
@@ -216,7 +249,12 @@ Fitted fitted(const Problem& problem) {
     const fit::Result result = fit::minimise(residuals, unknowns, options);
     if (!result.usable()) return {};
     const bool again = round > 0 && match == best.match && result.squares > 0.999 * best.squares;
-    best = {result.value, result.covariance().matrix, match, result.squares};
+    // Every unknown has a prior, so that this is regular, at a bound too.
+    VectorXd left(residuals.count());
+    Eigen::MatrixXd jacobian(residuals.count(), result.value.size());
+    if (!residuals.evaluate(result.value, &left, &jacobian)) return {};
+    best = {result.value, linear::inverseSymmetric(Eigen::MatrixXd(jacobian.transpose() * jacobian)), match,
+            result.squares};
     if (again) break;
   }
   return best;
@@ -231,17 +269,17 @@ struct Answers {
 
 Answers answersOf(const Problem& problem, const Fitted& fit, const VectorXd& z) {
   Answers a;
-  const std::vector<HeldMode> held = heldModes(built(problem, z));
+  const std::vector<HeldMode> held = HeldTool(built(problem, z)).modes();
   const OffsetMeasurement& at = problem.measurements.front();
   for (const std::size_t k : fit.match) {
     a.direct.push_back(held[k].gain(0.0, 0.0));
-    a.factor.push_back(held[k].gain(0.0, 0.0) / held[k].gain(at.struck, at.read));
+    a.factor.push_back(held[k].gain(0.0, 0.0) / problem.gainOf(held[k], at, z));
   }
   for (std::size_t k = 0; k < held.size(); ++k) {
     if (std::find(fit.match.begin(), fit.match.end(), k) != fit.match.end()) continue;
     a.frequency.push_back(held[k].frequency);
     a.unseen_gain.push_back(held[k].gain(0.0, 0.0));
-    a.unseen_added.push_back(held[k].gain(0.0, 0.0) - held[k].gain(at.struck, at.read));
+    a.unseen_added.push_back(held[k].gain(0.0, 0.0) - problem.gainOf(held[k], at, z));
   }
   return a;
 }
@@ -255,14 +293,14 @@ VectorXd flat(const Answers& a) {
 
 /// Standard deviations of the answers, by those of the unknowns.
 VectorXd deviations(const Problem& problem, const Fitted& fit) {
-  constexpr double STEP = 1e-4;
+  constexpr double SPAN = 1e-4;
   const Index n = fit.z.size();
   Eigen::MatrixXd map(flat(answersOf(problem, fit, fit.z)).size(), n);
   for (Index k = 0; k < n; ++k) {
     VectorXd up = fit.z, down = fit.z;
-    up[k] += STEP;
-    down[k] -= STEP;
-    map.col(k) = (flat(answersOf(problem, fit, up)) - flat(answersOf(problem, fit, down))) / (2.0 * STEP);
+    up[k] += SPAN;
+    down[k] -= SPAN;
+    map.col(k) = (flat(answersOf(problem, fit, up)) - flat(answersOf(problem, fit, down))) / (2.0 * SPAN);
   }
   return (map * fit.covariance * map.transpose()).diagonal().cwiseMax(0.0).cwiseSqrt();
 }
@@ -324,7 +362,8 @@ std::vector<ToolModes> hypotheses(const Problem& problem) {
   ToolInHolder clamped = built(problem, VectorXd::Zero(problem.unknowns()));
   clamped.spindle.clear();
   std::vector<double> own;
-  for (const HeldMode& h : heldModes(clamped)) own.push_back(h.frequency);
+  const HeldTool alone(clamped);
+  for (const HeldMode& h : alone.modes()) own.push_back(h.frequency);
   std::vector<ToolModes> all = {{}};
   const std::size_t n = problem.modes().size();
   const auto near = [&](std::size_t r, std::size_t k) {
@@ -387,6 +426,19 @@ TipCorrection together(const std::vector<TipCorrection>& all, const std::vector<
 }
 
 }  // namespace
+
+void setMaterial(ToolBeam& tool, const std::string& material) {
+  if (material == "carbide") {
+    // Grades of 9..12 % cobalt.
+    tool.young = {5.8e11, 2.0e10};
+    tool.density = {14300.0, 300.0};
+  } else if (material == "steel") {
+    tool.young = {2.1e11, 5.0e9};
+    tool.density = {7900.0, 150.0};
+  } else {
+    throw Error("tool material '" + material + "': carbide or steel is due");
+  }
+}
 
 ModalModel TipCorrection::model() const {
   ModalModel model;

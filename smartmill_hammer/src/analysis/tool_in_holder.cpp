@@ -67,17 +67,19 @@ double HeldMode::gain(double struck, double read) const {
   return at(struck) * at(read) / std::pow(units::TWO_PI * frequency, 2);
 }
 
-std::vector<HeldMode> heldModes(const ToolInHolder& t) {
+namespace {
+
+/// Stiffness and mass of the beam, free, and of what the spindle's modes (of mass 1) move: x runs from the
+/// tip, so a mode that tilts towards the spindle has its end's deflection less.
+void assemble(const ToolInHolder& t, MatrixXd& stiffness, MatrixXd& mass) {
   const auto spindle = static_cast<Index>(t.spindle.size());
   const Index size = TOOL + spindle;
-  MatrixXd mass = MatrixXd::Zero(size, size), stiffness = mass;
+  mass = stiffness = MatrixXd::Zero(size, size);
   const double l = t.stickout / ELEMENTS;
   for (int e = 0; e < ELEMENTS; ++e) {
     const Section s = sectionOf(t, e * l, l);
     add(l, s.bending, s.shear, s.mass, s.inertia, 2 * e, mass, stiffness);
   }
-  // Springs between the beam's end and what the spindle's modes (of mass 1) move there: x runs from the tip,
-  // so a mode that tilts towards the spindle has its end's deflection less.
   MatrixXd across = MatrixXd::Zero(1, size), turning = across;
   across(0, TOOL - 2) = turning(0, TOOL - 1) = 1.0;
   for (Index i = 0; i < spindle; ++i) {
@@ -89,21 +91,48 @@ std::vector<HeldMode> heldModes(const ToolInHolder& t) {
     stiffness(TOOL + i, TOOL + i) = omega * omega;
   }
   stiffness += t.across * across.transpose() * across + t.turning * turning.transpose() * turning;
+}
+
+}  // namespace
+
+HeldTool::HeldTool(const ToolInHolder& t) {
+  assemble(t, stiffness_, mass_);
   // K v = w^2 M v with M = S S', S from M's own eigenvectors.
-  const linear::SymmetricEigensystem of_mass = linear::symmetricEigensystem(mass);
-  if (!(of_mass.values.minCoeff() > 0.0)) return {};
+  const linear::SymmetricEigensystem of_mass = linear::symmetricEigensystem(mass_);
+  if (!(of_mass.values.minCoeff() > 0.0)) return;
   const MatrixXd root = of_mass.vectors * of_mass.values.cwiseSqrt().cwiseInverse().asDiagonal();
   const linear::SymmetricEigensystem modes =
-      linear::symmetricEigensystem(root.transpose() * stiffness * root);
+      linear::symmetricEigensystem(root.transpose() * stiffness_ * root);
+  shapes_ = root * modes.vectors;
+  squares_ = modes.values;
+  for (Index k = 0; k < squares_.size(); ++k)
+    modes_.push_back(
+        modeOf(std::sqrt(std::max(squares_[k], 1.0)) / units::TWO_PI, shapes_.col(k), t.stickout / ELEMENTS));
+}
+
+HeldMode HeldTool::modeOf(double frequency, const Eigen::VectorXd& shape, double element) const {
+  return {frequency, {shape.data(), shape.data() + TOOL}, element};
+}
+
+/// Rayleigh's perturbation: with d = v_j' (dK - w_k^2 dM) v_k, w_k^2 grows by d_kk, and v_k turns towards v_j
+/// by d_jk / (w_k^2 - w_j^2).
+std::vector<HeldMode> HeldTool::modesOf(const ToolInHolder& near) const {
+  MatrixXd stiffness, mass;
+  assemble(near, stiffness, mass);
+  const MatrixXd soft = shapes_.transpose() * (stiffness - stiffness_) * shapes_;
+  const MatrixXd heavy = shapes_.transpose() * (mass - mass_) * shapes_;
   std::vector<HeldMode> found;
-  for (Index k = 0; k < size; ++k) {
-    if (!(modes.values[k] > 0.0)) continue;
-    const Eigen::VectorXd v = root * modes.vectors.col(k);
-    HeldMode h;
-    h.frequency = std::sqrt(modes.values[k]) / units::TWO_PI;
-    h.shape.assign(v.data(), v.data() + TOOL);
-    h.element = l;
-    found.push_back(h);
+  for (Index k = 0; k < squares_.size(); ++k) {
+    Eigen::VectorXd turn(squares_.size());
+    for (Index j = 0; j < squares_.size(); ++j) {
+      const double apart = squares_[k] - squares_[j];
+      turn[j] = j == k                  ? 1.0 - 0.5 * heavy(k, k)
+                : std::abs(apart) > 0.0 ? (soft(j, k) - squares_[k] * heavy(j, k)) / apart
+                                        : 0.0;
+    }
+    const double square = squares_[k] + soft(k, k) - squares_[k] * heavy(k, k);
+    found.push_back(
+        modeOf(std::sqrt(std::max(square, 1.0)) / units::TWO_PI, shapes_ * turn, near.stickout / ELEMENTS));
   }
   return found;
 }

@@ -2,6 +2,8 @@
 
 #include <vector>
 
+#include <Eigen/Core>
+
 namespace smartmill {
 namespace hammer {
 
@@ -31,8 +33,23 @@ struct HeldMode {
   double gain(double struck, double read) const;  ///< [m/N] static share
 };
 
-/// Lowest first, all that the elements have. @return empty when the beam is none
-std::vector<HeldMode> heldModes(const ToolInHolder& tool);
+/// The modes of a tool in its holder, and, to first order, those of one that differs a little.
+class HeldTool {
+ public:
+  explicit HeldTool(const ToolInHolder& tool);
+
+  /// Lowest first, all that the elements have; empty when the beam is none.
+  const std::vector<HeldMode>& modes() const { return modes_; }
+  /// In the same order. Of the same spindle modes' number; modes of one frequency are not told apart.
+  std::vector<HeldMode> modesOf(const ToolInHolder& near) const;
+
+ private:
+  HeldMode modeOf(double frequency, const Eigen::VectorXd& shape, double element) const;
+
+  Eigen::MatrixXd mass_, stiffness_, shapes_;
+  Eigen::VectorXd squares_;  // [rad2/s2]
+  std::vector<HeldMode> modes_;
+};
 
 }  // namespace hammer
 }  // namespace smartmill

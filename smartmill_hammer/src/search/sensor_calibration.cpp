@@ -31,7 +31,7 @@ constexpr double LEAST_BEND = 0.08, MOST_BEND = 4.0;
 }  // namespace
 
 SensorCalibration::SensorCalibration(const SensorCalibrationOptions& options)
-    : options_(options), bend_gap_(std::numeric_limits<double>::quiet_NaN()) {
+    : options_(options), bend_gap_(std::numeric_limits<double>::quiet_NaN()), bend_gap_std_(bend_gap_) {
   const auto& o = options_;
   if (!(o.least_jog > 0.0 && o.first_jog >= o.least_jog && o.max_jog >= o.first_jog)) {
     throw Error("sensor calibration: 0 < least_jog <= first_jog <= max_jog is due, got " +
@@ -183,7 +183,9 @@ void SensorCalibration::check() {
 }
 
 void SensorCalibration::finish() {
-  bend_gap_ = hyperbola();
+  const Hyperbola curve = hyperbola();
+  bend_gap_ = curve.gap;
+  bend_gap_std_ = curve.gap_std;
   if (std::isfinite(bend_gap_) && options_.check_jog > 0.0) {
     // K / (g^2 - d^2) is what +-d measures of K / g^2.
     const double share = options_.check_jog / bend_gap_;
@@ -199,18 +201,18 @@ void SensorCalibration::finish() {
 
 /// [m] g of V = a + K / (g - (x - x_now)) through the readings nearby, as near as that gap itself where
 /// there are enough: further off another part of the tool counts.
-double SensorCalibration::hyperbola() const {
-  double gap = hyperbola(options_.gap_at_zero_volt);
-  for (int k = 0; k < CURVE_ROUNDS && std::isfinite(gap); ++k) {
-    const double nearer = hyperbola(std::max(gap, 2.0 * options_.check_jog));
-    if (!std::isfinite(nearer)) break;
-    gap = nearer;
+SensorCalibration::Hyperbola SensorCalibration::hyperbola() const {
+  Hyperbola found = hyperbola(options_.gap_at_zero_volt);
+  for (int k = 0; k < CURVE_ROUNDS && std::isfinite(found.gap); ++k) {
+    const Hyperbola nearer = hyperbola(std::max(found.gap, 2.0 * options_.check_jog));
+    if (!std::isfinite(nearer.gap)) break;
+    found = nearer;
   }
-  return gap;
+  return found;
 }
 
 /// Least squares of V x = g V + a x + c over the readings within `reach` [m]; NaN: too few tell.
-double SensorCalibration::hyperbola(double reach) const {
+SensorCalibration::Hyperbola SensorCalibration::hyperbola(double reach) const {
   std::vector<Reading> near;
   double furthest = 0.0;
   for (const Reading& r : readings_) {
@@ -219,7 +221,8 @@ double SensorCalibration::hyperbola(double reach) const {
     near.push_back(r);
     furthest = std::max(furthest, away);
   }
-  const double none = std::numeric_limits<double>::quiet_NaN();
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const Hyperbola none{nan, nan};
   if (near.size() < 5 || furthest < LEAST_REACH * reach) return none;
   const auto rows = static_cast<Eigen::Index>(near.size());
   Eigen::MatrixXd a(rows, 3), b(rows, 1);
@@ -232,7 +235,21 @@ double SensorCalibration::hyperbola(double reach) const {
   const linear::LeastSquares fit = linear::leastSquares(a, b);
   const double gap = fit.x(0, 0);
   if (fit.rank < 3 || !(gap > LEAST_BEND && gap < MOST_BEND)) return none;
-  return gap * options_.gap_at_zero_volt;
+  // Of each row's error: of the place (a distance has both its ends'), of the reading, and of the law.
+  const Eigen::MatrixXd influence =
+      linear::inverseSymmetric(Eigen::MatrixXd(a.transpose() * a)) * a.transpose();
+  const double place = options_.position_std / std::sqrt(2.0) / options_.gap_at_zero_volt;
+  const double reading = std::hypot(volt_std_, near_std_) / options_.range_volt;
+  double variance = 0.0, squares = 0.0, due = 0.0;
+  for (Eigen::Index i = 0; i < rows; ++i) {
+    const double error = std::hypot((a(i, 0) - fit.x(1, 0)) * place, (a(i, 1) - gap) * reading);
+    const double left = b(i, 0) - a.row(i).dot(fit.x.col(0));
+    variance += std::pow(influence(0, i) * error, 2);
+    squares += left * left;
+    due += error * error * static_cast<double>(rows - 3) / static_cast<double>(rows);
+  }
+  const double misfit = due > 0.0 ? std::max(1.0, squares / due) : 1.0;
+  return {gap * options_.gap_at_zero_volt, std::sqrt(variance * misfit) * options_.gap_at_zero_volt};
 }
 
 void SensorCalibration::fail(std::string reason) {

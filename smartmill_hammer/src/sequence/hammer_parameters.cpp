@@ -72,6 +72,24 @@ void declareCalibration(HammerParameters& p, ParameterTable& table) {
                "to the sensor, beyond the depth between two flutes");
 }
 
+void declareTip(HammerParameters& p, ParameterTable& table) {
+  table.section("From the struck height to the tip, where the goal tells the stick-out.");
+  table.choice("tip_correction", p.tip_correction, {"apart", "eq_4_44"},
+               "apart: modes of spindle and tool each by its own shape, the tool a beam; eq_4_44: one factor "
+               "for all, the thesis's");
+  table.number("second_height", p.second_height, "1", Range::closed(0, 1),
+               "1: half as many hits again with the tool lowered by half the hammer's offset, which tell how "
+               "the spindle's modes turn");
+  table.number("read_height", p.read_height, "m", Range::closed(0.0, 0.05),
+               "of the sensor's centre above the tip at the station; the hammer stands its offset above the "
+               "sensor");
+  table.number("height_std", p.height_std, "m", Range::notNegative(), "to which heights are known");
+  table.number("stickout_std", p.stickout_std, "m", Range::notNegative(), "of the goal's stick-out");
+  table.choice("tool_material", p.tool_material, {"carbide", "steel"}, "of the tool's body");
+  table.number("tool_fluted_length", p.tool_fluted_length, "m", Range::closed(0.0, 0.5),
+               "of the tool, from its tip, within 1 mm; 0: not known, some two diameters");
+}
+
 }  // namespace
 
 void HammerParameters::declare(ParameterTable& table) {
@@ -91,8 +109,16 @@ void HammerParameters::declare(ParameterTable& table) {
                "time constant of an exponential window; 0: none");
   table.number("straighten_sensor", straighten_sensor, "1", Range::closed(0, 1),
                "1: bend the sensor's curve straight over the vibration, as calibrated; 0: linear");
+  table.number(
+      "coil_share", coil_share, "1", Range::closed(0.0, 0.2),
+      "of a channel's largest, that the solenoid's current may add to it: what is full until the touch "
+      "and then dies away is taken off; 0: nothing is");
+  table.number("axes_turn_std", axes_turn_std, "rad", Range::closed(0.0, 0.5),
+               "by which the station's axes may be turned against the structure's own: modes across show by "
+               "its square");
   table.number("cross_frf", cross_frf, "1", Range::closed(0, 1),
                "1: where a second sensor stands at right angles (channel gap_cross), read it too");
+  declareTip(*this, table);
   table.section("FRF and fit.");
   declareFit(table);
 }

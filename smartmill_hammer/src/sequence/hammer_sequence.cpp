@@ -11,8 +11,7 @@
 #include "smartmill_core/modal/hit_judge.h"
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/units.h"
-#include "smartmill_hammer/analysis/hits_needed.h"
-#include "smartmill_hammer/analysis/offset_factor.h"
+#include "smartmill_hammer/analysis/coil_talk.h"
 
 namespace smartmill {
 namespace hammer {
@@ -39,7 +38,13 @@ constexpr int FACE_STEPS = 24;
 constexpr double LARGEST_SWING = 1.5;
 /// Two tips of a fit band: share of the sensor's range that counts as its end.
 constexpr double RANGE_SHARE = 0.98;
-constexpr std::size_t LEAST_HITS = 3;
+/// Hits at the second height, at least; [m] of tool left above it; [1] of the gap at zero volt by which a
+/// flank seen from the same place may be nearer.
+constexpr int SECOND_HITS = 3;
+constexpr double LEAST_SHANK = 4e-3;
+/// Of the hammer's offset: less tells nothing.
+constexpr double LEAST_LOWERED = 0.15;
+constexpr double SAME_FLANK = 0.1;
 
 int axisIndex(const std::string& name) {
   if (name.size() != 1) return -1;
@@ -93,6 +98,7 @@ void HammerSequence::reset() {
   cross_collector_.reset();
   hits_.clear();
   cross_hits_.clear();
+  second_hits_.clear();
   commands_.clear();
   feedback_.reset();
   done_.reset();
@@ -109,7 +115,7 @@ std::optional<MeasureFrfResult> HammerSequence::takeResult() {
 }
 
 void HammerSequence::say(const std::string& stage, double progress) {
-  feedback_ = Feedback{stage, progress, static_cast<int>(hits_.size())};
+  feedback_ = Feedback{stage, progress, static_cast<int>(hits_.size() + second_hits_.size())};
 }
 
 // ---------------------------------------------------------------------------------------------- goal
@@ -120,13 +126,15 @@ bool HammerSequence::handle(const MeasureFrfGoal& goal) {
   result_ = MeasureFrfResult();
   hits_.clear();
   cross_hits_.clear();
+  second_hits_.clear();
   bad_hits_ = bad_averages_ = near_samples_ = 0;
   search_.reset();
   calibration_.reset();
-  sensor_ = cross_sensor_ = SensorState();
-  has_cross_ = surveyed_ = false;
+  sensor_ = cross_sensor_ = second_sensor_ = SensorState();
+  has_cross_ = surveyed_ = second_ = false;
   swing_.reset();
   no_cross_.clear();
+  no_second_.clear();
   collector_.reset();
   cross_collector_.reset();
   at_station_ = retracting_after_abort_ = false;
@@ -143,9 +151,10 @@ bool HammerSequence::handle(const MeasureFrfGoal& goal) {
     fault = "modes " + std::to_string(goal.modes) + ": 0..20 are due";
   } else if (teeth < 1 || teeth > 20) {
     fault = "teeth " + std::to_string(teeth) + ": 1..20 are due";
-  } else if (!(goal.stickout == 0.0 || (goal.stickout > station_.offset && std::isfinite(goal.stickout)))) {
+  } else if (const double struck = station_.offset + parameters_.read_height;
+             !(goal.stickout == 0.0 || (goal.stickout > struck && std::isfinite(goal.stickout)))) {
     fault = formatted("stickout %.2f mm: 0 or more than the hammer's offset %.2f mm is due",
-                      1e3 * goal.stickout, 1e3 * station_.offset);
+                      1e3 * goal.stickout, 1e3 * struck);
   }
   if (!fault.empty()) {
     result_.code = FrfCode::bad_goal;
@@ -427,7 +436,8 @@ void HammerSequence::handle(const SampleBlock& block) {
 /// On the way to the station and while the spindle turns before it.
 bool HammerSequence::tooNear(double volt) {
   const bool watched = at_station_ && (stage_ == Stage::to_station || stage_ == Stage::search_low ||
-                                       stage_ == Stage::to_height || stage_ == Stage::search_high);
+                                       stage_ == Stage::to_height || stage_ == Stage::search_high ||
+                                       stage_ == Stage::to_second || stage_ == Stage::orient_second);
   near_samples_ = watched && volt >= NEAR_SHARE * station_.range_volt ? near_samples_ + 1 : 0;
   return near_samples_ >= NEAR_SAMPLES;
 }
@@ -488,6 +498,17 @@ void HammerSequence::reached(double now) {
     case Stage::calibrate:
     case Stage::calibrate_cross:
     case Stage::calibrate_again:
+    case Stage::calibrate_second:
+      return average(now + parameters_.settle_time);
+    case Stage::to_second:
+      stage_ = Stage::orient_second;
+      say("turning the flute to the hammer at the second height", 0.84);
+      // As far beyond the hammer's first height as that is above the tip's search, at the same helix.
+      return orient(now, result_.flute_low + (result_.flute_hammer - result_.flute_low) *
+                                                 (1.0 + lowered() / station_.offset));
+    case Stage::orient_second:
+      stage_ = Stage::calibrate_second;
+      say("calibrating the displacement sensor at the second height", 0.85);
       return average(now + parameters_.settle_time);
     case Stage::to_height:
       stage_ = Stage::search_high;
@@ -620,7 +641,8 @@ SensorCalibrationOptions HammerSequence::calibrationOptions(std::size_t axis) co
 }
 
 void HammerSequence::measured(double now, double volt, double volt_std) {
-  if (stage_ == Stage::calibrate || stage_ == Stage::calibrate_cross || stage_ == Stage::calibrate_again) {
+  if (stage_ == Stage::calibrate || stage_ == Stage::calibrate_cross || stage_ == Stage::calibrate_again ||
+      stage_ == Stage::calibrate_second) {
     return calibrated(now, volt, volt_std);
   }
   if (stage_ == Stage::survey) return surveyed(now, volt);
@@ -674,6 +696,12 @@ void HammerSequence::surveyed(double now, double volt) {
 
 void HammerSequence::calibrated(double now, double volt, double volt_std) {
   if (!calibration_) {
+    if (stage_ == Stage::calibrate) flank_volt_ = volt;
+    // Seen from the same place, nearer than at the tip: the flutes end here, or run otherwise. Then nothing
+    // is known of the flanks, and the tool counts as round.
+    if (stage_ == Stage::calibrate_second &&
+        nominalGap(volt) < nominalGap(flank_volt_) - SAME_FLANK * station_.gap_at_zero_volt)
+      profile_.clear();
     if (stage_ != Stage::calibrate_again) addToProfile(calibratedAxis(), 0.0, volt);
     if (stage_ == Stage::calibrate && surveyDue(volt)) {
       stage_ = Stage::survey;
@@ -695,6 +723,8 @@ void HammerSequence::calibrated(double now, double volt, double volt_std) {
       return jog(now, AXIS_NAMES[calibratedAxis()], calibration_->next(), parameters_.jog_feed);
     case SensorCalibration::State::failed:
       if (stage_ == Stage::calibrate_cross) return crossFailed(now);
+      if (stage_ == Stage::calibrate_second)
+        return withoutSecond(now, "sensor calibration: " + calibration_->reason());
       return abort(now, FrfCode::bad_data, "sensor calibration: " + calibration_->reason());
     case SensorCalibration::State::done:
       return sensorKnown(now);
@@ -703,9 +733,11 @@ void HammerSequence::calibrated(double now, double volt, double volt_std) {
 
 /// With a second sensor the first is done again: the second's jogs have moved the round tool before it.
 void HammerSequence::sensorKnown(double now) {
-  SensorState& sensor = stage_ == Stage::calibrate_cross ? cross_sensor_ : sensor_;
+  SensorState& sensor = stage_ == Stage::calibrate_cross    ? cross_sensor_
+                        : stage_ == Stage::calibrate_second ? second_sensor_
+                                                            : sensor_;
   sensor = {calibration_->sensitivity(), calibration_->sensitivityStd(), calibration_->bendGap(),
-            calibration_->volt()};
+            calibration_->bendGapStd(), calibration_->volt()};
   const bool held_back = calibration_->heldBack();
   calibration_.reset();
   say(formatted("sensor calibrated: %.3f +- %.3f um/V", 1e6 * sensor.sensitivity,
@@ -713,7 +745,8 @@ void HammerSequence::sensorKnown(double now) {
           (held_back ? formatted(" at %.2f V, held back by the tool's edges", sensor.volt) : std::string()),
       stage_ == Stage::calibrate         ? 0.62
       : stage_ == Stage::calibrate_cross ? 0.66
-                                         : 0.7);
+      : stage_ == Stage::calibrate_again ? 0.7
+                                         : 0.87);
   if (stage_ == Stage::calibrate && has_cross_) {
     stage_ = Stage::calibrate_cross;
     return average(now + parameters_.settle_time);
@@ -722,8 +755,10 @@ void HammerSequence::sensorKnown(double now) {
     stage_ = Stage::calibrate_again;
     return average(now + parameters_.settle_time);
   }
-  result_.sensitivity = sensor_.sensitivity;
-  result_.sensitivity_std = sensor_.sensitivity_std;
+  if (stage_ != Stage::calibrate_second) {
+    result_.sensitivity = sensor_.sensitivity;
+    result_.sensitivity_std = sensor_.sensitivity_std;
+  }
   stage_ = Stage::strike;
   strike(now);
 }
@@ -775,122 +810,99 @@ HitFault HammerSequence::judged(const Hit& hit) const {
 
 void HammerSequence::recorded(double now, HitCollector::Record record,
                               std::optional<HitCollector::Record> cross) {
+  removeCoilTalk(record.hit, parameters_.coil_share);
+  if (cross) removeCoilTalk(cross->hit, parameters_.coil_share);
   HitFault fault{record.fault, true};
   if (fault.text.empty() && cross) fault.text = cross->fault;
   if (fault.text.empty()) fault = judged(record.hit);
   if (!fault.text.empty()) return badHit(now, fault.text, fault.bad_data);
   if (stage_ == Stage::trial) return tried(now, record.hit);
-  hits_.push_back(std::move(record.hit));
-  if (cross) cross_hits_.push_back(std::move(cross->hit));
-  const std::vector<HitFault> beside = faultsBeside(hits_, std::vector<bool>(hits_.size(), true));
-  for (std::size_t h = 0; h < hits_.size(); ++h) {
+  std::vector<Hit>& hits = second_ ? second_hits_ : hits_;
+  hits.push_back(std::move(record.hit));
+  if (cross && !second_) cross_hits_.push_back(std::move(cross->hit));
+  const std::vector<HitFault> beside = faultsBeside(hits, std::vector<bool>(hits.size(), true));
+  for (std::size_t h = 0; h < hits.size(); ++h) {
     if (beside[h].text.empty()) continue;
-    hits_.erase(hits_.begin() + static_cast<std::ptrdiff_t>(h));
-    if (h < cross_hits_.size()) cross_hits_.erase(cross_hits_.begin() + static_cast<std::ptrdiff_t>(h));
+    hits.erase(hits.begin() + static_cast<std::ptrdiff_t>(h));
+    if (!second_ && h < cross_hits_.size())
+      cross_hits_.erase(cross_hits_.begin() + static_cast<std::ptrdiff_t>(h));
     return badHit(now, beside[h].text, beside[h].bad_data);
   }
-  say("hit " + std::to_string(hits_.size()) + " of " + std::to_string(goal_.hits),
-      0.7 + 0.25 * static_cast<double>(hits_.size()) / goal_.hits);
-  if (static_cast<int>(hits_.size()) >= goal_.hits || enough()) {
-    evaluate();
-    return retract(now);
-  }
+  say("hit " + std::to_string(hits.size()) + " of " + std::to_string(hitsDue()), hitProgress());
+  if (static_cast<int>(hits.size()) >= hitsDue() || enough()) return hitsDone(now);
   wait_ = Wait::rest;
   rest_until_ = now + parameters_.rest_time;
+}
+
+/// [1] with a second height the first one's hits end at 0.83.
+double HammerSequence::hitProgress() const {
+  const double from = second_ ? 0.87 : 0.7, to = second_ || !secondHeightDue() ? 0.95 : 0.83;
+  const std::size_t hits = second_ ? second_hits_.size() : hits_.size();
+  return from + (to - from) * static_cast<double>(hits) / hitsDue();
+}
+
+/// At the second height half as many: only the ratio to the first counts.
+int HammerSequence::hitsDue() const {
+  return second_ ? std::min(goal_.hits, std::max(SECOND_HITS, (goal_.hits + 1) / 2)) : goal_.hits;
+}
+
+void HammerSequence::hitsDone(double now) {
+  if (!second_ && secondHeightDue()) return toSecondHeight(now);
+  evaluate();
+  retract(now);
+}
+
+/// [m] by which the tool is lowered for the second height: no further than the search of the flute has been,
+/// and the hammer still meets the tool.
+double HammerSequence::lowered() const {
+  const double room = goal_.stickout - station_.offset - parameters_.read_height - LEAST_SHANK;
+  return roundTo(std::min(0.5 * station_.offset, room), parameters_.resolution);
+}
+
+bool HammerSequence::correctsApart() const {
+  return parameters_.tip_correction == "apart" && goal_.stickout > 0.0 && station_.offset > 0.0;
+}
+
+bool HammerSequence::secondHeightDue() const {
+  return correctsApart() && parameters_.second_height != 0 && lowered() > LEAST_LOWERED * station_.offset;
+}
+
+/// First back to the station's distance, where nothing of the tool can reach the sensor; then down.
+void HammerSequence::toSecondHeight(double now) {
+  second_ = true;
+  bad_hits_ = 0;
+  stage_ = Stage::to_second;
+  say("lowering the tool for hits at a second height", 0.83);
+  Axes3 here{};
+  double to_go = 0.0;
+  readPosition(*state_, here, to_go);
+  const Axes3 station = stationPosition();
+  Axes3 beside = here;
+  for (std::size_t axis = 0; axis < 2; ++axis) beside[axis] = station[axis];
+  Axes3 down = beside;
+  down[2] = station[2] - lowered();
+  move(now, here, {{beside, parameters_.jog_feed}, {down, parameters_.approach_feed}});
+}
+
+/// The first height's hits stand for themselves.
+void HammerSequence::withoutSecond(double now, const std::string& why) {
+  no_second_ = why;
+  second_hits_.clear();
+  calibration_.reset();
+  say("no second height: " + why, 0.95);
+  evaluate();
+  retract(now);
 }
 
 void HammerSequence::badHit(double now, const std::string& why, bool bad_data) {
   if (++bad_hits_ > parameters_.max_bad_hits) {
+    if (second_) return withoutSecond(now, std::to_string(bad_hits_) + " useless hits, the last: " + why);
     return abort(now, bad_data ? FrfCode::bad_data : FrfCode::no_hit,
                  std::to_string(bad_hits_) + " useless hits, the last: " + why);
   }
-  say("hit thrown away: " + why, 0.7 + 0.25 * static_cast<double>(hits_.size()) / goal_.hits);
+  say("hit thrown away: " + why, hitProgress());
   wait_ = Wait::rest;
   rest_until_ = now + parameters_.rest_time;
-}
-
-double HammerSequence::offsetCorrection() const {
-  return goal_.stickout > 0.0 ? offsetFactor(goal_.stickout, station_.offset) : 1.0;
-}
-
-// Three at least: of fewer none can be told to be odd.
-bool HammerSequence::enough() const {
-  if (!(parameters_.asked_std > 0.0) || hits_.size() < LEAST_HITS) return false;
-  ImpactAnalysis analysis(impactOptions(sensor_));
-  for (const Hit& hit : hits_) analysis.add(hit);
-  return hitsNeeded(analysis.frf(), parameters_.fit_low, parameters_.fit_high, parameters_.asked_std)
-      .enough();
-}
-
-ImpactOptions HammerSequence::impactOptions(const SensorState& sensor) const {
-  ImpactOptions options;
-  options.exponential_time = parameters_.exponential_time;
-  // The blow drives the tool away from the sensor: the voltage falls. Across, the blow's sense is turned too.
-  options.response_scale = -sensor.sensitivity * offsetCorrection();
-  if (parameters_.straighten_sensor == 0) return options;
-  options.sensor_gain = std::isfinite(sensor.bend_gap) ? sensor.bend_gap / sensor.sensitivity - sensor.volt
-                                                       : station_.gain_volt;
-  return options;
-}
-
-/// Struck along the goal's direction, read across it.
-void HammerSequence::evaluateCross() {
-  if (cross_hits_.size() != hits_.size() || !std::isfinite(cross_sensor_.sensitivity)) return;
-  ImpactAnalysis analysis(impactOptions(cross_sensor_));
-  for (const Hit& hit : cross_hits_) analysis.add(hit);
-  const double relative = cross_sensor_.sensitivity_std / cross_sensor_.sensitivity;
-  MeasuredFrf& cross = result_.cross;
-  cross.stamp = result_.frf.stamp;
-  cross.tool = goal_.tool;
-  cross.point = goal_.point;
-  cross.direction = goal_.direction + AXIS_NAMES[1 - direction_];
-  cross.frf = analysis.frf().band(1e-3, parameters_.frf_high);
-  for (std::size_t k = 0; k < cross.frf.size(); ++k)
-    cross.frf.std_dev[k] = std::hypot(cross.frf.std_dev[k], relative * std::abs(cross.frf.value[k]));
-}
-
-void HammerSequence::evaluate() {
-  const ImpactOptions options = impactOptions(sensor_);
-  const double relative = result_.sensitivity_std / result_.sensitivity;
-  result_.frf.stamp = result_.modes.stamp = hits_.back().stamp;
-  result_.frf.tool = result_.modes.tool = goal_.tool;
-  result_.frf.point = result_.modes.point = goal_.point;
-  result_.frf.direction = result_.modes.direction = goal_.direction;
-  result_.modes.unit = options.unit;
-  try {
-    ImpactAnalysis analysis(options);
-    for (const Hit& hit : hits_) analysis.add(hit);
-    // The line at zero is the drift of the sensor.
-    FrequencyResponse frf = analysis.frf().band(1e-3, parameters_.frf_high);
-    ModalFitOptions fit_options;
-    fit_options.low = parameters_.fit_low;
-    fit_options.high = parameters_.fit_high;
-    fit_options.modes = goal_.modes;
-    fit_options.max_modes = parameters_.max_modes;
-    fit_options.positive_gains = true;  // corrected to hit and response at the tip
-    // The sensitivity's error is common to all lines: it takes no part in the fit and is added after it.
-    result_.frf.frf = frf;
-    for (std::size_t k = 0; k < frf.size(); ++k) {
-      result_.frf.frf.std_dev[k] = std::hypot(frf.std_dev[k], relative * std::abs(frf.value[k]));
-    }
-    const ModalFit fit = fitModes(frf, fit_options);
-    result_.modes.model = fit.model;
-    result_.modes.relative_error = fit.relative_error;
-    for (Mode& mode : result_.modes.model.modes)
-      mode.gain_std = std::hypot(mode.gain_std, relative * mode.gain);
-    result_.modes.model.direct_std =
-        std::hypot(result_.modes.model.direct_std, relative * result_.modes.model.direct);
-    analysis.removeWindowDamping(result_.modes.model);
-    evaluateCross();
-    result_.message =
-        std::to_string(hits_.size()) + " hits, " + std::to_string(result_.modes.model.modes.size()) +
-        " modes" +
-        (goal_.stickout > 0.0 ? formatted(", offset correction %.3f", offsetCorrection()) : std::string()) +
-        (no_cross_.empty() ? std::string() : ", no cross FRF: " + no_cross_);
-  } catch (const Error& error) {
-    result_.code = FrfCode::fit_failed;
-    result_.message = error.what();
-  }
 }
 
 // ---------------------------------------------------------------------------------------------- ends

@@ -23,15 +23,10 @@ double angleOf(std::size_t axis) {
   return axis == 0 ? 0.5 * units::PI : 0.0;
 }
 
-/// Share of a cantilever's bending at the tip of a force so far below its root's end: l^2 (3 L - l) / (2 L^3)
-/// with l = L - offset (Dunwoody eq. 4.43).
-double cantilever(double stickout, double offset) {
-  const double l = stickout - offset;
-  if (!(l > 0.0)) {
-    throw Error("hammer.offset_mm: " + std::to_string(offset / units::MM) +
-                " is not below the tool's stickout");
-  }
-  return l * l * (3.0 * stickout - l) / (2.0 * stickout * stickout * stickout);
+void checkHeight(double stickout, double struck) {
+  if (struck < stickout) return;
+  throw Error("hammer.offset_mm: " + std::to_string(struck / units::MM) +
+              " is not below the tool's stickout");
 }
 
 bool same(const HammerStation::Place& a, const HammerStation::Place& b) {
@@ -47,20 +42,34 @@ HammerStation::HammerStation(const MachineModel& model, const StationTraits& tra
       traits_(traits),
       surface_(traits, tool_, station_.flute_depth),
       sensor_{{GapSensor(traits, station_, angleOf(0)), GapSensor(traits, station_, angleOf(1))}},
-      solenoid_(traits, station_, force_scatter) {
-  if (model.stickout) shape_ = cantilever(*model.stickout, station_.offset);
+      solenoid_(traits, station_, force_scatter),
+      step_(step) {
+  turns_ = model.stickout.has_value();
+  height_ = traits.read_height;
+  if (turns_) checkHeight(*model.stickout, station_.offset);
   if (traits.structure != "beam") return;
   if (!model.stickout) throw Error("hammer_structure: beam needs the model's tool.stickout_mm");
-  cantilever(*model.stickout, station_.offset + traits.read_height);
+  checkHeight(*model.stickout, station_.offset + traits.read_height);
   structure_.emplace(traits, tool_, *model.stickout);
-  const double struck = traits.read_height + station_.offset;
-  for (std::size_t axis = 0; axis < 2; ++axis) {
-    const auto filter = [&](std::size_t read_axis, double height) {
-      return ModalFilter(structure_->between(read_axis, height, axis, struck), 1.0 / step, Hold::first_order);
-    };
-    ways_.push_back({{{filter(0, traits.read_height), filter(1, traits.read_height)}},
-                     {{filter(0, 0.0), filter(1, 0.0)}}});
-  }
+  ways_.resize(2);
+  for (std::size_t axis = 0; axis < 2; ++axis) standBy(axis);
+}
+
+/// Share of the tip's displacement, or of a force there, at a height of a rigid tool that turns about a
+/// point.
+double HammerStation::rigid(double height) const {
+  return turns_ ? 1.0 - height / traits_.pivot : 1.0;
+}
+
+/// The beam's filters for the height at which the tool stands.
+void HammerStation::standBy(std::size_t axis) {
+  if (!structure_ || (!ways_[axis].tip.empty() && std::abs(height_ - way_height_[axis]) < 1e-7)) return;
+  way_height_[axis] = height_;
+  const auto filter = [&](std::size_t read_axis, double read) {
+    return ModalFilter(structure_->between(read_axis, read, axis, height_ + station_.offset), 1.0 / step_,
+                       Hold::first_order);
+  };
+  ways_[axis] = {{filter(0, height_), filter(1, height_)}, {filter(0, 0.0), filter(1, 0.0)}};
 }
 
 std::optional<ToolTip> HammerStation::tip() const {
@@ -89,6 +98,7 @@ std::optional<std::size_t> HammerStation::facing(const std::array<double, 3>& po
 void HammerStation::fire(std::size_t axis, double now, double touch, std::mt19937_64& random) {
   fired_ = true;
   fired_axis_ = axis;
+  standBy(axis);
   solenoid_.fire(now, touch, random);
 }
 
@@ -131,17 +141,17 @@ void HammerStation::stand(const Place& place, std::mt19937_64& random) {
     if (before) closest_ = 1.0;
   }
   if (!before_) return;
+  height_ = station_.position.at(AXIS[*before_])[2] - place.position[2] + traits_.read_height;
   const bool stale = !faced_ || !same(*faced_, place);
   const bool at_rest = !moving_ && place.speed == 0.0;
   if (stale && (at_rest || !faced_ || ++since_faced_ >= LOOK)) {
     since_faced_ = 0;
     faced_ = place;
     const Axes3& p = station_.position.at(AXIS[*before_]);
-    const double above = p[2] - place.position[2] + traits_.read_height;
     for (std::size_t axis = 0; axis < 2; ++axis) {
       if (axis != *before_ && !traits_.cross_sensor) continue;
       const double off = place.position[1 - axis] - p[1 - axis] + traits_.beside;
-      sensor_[axis].face(surface_, place.angle, above, off);
+      sensor_[axis].face(surface_, place.angle, height_, off);
       seen_[axis] = Seen();
     }
   }
@@ -160,7 +170,7 @@ HammerStation::Push HammerStation::push(double time) {
       push.tip[axis] = way.tip[axis].step(-push.force);
     }
   } else if (meets) {
-    push.tip_force[fired_axis_] = -shape_ * push.force;
+    push.tip_force[fired_axis_] = -rigid(height_ + station_.offset) * push.force;
   }
   ++steps_;
   force_sum_ += push.force;
@@ -180,7 +190,9 @@ std::array<double, 2> HammerStation::gaps(const std::array<double, 2>& displacem
 
 void HammerStation::hear(const std::array<double, 2>& displacement) {
   if (!before_) return;
-  const std::array<double, 2> gap = gaps({{displacement[0] + now_[0], displacement[1] + now_[1]}});
+  const double share = structure_ ? 1.0 : rigid(height_);
+  const std::array<double, 2> gap =
+      gaps({{share * displacement[0] + now_[0], share * displacement[1] + now_[1]}});
   for (std::size_t axis = 0; axis < 2; ++axis) {
     if (axis != *before_ && !traits_.cross_sensor) continue;
     Seen& seen = seen_[axis];

@@ -7,9 +7,13 @@ namespace smartmill::sim {
 namespace {
 
 void declareStructure(StationTraits& t, ParameterTable& table) {
-  table.choice("structure", t.structure, {"modes", "beam"},
-               "modes: the model's tool_tip, in every mode bent as a cantilever; beam: the tool as a beam on "
-               "spindle and holder, as the keys up to plane_turn say, in the place of the model's tool_tip");
+  table.choice(
+      "structure", t.structure, {"modes", "beam"},
+      "modes: the model's tool_tip, the tool rigid and turning about one point in every mode; beam: the "
+      "tool as a beam on spindle and holder, as the keys up to plane_turn say, in the place of the "
+      "model's tool_tip");
+  table.number("pivot", t.pivot, "m", Range::closed(0.05, 100.0),
+               "height above the tip of the point about which a rigid tool turns");
   table.number("shank_diameter", t.shank_diameter, "m", Range::closed(0.0, 0.1), "0: the tool's");
   table.number("flute_length", t.flute_length, "m", Range::closed(0.0, 0.5), "from the tip");
   table.number("flute_core", t.flute_core, "1", Range::openLow(0.3, 1.0),

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <functional>
 #include <memory>
 #include <random>
@@ -72,6 +73,31 @@ FrequencyResponse certainLines(const FrequencyResponse& frf, double error) {
     kept.value.push_back(frf.value[i]);
   }
   return kept;
+}
+
+/// Cross receptances where they were measured over the whole band: "xy" is struck along x and read along y.
+/// One alone stands for both (reciprocity).
+void addCross(const std::map<std::string, MeasuredFrf>& frfs, ToolTipResponse& response) {
+  const auto lines = [&](const char* direction) {
+    std::vector<std::complex<double>> values;
+    const auto found = frfs.find(direction);
+    if (found == frfs.end() || found->second.frf.size() < 2 || found->second.frf.unit != "m/N") return values;
+    const FrequencyResponse& frf = found->second.frf;
+    if (frf.frequency.front() > response.frequency.front() ||
+        frf.frequency.back() < response.frequency.back())
+      return values;
+    // What noise would show as well counts as none: it would take depth off at random.
+    FrequencyResponse seen = frf;
+    for (std::size_t i = 0; i < seen.size() && seen.std_dev.size() == seen.size(); ++i) {
+      if (std::abs(seen.value[i]) < 2.0 * seen.std_dev[i]) seen.value[i] = 0.0;
+    }
+    for (const double f : response.frequency) values.push_back(seen.at(f));
+    return values;
+  };
+  response.yx = lines("xy");
+  response.xy = lines("yx");
+  if (response.xy.empty()) response.xy = response.yx;
+  if (response.yx.empty()) response.yx = response.xy;
 }
 
 /// Limits at rising speeds, solved where a straight line between the neighbours would be off by more than a
@@ -256,6 +282,7 @@ ChartMaker::Basis ChartMaker::basis() const {
                           parameters_.line_error);
     };
     basis.response = responseOf(lines("x"), lines("y"));
+    addCross(frfs_, basis.response);
   }
   return basis;
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <functional>
 
 #include <gtest/gtest.h>
@@ -69,6 +70,43 @@ TEST(ChartMaker, linesThatTheHammerDidNotExciteMakeNoPocket) {
     if (std::isinf(clean.limit.depth[k])) continue;
     ASSERT_NEAR(chart.limit.depth[k] / clean.limit.depth[k], 1.0, 1e-2) << k;
   }
+}
+
+// With the tool engaged all round no direction is special: a structure turned by 30 degrees about the spindle
+// keeps its limits, when the receptances across are known; without them it does not.
+TEST(ChartMaker, crossFrfsMakeATurnedStructureTheSame) {
+  ChartParameters parameters = slot();
+  parameters.method = "zero_order";
+  parameters.radial_ratio = 1.0 / 3.0;
+  parameters.exit = units::TWO_PI;
+  MeasuredFrf along = frf("x", 1.0), across = frf("y", 1.0);
+  // One direction half as stiff, so that both differ.
+  for (std::complex<double>& value : across.frf.value) value *= 2.0;
+  const double c = std::cos(units::PI / 6.0), s = std::sin(units::PI / 6.0);
+  MeasuredFrf x = along, y = across, xy = along;
+  xy.direction = "xy";
+  for (std::size_t i = 0; i < along.frf.size(); ++i) {
+    const std::complex<double> a = along.frf.value[i], b = across.frf.at(along.frf.frequency[i]);
+    x.frf.value[i] = c * c * a + s * s * b;
+    y.frf.value[i] = s * s * a + c * c * b;
+    xy.frf.value[i] = c * s * (a - b);
+  }
+  const auto limits = [&](const std::vector<MeasuredFrf>& frfs) {
+    ChartMaker maker(parameters, machine());
+    for (const MeasuredFrf& one : frfs) maker.handle(one);
+    maker.handle(coefficients());
+    return maker.chart().limit.depth;
+  };
+  const std::vector<double> due = limits({along, across}), turned = limits({x, y, xy}),
+                            without = limits({x, y});
+  double most = 0.0, most_without = 0.0;
+  for (std::size_t k = 0; k < due.size(); ++k) {
+    if (std::isinf(due[k])) continue;
+    most = std::max(most, std::abs(turned[k] / due[k] - 1.0));
+    most_without = std::max(most_without, std::abs(without[k] / due[k] - 1.0));
+  }
+  EXPECT_LT(most, 1e-6);
+  EXPECT_GT(most_without, 0.02);
 }
 
 TEST(ChartMaker, modesGiveTheSameChartAsTheirFrf) {

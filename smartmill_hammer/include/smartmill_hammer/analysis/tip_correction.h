@@ -1,5 +1,6 @@
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "smartmill_core/modal/modal_model.h"
@@ -24,6 +25,9 @@ struct ToolBeam {
   Known density{14300.0, 300.0};  ///< [kg/m3]
 };
 
+/// Young's modulus and density of "carbide" or "steel". @throws Error on another word.
+void setMaterial(ToolBeam& tool, const std::string& material);
+
 /// What is believed of spindle and holder before anything is measured.
 struct HolderPrior {
   /// [1/m] slope of a spindle mode at the tool tip over its deflection there: it turns about a point some 0.2
@@ -32,12 +36,14 @@ struct HolderPrior {
   /// Tool against holder: the compliance of its seat is one deviation at these stiffnesses, and may be none.
   double across = 1.0e8;   ///< [N/m]
   double turning = 1.0e5;  ///< [N m/rad] of a tool of 12 mm; it grows with the cube of the diameter
+  double height = 0.0;     ///< [m] one deviation by which all heights above the tip may be off together
 };
 
 /// One measurement: where the hammer struck and the sensor read, above the tip, and what was found.
 struct OffsetMeasurement {
   double struck = 0.0, read = 0.0;  ///< [m]
   ModalModel modes;                 ///< [m/N] of the FRF from struck to read
+  double scale_std = 0.0;           ///< [1] of what is common to its gains; their deviations are without it
 };
 
 /// A mode as it is at the tip.

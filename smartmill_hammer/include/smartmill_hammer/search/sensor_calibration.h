@@ -57,6 +57,8 @@ class SensorCalibration {
 
   /// [m] > 0: gap of the hyperbola that the sensor's curve follows here; NaN: too few readings tell.
   double bendGap() const { return bend_gap_; }
+  /// [m] its standard deviation, by the readings' and the places' own and by what the hyperbola leaves.
+  double bendGapStd() const { return bend_gap_std_; }
   /// Whether the approach ended at safe_travel instead of at zero volt.
   bool heldBack() const { return held_back_; }
   double volt() const { return volt_; }  ///< [V] last reading
@@ -71,8 +73,11 @@ class SensorCalibration {
   void finish();
   void approached(double change, double moved, double noise);
   double localGap() const;
-  double hyperbola() const;
-  double hyperbola(double reach) const;
+  struct Hyperbola {
+    double gap, gap_std;  // [m]
+  };
+  Hyperbola hyperbola() const;
+  Hyperbola hyperbola(double reach) const;
 
   enum class Phase { approach, check_near, check_far, check_back };
 
@@ -84,7 +89,7 @@ class SensorCalibration {
   double volt_ = 0.0, volt_std_ = 0.0;  // last reading
   double near_volt_ = 0.0, near_std_ = 0.0;
   double sensitivity_ = 0.0, sensitivity_std_ = 0.0;
-  double bend_gap_;
+  double bend_gap_, bend_gap_std_;
   bool held_back_ = false;
   struct Reading {
     double at, volt;  // [m] towards the sensor, [V]

@@ -13,6 +13,7 @@
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/signal/hit_collector.h"
 #include "smartmill_core/signal/streams.h"
+#include "smartmill_hammer/analysis/tip_correction.h"
 #include "smartmill_hammer/search/flute_search.h"
 #include "smartmill_hammer/search/sensor_calibration.h"
 
@@ -61,7 +62,17 @@ struct HammerParameters : HitTestParameters {
   double asked_std = 0.0;
   double exponential_time = 0.0;
   int straighten_sensor = 1;
+  double coil_share = 0.1;
+  double axes_turn_std = 0.03;
   int cross_frf = 1;
+  // From the struck height to the tip.
+  std::string tip_correction = "apart";
+  int second_height = 1;
+  double read_height = 0.0;
+  double height_std = 0.5e-3;
+  double stickout_std = 0.5e-3;
+  std::string tool_material = "carbide";
+  double tool_fluted_length = 0.0;
 
   HammerParameters() {
     fit_low = 200.0;
@@ -78,6 +89,9 @@ struct MeasureFrfResult {
   std::string message;
   MeasuredFrf frf;
   MeasuredModes modes;
+  /// Before the correction to the tip apart for spindle and tool; by eq. 4.44, or without one, as above.
+  FrequencyResponse measured_frf;  ///< deviations without the sensitivity's
+  ModalModel measured;
   double sensitivity = NOT_A_NUMBER;      ///< [m/V] displacement towards the sensor per volt
   double sensitivity_std = NOT_A_NUMBER;  ///< [m/V]
   double flute_low = NOT_A_NUMBER;        ///< [rad] spindle angle with a flute at the sensor, at the tip
@@ -169,6 +183,9 @@ class HammerSequence {
     calibrate_cross,
     calibrate_again,
     strike,
+    to_second,
+    orient_second,
+    calibrate_second,
     stopping,
     retract
   };
@@ -177,7 +194,7 @@ class HammerSequence {
   /// A sensor as its calibration left it.
   struct SensorState {
     double sensitivity = NOT_A_NUMBER, sensitivity_std = NOT_A_NUMBER;  // [m/V]
-    double bend_gap = NOT_A_NUMBER;                                     // [m]
+    double bend_gap = NOT_A_NUMBER, bend_gap_std = NOT_A_NUMBER;        // [m]
     double volt = 0.0;                                                  // [V] at rest
   };
 
@@ -217,7 +234,22 @@ class HammerSequence {
   bool enough() const;
   double offsetCorrection() const;
   ImpactOptions impactOptions(const SensorState& sensor) const;
-  void evaluateCross();
+  bool secondHeightDue() const;
+  double lowered() const;
+  int hitsDue() const;
+  void hitsDone(double now);
+  void toSecondHeight(double now);
+  void withoutSecond(double now, const std::string& why);
+  double hitProgress() const;
+  FrequencyResponse averaged(const std::vector<Hit>& hits, const SensorState& sensor) const;
+  void addScatter(const FrequencyResponse& frf, ModalModel& model) const;
+  void addSystematic(const FrequencyResponse& frf, ModalModel& model) const;
+  ToolBeam toolBeam() const;
+  std::vector<OffsetMeasurement> atHeights(const ModalModel& modes) const;
+  TipCorrection tipOf(const ModalModel& modes) const;
+  bool correctsApart() const;
+  void toTip(const FrequencyResponse& frf, const ModalFit& fit);
+  void evaluateCross(const std::optional<TipCorrection>& tip);
   void evaluate();
 
   void abort(double now, FrfCode code, const std::string& why);
@@ -270,12 +302,15 @@ class HammerSequence {
   double flute_volt_ = 0.0;      // [V] of that flute at the sensor
   double flute_gap_ = 0.0;       // [m] at most, from the sensor to a flute that points at it, at the station
   std::optional<SensorCalibration> calibration_;
-  SensorState sensor_, cross_sensor_;
+  SensorState sensor_, cross_sensor_, second_sensor_;
+  bool second_ = false;      // at the second height
+  std::string no_second_;    // why there is none
+  double flank_volt_ = 0.0;  // [V] of the first sensor at the station, a flute at the hammer
   bool has_cross_ = false;
   std::string no_cross_;  // why there is no cross FRF
   int near_samples_ = 0;
   HitCollector collector_, cross_collector_;
-  std::vector<Hit> hits_, cross_hits_;
+  std::vector<Hit> hits_, cross_hits_, second_hits_;
   int bad_hits_ = 0;
 
   std::vector<Command> commands_;

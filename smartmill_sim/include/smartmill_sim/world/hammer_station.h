@@ -67,10 +67,12 @@ class HammerStation {
   double struckRetreat(const Place& place, std::size_t axis) const;
 
  private:
-  struct Way {  // from a blow in one axis
-    std::array<ModalFilter, 2> read, tip;
+  struct Way {                           // from a blow in one axis
+    std::vector<ModalFilter> read, tip;  // by axis
   };
   std::array<double, 2> gaps(const std::array<double, 2>& displacement) const;
+  double rigid(double height) const;
+  void standBy(std::size_t axis);
   void settle(const Place& place, std::mt19937_64& random);
 
   smartmill::HammerStation station_;
@@ -80,8 +82,11 @@ class HammerStation {
   std::array<GapSensor, 2> sensor_;  // facing x, y
   Solenoid solenoid_;
   std::optional<ToolStructure> structure_;
-  std::vector<Way> ways_;  // by axis struck; of a beam
-  double shape_ = 1.0;
+  std::vector<Way> ways_;                     // by axis struck; of a beam, at the height of the last blow
+  std::array<double, 2> way_height_{{0, 0}};  // [m] of the sensor above the tip in each
+  double step_;                               // [s]
+  bool turns_ = false;                        // a rigid tool, about its pivot
+  double height_ = 0.0;                       // [m] of the sensor's centre above the tip
 
   bool fired_ = false;
   std::size_t fired_axis_ = 0;

@@ -9,9 +9,10 @@ namespace smartmill::sim {
 
 /// What a hammer station is like beyond the model's `hammer` section: how the tool bends between hammer,
 /// sensor and tip, what the sensor's electrode sees of it, and what the solenoid does wrong. The defaults are
-/// an ideal station: a point sensor, half-sine blows and the model's modes along a cantilever's line.
+/// an ideal station: a point sensor, half-sine blows and the model's modes as those of a rigid tool.
 struct StationTraits {
   std::string structure = "modes";
+  double pivot = 0.25;
   // The tool as a beam.
   double shank_diameter = 0.0;
   double flute_length = 25.0e-3;

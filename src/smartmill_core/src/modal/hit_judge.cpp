@@ -26,7 +26,7 @@ constexpr double CLEAR_HIT = 10.0;
 constexpr double ABOVE_NOISE = 8.0;
 /// A second hit comes no sooner [s].
 constexpr double SOONEST_SECOND = 0.4e-3;
-constexpr std::size_t CLIPPED = 3, STUCK_RUN = 8, CROWD = 8, CROWDED = 3;
+constexpr std::size_t CLIPPED = 3, STUCK_RUN = 8, CROWD = 8, CROWDED = 3, MIRRORED = 5, PILED = 2;
 constexpr double FLAT = 3.0;
 /// Width of the bands in which samples at the top are counted: in noise, and of the largest.
 constexpr double ROUND = 1.35, SHARP = 2.5, VERY_SHARP = 6.0;
@@ -47,6 +47,8 @@ constexpr double BUMP = 5.0, BUMP_SHARE = 0.25, RISE = 1.5, RISE_SHARE = 0.06, F
 constexpr double DULL = 0.05;
 /// Gain beside that of the other hits, and shift between the channels [samples].
 constexpr double GAIN_JUMP = 0.1, SKEW = 0.35;
+/// And so many deviations of what noise makes of both.
+constexpr double BY_NOISE = 3.0;
 /// Shifts that are tried [samples]; lines with this share of the strongest take part.
 constexpr double MOST_SKEW = 6.0, SKEW_STEP = 0.1, STRONG_FORCE = 0.2;
 
@@ -136,6 +138,21 @@ bool crowded(const Channel& c, double sign) {
   return top > 0.2 * c.largest && first >= CROWD && first >= CROWDED * next;
 }
 
+/// An amplifier has one range to both sides, while the crests of a ringing fall from one to the next: both
+/// ends at one height, and samples piled up there, of both signs together.
+bool mirrored(const Channel& c) {
+  const double width = std::max(FLAT_NOISE * c.noise, FLAT_SHARE * c.largest);
+  const auto [low, high] = std::minmax_element(c.values.begin(), c.values.end());
+  if (std::abs(*high + *low) >= width) return false;
+  std::size_t first = 0, next = 0;
+  for (const double v : c.values) {
+    const double depth = c.largest - std::abs(v);
+    first += depth < width;
+    next += depth >= width && depth < 3.0 * width;
+  }
+  return first >= MIRRORED && first >= PILED * next;
+}
+
 /// Samples that share the largest value, the crests they stand on, and others near it.
 struct Top {
   std::size_t equal = 0, below = 0, crests = 0;
@@ -177,7 +194,7 @@ bool clipped(const Channel& c, bool both_ways) {
       return true;
   }
   if ((up.equal >= 2 && down.equal >= 2) || cornered(c, 1.0)) return true;
-  return both_ways && (cornered(c, -1.0) || crowded(c, 1.0) || crowded(c, -1.0));
+  return both_ways && (cornered(c, -1.0) || crowded(c, 1.0) || crowded(c, -1.0) || mirrored(c));
 }
 
 /// A rise of the force after it had fallen from the main peak, or before it.
@@ -342,24 +359,31 @@ std::string weak(const Channel& force, const Channel& response, double least) {
 
 struct Lines {
   std::vector<Complex> force, response;
+  double noise = 0.0;  // mean |response|^2 of a line that the sensor's noise alone would show
 };
 
 Lines linesOf(const Hit& hit) {
   Channel force = channelOf(hit.force, hit.pre_trigger);
   const std::vector<double> window = impactWindow(force.values);
   for (std::size_t i = 0; i < window.size(); ++i) force.values[i] *= window[i];
-  return {fourier(force.values), fourier(channelOf(hit.response, hit.pre_trigger).values)};
+  const Channel response = channelOf(hit.response, hit.pre_trigger);
+  return {fourier(force.values), fourier(response.values),
+          static_cast<double>(response.values.size()) * response.noise * response.noise};
 }
 
 /// A hit's response over what the others' FRF makes of its force.
 struct Beside {
-  double gain = 1.0, shift = 0.0;  ///< [1], [samples] of the response
-  double badness() const { return std::max(std::abs(std::log(gain)) / GAIN_JUMP, std::abs(shift) / SKEW); }
+  double gain = 1.0, shift = 0.0;          ///< [1], [samples] of the response
+  double gain_std = 0.0, shift_std = 0.0;  ///< by the noise
+  double jump() const { return std::abs(std::log(gain)) / (GAIN_JUMP + BY_NOISE * gain_std); }
+  double skew() const { return std::abs(shift) / (SKEW + BY_NOISE * shift_std); }
+  double badness() const { return std::max(jump(), skew()); }
 };
 
 Beside besideOthers(const std::vector<Lines>& lines, const std::vector<std::size_t>& members, std::size_t h) {
   const std::vector<Complex>& force = lines[h].force;
-  double strongest = 0.0, power = 0.0;
+  double strongest = 0.0, power = 0.0, turned = 0.0, noise = 0.0;
+  const double turn = units::PI / static_cast<double>(force.size() - 1);
   for (const Complex& f : force) strongest = std::max(strongest, std::abs(f));
   std::vector<Complex> product(force.size());
   for (std::size_t k = 1; k < force.size(); ++k) {
@@ -373,10 +397,14 @@ Beside besideOthers(const std::vector<Lines>& lines, const std::vector<std::size
     }
     const Complex due = force[k] * cross / squares;
     product[k] = std::conj(due) * lines[h].response[k];
-    power += std::norm(due);
+    // Of the others' noise a share stands in what is due: it is none of its power.
+    const double of_noise = std::norm(force[k]) * lines[h].noise / squares;
+    power += std::norm(due) - of_noise;
+    turned += std::pow(turn * static_cast<double>(k), 2) * (std::norm(due) - of_noise);
+    noise = std::max(noise, lines[h].noise * (1.0 + std::norm(force[k]) / squares));
   }
+  if (!(power > 0.0 && turned > 0.0)) return {1.0, 0.0, INFINITY, INFINITY};
   // Where the correlation of both is largest; there the gain.
-  const double turn = units::PI / static_cast<double>(force.size() - 1);
   const auto along = [&](double shift) {
     double sum = 0.0;
     for (std::size_t k = 1; k < product.size(); ++k) {
@@ -385,10 +413,11 @@ Beside besideOthers(const std::vector<Lines>& lines, const std::vector<std::size
     }
     return sum / power;
   };
-  Beside found{along(0.0), 0.0};
+  const double gain_std = std::sqrt(0.5 * noise / power), shift_std = std::sqrt(0.5 * noise / turned);
+  Beside found{along(0.0), 0.0, gain_std, shift_std};
   for (double shift = -MOST_SKEW; shift <= MOST_SKEW; shift += SKEW_STEP) {
     const double gain = along(shift);
-    if (gain > found.gain) found = {gain, shift};
+    if (gain > found.gain) found = {gain, shift, gain_std, shift_std};
   }
   found.gain = std::max(found.gain, 1e-6);
   return found;
@@ -444,7 +473,7 @@ std::vector<HitFault> faultsBeside(const std::vector<Hit>& hits, const std::vect
     }
     if (worst.badness() <= 1.0) break;
     faults[at] = {
-        std::abs(worst.shift) / SKEW > std::abs(std::log(worst.gain)) / GAIN_JUMP
+        worst.skew() > worst.jump()
             ? formatted("trigger skew: the channels are shifted by %.2f samples beside the other hits",
                         worst.shift)
             : formatted("gain jump: %.2f of that of the other hits", worst.gain),

@@ -25,6 +25,9 @@ constexpr double LEAST_GAIN = 1e-6;
 constexpr double MOST_BENT = 0.94;
 // A deviation that the lines do not tell is stated as this many times the value.
 constexpr double NOT_TOLD = 10.0;
+// Lines whose misfit hangs together; a line that the fit goes through tells at most so much.
+constexpr Eigen::Index NEIGHBOURS = 3;
+constexpr double MOST_LEVERAGE = 0.8;
 
 struct Solution {
   int modes = 0;
@@ -164,6 +167,35 @@ Solution fitTogether(const ModalLines& problem, const std::vector<EstimatedMode>
   return solution;
 }
 
+// Misfit of a measured FRF is no even noise: it gathers about the resonances, where few lines rule, and hangs
+// together from line to line. So each line's own misfit counts where it has leverage, set free of the fit's
+// pull (MacKinnon and White's HC3), with its neighbours (Newey and West's weights). What that adds to a
+// parameter's deviation enters the covariance; it never lessens it.
+Eigen::MatrixXd widened(const Eigen::MatrixXd& even, const Eigen::MatrixXd& inverse,
+                        const Eigen::MatrixXd& jacobian, const Eigen::VectorXd& residuals) {
+  if (!inverse.allFinite()) return even;
+  const Eigen::Index lines = residuals.size() / 2, columns = jacobian.cols();
+  Eigen::MatrixXd score = Eigen::MatrixXd::Zero(lines, columns);
+  const Eigen::MatrixXd pull = jacobian * inverse;
+  for (Eigen::Index row = 0; row < residuals.size(); ++row) {
+    const double leverage = std::min(MOST_LEVERAGE, pull.row(row).dot(jacobian.row(row)));
+    score.row(row / 2) += residuals[row] / (1.0 - leverage) * jacobian.row(row);
+  }
+  const Eigen::MatrixXd influence = score * inverse;  // of each line on each parameter
+  Eigen::VectorXd wide = Eigen::VectorXd::Ones(columns);
+  for (Eigen::Index k = 0; k < columns; ++k) {
+    const Eigen::VectorXd of = influence.col(k);
+    double variance = of.squaredNorm();
+    for (Eigen::Index lag = 1; lag <= NEIGHBOURS && lag < lines; ++lag) {
+      const double weight = 1.0 - static_cast<double>(lag) / (NEIGHBOURS + 1.0);
+      variance += 2.0 * weight * of.head(lines - lag).dot(of.tail(lines - lag));
+    }
+    if (even(k, k) > 0.0 && std::isfinite(variance))
+      wide[k] = std::sqrt(std::max(1.0, variance / even(k, k)));
+  }
+  return wide.asDiagonal() * even * wide.asDiagonal();
+}
+
 // The physical model of a solution with its covariance.
 ModalFit describe(const ModalLines& problem, const Solution& solution) {
   const int columns = problem.parameters(solution.modes);
@@ -173,7 +205,8 @@ ModalFit describe(const ModalLines& problem, const Solution& solution) {
   cost.evaluate(asVector(solution.parameters), &residuals, &jacobian);
   const double chi2 = solution.cost / static_cast<double>(cost.count() - columns);
   const double inflation = problem.weighted ? std::max(1.0, chi2) : chi2;
-  const Eigen::MatrixXd inner = fit::covarianceOf(jacobian).matrix * inflation;
+  const Eigen::MatrixXd inverse = fit::covarianceOf(jacobian).matrix;
+  const Eigen::MatrixXd inner = widened(inverse * inflation, inverse, jacobian, residuals);
 
   ModalFit fit;
   fit.reduced_chi2 = problem.weighted ? chi2 : std::numeric_limits<double>::quiet_NaN();
