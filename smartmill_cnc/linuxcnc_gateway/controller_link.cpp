@@ -187,15 +187,16 @@ void ControllerLink::noticeEnd() {
 bool ControllerLink::waitFor(const std::function<bool()>& so, double seconds) {
   const Clock::time_point end =
       Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
-  while (!so()) {
-    if (Clock::now() > end || !channels_) {
+  // Looking may find that the controller has gone, and its channels with it.
+  while (channels_ && !so()) {
+    if (Clock::now() > end) {
       return false;
     }
     std::this_thread::sleep_for(LOOK);
     look();
     meanwhile_();
   }
-  return true;
+  return channels_ != nullptr;
 }
 
 /// @return the command's serial number once the task has taken it.

@@ -25,10 +25,16 @@ void bag(const std::uint8_t* data, std::size_t size);        ///< recorded ROS b
 
 /// By name; the corpus of each is the folder corpus/NAME.
 inline const std::map<std::string, Target>& targets() {
-  static const std::map<std::string, Target> TARGETS{
-      {"replies", replies},     {"requests", requests}, {"nc", nc},
-      {"recording", recording}, {"model", model},       {"campaign", campaign},
-      {"dynoware", dynoware},   {"uff", uff},           {"gateway", gateway}, {"bag", bag}};
+  static const std::map<std::string, Target> TARGETS{{"replies", replies},
+                                                     {"requests", requests},
+                                                     {"nc", nc},
+                                                     {"recording", recording},
+                                                     {"model", model},
+                                                     {"campaign", campaign},
+                                                     {"dynoware", dynoware},
+                                                     {"uff", uff},
+                                                     {"gateway", gateway},
+                                                     {"bag", bag}};
   return TARGETS;
 }
 

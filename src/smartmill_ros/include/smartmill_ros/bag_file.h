@@ -81,6 +81,7 @@ BagBytes bagBytesOf(const std::string& path);
 /// ros::serialization::IStream, but no vector is made longer than the bytes that are left can fill.
 class CheckedStream : public ros::serialization::Stream {
  public:
+  // NOLINTNEXTLINE(readability-identifier-naming): ros::serialization asks for it by this name
   static const ros::serialization::StreamType stream_type = ros::serialization::stream_types::Input;
 
   CheckedStream(const std::uint8_t* data, std::uint32_t size)
