@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
-#include <cstdio>
 #include <string>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/modal/modal_fit.h"
 #include "smartmill_hammer/analysis/hits_needed.h"
 #include "smartmill_hammer/analysis/offset_factor.h"
@@ -46,12 +46,6 @@ void addCommon(ModalModel& model, double relative) {
 double studentOverNormal(std::size_t freedom) {
   const double z = 1.96, n = static_cast<double>(freedom), z2 = z * z;
   return 1.0 + (z2 + 1.0) / (4.0 * n) + (5.0 * z2 * z2 + 16.0 * z2 + 3.0) / (96.0 * n * n);
-}
-
-std::string format(const char* pattern, double value) {
-  char line[120];
-  std::snprintf(line, sizeof line, pattern, value);
-  return line;
 }
 
 }  // namespace
@@ -249,7 +243,7 @@ void HammerSequence::evaluate() {
       toTip(frf, fit);
     } else {
       evaluateCross(std::nullopt);
-      if (goal_.stickout > 0.0) result_.message += format(", offset correction %.3f", offsetCorrection());
+      if (goal_.stickout > 0.0) result_.message += formatted(", offset correction %.3f", offsetCorrection());
     }
     if (!no_cross_.empty()) result_.message += ", no cross FRF: " + no_cross_;
     addCommon(result_.modes.model, relative);
