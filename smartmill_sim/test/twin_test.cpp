@@ -182,6 +182,10 @@ TEST(Twin, channelsAskedForAloneAreThoseOfTheRecord) {
   delayed.effects = {effectEntry("channel_delay", {{"delay_us", 30.0}}, {{"channel", "fy"}})};
   mixed.effects = {effectEntry("cross_talk", {{"xy", 0.1}})};
   EXPECT_FALSE(channelsApart(mixed));
+  mixed.effects = {effectEntry("empirical:resonance",
+                               {{"frequency_hz", 870.0}, {"damping_ratio", 0.03}, {"gain", 0.3}},
+                               {{"channel", "fz"}, {"from", "fx"}})};
+  EXPECT_FALSE(channelsApart(mixed));
   SimulationOptions options;
   options.noise = false;
   options.phase = 1.0;

@@ -81,6 +81,11 @@ void withdraw(const SearchResult& found, Explanation* result) {
   result->suggested_test.reset();
 }
 
+void sayVerdict(const SearchOptions& options, const Explanation& e) {
+  options.say(formatted("verdict %s; gap %.4f -> %.4f, held out %.4f -> %.4f", nameOf(e.verdict),
+                        e.before.fit, e.after.fit, e.before.heldout, e.after.heldout));
+}
+
 }  // namespace
 
 Explanation explain(const Dataset& data, const ExplainOptions& options, const std::string& folder) {
@@ -139,9 +144,7 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
   // An effect that acts in one test most may look like another test's label; one that explains all clears it.
   if (!result.unexplained.empty()) refuse(data, labels.doubtful);
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  options.search.say(formatted("verdict %s; gap %.4f -> %.4f, held out %.4f -> %.4f", nameOf(result.verdict),
-                               result.before.fit, result.after.fit, result.before.heldout,
-                               result.after.heldout));
+  sayVerdict(options.search, result);
   return result;
 }
 

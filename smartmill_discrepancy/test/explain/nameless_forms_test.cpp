@@ -95,9 +95,9 @@ TEST(NamelessForms, aChannelThatJumpsInEachRecord) {
 TEST(NamelessForms, aChannelThatDrifts) {
   const TemporaryFolder folder;
   const Explanation e =
-      withExtra(folder, "fz", [](const CampaignTest&, double time, std::uint64_t) { return -80.0 * time; });
+      withExtra(folder, "fz", [](const CampaignTest&, double time, std::uint64_t) { return -160.0 * time; });
   expectBuilt(e, "ramp", "in a straight line as charge_drift does");
-  EXPECT_NEAR(valueOf(e.effects[0], "per_min"), -4800.0, 100.0);
+  EXPECT_NEAR(valueOf(e.effects[0], "per_min"), -9600.0, 100.0);
 }
 
 TEST(NamelessForms, aChannelThatWarmsUp) {

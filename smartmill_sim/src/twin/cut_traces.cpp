@@ -99,7 +99,8 @@ bool channelsApart(const MachineModel& model) {
     if (!known) return true;
     const bool shown =
         known->stage == Stage::sensor_output || known->stage == Stage::delay || known->stage == Stage::signal;
-    return shown && effect.words.count("channel") == 0;
+    const bool from_another = effect.words.count("from") > 0;
+    return shown && (from_another || effect.words.count("channel") == 0);
   });
 }
 
