@@ -358,9 +358,22 @@ Place resonanceAt(double frequency, const std::map<std::size_t, Shown>& to,
   return {frequency, product / squares, product * product / squares};
 }
 
+/// Of the frequencies that records of a rate hold, the one at which a resonance takes most.
+Place bestResonance(const TwinRunner& runner, double rate, const std::map<std::size_t, Shown>& to,
+                    const std::map<std::size_t, Shown>& from, bool itself) {
+  constexpr double RATIO = 1.05, LOWEST = 60.0, HIGHEST = 0.42;
+  std::vector<double> frequencies;
+  for (double f = LOWEST; f < HIGHEST * rate; f *= RATIO) frequencies.push_back(f);
+  std::vector<Place> places(frequencies.size());
+  runParallel(frequencies.size(), runner.threads(),
+              [&](std::size_t k) { places[k] = resonanceAt(frequencies[k], to, from, itself); });
+  return *std::max_element(places.begin(), places.end(),
+                           [](const Place& a, const Place& b) { return a.squares < b.squares; });
+}
+
 void addResonances(const std::vector<Hypothesis>& all, const TwinRunner& runner,
                    const std::vector<double>& residual, std::vector<Hypothesis>* placed) {
-  constexpr double RATIO = 1.05, LOWEST = 60.0, HIGHEST = 0.42, LEAST = 100.0;
+  constexpr double LEAST = 100.0;
   const auto shown = forcesShown(runner, residual);
   double rate = 0.0;
   for (const TestData& t : runner.data().tests) rate = std::max(rate, t.test.sample_rate);
@@ -369,15 +382,7 @@ void addResonances(const std::vector<Hypothesis>& all, const TwinRunner& runner,
       const std::string variant = to + " from " + from;
       for (const Hypothesis& h : all) {
         if (!isForm(h, "resonance", variant)) continue;
-        std::vector<double> frequencies;
-        for (double f = LOWEST; f < HIGHEST * rate; f *= RATIO) frequencies.push_back(f);
-        std::vector<Place> places(frequencies.size());
-        runParallel(frequencies.size(), runner.threads(), [&](std::size_t k) {
-          places[k] = resonanceAt(frequencies[k], left, source, to == from);
-        });
-        const Place best =
-            *std::max_element(places.begin(), places.end(),
-                              [](const Place& a, const Place& b) { return a.squares < b.squares; });
+        const Place best = bestResonance(runner, rate, left, source, to == from);
         if (best.squares < LEAST) continue;
         Hypothesis at = h;
         const double f = std::log(best.frequency), d = std::log(MODE_DAMPING);

@@ -25,10 +25,10 @@ struct Lines {
   Eigen::VectorXd b;
   Index flanks = 0;  // first of the two columns
 
-  /// @param columnsAt the other columns at a frequency [Hz]
+  /// @param columns_at the other columns at a frequency [Hz]
   template <class Columns>
   Lines(const FrequencyResponse& band, const std::vector<Complex>& due, Index columns, double high,
-        const Columns& columnsAt)
+        const Columns& columns_at)
       : a(2 * static_cast<Index>(band.size()), columns + 2),
         b(2 * static_cast<Index>(band.size())),
         flanks(columns) {
@@ -39,7 +39,7 @@ struct Lines {
       const double std = i < band.std_dev.size() ? band.std_dev[i] : NAN;
       const double weight = std > 0.0 ? std::sqrt(2.0) / std : 1.0;
       row.clear();
-      columnsAt(band.frequency[i], row);
+      columns_at(band.frequency[i], row);
       row.push_back(1.0);
       row.push_back(std::pow(band.frequency[i] / high, 2));
       const auto at = static_cast<Index>(2 * i);
