@@ -556,19 +556,30 @@ double HammerSequence::retreatOf(double volt, double moved) const {
   return TRUSTED_DEPTH * std::clamp(depth, 0.0, station_.flute_depth);
 }
 
-/// What a sensor sees with the flute at the hammer belongs to the flanks of the flutes on either side.
+/// What a sensor sees with the flute at the hammer belongs to the flanks of the flutes on either side. Of
+/// uneven teeth any may be the flute that was found: as far from them as the tool allows, which says least.
 /// @param further [rad] that the spindle has turned on from there
 void HammerSequence::addToProfile(std::size_t axis, double further, double volt) {
   const double off = turnedFrom(axis) + further, moved = target_[axis] - stationPosition()[axis];
-  double ahead = units::TWO_PI, behind = -units::TWO_PI;
-  for (int tooth = 0; tooth < tool_.teeth; ++tooth) {
-    const double turned = std::remainder(off - tool_.toothAngle(tooth), units::TWO_PI);
-    if (turned >= 0.0) ahead = std::min(ahead, turned);
-    if (turned <= 0.0) behind = std::max(behind, turned);
+  double ahead = 0.0, behind = 0.0;
+  for (int found = 0; found < tool_.teeth; ++found) {
+    double next = units::TWO_PI, last = -units::TWO_PI;
+    for (int tooth = 0; tooth < tool_.teeth; ++tooth) {
+      const double turned = turnedFromTooth(off, tooth, found);
+      if (turned >= 0.0) next = std::min(next, turned);
+      if (turned <= 0.0) last = std::max(last, turned);
+    }
+    if (next < units::TWO_PI) ahead = std::max(ahead, next);
+    if (last > -units::TWO_PI) behind = std::min(behind, last);
   }
   for (const double place : {ahead, behind}) {
-    if (std::abs(place) < units::TWO_PI) profile_.push_back({place, retreatOf(volt, moved)});
+    if (place != 0.0) profile_.push_back({place, retreatOf(volt, moved)});
   }
+}
+
+/// [rad] from a tooth, of a place so far from the flute that was found, were that the tooth `found`.
+double HammerSequence::turnedFromTooth(double off, int tooth, int found) const {
+  return std::remainder(off - tool_.toothAngle(tooth) + tool_.toothAngle(found), units::TWO_PI);
 }
 
 /// [rad] that the spindle, a flute at the hammer, stands from a flute at the sensor of an axis.
@@ -581,11 +592,13 @@ double HammerSequence::turnedFrom(std::size_t axis) const {
 
 /// [m] at least, of the surface that the sensor would see with the spindle so far from a flute. The root of
 /// the depth runs straight between two readings, which lies below a flank that is round or straight; beyond
-/// the last reading the surface falls towards the gullet.
+/// the last reading the surface falls towards the gullet. Of uneven teeth any may be the flute that was
+/// found.
 double HammerSequence::leastRetreat(double off) const {
   double least = station_.flute_depth;
-  for (int tooth = 0; tooth < tool_.teeth; ++tooth) {
-    const double turned = std::remainder(off - tool_.toothAngle(tooth), units::TWO_PI);
+  const int teeth = tool_.teeth;
+  for (int k = 0; k < teeth * teeth; ++k) {
+    const double turned = turnedFromTooth(off, k / teeth, k % teeth);
     const double sense = turned < 0.0 ? -1.0 : 1.0, at = sense * turned;
     Retreat below, above{std::numeric_limits<double>::infinity(), 0.0};
     for (const Retreat& r : profile_) {

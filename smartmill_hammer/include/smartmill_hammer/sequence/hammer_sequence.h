@@ -208,6 +208,7 @@ class HammerSequence {
 
   FluteSearchOptions searchOptions() const;
   SensorCalibrationOptions calibrationOptions(std::size_t axis) const;
+  double turnedFromTooth(double off, int tooth, int found) const;
   double safeTravel(std::size_t axis) const;
   void keepProfile();
   void addToProfile(std::size_t axis, double further, double volt);
