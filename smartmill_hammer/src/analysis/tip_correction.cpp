@@ -471,6 +471,17 @@ TipCorrection correctToTip(const std::vector<OffsetMeasurement>& measurements, c
   return result;
 }
 
+TipCorrection withoutBeyond(TipCorrection correction) {
+  for (TipMode& tip : correction.beyond) {
+    correction.direct -= tip.added;
+    correction.direct_std = std::hypot(correction.direct_std, tip.added);
+    tip.direct.gain -= tip.added;
+    tip.direct.gain_std = std::hypot(tip.direct.gain_std, tip.added);
+    tip.added = 0.0;
+  }
+  return correction;
+}
+
 FrequencyResponse tipResponse(const FrequencyResponse& measured, const TipCorrection& correction) {
   FrequencyResponse frf = measured;
   frf.std_dev.resize(frf.size(), 0.0);

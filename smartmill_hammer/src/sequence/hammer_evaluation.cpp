@@ -18,6 +18,7 @@ namespace hammer {
 namespace {
 
 constexpr std::size_t LEAST_HITS = 3, LEAST_JACKKNIFE = 4;
+constexpr const char* UNKNOWN = "unknown";
 constexpr const char* AXIS_NAMES[] = {"x", "y", "z"};
 /// The line at zero is the drift of the sensor. [Hz]
 constexpr double FIRST_LINE = 1e-3;
@@ -146,7 +147,7 @@ ToolBeam HammerSequence::toolBeam() const {
       parameters_.tool_fluted_length > 0.0
           ? Known{std::min(parameters_.tool_fluted_length, longest), FLUTED_STD}
           : Known{std::min(USUAL_FLUTES.value * tool_.diameter, longest), USUAL_FLUTES.std * tool_.diameter};
-  setMaterial(tool, parameters_.tool_material);
+  if (parameters_.tool_material != UNKNOWN) setMaterial(tool, parameters_.tool_material);
   return tool;
 }
 
@@ -166,7 +167,8 @@ TipCorrection HammerSequence::tipOf(const ModalModel& modes) const {
   HolderPrior prior;
   prior.height = parameters_.height_std;
   prior.tilt.std = TILT_STD;
-  return correctToTip(atHeights(modes), toolBeam(), prior, parameters_.fit_high);
+  const TipCorrection tip = correctToTip(atHeights(modes), toolBeam(), prior, parameters_.fit_high);
+  return parameters_.tool_material == UNKNOWN ? withoutBeyond(tip) : tip;
 }
 
 /// Struck along the goal's direction, read across it. What a mode gains from the struck height to the tip it

@@ -85,7 +85,9 @@ void declareTip(HammerParameters& p, ParameterTable& table) {
                "sensor");
   table.number("height_std", p.height_std, "m", Range::notNegative(), "to which heights are known");
   table.number("stickout_std", p.stickout_std, "m", Range::notNegative(), "of the goal's stick-out");
-  table.choice("tool_material", p.tool_material, {"carbide", "steel"}, "of the tool's body");
+  table.choice(
+      "tool_material", p.tool_material, {"unknown", "carbide", "steel"},
+      "of the tool's body; unknown: what only the tool's beam tells, of modes above the band, stays a doubt");
   table.number("tool_fluted_length", p.tool_fluted_length, "m", Range::closed(0.0, 0.5),
                "of the tool, from its tip, within 1 mm; 0: not known, some two diameters");
 }

@@ -71,7 +71,7 @@ struct HammerParameters : HitTestParameters {
   double read_height = 0.0;
   double height_std = 0.5e-3;
   double stickout_std = 0.5e-3;
-  std::string tool_material = "carbide";
+  std::string tool_material = "unknown";
   double tool_fluted_length = 0.0;
 
   HammerParameters() {
