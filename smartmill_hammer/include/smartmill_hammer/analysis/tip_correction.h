@@ -76,8 +76,8 @@ struct TipCorrection {
 TipCorrection correctToTip(const std::vector<OffsetMeasurement>& measurements, const ToolBeam& tool,
                            const HolderPrior& prior, double high);
 
-/// The same where nothing is known of the tool's material: modes above the band, of which only the beam tells,
-/// add nothing but their share to the standard deviations.
+/// The same where nothing is known of the tool's material: modes above the band, of which only the beam
+/// tells, add nothing but their share to the standard deviations.
 TipCorrection withoutBeyond(TipCorrection correction);
 
 /// The measured FRF [m/N] turned into the tip's: what the modes gain is added line by line. Standard
