@@ -4,7 +4,6 @@
 #include <cmath>
 #include <complex>
 #include <map>
-#include <numeric>
 #include <optional>
 #include <string>
 
@@ -12,6 +11,7 @@
 #include "smartmill_core/modal/modal_filter.h"
 #include "smartmill_core/model/effect_catalogue.h"
 #include "smartmill_core/signal/fourier.h"
+#include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::discrepancy {
@@ -78,8 +78,7 @@ std::map<std::string, std::vector<Left>> leftByChannel(const TwinRunner& runner,
     if (b.slow) continue;
     const auto from = residual.begin() + static_cast<std::ptrdiff_t>(b.offset);
     Left left{&runner.data().tests[b.test], {from, from + static_cast<std::ptrdiff_t>(b.size)}, 0.0, b.noise};
-    left.mean = std::accumulate(left.values.begin(), left.values.end(), 0.0) /
-                static_cast<double>(left.values.size());
+    left.mean = mean(left.values);
     for (double& v : left.values) v -= left.mean;
     channels[b.channel].push_back(std::move(left));
   }
@@ -206,8 +205,8 @@ std::vector<double> envelope(const std::vector<double>& values, double frequency
     inside = keep * turn * inside + values[i];
     power[i] = std::norm(inside);
   }
-  const double mean = std::accumulate(power.begin(), power.end(), 0.0) / static_cast<double>(power.size());
-  for (double& p : power) p -= mean;
+  const double level = mean(power);
+  for (double& p : power) p -= level;
   return power;
 }
 

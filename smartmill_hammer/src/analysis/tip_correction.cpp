@@ -429,9 +429,8 @@ TipCorrection together(const std::vector<TipCorrection>& all, const std::vector<
 
 void setMaterial(ToolBeam& tool, const std::string& material) {
   if (material == "carbide") {
-    // Grades of 9..12 % cobalt.
-    tool.young = {5.8e11, 2.0e10};
-    tool.density = {14300.0, 300.0};
+    tool.young = ToolBeam().young;
+    tool.density = ToolBeam().density;
   } else if (material == "steel") {
     tool.young = {2.1e11, 5.0e9};
     tool.density = {7900.0, 150.0};

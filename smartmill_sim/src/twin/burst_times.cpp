@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+
+#include "smartmill_core/signal/statistics.h"
 
 namespace smartmill::sim {
 namespace {
@@ -73,8 +74,8 @@ void findBursts(const Record* recorded, const std::array<std::vector<double>*, C
         machine.finish(static_cast<double>(i) / rate, values);
         left[i] -= values[c];
       }
-      const double mean = std::accumulate(left.begin(), left.end(), 0.0) / static_cast<double>(left.size());
-      for (double& v : left) v -= mean;
+      const double level = mean(left);
+      for (double& v : left) v -= level;
       train->first = bestFirst(left, rate, *train);
       train->amplitude = amplitude;
     }
