@@ -1,0 +1,19 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "gallery/gallery.h"
+
+namespace smartmill::studies {
+
+struct Shown {
+  Figure figure;
+  Drawn drawn;
+};
+
+/// One HTML file: opens with what differs, what is better and what agrees, then figure by figure.
+/// @throws Error
+void writePage(const std::vector<Shown>& shown, unsigned seed, const std::string& file);
+
+}  // namespace smartmill::studies

@@ -1,0 +1,59 @@
+#include "gallery/gallery.h"
+
+#include <filesystem>
+#include <set>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "gallery/page.h"
+#include "smartmill_core/io/text_file.h"
+#include "smartmill_core/testing/temporary_folder.h"
+
+namespace smartmill::studies {
+namespace {
+
+using ::testing::HasSubstr;
+
+TEST(Gallery, everyFigureHasItsOwnName) {
+  std::set<std::string> names;
+  for (const Figure& figure : allFigures()) {
+    EXPECT_TRUE(names.insert(figure.name).second) << figure.name;
+    EXPECT_FALSE(figure.title.empty()) << figure.name;
+  }
+}
+
+TEST(Gallery, aNumberAgreesWithinItsShareAlone) {
+  EXPECT_EQ(compareNumber("a", 10.0, 10.4, 0.0, 0.05, "").verdict, Verdict::agrees);
+  EXPECT_EQ(compareNumber("a", 10.0, 10.6, 0.0, 0.05, "").verdict, Verdict::differs);
+  EXPECT_EQ(compareNumber("a", -10.0, -10.4, 0.0, 0.05, "").verdict, Verdict::agrees);
+  EXPECT_EQ(compareNumber("a", -10.0, 10.0, 0.0, 0.05, "").verdict, Verdict::differs);
+}
+
+// What the thesis prints of its load meter (eq. 3.11, section 3.2.1), found again from steps of 3e-4 V.
+TEST(Gallery, theLoadMetersNumbersComeBack) {
+  const TemporaryFolder folder;
+  for (const Figure& figure : loadMeterFigures()) {
+    if (figure.name == "dunwoody_3_5_machines") continue;  // half a minute
+    const Drawn drawn = figure.draw(folder.file(""), 3);
+    for (const std::string& picture : drawn.pictures) EXPECT_GT(std::filesystem::file_size(picture), 5000u);
+    for (const Compared& row : drawn.rows)
+      EXPECT_NE(row.verdict, Verdict::differs) << row.what << ": " << row.ours;
+  }
+}
+
+TEST(Gallery, thePageOpensWithTheCounts) {
+  const TemporaryFolder folder;
+  const Figure figure{"one", "A <figure>", nullptr};
+  const Drawn drawn{{}, {{"a", "1", "1", Verdict::agrees, ""}, {"b", "1", "2", Verdict::differs, "<why>"}}};
+  const std::string file = folder.file("page.html");
+  writePage({{figure, drawn}}, 7, file);
+  const std::string text = readText(file);
+  EXPECT_THAT(text, HasSubstr("1 numbers agree, 0 are better here, 1 do not agree; 1 figures, seed 7."));
+  EXPECT_THAT(text, HasSubstr("&lt;why&gt;"));
+  EXPECT_THAT(text, HasSubstr("A &lt;figure&gt;"));
+  EXPECT_LT(text.find("What agrees"), text.find("What does not agree"));
+}
+
+}  // namespace
+}  // namespace smartmill::studies
