@@ -247,7 +247,7 @@ Drawn coefficients(const std::string& folder, unsigned seed) {
           "1:3 "
           "with points pt 7 lc rgb '#2060c0' title 'load meter'\n";
   plot.draw();
-  const auto off = [](double x) { return formatted("%.1f %%", 100.0 * x); };
+  const auto off = [](double x) { return formatted("%.2f %% off", 100.0 * std::abs(x)); };
   const double here = ktc / KTC - 1.0, here_edge = kte / KTE - 1.0;
   const std::string why =
       "same procedure, on a machine whose only faults are steps, noise and Stribeck friction; "

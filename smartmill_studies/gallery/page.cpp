@@ -12,22 +12,27 @@ std::string cell(const std::string& text) {
   return "<td>" + escapedHtml(text) + "</td>";
 }
 
-void table(ReportPage& page, const std::vector<const Compared*>& rows) {
+/// A row, and the figure whose it is.
+using Told = std::pair<const Figure*, const Compared*>;
+
+void table(ReportPage& page, const std::vector<Told>& rows) {
   if (rows.empty()) return;
-  page.html() << "<table><tr><th>number</th><th>document</th><th>here</th><th></th><th>why</th></tr>\n";
-  for (const Compared* row : rows) {
+  page.html() << "<table><tr><th>figure</th><th>number</th><th>document</th><th>here</th><th></th><th>why</"
+                 "th></tr>\n";
+  for (const auto& [figure, row] : rows) {
     const char* look = row->verdict == Verdict::differs ? "bad" : "good";
-    page.html() << "<tr>" << cell(row->what) << cell(row->seed) << cell(row->ours) << "<td class=\"" << look
-                << "\">" << nameOf(row->verdict) << "</td>" << cell(row->why) << "</tr>\n";
+    page.html() << "<tr><td><a href=\"#" << figure->name << "\">" << figure->name << "</a></td>"
+                << cell(row->what) << cell(row->seed) << cell(row->ours) << "<td class=\"" << look << "\">"
+                << nameOf(row->verdict) << "</td>" << cell(row->why) << "</tr>\n";
   }
   page.html() << "</table>\n";
 }
 
-std::vector<const Compared*> rowsOf(const std::vector<Shown>& shown, Verdict verdict) {
-  std::vector<const Compared*> rows;
+std::vector<Told> rowsOf(const std::vector<Shown>& shown, Verdict verdict) {
+  std::vector<Told> rows;
   for (const Shown& one : shown)
     for (const Compared& row : one.drawn.rows)
-      if (row.verdict == verdict) rows.push_back(&row);
+      if (row.verdict == verdict) rows.emplace_back(&one.figure, &row);
   return rows;
 }
 
@@ -41,7 +46,7 @@ void writePage(const std::vector<Shown>& shown, unsigned seed, const std::string
               << formatted("%zu numbers agree, %zu are better here, %zu do not agree; %zu figures, seed %u.",
                            agrees.size(), better.size(), differs.size(), shown.size(), seed)
               << "</p>\n";
-  const std::pair<const char*, const std::vector<const Compared*>*> parts[] = {
+  const std::pair<const char*, const std::vector<Told>*> parts[] = {
       {"What agrees", &agrees}, {"What is better", &better}, {"What does not agree", &differs}};
   for (const auto& [title, rows] : parts) {
     page.html() << "<h2>" << title << "</h2>\n";
@@ -54,8 +59,8 @@ void writePage(const std::vector<Shown>& shown, unsigned seed, const std::string
                 << "smartmill_studies gallery --only " << one.figure.name << " --seed " << seed
                 << " -o DIR</code></p>\n";
     for (const std::string& picture : one.drawn.pictures) page.picture(picture, one.figure.title);
-    std::vector<const Compared*> rows;
-    for (const Compared& row : one.drawn.rows) rows.push_back(&row);
+    std::vector<Told> rows;
+    for (const Compared& row : one.drawn.rows) rows.emplace_back(&one.figure, &row);
     table(page, rows);
   }
   page.write(file);
