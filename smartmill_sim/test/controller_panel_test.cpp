@@ -45,6 +45,9 @@ TEST(Program, EveryWordOfTheSubsetGoesWhereItSays) {
            {"#101=10*SIN[30]\nG91 G0 X#101 Y[10*COS[60]]\n", mm(5, 5, 0)},
            {"#1=1\n#[100+#1]=7\nG91 G0 X##1\n", mm(1, 0, 0)},  // ##1 is #1, which is 1
            {"G91 G0 X#33 Y2\n", mm(0, 2, 0)},                  // a vacant variable is no word
+           {"#9=4\n#9=#0\nG91 G0 X#9 Y2\n", mm(0, 2, 0)},      // #0 has no value, ever
+           {"G91 G2 X0 R5 F6000\nG0 Y1\n", mm(0, 1, 0)},       // an arc of no angle
+           {"N10 #1=4\nN0020 #2=#1*2\nG91 G0 X#2\n", mm(8, 0, 0)},
            {"O0042(SLOT)\nN7 G94 G21 G17 G90\nG91 G0 X1 (COMMENT)\n%\n", mm(1, 0, 0)},
        }) {
     Machine m(options);
@@ -71,6 +74,15 @@ TEST(Program, ArcKeepsItsRadiusAndItsAcceleration) {
   expectAt(m, mm(0, 20, 0), "half circle");
 }
 
+TEST(Program, MachineCoordinatesAreReachedInRapidTraverseWhateverMotionIsInForce) {
+  Machine m;
+  m.start("G90 G1 F60 X1\nG53 X51\n");
+  // A millimetre at 1 mm/s, then 50 mm at 0.5 m/s and 2 m/s2, a triangle of 2 sqrt(s / a).
+  const double creep = 1e-3 / 1e-3 + 1e-3 / 2.0, rapid = 2.0 * std::sqrt(0.05 / 2.0);
+  EXPECT_NEAR(m.runToEnd(), creep + rapid, 3.0 * DT);
+  expectAt(m, mm(51, 0, 0), "G53");
+}
+
 TEST(Program, ArcThatBulgesOutOfTheTravelIsRefused) {
   Machine m;
   m.start("G90 G0 X245\nG3 X245 Y20 I0 J10 F6000\n");
@@ -85,9 +97,9 @@ TEST(Program, FlowAndOtherUnknownThingsAreRefusedByName) {
     m.run(DT);
     EXPECT_EQ(m.alarmText().substr(0, word.size() + 13), word + " IS NOT KNOWN") << m.alarmText();
   }
-  for (const std::string block :
-       {"G2 X1 R0.1 F100", "G2 X1 Y1 F100", "G3 X9 I1 F100", "#1=1/0", "#1=SQRT[-1]", "#1=[[[[[[1]]]]]]",
-        "#1=[1", "#1=1]", "#5021=1", "#1=--1", "M6", "G41", "T1"}) {
+  for (const std::string block : {"G2 X1 R0.1 F100", "G2 X1 Y1 F100", "G3 X9 I1 F100", "#1=1/0",
+                                  "#1=SQRT[-1]", "#1=[[[[[[1]]]]]]", "#1=[1", "#1=1]", "#5021=1", "#0=1",
+                                  "#34=1", "#1=#34", "N5 #1", "N#1=5 X1", "#1=--1", "M6", "G41", "T1"}) {
     Machine m;
     m.start(block + "\n");
     m.run(DT);

@@ -399,7 +399,7 @@ bool ControlledMachine::takeBlock(double time) {
     block_text = *line;
     if (!block_text.empty()) {
       start(time, parseBlock(block_text, [this](int number) {
-              if (!Variables::exists(number)) {
+              if (number != Variables::VACANT && !Variables::exists(number)) {
                 throw NcAlarm(PS_VARIABLE_NUMBER, ALARM_PS, "VARIABLE NO. OUT OF RANGE");
               }
               return readVariable(number);
@@ -497,11 +497,13 @@ void ControlledMachine::planPath(const NcBlock& block) {
     }
     append(PathMove::line(from, to), true);
     append(PathMove::line(to, home), true);
-  } else if (modal_.motion >= 2 && !block.machine) {
+  } else if (modal_.motion >= 2 && !block.machine && !(block.radius && from == to)) {
     const bool clockwise = modal_.motion == 2;
     append(PathMove::arc(from, to, centreOf(block, from, to), clockwise), false);
   } else {
-    append(PathMove::line(from, to), modal_.motion == 0);
+    // In machine coordinates a control goes in rapid traverse, whatever motion is in force; an arc of a
+    // radius that ends where it begins is none.
+    append(PathMove::line(from, to), modal_.motion == 0 || block.machine);
   }
 }
 

@@ -107,6 +107,9 @@ void takeDwell(NcBlock& block, const std::optional<double>& milliseconds) {
 
 NcBlock parseAssignment(NcReader& reader) {
   NcBlock block;
+  if (reader.take("N")) {
+    block.sequence = reader.whole("N");
+  }
   reader.next();
   block.macro = reader.number("#");
   if (reader.next() != '=') {
@@ -201,8 +204,11 @@ NcBlock parseBlock(const std::string& line, const NcVariables& variables) {
   if (text.empty() || text[0] == '%') {
     return {};
   }
+  // A sequence number may stand before an assignment.
+  const std::size_t first = text[0] == 'N' ? text.find_first_not_of("0123456789", 1) : 0;
   NcReader reader(text, variables);
-  return text[0] == '#' ? parseAssignment(reader) : parseWords(reader);
+  return first != std::string::npos && text[first] == '#' && first != 1 ? parseAssignment(reader)
+                                                                        : parseWords(reader);
 }
 
 }  // namespace smartmill::sim

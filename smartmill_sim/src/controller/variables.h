@@ -13,6 +13,7 @@ class Variables {
  public:
   using Point = std::array<double, 3>;
   static constexpr int ORIENT = 1133;  // Dunwoody 6.2
+  static constexpr int VACANT = 0;     // programs may read it, it has no value
   static constexpr std::size_t SYSTEMS = 6;
 
   /// Positions [m] of now; offsets are kept here.

@@ -370,15 +370,29 @@ int DataCalls::readMacroDoubles(const SubRequest& request, Writer& out) const {
 }
 
 int DataCalls::writeMacroDoubles(const SubRequest& request) {
-  const int count = static_cast<int>(request.extra.size() / 8);
-  if (count < 1 || count > MAX_MACROS || request.v[0] > std::numeric_limits<std::int32_t>::max() - count) {
+  constexpr std::size_t DOUBLE = 8;  // [byte]
+  const int count = static_cast<int>(request.extra.size() / DOUBLE);
+  if (request.extra.size() % DOUBLE != 0 || count < 1 || count > MAX_MACROS ||
+      request.v[0] > std::numeric_limits<std::int32_t>::max() - count) {
     return EW_LENGTH;
   }
+  // All of them or none.
   Reader reader(request.extra);
+  std::vector<std::optional<double>> contents;
   for (int i = 0; i < count; ++i) {
     const double value = reader.f64();
-    const std::optional<double> content = std::isnan(value) ? std::nullopt : std::optional<double>(value);
-    const int code = controller_.writeMacro(request.v[0] + i, content);
+    if (std::isinf(value)) {
+      return EW_DATA;
+    }
+    contents.push_back(std::isnan(value) ? std::nullopt : std::optional<double>(value));
+    std::optional<double> former;
+    const int code = controller_.readMacro(request.v[0] + i, &former);
+    if (code != EW_OK) {
+      return code;
+    }
+  }
+  for (int i = 0; i < count; ++i) {
+    const int code = controller_.writeMacro(request.v[0] + i, contents[static_cast<std::size_t>(i)]);
     if (code != EW_OK) {
       return code;
     }

@@ -3,6 +3,7 @@
 #include <arpa/inet.h>
 #include <fcntl.h>
 #include <netinet/in.h>
+#include <netinet/tcp.h>
 #include <poll.h>
 #include <sys/socket.h>
 #include <unistd.h>
@@ -29,6 +30,9 @@ constexpr int IDLE_POLL_MS = 200;
 constexpr int SESSION_POLL_MS = 5;  // the machine is asked for an abort this often
 constexpr int BLOCKED_POLL_MS = 2;  // text that the machine's buffer did not take is offered this often
 constexpr int LISTEN_BACKLOG = 64;
+// [byte] of an Ethernet packet. Loopback's own are of 64 kB, and a client's kernel holds back twenty of them
+// (tcp_sndbuf_expand of Linux), so that it would feel the machine's pace megabytes late.
+constexpr int SEGMENT = 1460;
 
 enum class Dnc { none, open, aborted };
 
@@ -105,6 +109,7 @@ class Server::Impl {
     // Set before listen(), so that accepted connections advertise the small window from the first packet on.
     ::setsockopt(listener_.get(), SOL_SOCKET, SO_RCVBUF, &options_.receive_buffer,
                  sizeof options_.receive_buffer);
+    ::setsockopt(listener_.get(), IPPROTO_TCP, TCP_MAXSEG, &SEGMENT, sizeof SEGMENT);
     prepareSocket(listener_.get());
     if (::bind(listener_.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
         ::listen(listener_.get(), LISTEN_BACKLOG) != 0) {

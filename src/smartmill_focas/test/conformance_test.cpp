@@ -92,6 +92,22 @@ TEST_F(ConformanceTest, ClockIsReadAndSet) {
               "0012 0001 0010 0001 0001 0046 0002 0000 0000 0000");  // nothing given
 }
 
+TEST_F(ConformanceTest, DoublesAreWrittenAllOrNone) {
+  const auto data = open(2);
+  const std::string one = "3ff0000000000000", request = " 0001 0001 00a8 000001f4 Z12 ";
+  const std::string answer = "0012 0001 0010 0001 0001 00a8 ";
+  controller_.change([](TestController& c) { c.macros[500] = 7.0; });
+  // No whole double, an infinite one, numbers beyond those that are there.
+  expectReply(*data, "0029 0001 0027" + request + "0000000b" + one + "Z3", answer + "0002 0000 0000 0000");
+  expectReply(*data, "002e 0001 002c" + request + "00000010" + one + "7ff0000000000000",
+              answer + "0005 0000 0000 0000");
+  expectReply(*data, "003e 0001 003c" + request + "00000020" + one + one + one + one,
+              answer + "0003 0000 0000 0000");
+  EXPECT_EQ(controller_.locked(controller_.macros)[500], 7.0);
+  expectReply(*data, "0026 0001 0024" + request + "00000008" + one, answer + "0000 0000 0000 0000");
+  EXPECT_EQ(controller_.locked(controller_.macros)[500], 1.0);
+}
+
 TEST_F(ConformanceTest, PmcRangesAreBigEndianOnTheWireAndLowByteFirstInMemory) {
   const auto data = open(2);
   expectReply(*data, "0022 0001 0020 0002 0001 8002 00000064 00000067 00000009 00000002 00000004 01020304",

@@ -186,6 +186,23 @@ TEST_F(ServerTest, BackPressureLosesNothing) {
   EXPECT_EQ(controller_.locked(controller_.text), text);
 }
 
+/// Loopback's own packets would let a client's kernel take megabytes before it feels the machine.
+TEST_F(ServerTest, AClientOfDefaultBuffersIsHeldBackSoon) {
+  controller_.change([](TestController& c) { c.room = 100; });
+  const auto stream = open(1);
+  stream->send(hex(dncStartFrame()));
+  stream->receive(10);
+  const Bytes frame = dncText(std::string(DNC_CHUNK - 1, 'X') + "\n");
+  std::size_t taken = 0;
+  for (int full = 0; full < 100 && taken < 1000000;) {
+    const std::size_t sent = stream->sendSome(frame);
+    taken += sent;
+    full = sent == 0 ? full + 1 : 0;
+    std::this_thread::sleep_for(std::chrono::milliseconds(sent == 0 ? 2 : 0));
+  }
+  EXPECT_LT(taken, 300000u);
+}
+
 TEST_F(ServerTest, AbortIsToldUnasked) {
   const auto stream = open(1);
   controller_.change([](TestController& c) { c.room = 10; });

@@ -111,6 +111,11 @@ class RawSocket : public OwnedDescriptor {
     }
     return true;
   }
+  /// What the kernel takes at once. [byte]
+  std::size_t sendSome(const Bytes& bytes) {
+    const ssize_t put = ::send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+    return put > 0 ? static_cast<std::size_t>(put) : 0;
+  }
   /// That many bytes, fewer when the peer closes or nothing comes for two minutes.
   Bytes receive(std::size_t count, int timeout_ms = 120000) {
     Bytes bytes;
