@@ -43,6 +43,7 @@ void Poller::fetch(double now) {
 void Poller::connect() {
   ++counts_.attempts;
   const Result<std::string> identity = controller_.connect();
+  turned_away_ = !identity && identity.failure().kind != Failure::Kind::lost;
   if (identity) {
     identity_ = *identity;
   } else {
@@ -70,8 +71,8 @@ std::optional<Reading> Poller::take() {
 void Poller::lost() {
   const bool was_connected = std::exchange(connected_, false);
   counts_.lost += was_connected ? 1 : 0;
-  // That nothing can be reached after a loss is no news; a refusal of another kind is.
-  const bool expected = loss_told_ && !was_connected;
+  // That nothing can be reached after a loss is no news; that one is turned away is.
+  const bool expected = loss_told_ && !was_connected && !turned_away_;
   if (was_connected || (last_error_ != told_error_ && !expected)) {
     log_.error(last_error_ + "; trying again every " + fixedDecimals(reconnect_period_, 1) + " to " +
                fixedDecimals(LONGEST_WAIT * reconnect_period_, 1) + " s");

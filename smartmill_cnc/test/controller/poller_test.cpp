@@ -77,6 +77,17 @@ TEST_F(PollerTest, LossIsOneLineAndSoIsTheReturn) {
   EXPECT_EQ(notes_.size(), 3u);
 }
 
+TEST_F(PollerTest, ThatAllSessionsAreTakenAfterALossIsNews) {
+  cycle(0.0);
+  controller_.is_connected = false;
+  controller_.connecting = Failure{Failure::Kind::refused, "all sessions are taken"};
+  poller_.failed("the wire is cut");
+  poller_.lost();
+  for (int i = 0; i < 200; ++i) cycle(1.0 + 0.02 * i);
+  ASSERT_EQ(notes_.size(), 3u);
+  EXPECT_EQ(notes_[2], "all sessions are taken; trying again every 1.0 to 8.0 s");
+}
+
 TEST_F(PollerTest, ACommandThatFindsTheConnectionDeadVoidsWhatWasRead) {
   poller_.fetch(0.0);
   controller_.is_connected = false;

@@ -45,7 +45,7 @@ class Poller {
   std::optional<Reading> reading_;
   std::string identity_;
   double next_connect_ = -std::numeric_limits<double>::infinity();  // [s]
-  bool connected_ = false, loss_told_ = false;
+  bool connected_ = false, loss_told_ = false, turned_away_ = false;
   std::string last_error_ = "not connected yet", told_error_ = "not connected yet";
 };
 
