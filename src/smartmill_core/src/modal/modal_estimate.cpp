@@ -137,8 +137,8 @@ bool addParts(const WeightedLines& lines, const ModalEstimateOptions& options,
 }
 
 /// Starts a search with the poles that are steady over the orders. Where that leaves some of them without a
-/// mode, all candidates start together beside it: in dense bands poles that are hardly seen are what the steady
-/// ones' neighbours lack. The start that meets more of the steady ones stays.
+/// mode, all candidates start together beside it: in dense bands poles that are hardly seen are what the
+/// steady ones' neighbours lack. The start that meets more of the steady ones stays.
 bool begin(ModalSearch& search, const std::vector<Pole>& candidates, int largest_order) {
   std::vector<Pole> steady;
   for (const Pole& p : candidates) {
