@@ -110,8 +110,14 @@ void write(const Options& options, const std::string& suffix, const std::vector<
               suffix.c_str());
 }
 
+struct Frfs {
+  std::vector<NamedFrf> frfs;
+  double ringing_length = 0.0;  // [s] of hits, see TapFrf
+};
+
 /// Hits become one FRF; FRFs stay as they are.
-std::vector<NamedFrf> readFrfs(const Options& options, const std::vector<TapFormat>& formats) {
+Frfs readFrfs(const Options& options, const std::vector<TapFormat>& formats) {
+  double ringing_length = 0.0;
   std::vector<TapRecord> taps;
   std::vector<NamedFrf> frfs;
   for (std::size_t i = 0; i < options.inputs.size(); ++i) {
@@ -131,6 +137,7 @@ std::vector<NamedFrf> readFrfs(const Options& options, const std::vector<TapForm
                                 AVERAGES.at(options.average)};
     const TapFrf frf = averageTaps(taps, average);
     verdicts = frf.hits;
+    ringing_length = frf.ringing_length;
     for (const TapVerdict& v : verdicts)
       std::printf("%s: %s\n", v.file.c_str(), v.accepted() ? "accepted" : ("refused: " + v.reason).c_str());
     const int hits = frf.receptance.averages;
@@ -140,7 +147,7 @@ std::vector<NamedFrf> readFrfs(const Options& options, const std::vector<TapForm
   }
   writeHitsCsv(verdicts, options.out + "/hits.csv");
   if (frfs.empty()) throw Error("no hit is left; " + verdicts.back().file + ": " + verdicts.back().reason);
-  return frfs;
+  return {frfs, ringing_length};
 }
 
 /// So many modes, those with the most evidence, whether proven or not.
@@ -191,7 +198,7 @@ void writeTip(const Options& options, const FrequencyResponse& frf, const ModalE
 }
 
 void runFiles(const Options& options, const std::vector<TapFormat>& formats) {
-  const std::vector<NamedFrf> frfs = readFrfs(options, formats);
+  const auto [frfs, ringing_length] = readFrfs(options, formats);
   const bool receptance = frfs.front().frf.unit == "m/N";
   std::vector<FrequencyResponse> all;
   for (const NamedFrf& frf : frfs) all.push_back(frf.frf);
@@ -206,7 +213,12 @@ void runFiles(const Options& options, const std::vector<TapFormat>& formats) {
     if (percent > told) std::cerr << "modes: " << (told = percent) << " %\n";
     return true;
   };
-  ModalEstimate estimate = estimateModes(all, search);
+  ModalEstimate estimate;
+  try {
+    estimate = estimateModes(all, search);
+  } catch (const Error& error) {
+    throw Error(options.inputs.front() + ": " + error.what());
+  }
   if (options.modes > 0) keep(estimate, static_cast<std::size_t>(options.modes));
   const double window = options.parameters.measurement.exponential_time;
   for (std::vector<EstimatedMode>* modes : {&estimate.modes, &estimate.doubts}) {
@@ -214,11 +226,21 @@ void runFiles(const Options& options, const std::vector<TapFormat>& formats) {
     for (EstimatedMode& m : *modes)
       m.damping_ratio -= window > 0.0 ? 1.0 / (window * units::TWO_PI * m.frequency) : 0.0;
   }
-  printEstimate(estimate, receptance);
+  // Pictures show the FRF as it was measured, cut decay and all.
+  ModalEstimate whole = estimate;
+  removeCut(whole.modes, ringing_length);
+  removeCut(whole.doubts, ringing_length);
+  if (ringing_length > 0.0)
+    std::printf(
+        "the response rings on at the record's end: poles as they are, gains with the cut's share taken "
+        "off\n");
+  printEstimate(whole, receptance);
   write(options, "", frfs, estimate);
+  if (ringing_length > 0.0)
+    writeModesYaml(whole, frfs.front().frf.unit, {frfs.front().name}, options.out + "/modes.yaml");
   if (options.tip.stickout > 0.0) {
     if (!receptance || frfs.size() > 1) throw Error("--stickout-mm: one receptance is due");
-    writeTip(options, frfs.front().frf, estimate);
+    writeTip(options, frfs.front().frf, whole);
   }
 }
 

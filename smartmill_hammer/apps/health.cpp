@@ -1,4 +1,4 @@
-// rosrun smartmill_hammer health BAGS... : drift of modes and friction over recorded sessions.
+// rosrun smartmill_hammer health BAGS... : drift of modes, friction and unbalance over recorded sessions.
 
 #include <algorithm>
 #include <cmath>
@@ -10,6 +10,7 @@
 #include <smartmill_msgs/CuttingCoefficients.h>
 #include <smartmill_msgs/ModalModel.h>
 
+#include "../src/node/wiring.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/io/csv.h"
 #include "smartmill_core/names.h"
@@ -36,12 +37,29 @@ struct Friction {
   std::string bag;
   double stamp = 0.0, viscous = 0.0, coulomb = 0.0;
 };
+/// In air, of one tool in one bag.
+struct Air {
+  std::string bag;
+  double stamp = 0.0;
+  IdleRecord record;
+};
 
 /// All of the bags, in the order of their stamps; modes by tool, point and direction.
 struct History {
   std::map<std::string, std::vector<Seen>> modes;
   std::vector<Friction> friction;
+  std::map<std::string, std::vector<Air>> air;  // by tool
+  std::map<std::string, ModalModel> sensors;    // the newest, by channel of the dynamometer
 };
+
+constexpr double HOLD_BACK = 0.05;  // [s] see StreamSorter
+
+/// [s] of the last stretch
+double endOf(const IdleRecord& record) {
+  double end = record.loads.empty() ? 0.0 : record.loads.back().stamp;
+  for (const auto& [channel, lines] : record.lines) end = std::max(end, lines.back().stamp);
+  return end;
+}
 
 History read(const std::vector<std::string>& bags) {
   History history;
@@ -54,14 +72,23 @@ History read(const std::vector<std::string>& bags) {
           const std::string name =
               (modes.tool.empty() ? std::string() : modes.tool + " ") + modes.point + " " + modes.direction;
           history.modes[name].push_back({bag, modes});
+          if (modes.point == POINT_FORCE_SENSOR) history.sensors["f" + modes.direction] = modes.model;
         });
     reader.on<smartmill_msgs::CuttingCoefficients>(
         names::COEFFICIENTS, [&](const smartmill_msgs::CuttingCoefficients& m, double) {
           if (std::isfinite(m.friction_viscous) && std::isfinite(m.friction_coulomb))
             history.friction.push_back({bag, m.header.stamp.toSec(), m.friction_viscous, m.friction_coulomb});
         });
+    SortedIdle idle(HOLD_BACK);
+    connectIdle(reader, idle);
+    feed<smartmill_msgs::SpindleAngle>(reader, names::SPINDLE_ANGLE, idle);
     reader.run();
+    idle.finish();
+    for (const auto& [tool, record] : idle.records())
+      history.air[tool].push_back({bag, endOf(record), record});
   }
+  for (auto& [tool, list] : history.air)
+    std::stable_sort(list.begin(), list.end(), [](const Air& a, const Air& b) { return a.stamp < b.stamp; });
   for (auto& [name, list] : history.modes)
     std::stable_sort(list.begin(), list.end(),
                      [](const Seen& a, const Seen& b) { return a.modes.stamp < b.modes.stamp; });
@@ -76,7 +103,7 @@ int report(const std::string& name, const std::string& bag, double days,
   std::printf("%s, %s, %.2f days after the first\n", name.c_str(), bag.c_str(), days);
   int drifted = 0;
   for (const HealthChange& c : changes) {
-    std::printf("  %-40s %12.5g -> %12.5g  %+8.2f %%  %7.1f deviations%s\n", c.what.c_str(), c.before, c.now,
+    std::printf("  %-52s %12.5g -> %12.5g  %+8.2f %%  %7.1f deviations%s\n", c.what.c_str(), c.before, c.now,
                 100.0 * c.relative, c.sigmas, c.drifted() ? "  DRIFT" : "");
     csv.row(name, bag, days, c.what, c.before, c.now, c.sigmas, c.drifted() ? "true" : "false");
     drifted += c.drifted();
@@ -98,13 +125,19 @@ int run(const Options& options) {
     const Friction &first = history.friction[0], &now = history.friction[i];
     drifted +=
         report("spindle", now.bag, (now.stamp - first.stamp) / DAY,
-               {valueChange("viscous friction", first.viscous, now.viscous, options.allowance.friction),
-                valueChange("Coulomb friction", first.coulomb, now.coulomb, options.allowance.friction)},
+               {valueChange("viscous friction", {first.viscous}, {now.viscous}, options.allowance.friction),
+                valueChange("Coulomb friction", {first.coulomb}, {now.coulomb}, options.allowance.friction)},
                csv);
+  }
+  for (const auto& [tool, list] : history.air) {
+    for (std::size_t i = 1; i < list.size(); ++i, ++compared)
+      drifted += report("spindle in air, " + (tool.empty() ? std::string("tool") : tool), list[i].bag,
+                        (list[i].stamp - list[0].stamp) / DAY,
+                        idleChanges(list[0].record, list[i].record, history.sensors, options.allowance), csv);
   }
   if (compared == 0)
     throw Error(options.bags.front() +
-                ": nothing was measured twice (topics tool/modes, material/coefficients)");
+                ": nothing was measured twice (topics tool/modes, material/coefficients; cuts in air)");
   if (!options.out.empty()) csv.save(options.out);
   std::printf("%d measurements compared with the first of their kind, %d quantities drifted\n", compared,
               drifted);
@@ -118,9 +151,9 @@ int run(const Options& options) {
 int main(int argc, char** argv) {
   smartmill::hammer::Options o;
   smartmill::CommandLine line(
-      "Health of a spindle over recorded sessions: modes of each tool, point and direction, and friction, "
-      "against the "
-      "first measurement of their kind.");
+      "Health of a spindle over recorded sessions: modes of each tool, point and direction, friction, and in "
+      "air "
+      "unbalance and the load meter's reading, against the first measurement of their kind.");
   line.option("bags", o.bags, "recorded sessions").required();
   line.option("-o,--out", o.out, "CSV of every comparison");
   line.option("--frequency", o.allowance.frequency, "what may change from day to day, relative")
@@ -129,5 +162,8 @@ int main(int argc, char** argv) {
   line.option("--damping", o.allowance.damping, "the same").notNegative().showDefault();
   line.option("--gain", o.allowance.gain, "the same").notNegative().showDefault();
   line.option("--friction", o.allowance.friction, "the same").notNegative().showDefault();
+  line.option("--unbalance", o.allowance.unbalance, "the same; a tool clamped anew turns it")
+      .notNegative()
+      .showDefault();
   return runProgram(line, argc, argv, [&] { return smartmill::hammer::run(o); });
 }

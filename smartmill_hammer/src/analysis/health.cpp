@@ -80,8 +80,8 @@ std::vector<HealthChange> modeChanges(const MeasuredModes& before, const Measure
   return changes;
 }
 
-HealthChange valueChange(const std::string& what, double before, double now, double allowance) {
-  return change(what, before, 0.0, now, 0.0, allowance);
+HealthChange valueChange(const std::string& what, const Stated& before, const Stated& now, double allowance) {
+  return change(what, before.value, before.std, now.value, now.std, allowance);
 }
 
 std::string driftOf(const std::vector<HealthChange>& changes) {

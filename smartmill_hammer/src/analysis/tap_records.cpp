@@ -6,14 +6,17 @@
 #include <complex>
 #include <cstdlib>
 #include <fstream>
+#include <limits>
 #include <sstream>
 #include <utility>
 
 #include "smartmill_core/campaign/record.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/io/csv.h"
 #include "smartmill_core/io/text_file.h"
 #include "smartmill_core/io/uff.h"
+#include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill {
@@ -24,6 +27,10 @@ namespace {
 constexpr double LARGEST_TIME_STEP = 2e-3;  // [s]
 /// Force that counts as the beginning of the hit, of the peak.
 constexpr double ONSET_SHARE = 0.02;
+/// A response rings on when so much of it is left at the end, clear of its noise.
+constexpr double RINGING = 0.02, CLEAR_OF_NOISE = 2.0;
+constexpr std::size_t LEAST_TENTH = 48;  // samples of which a scatter is taken
+constexpr std::size_t LEAD = 8;          // samples kept before the foot of a blow
 
 struct ThreeColumns {
   std::vector<double> a, b, c;
@@ -292,6 +299,51 @@ TapFile readTapUff(const std::string& file) {
   return result;
 }
 
+/// Whether the response still rings at the end: its last tenth over the first behind the blow.
+bool ringsOn(const Hit& hit) {
+  const std::size_t quiet = hit.pre_trigger - hit.pre_trigger / 4,
+                    tenth = (hit.response.size() - hit.pre_trigger) / 10;
+  if (tenth < LEAST_TENTH) return false;
+  const auto part = [&](std::size_t from, std::size_t count) {
+    const auto begin = hit.response.begin() + static_cast<std::ptrdiff_t>(from);
+    return standardDeviation({begin, begin + static_cast<std::ptrdiff_t>(count)});
+  };
+  const double noise = quiet < LEAST_TENTH ? 0.0 : part(0, quiet);
+  const double first = part(hit.pre_trigger, tenth), last = part(hit.response.size() - tenth, tenth);
+  return last > std::hypot(CLEAR_OF_NOISE * noise, RINGING * first);
+}
+
+/// The record from just before the blow on, its baselines taken off.
+Hit fromBlow(const Hit& hit) {
+  Hit cut = hit;
+  const auto peak =
+      static_cast<std::size_t>(std::max_element(hit.force.begin(), hit.force.end()) - hit.force.begin());
+  const std::size_t lead = std::min(hit.pre_trigger, peak - hit.pre_trigger + LEAD);
+  const std::size_t quiet = hit.pre_trigger - hit.pre_trigger / 4;
+  for (std::vector<double>* channel : {&cut.force, &cut.response}) {
+    const auto begin = channel->begin();
+    const double base = quiet < LEAST_TENTH ? 0.0 : mean({begin, begin + static_cast<std::ptrdiff_t>(quiet)});
+    channel->erase(begin, begin + static_cast<std::ptrdiff_t>(hit.pre_trigger - lead));
+    for (double& value : *channel) value -= base;
+  }
+  cut.pre_trigger = lead;
+  return cut;
+}
+
+/// Records that ring on begin with the blow and are all as long as the shortest. @return [s] that length
+double cutToBlow(std::vector<Hit>& hits) {
+  std::size_t shortest = std::numeric_limits<std::size_t>::max();
+  for (Hit& hit : hits) {
+    hit = fromBlow(hit);
+    shortest = std::min(shortest, hit.force.size());
+  }
+  for (Hit& hit : hits) {
+    hit.force.resize(shortest);
+    hit.response.resize(shortest);
+  }
+  return static_cast<double>(shortest) / hits.front().sample_rate;
+}
+
 /// What frf.csv says beside the three columns.
 void readDeviations(const std::string& file, FrequencyResponse& frf) {
   const NumberTable table = readNumberTable(file);
@@ -392,20 +444,46 @@ TapFrf averageTaps(const std::vector<TapRecord>& taps, const TapFrfOptions& opti
   ImpactOptions impact;
   impact.exponential_time = options.exponential_time;
   impact.unit = UNIT[index(taps.front().kind)];
-  ImpactAnalysis analysis(impact);
+  std::vector<Hit> accepted;
   for (std::size_t i = 0; i < taps.size(); ++i) {
     result.hits.push_back({taps[i].file, faults[i].text});
     if (!result.hits[i].accepted()) continue;
-    try {
-      analysis.add(hits[i]);
-    } catch (const Error& error) {
-      throw Error(taps[i].file + ": " + error.what());
+    if (!accepted.empty() && (hits[i].force.size() != accepted.front().force.size() ||
+                              hits[i].sample_rate != accepted.front().sample_rate)) {
+      throw Error(formatted("%s: %zu samples at %g Hz, another length or rate than the hits before",
+                            taps[i].file.c_str(), hits[i].force.size(), hits[i].sample_rate));
     }
+    accepted.push_back(hits[i]);
   }
-  if (analysis.hits() == 0) return result;
+  if (accepted.empty()) return result;
+  if (options.exponential_time == 0.0 && std::any_of(accepted.begin(), accepted.end(), ringsOn))
+    result.ringing_length = cutToBlow(accepted);
+  ImpactAnalysis analysis(impact);
+  for (const Hit& hit : accepted) analysis.add(hit);
   result.measured = analysis.frf(options.average).band(1e-9, INFINITY);
   result.receptance = receptanceOf(result.measured, taps.front().kind);
   return result;
+}
+
+void removeCut(std::vector<EstimatedMode>& modes, double ringing_length) {
+  using Complex = std::complex<double>;
+  if (!(ringing_length > 0.0)) return;
+  for (EstimatedMode& m : modes) {
+    const double w = units::TWO_PI * m.frequency, turn = w * ringing_length;
+    const Complex cut =
+        std::exp(turn * Complex(-m.damping_ratio, std::sqrt(1.0 - m.damping_ratio * m.damping_ratio)));
+    const Complex share = 1.0 - cut;
+    const double by_pole =
+        std::abs(cut / share) * turn * std::hypot(m.frequency_std / m.frequency, m.damping_ratio_std);
+    for (std::size_t o = 0; o < m.gain.size(); ++o) {
+      const Complex whole = Complex(m.gain[o], m.phase_part[o]) / share;
+      const double by_share = by_pole * std::abs(whole);
+      m.gain[o] = whole.real();
+      m.phase_part[o] = whole.imag();
+      m.gain_std[o] = std::hypot(m.gain_std[o] / std::abs(share), by_share);
+      m.phase_part_std[o] = std::hypot(m.phase_part_std[o] / std::abs(share), by_share);
+    }
+  }
 }
 
 }  // namespace hammer

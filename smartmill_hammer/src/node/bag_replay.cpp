@@ -4,6 +4,7 @@
 
 #include <smartmill_msgs/MeasureFrfActionGoal.h>
 
+#include "smartmill_hammer/sequence/sorted_sequence.h"
 #include "smartmill_ros/bag_reader.h"
 #include "smartmill_ros/goals.h"
 #include "wiring.h"

@@ -39,6 +39,9 @@ HammerServer::HammerServer(ros::NodeHandle nh, ros::NodeHandle private_nh)
                  if (machine_) machine_->forget();
                  server_.restart();
                }}),
+      idle_(parameters_.hold_back,
+            [this](const std::string& tool, const IdleRecord& seen) { compareIdle(tool, seen); }),
+      streams_{sorted_, idle_},
       server_(nh, names::MEASURE_TOOL_FRF, "hammer",
               {[this](const MeasureFrfGoal& goal, std::function<bool(bool)> begin) {
                  sorted_.push(goal, std::move(begin));
@@ -48,7 +51,8 @@ HammerServer::HammerServer(ros::NodeHandle nh, ros::NodeHandle private_nh)
   // node's subscribers before it publishes one.
   if (parameters_.command_machine)
     machine_.emplace(nh, [this](const std::string& text) { sorted_.commandFailed(text); });
-  connect(shell_.inputs(), sorted_);
+  connect(shell_.inputs(), streams_);
+  connectIdle(shell_.inputs(), idle_);
   shell_.diagnose("automatic hammer", [this](auto& status) { diagnose(status); });
   shell_.every(WATCH_PERIOD, [this] { watch(); });
 }
@@ -62,6 +66,13 @@ void HammerServer::finish(const MeasureFrfResult& result) {
   }
   server_.finish({result.code, result.message, result.frf, result.modes, result.cross, result.sensitivity,
                   result.sensitivity_std, result.flute_sure, result.spindle_moves});
+}
+
+// At one speed a line and a load stand beside those of the first time; the sensor's dynamics are the same.
+void HammerServer::compareIdle(const std::string& tool, const IdleRecord& seen) {
+  IdleRecord& first = first_idle_[tool];
+  if (addSpeeds(first, seen)) return;
+  idle_drift_ = driftOf(idleChanges(first, seen, {}));
 }
 
 void HammerServer::watch() {
@@ -84,6 +95,8 @@ void HammerServer::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status)
   if (const InputHealth* dead = shell_.inputs().dead({names::HAMMER, names::CNC_STATE, names::SPINDLE_ANGLE}))
     status.mergeSummary(Level::WARN, dead->topic() + " is silent");
   if (!drift_.empty()) status.mergeSummary(Level::WARN, "differs from the last good measurement: " + drift_);
+  if (!idle_drift_.empty())
+    status.mergeSummary(Level::WARN, "spindle in air differs from the first time: " + idle_drift_);
   status.add("late messages", sorted_.late());
   status.add("waiting for", sorted_.waitingFor());
   status.add("last measurement", server_.lastMessage());

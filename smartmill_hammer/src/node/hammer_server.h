@@ -8,12 +8,26 @@
 
 #include "machine_commands.h"
 #include "parameters.h"
+#include "smartmill_hammer/analysis/idle_spindle.h"
 #include "smartmill_hammer/sequence/sorted_sequence.h"
 #include "smartmill_ros/frf_server.h"
 #include "smartmill_ros/node_shell.h"
 
 namespace smartmill {
 namespace hammer {
+
+/// The spindle's angle serves the measurement and the watch in air; one subscription.
+struct Streams {
+  SortedSequence& sequence;
+  SortedIdle& idle;
+
+  void push(const SampleBlock& hammer) { sequence.push(hammer); }
+  void push(const CncState& state) { sequence.push(state); }
+  void push(const SpindleAngle& angle) {
+    sequence.push(angle);
+    idle.push(angle);
+  }
+};
 
 /// Shell around SortedSequence: goals and streams in, commands to the CNC bridge's actions and to daq/strike,
 /// results out. All callbacks run in one thread.
@@ -25,6 +39,7 @@ class HammerServer {
 
  private:
   void finish(const MeasureFrfResult& result);
+  void compareIdle(const std::string& tool, const IdleRecord& seen);
   void watch();
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
@@ -32,9 +47,13 @@ class HammerServer {
   NodeShell shell_;
   std::optional<MachineCommands> machine_;  // none in a replay
   SortedSequence sorted_;
+  SortedIdle idle_;
+  Streams streams_;
   FrfServer server_;
   std::map<std::string, MeasuredModes> last_good_;  // by tool and direction
-  std::string drift_;  // of the newest measurement against the one before; empty: none
+  std::map<std::string, IdleRecord> first_idle_;    // by tool
+  std::string drift_;       // of the newest measurement against the one before; empty: none
+  std::string idle_drift_;  // of the newest air cuts against the first
 };
 
 }  // namespace hammer

@@ -9,7 +9,7 @@ namespace smartmill {
 namespace hammer {
 namespace {
 
-constexpr HealthAllowance NONE{0.0, 0.0, 0.0, 0.0};
+constexpr HealthAllowance NONE{0.0, 0.0, 0.0, 0.0, 0.0};
 
 MeasuredModes measured(std::mt19937& random, double stiffer = 1.0) {
   std::normal_distribution<double> normal;
@@ -41,8 +41,8 @@ TEST(Health, SeesModesComeAndGo) {
   less.model.modes.pop_back();
   EXPECT_NE(driftOf(modeChanges(first, less)).find("gone"), std::string::npos);
   EXPECT_NE(driftOf(modeChanges(less, first)).find("new"), std::string::npos);
-  EXPECT_TRUE(valueChange("friction", 1.0, 1.3, 0.05).drifted());
-  EXPECT_FALSE(valueChange("friction", 1.0, 1.1, 0.05).drifted());
+  EXPECT_TRUE(valueChange("friction", {1.0}, {1.3}, 0.05).drifted());
+  EXPECT_FALSE(valueChange("friction", {1.0}, {1.1}, 0.05).drifted());
 }
 
 }  // namespace

@@ -190,6 +190,14 @@ TEST(TapRecords, NameWhatIsWrong) {
             std::string::npos);
   EXPECT_NE(message("0 1 2\n0.1 1\n", [](const std::string& f) { readTapText(f); }).find("line 2"),
             std::string::npos);
+  // Too short to be judged
+  EXPECT_NE(message("time[s],hammer[N],acceleration[m/s2]\n0,1,1\n0.1,1,1\n",
+                    [](const std::string& f) {
+                      const TapFrf none = averageTaps({readTapCsv(f)}, {});
+                      throw Error(none.hits.front().reason);
+                    })
+                .find("2 samples"),
+            std::string::npos);
   EXPECT_NE(message("hello\n", [](const std::string& f) { detectFormat(f); }).find("neither"),
             std::string::npos);
 }

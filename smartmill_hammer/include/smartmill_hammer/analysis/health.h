@@ -11,7 +11,7 @@ namespace hammer {
 /// What changes from day to day without anything being wrong (seat, temperature), one standard deviation,
 /// relative; added to the stated deviations.
 struct HealthAllowance {
-  double frequency = 0.002, damping = 0.05, gain = 0.03, friction = 0.05;
+  double frequency = 0.002, damping = 0.05, gain = 0.03, friction = 0.05, unbalance = 0.1;
 };
 
 /// A quantity at two times.
@@ -27,8 +27,11 @@ struct HealthChange {
 /// its own.
 std::vector<HealthChange> modeChanges(const MeasuredModes& before, const MeasuredModes& now,
                                       const HealthAllowance& allowance = {});
-/// A single value without a stated deviation.
-HealthChange valueChange(const std::string& what, double before, double now, double allowance);
+/// A value with its standard deviation; 0: none is stated.
+struct Stated {
+  double value = 0.0, std = 0.0;
+};
+HealthChange valueChange(const std::string& what, const Stated& before, const Stated& now, double allowance);
 
 /// One line naming what has drifted most; empty: nothing.
 std::string driftOf(const std::vector<HealthChange>& changes);

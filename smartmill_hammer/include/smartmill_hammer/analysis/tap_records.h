@@ -5,6 +5,7 @@
 
 #include "smartmill_core/modal/hit_judge.h"
 #include "smartmill_core/modal/impact_analysis.h"
+#include "smartmill_core/modal/modal_estimate.h"
 #include "smartmill_core/signal/frequency_response.h"
 
 namespace smartmill {
@@ -73,7 +74,14 @@ struct TapFrf {
   FrequencyResponse measured;    ///< of the response as measured [m/s2/N], [m/s/N], [m/N] or [1]
   FrequencyResponse receptance;  ///< [m/N]; [1] of a force
   std::vector<TapVerdict> hits;  ///< one a record, in order
+  /// [s] where the response rings on at the records' end: their length, which begins with the blow; at lines
+  /// k / length the cut decay has the poles of the whole one. 0: it has died away.
+  double ringing_length = 0.0;
 };
+
+/// Gains of modes found in an average that rings on, as they are without the cut: a record of length T holds
+/// of a mode with pole s the share 1 - exp(s T). Their deviations hold what the pole's do to that share.
+void removeCut(std::vector<EstimatedMode>& modes, double ringing_length);
 
 /// Without a hit left the FRFs are empty. @throws Error when the records differ in length, rate or kind of
 /// response.

@@ -20,6 +20,8 @@ using Complex = std::complex<double>;
 
 /// Samples before the hit that give a baseline and noise worth having.
 constexpr std::size_t LEAST_QUIET = 48;
+/// Fewer samples are no hit.
+constexpr std::size_t LEAST_SAMPLES = 2 * LEAST_QUIET;
 /// Peak over noise of a hit that is one.
 constexpr double CLEAR_HIT = 10.0;
 /// Noise, in standard deviations, above which a rise is one.
@@ -428,6 +430,8 @@ Beside besideOthers(const std::vector<Lines>& lines, const std::vector<std::size
 HitFault hitFault(const Hit& hit, const HitJudgeOptions& options) {
   if (hit.force.empty() || hit.force.size() != hit.response.size())
     return {"the record is empty or its channels differ in length", true};
+  if (hit.force.size() < LEAST_SAMPLES)
+    return {formatted("the record holds %zu samples, %zu are due", hit.force.size(), LEAST_SAMPLES), true};
   const std::size_t bad = std::min(firstNotFinite(hit.force), firstNotFinite(hit.response));
   if (bad < hit.force.size()) return {"sample " + std::to_string(bad) + " is not a number", true};
   const Channel force = channelOf(hit.force, hit.pre_trigger),

@@ -136,6 +136,22 @@ bool addParts(const WeightedLines& lines, const ModalEstimateOptions& options,
   return true;
 }
 
+/// Starts a search with the poles that are steady over the orders. Where that leaves some of them without a
+/// mode, all candidates start together beside it: in dense bands poles that are hardly seen are what the
+/// steady ones' neighbours lack. The start that meets more of the steady ones stays.
+bool begin(ModalSearch& search, const std::vector<Pole>& candidates, int largest_order) {
+  std::vector<Pole> steady;
+  for (const Pole& p : candidates) {
+    if (p.order * STEADY_SHARE >= largest_order) steady.push_back(p);
+  }
+  ModalSearch dense = search;
+  if (!search.startWith(steady) || !search.settle(1, false)) return false;
+  if (search.unmet(steady) == 0 || steady.size() == candidates.size()) return true;
+  if (!dense.startWith(candidates) || !dense.settle(1, false)) return false;
+  if (dense.unmet(steady) < search.unmet(steady)) search.goOnFrom(std::move(dense));
+  return true;
+}
+
 /// Lower and upper residual of what modes and doubts leave, by least squares.
 ModalFlanks flanksOf(const WeightedLines& lines, const ModalEstimate& estimate, std::size_t o) {
   const double reference = units::TWO_PI * lines.frequency[lines.size() / 2];
@@ -231,15 +247,8 @@ ModalEstimate estimateModes(const std::vector<FrequencyResponse>& frfs, const Mo
   std::vector<Pole> candidates = persistentPoles(result.diagram, whole);
   const WeightedLines searched = withoutMassLine(lines);
   ModalSearch search(searched, options);
-  const auto steady = [&] {
-    std::vector<Pole> chosen;
-    for (const Pole& p : candidates) {
-      if (p.order * STEADY_SHARE >= whole.largest_order) chosen.push_back(p);
-    }
-    return chosen;
-  };
   result.cancelled =
-      !(addParts(start, options, candidates) && search.startWith(steady()) && search.settle(1, false) &&
+      !(addParts(start, options, candidates) && begin(search, candidates, whole.largest_order) &&
         search.addCandidates(candidates) && search.addLoudest(10) && search.settle(2, true));
   search.addByMagnitude();
   result.modes = search.results(true);

@@ -15,7 +15,7 @@ using Eigen::Index;
 constexpr double REACH = 8.0, LEAST_LINES = 20.0;
 /// Modes nearer than this many times their half widths are fitted together.
 constexpr double TOGETHER = 4.0;
-constexpr std::size_t MOST_TOGETHER = 6, MOST_AT_START = 16;
+constexpr std::size_t MOST_TOGETHER = 6, MOST_AT_START = 32;
 /// A mode must stand so many lines, and half widths, inside the band: of a peak that is cut nothing is
 /// proven.
 constexpr double FROM_END = 2.5, HALF_WIDTHS_FROM_END = 1.5;
@@ -282,6 +282,20 @@ bool ModalSearch::taken(const Pole& p) const {
   return std::any_of(modes_.begin(), modes_.end(), [&](const EstimatedMode& m) {
     return std::abs(m.frequency - p.frequency) < std::max(m.frequency * m.damping_ratio, p.halfWidth());
   });
+}
+
+std::size_t ModalSearch::unmet(const std::vector<Pole>& candidates) const {
+  return static_cast<std::size_t>(std::count_if(candidates.begin(), candidates.end(), [&](const Pole& p) {
+    return std::none_of(modes_.begin(), modes_.end(), [&](const EstimatedMode& m) {
+      return m.evidence >= PROVEN && std::abs(m.frequency - p.frequency) < p.halfWidth();
+    });
+  }));
+}
+
+void ModalSearch::goOnFrom(ModalSearch other) {
+  left_ = std::move(other.left_);
+  modes_ = std::move(other.modes_);
+  tried_ = std::move(other.tried_);
 }
 
 bool ModalSearch::tryPole(double frequency, double damping) {

@@ -20,6 +20,10 @@ class ModalSearch {
   /// are proven: in dense bands one mode alone proves nothing while the others are missing. @return false:
   /// cancelled
   bool startWith(std::vector<Pole> candidates);
+  /// How many of these stand where no mode is proven.
+  std::size_t unmet(const std::vector<Pole>& candidates) const;
+  /// Goes on from where another search of the same lines stands.
+  void goOnFrom(ModalSearch other);
   /// Tries candidates in the order of what each alone explains. @return false: cancelled
   bool addCandidates(std::vector<Pole> candidates);
   /// Tries where most is left.
