@@ -18,10 +18,9 @@ void ServoRecorder::push(const Input& input) {
   for (std::size_t i = 0; i < 3; ++i) {
     const double v = input.motion.velocity[i];
     const double acceleration = step > 0.0 ? (v - last_velocity_[i]) / step : 0.0;
-    const double friction = v == 0.0 ? 0.0 : drive_.viscous * v + std::copysign(drive_.coulomb, v);
-    // The cut pushes the tool; the drive holds against it.
     const double cut = cut_[i] / static_cast<double>(cut_count_);
-    current_[i] = (drive_.mass * acceleration + friction - cut) / drive_.force_per_ampere;
+    current_[i] =
+        drives_[i].force(input.motion.position[i], v, acceleration, cut) / drives_[i].force_per_ampere;
     last_velocity_[i] = v;
     cut_[i] = 0.0;
   }
@@ -54,7 +53,7 @@ SampleBlock ServoRecorder::take() {
 std::array<double, 3> ServoRecorder::load() const {
   std::array<double, 3> percent{};
   for (std::size_t i = 0; i < 3; ++i) {
-    percent[i] = 100.0 * std::abs(current_[i]) / drive_.rated_current;
+    percent[i] = 100.0 * std::abs(current_[i]) / drives_[i].rated_current;
   }
   return percent;
 }

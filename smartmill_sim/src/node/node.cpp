@@ -51,6 +51,8 @@ Node::Node(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
       frf_(nh_, names::TRUE_FRF),
       modes_(nh_, names::TRUE_MODES),
       shell_(nh_, private_nh, "simulated mill", 1.0) {
+  if (parameters_.world.motor.currents)
+    motor_current_ = nh_.advertise<smartmill_msgs::SampleBlock>(names::MOTOR_CURRENT, STREAM_QUEUE);
   if (parameters_.axes_input.empty()) {
     serve();
   } else {
@@ -144,6 +146,7 @@ void Node::publish(const World::Block& block) {
   force_.publish(toMsg(shifted(block.force), frames::MACHINE));
   vibration_.publish(toMsg(shifted(block.vibration)));
   servo_.publish(toMsg(shifted(block.servo)));
+  if (!block.motor_current.channels.empty()) motor_current_.publish(toMsg(shifted(block.motor_current)));
 }
 
 void Node::run() {

@@ -57,7 +57,7 @@ class World::Impl {
       : options_(options),
         spindle_(model.needSpindle("simulate the machine")),
         controller_(controllerOptions(model, options)),
-        servo_(options.servo_trigger),
+        servo_(options.servo_trigger, options.motor.drives()),
         station_(stationOf(model, options)),
         tip_(withStructure(model, station_).tool_tip),
         machine_(withStructure(model, station_), 1.0 / (SAMPLE_RATE * options.substeps)),
@@ -70,6 +70,7 @@ class World::Impl {
                   ": spindle.load_meter_full_scale_v is missing (needed to simulate the machine)");
     }
     if (model.workpiece) stock_.emplace(*model.workpiece, tool.radius());
+    if (options.motor.currents) motors_.emplace(options.motor, spindle_, options.seed);
     if (model.force_sensor.noise_rms) force_noise_ = *model.force_sensor.noise_rms;
     last_ = controller_.motion();
     machine_.resetLoadMeter(0.0);
@@ -158,6 +159,7 @@ class World::Impl {
     }
     index_ += BLOCK;
     block.servo = servo_.take();
+    if (motors_) block.motor_current = motors_->take();
     block.spindle_load = machine_.rounded(load_meter_) / *spindle_.load_meter_full_scale;
   }
 
@@ -253,6 +255,8 @@ class World::Impl {
                  now,
                  load_meter_ / *spindle_.load_meter_full_scale,
                  {share * force[0], share * force[1], share * force[2]}});
+    if (motors_)
+      motors_->push({time, now, {share * force[0], share * force[1], share * force[2]}, share * torque});
     HammerStation::Reading reading;
     if (station_) reading = station_->read(time, random_);
     if (station_ && station_->touched()) refuse(SENSOR, "TOOL MET THE DISPLACEMENT SENSOR");
@@ -271,6 +275,7 @@ class World::Impl {
   Spindle spindle_;
   Controller controller_;
   ServoRecorder servo_;
+  std::optional<MotorCurrents> motors_;
   std::optional<HammerStation> station_;
   ToolTip tip_;
   CuttingMachine machine_;

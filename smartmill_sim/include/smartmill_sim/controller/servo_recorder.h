@@ -4,19 +4,10 @@
 #include <cstdint>
 
 #include "smartmill_core/signal/streams.h"
+#include "smartmill_sim/controller/axis_drive.h"
 #include "smartmill_sim/controller/controller.h"
 
 namespace smartmill::sim {
-
-/// An axis' drive: what its motor has to carry and how much current that takes. Typical of a machine of this
-/// size: 400 kg on a screw of 10 mm lead, a motor of 1.0 N m/A.
-struct AxisDrive {
-  double mass = 400.0;              ///< [kg] moved, the motor's inertia included
-  double viscous = 600.0;           ///< [N s/m]
-  double coulomb = 150.0;           ///< [N]
-  double force_per_ampere = 628.0;  ///< [N/A]
-  double rated_current = 12.0;      ///< [A] 100 % of the load meter
-};
 
 /// What Fanuc's Servo Guide records: load of the spindle and currents of the axes' motors at 1 kHz, with the
 /// block that runs and a trigger that begins with a block (N word).
@@ -25,7 +16,8 @@ class ServoRecorder {
   static constexpr double SAMPLE_RATE = 1000.0;  ///< [Hz]
 
   /// @param trigger N word of the block whose start sets the channel trigger; 0: none
-  explicit ServoRecorder(int trigger) : trigger_(trigger) {}
+  explicit ServoRecorder(int trigger, const std::array<AxisDrive, 3>& drives = {})
+      : drives_(drives), trigger_(trigger) {}
 
   struct Input {
     double time = 0.0;  ///< [s]
@@ -43,7 +35,7 @@ class ServoRecorder {
   std::array<double, 3> load() const;                                ///< [percent] of the axes
 
  private:
-  AxisDrive drive_;
+  std::array<AxisDrive, 3> drives_;
   int trigger_;
   bool triggered_ = false, any_ = false;
   std::uint64_t index_ = 0, block_index_ = 0;

@@ -10,6 +10,7 @@
 #include "smartmill_core/parameters/parameter_table.h"
 #include "smartmill_core/signal/streams.h"
 #include "smartmill_sim/controller/controller.h"
+#include "smartmill_sim/world/motor_currents.h"
 #include "smartmill_sim/world/station_traits.h"
 
 namespace smartmill::sim {
@@ -24,6 +25,7 @@ struct WorldOptions {
   double load_step = 3.0e-4;
   int servo_trigger = 0;
   StationTraits hammer;
+  MotorTraits motor;
 
   void declare(ParameterTable& table) {
     table.number("seed", seed, "1", Range::notNegative(), "of noise and scatter");
@@ -39,6 +41,7 @@ struct WorldOptions {
     table.number("servo_trigger", servo_trigger, "1", Range::notNegative(),
                  "N word of the block that starts the trigger in daq/servo; 0: none");
     table.part("hammer_", hammer);
+    table.part("motor_", motor);
     table.section();
   }
   /// @throws Error naming key and value.
@@ -59,9 +62,11 @@ class World {
     SampleBlock hammer;       ///< hammer [N] positive in compression, gap [V]; gap_cross [V] where it stands
     SampleBlock dynamometer;  ///< fx, fy, fz [N]
     std::array<SpindleAngle, ANGLES> angle;
-    ForceBlock force;           ///< true force of the cut on the tool
-    SampleBlock vibration;      ///< true displacement of the tip, x, y [m]
-    SampleBlock servo;          ///< ServoRecorder's: spindle load and axis currents at 1 kHz
+    ForceBlock force;       ///< true force of the cut on the tool
+    SampleBlock vibration;  ///< true displacement of the tip, x, y [m]
+    SampleBlock servo;      ///< ServoRecorder's: spindle load and axis currents at 1 kHz
+    SampleBlock
+        motor_current;  ///< MotorCurrents': phase currents at 1 kHz; without channels where they are off
     double spindle_load = 0.0;  ///< [1] what the load meter shows at the end, 1 is full scale
   };
   enum class StrikeAnswer { ok, by_hand, failed };

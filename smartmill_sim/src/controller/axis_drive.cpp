@@ -1,0 +1,22 @@
+#include "smartmill_sim/controller/axis_drive.h"
+
+#include <cmath>
+
+#include "smartmill_core/units.h"
+
+namespace smartmill::sim {
+
+double AxisDrive::friction(double velocity, double factor) const {
+  if (velocity == 0.0) return 0.0;
+  const double dry = coulomb + stribeck * std::exp(-std::pow(velocity / stribeck_velocity, 2));
+  return factor * (viscous * velocity + std::copysign(dry, velocity));
+}
+
+double AxisDrive::force(double position, double velocity, double acceleration, double cut,
+                        double friction_factor) const {
+  const double turned = units::TWO_PI * position / disturbance_period;
+  return mass * acceleration + friction(velocity, friction_factor) + weight + disturbance * std::sin(turned) -
+         cut;
+}
+
+}  // namespace smartmill::sim
