@@ -1,0 +1,15 @@
+#pragma once
+
+#include <array>
+
+namespace smartmill {
+
+/// daq/spindle_force: a spindle-integrated force sensor.
+constexpr const char* SPINDLE_FORCE = "spindle_force";
+/// Its channels [N]: three pairs of preloaded quartz rings, compression positive.
+constexpr std::array<const char*, 6> SPINDLE_SENSOR_CHANNELS{{"x1", "x2", "y1", "y2", "z1", "z2"}};
+
+/// Channels [N, N m] of a dynamometer plate: force, then moment about the sensor's origin.
+constexpr std::array<const char*, 6> PLATE_CHANNELS{{"fx", "fy", "fz", "mx", "my", "mz"}};
+
+}  // namespace smartmill
