@@ -151,6 +151,10 @@ void SpindleRig::start() {
   from_ = now_;
 }
 
+int SpindleRig::slots() {
+  return slots_++;
+}
+
 SpindleRig::Record SpindleRig::take() {
   recording_ = false;
   return std::exchange(record_, {});
@@ -161,7 +165,10 @@ SpindleRig::Record cutSlot(SpindleRig& rig, const MachineModel& model, double sp
   const ToolGeometry& tool = model.needTool("cut");
   const Workpiece& stock = model.workpiece.value();
   const double advance = feed * tool.teeth * speed / units::TWO_PI;  // [m/s]
-  const double y = 0.5 * (stock.low[1] + stock.high[1]);
+  // Every slot beside the ones before.
+  const double pitch = 1.15 * tool.diameter;
+  const int rows = static_cast<int>((stock.high[1] - stock.low[1]) / pitch);
+  const double y = stock.low[1] + pitch * (rig.slots() % rows + 0.5);
   rig.spin(speed);
   rig.tell(CuttingCondition::Kind::air);
   rig.place({stock.low[0] - tool.radius() - 1e-3, y, stock.high[2] + 10e-3});

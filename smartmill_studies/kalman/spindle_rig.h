@@ -42,6 +42,7 @@ class SpindleRig {
     std::array<std::vector<double>, 6> sensors;
     std::vector<double> angle;  ///< [rad] of tooth 1
   };
+  int slots();  ///< asked for before
   void start();
   /// Ends it.
   Record take();
@@ -55,7 +56,7 @@ class SpindleRig {
   std::unique_ptr<SortedCompensation> sorted_;
   std::array<double, 3> position_{{0, 0, 0}};
   double speed_ = 0.0, angle_ = 0.0, now_ = 0.0;
-  int tests_ = 0;
+  int tests_ = 0, slots_ = 0;
   std::optional<CalibrationResult> calibration_;
   std::optional<SensorResult> tapped_;
   bool recording_ = false;

@@ -158,7 +158,7 @@ void SortedCompensation::push(const MeasureFrfGoal& goal, std::function<bool(boo
     const bool free = !measurement_.active();
     const bool wanted = !begin || begin(free);  // before the goal's own results
     if (free && wanted) {
-      if (spindle_) calibrator_.tapping(goal.direction);
+      if (spindle_) calibrator_.tapping(goal.direction, spindle_length_);
       measurement_.handle(goal);
     }
     drain();

@@ -115,7 +115,7 @@ void SpindleSensorCalibrator::read(const SampleBlock& block, const std::array<st
     to.length.push_back(goal_->length);
     to.load.push_back(goal_->load);
     to.sensors.push_back(mean);
-    tap_length_ = goal_->length;
+    if (!(tap_length_ > 0.0)) tap_length_ = goal_->length;
     return finish(Code::ok, formatted("reading %zu: %.2f %.2f %.2f %.2f %.2f %.2f N", to.size(), mean[0],
                                       mean[1], mean[2], mean[3], mean[4], mean[5]));
   }
@@ -151,8 +151,9 @@ void SpindleSensorCalibrator::join() {
   if (static_cast<double>(std::max(hammer_.size(), means_.size())) > MOST_WAITING) tapping("");
 }
 
-void SpindleSensorCalibrator::tapping(const std::string& direction) {
+void SpindleSensorCalibrator::tapping(const std::string& direction, double length) {
   direction_ = direction;
+  if (length > 0.0) tap_length_ = length;
   hammer_.clear();
   means_.clear();
   hits_.clear();

@@ -45,7 +45,7 @@ Node::Node(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
       world_(std::make_unique<World>(model_, parameters_.world)),
       hammer_(nh_.advertise<smartmill_msgs::SampleBlock>(names::HAMMER, STREAM_QUEUE)),
       dynamometer_(nh_.advertise<smartmill_msgs::SampleBlock>(names::DYNAMOMETER, STREAM_QUEUE)),
-      spindle_force_(nh_.advertise<smartmill_msgs::SampleBlock>(names::daq(SPINDLE_FORCE), STREAM_QUEUE)),
+      spindle_force_(nh_.advertise<smartmill_msgs::SampleBlock>(names::SPINDLE_FORCE, STREAM_QUEUE)),
       force_(nh_.advertise<smartmill_msgs::ForceBlock>(names::TRUE_FORCE, STREAM_QUEUE)),
       vibration_(nh_.advertise<smartmill_msgs::SampleBlock>(names::TRUE_VIBRATION, STREAM_QUEUE)),
       servo_(nh_.advertise<smartmill_msgs::SampleBlock>(names::daq("servo"), STREAM_QUEUE)),

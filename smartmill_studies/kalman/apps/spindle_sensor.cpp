@@ -57,12 +57,12 @@ void calibrate(SpindleRig& rig, const Request& request) {
 
 void cuts(SpindleRig& rig, const MachineModel& model, double band) {
   std::printf(
-      "slots 2 mm deep, 0.1 mm a tooth: RMS of the difference to the true force up to %.0f Hz, %% of it\n",
+      "slots 0.8 mm deep, 0.1 mm a tooth: RMS of the difference to the true force up to %.0f Hz, %% of it\n",
       band);
   std::printf("%6s %24s %24s %24s %24s\n", "rpm", "sensor, static", "sensor, compensated",
               "table dynamometer", "compensated to dynam.");
   for (const double rpm : {1000.0, 4500.0, 6000.0, 8400.0, 9000.0, 11600.0, 17600.0}) {
-    const auto r = kalman::cutSlot(rig, model, units::radPerSecFromRpm(rpm), 2e-3, 0.1e-3, 1.0, 0.8);
+    const auto r = kalman::cutSlot(rig, model, units::radPerSecFromRpm(rpm), 0.8e-3, 0.1e-3, 1.0, 0.8);
     std::printf("%6.0f", rpm);
     const auto row = [&](const auto& found, const auto& truth) {
       for (std::size_t axis = 0; axis < 3; ++axis) {

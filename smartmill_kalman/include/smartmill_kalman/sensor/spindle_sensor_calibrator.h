@@ -50,8 +50,9 @@ class SpindleSensorCalibrator {
   /// Block of the six sensors. @throws Error when a channel is missing.
   void handle(const SampleBlock& block);
   void handleHammer(const SampleBlock& block);
-  /// Blows from now on are along an axis, for the measurement with this result in the end.
-  void tapping(const std::string& direction);
+  /// Blows from now on are along an axis, for the measurement that tapped() ends. @param length [m] of tool and
+  /// holder; 0: not told
+  void tapping(const std::string& direction, double length = 0.0);
   void tapped(const SensorResult& result);
   void cancel();
   void reset();
