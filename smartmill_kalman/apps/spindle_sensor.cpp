@@ -29,9 +29,10 @@ struct Request {
 };
 
 void printLine(const char* what, const LengthLine& found, const LengthLine& before, double length) {
-  std::printf("%-32s %9.4f L + %9.3f   std %.4f, %.3f   at %.0f mm %8.3f   before %8.3f\n", what,
+  std::printf("%-32s %9.4g L + %9.4g   std %.2g, %.2g%s   at %.0f mm %8.3f   before %8.3f\n", what,
               found.slope * units::MM, found.offset, found.slope_std * units::MM, found.offset_std,
-              length / units::MM, found.at(length), before.at(length));
+              found.reciprocal ? " of its reciprocal" : "", length / units::MM, found.at(length),
+              before.at(length));
 }
 
 void calibrate(const Request& request) {
@@ -42,7 +43,8 @@ void calibrate(const Request& request) {
   const SpindleSensorCalibration& c = found.calibration;
   const double length = found.lengths.front().length;
   const LengthLine none{0.0, std::nan("")};
-  std::printf("constants over the length L [mm] of tool and holder (applied over shown force)\n");
+  std::printf("constants over the length L [mm] of tool and holder (applied over shown force), known for %.0f .. %.0f mm\n",
+              c.lengths[0] / units::MM, c.lengths[1] / units::MM);
   printLine("x", c.x, base.x, length);
   printLine("y", c.y, base.y, length);
   printLine("z", c.z, base.z, length);

@@ -39,16 +39,26 @@ SortedCompensation::SortedCompensation(const CompensationParameters& parameters,
       // A machine without a tachometer has no angles to wait for.
       angles_(parameters.track_speed ? sorter_.addUnawaited(names::SPINDLE_ANGLE)
                                      : sorter_.addRegular(names::SPINDLE_ANGLE)),
-      blocks_(sorter_.addRegular(names::DYNAMOMETER)) {
+      blocks_(sorter_.addRegular(names::DYNAMOMETER)),
+      taps_(withRange(taps, parameters.saturation)),
+      calibrator_(taps_, SpindleSensorCalibration::table3()) {
   useModelFile();
   sorter_.onRestart([this] {
     compensation_.reset();
     measurement_.reset();
     if (spindle_) spindle_->reset();
+    calibrator_.reset();
+    condition_.reset();
     invalid_.clear();
     useModelFile();
     if (restarted_) restarted_();
   });
+}
+
+void SortedCompensation::useSpindleSensor(const SpindleSensorCalibration& calibration, double length) {
+  spindle_length_ = length;
+  spindle_.emplace(calibration, length);
+  calibrator_ = SpindleSensorCalibrator(taps_, calibration);
 }
 
 void SortedCompensation::useModelFile() {
@@ -69,6 +79,9 @@ void SortedCompensation::useModelFile() {
 void SortedCompensation::push(const SampleBlock& block) {
   sorter_.push(blocks_, block.stamp, [this, block] {
     if (SpindleForceSensor::isSixChannels(block)) {
+      calibrator_.handle(block);
+      drainCalibration();
+      if (!spindle_ && calibrator_.begun()) return;
       const SampleBlock forces = toForces(block);
       compensation_.handle(forces);
       measurement_.handleSensor(forces);
@@ -119,6 +132,7 @@ void SortedCompensation::forward(const ForceBlock& measured, const ForceBlock& c
 
 void SortedCompensation::pushHammer(const SampleBlock& block) {
   sorter_.push(hammers_, block.stamp, [this, block] {
+    calibrator_.handleHammer(block);
     measurement_.handleHammer(block);
     drain();
   });
@@ -133,6 +147,7 @@ void SortedCompensation::push(const SpindleAngle& angle) {
 
 void SortedCompensation::push(const CuttingCondition& condition) {
   sorter_.push(conditions_, condition.stamp, [this, condition] {
+    condition_ = condition;
     if (spindle_) spindle_->handle(condition);
     compensation_.handle(condition);
   });
@@ -142,9 +157,43 @@ void SortedCompensation::push(const MeasureFrfGoal& goal, std::function<bool(boo
   sorter_.push(goals_, goal.stamp, [this, goal, begin = std::move(begin)] {
     const bool free = !measurement_.active();
     const bool wanted = !begin || begin(free);  // before the goal's own results
-    if (free && wanted) measurement_.handle(goal);
+    if (free && wanted) {
+      if (spindle_) calibrator_.tapping(goal.direction, spindle_length_);
+      measurement_.handle(goal);
+    }
     drain();
   });
+}
+
+void SortedCompensation::push(const CalibrationGoal& goal, std::function<bool(bool)> begin) {
+  sorter_.push(goals_, goal.stamp, [this, goal, begin = std::move(begin)] {
+    const bool free = !calibrator_.active();
+    const bool wanted = !begin || begin(free);
+    if (free && wanted) calibrator_.handle(goal);
+    drainCalibration();
+  });
+}
+
+void SortedCompensation::cancelCalibration() {
+  sorter_.pushNow(goals_, [this] {
+    calibrator_.cancel();
+    drainCalibration();
+  });
+}
+
+void SortedCompensation::drainCalibration() {
+  auto result = calibrator_.takeResult();
+  if (!result) return;
+  if (result->calibration && spindle_length_ > 0.0) {
+    // What was found serves from now on; the zero is learnt anew.
+    try {
+      spindle_.emplace(*result->calibration, spindle_length_);
+      if (condition_) spindle_->handle(*condition_);
+    } catch (const Error& e) {
+      result->message += std::string("; it does not serve here: ") + e.what();
+    }
+  }
+  if (outputs_.calibration) outputs_.calibration(*result);
 }
 
 void SortedCompensation::event(std::function<void(SensorMeasurement&)> what) {
@@ -185,6 +234,7 @@ void SortedCompensation::drain() {
   if (const auto feedback = measurement_.takeFeedback(); feedback && outputs_.feedback)
     outputs_.feedback(*feedback);
   if (const auto result = measurement_.takeResult()) {
+    calibrator_.tapped(*result);
     if (result->code == FrfCode::ok) {
       const auto axis = static_cast<std::size_t>(axisOf(result->modes.direction));
       identified_[axis] = result->modes.stamp;

@@ -132,15 +132,16 @@ BagSummary compensateBag(const std::string& path, const ForceSensor& sensor, con
   BagReader bag(path);
   summary.duration = bag.duration();
   std::size_t blocks = 0;
-  bag.on<smartmill_msgs::SampleBlock>(names::DYNAMOMETER, [&](const smartmill_msgs::SampleBlock& m, double) {
-    if (blocks++ == 0) {
-      const auto found =
-          transforms.toMachine(m.header.frame_id.empty() ? frames::DYNAMOMETER : m.header.frame_id);
-      summary.rotation_known = found.has_value();
-      rotation = found.value_or(rotation);
-    }
-    sorted->push(fromMsg(m));
-  });
+  bag.on<smartmill_msgs::SampleBlock>(
+      parameters.force_input, [&](const smartmill_msgs::SampleBlock& m, double) {
+        if (blocks++ == 0) {
+          const auto found =
+              transforms.toMachine(m.header.frame_id.empty() ? frames::DYNAMOMETER : m.header.frame_id);
+          summary.rotation_known = found.has_value();
+          rotation = found.value_or(rotation);
+        }
+        sorted->push(fromMsg(m));
+      });
   connect(bag, *sorted);
   bag.on<smartmill_msgs::CuttingCondition>(names::CUTTING_CONDITION,
                                            [&](const smartmill_msgs::CuttingCondition& m, double) {
@@ -155,7 +156,7 @@ BagSummary compensateBag(const std::string& path, const ForceSensor& sensor, con
         sorted->push(goalFromMsg(m.goal, received));
       });
   bag.run(progress);
-  if (blocks == 0) throw Error(path + ": holds no " + names::DYNAMOMETER);
+  if (blocks == 0) throw Error(path + ": holds no " + parameters.force_input);
   sorted->flush();
   cutter.close();
   summary.gaps = sorted->health().gaps;

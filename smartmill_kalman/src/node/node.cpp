@@ -38,7 +38,7 @@ KalmanNode::KalmanNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
       measured_(nh.advertise<smartmill_msgs::ForceBlock>(names::FORCE_MEASURED, STREAM_QUEUE)),
       compensated_(nh.advertise<smartmill_msgs::ForceBlock>(names::FORCE_COMPENSATED, STREAM_QUEUE)),
       wrench_(nh.advertise<geometry_msgs::WrenchStamped>(names::FORCE_WRENCH, STREAM_QUEUE)),
-      strike_(nh, POINT_FORCE_SENSOR),
+      strike_(nh, parameters_.inSpindle() ? "tool" : POINT_FORCE_SENSOR),
       sorted_(parameters_.compensation, parameters_.taps, sensorOf(parameters_), parameters_.hold_back,
               {[this](const ForceBlock& m, const ForceBlock& c) { publish(m, c); },
                [this](const StrikeCommand& command) {
@@ -52,7 +52,8 @@ KalmanNode::KalmanNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
                  result.frf = r.frf;
                  result.modes = r.modes;
                  measure_.finish(result);
-               }}),
+               },
+               [this](const CalibrationResult& result) { calibrate_.finish(result); }}),
       measure_(nh, names::MEASURE_SENSOR_FRF, "kalman",
                {[this](const MeasureFrfGoal& goal, std::function<bool(bool)> begin) {
                   sorted_.push(goal, std::move(begin));
@@ -61,9 +62,13 @@ KalmanNode::KalmanNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
                   sorted_.event([due](SensorMeasurement& m) {
                     if (due()) m.cancel();
                   });
-                }}) {
+                }}),
+      calibrate_(nh, sorted_) {
   useFiles(sorted_, parameters_);
-  sorted_.onRestart([this] { measure_.restart(); });
+  sorted_.onRestart([this] {
+    measure_.restart();
+    calibrate_.restart();
+  });
   listen();
   shell_.diagnose("force compensation", [this](auto& status) { diagnose(status); });
   shell_.every(WATCH_PERIOD, [this] { watch(); });
@@ -72,14 +77,14 @@ KalmanNode::KalmanNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
 void KalmanNode::listen() {
   Inputs& inputs = shell_.inputs();
   inputs.on<smartmill_msgs::SampleBlock>(
-      names::DYNAMOMETER, [this](const smartmill_msgs::SampleBlock& message, double) {
+      parameters_.force_input, [this](const smartmill_msgs::SampleBlock& message, double) {
         const std::string frame =
             message.header.frame_id.empty() ? frames::DYNAMOMETER : message.header.frame_id;
         if (frame != sensor_frame_) rotation_known_ = false;
         sensor_frame_ = frame;
         sorted_.push(fromMsg(message));
       });
-  inputs.setWaiting(names::DYNAMOMETER, [this] { return waiting_.size(); });
+  inputs.setWaiting(parameters_.force_input, [this] { return waiting_.size(); });
   connect(inputs, sorted_);
   feed<smartmill_msgs::CuttingCondition>(inputs, names::CUTTING_CONDITION, sorted_);
   // A recording that began after the taps holds the modes that served in it.
@@ -139,7 +144,7 @@ void KalmanNode::watch() {
   watchMeasurement();
   publishWaiting();
   // End of data: nothing more will come to release what waits.
-  if (shell_.inputs().watchdog(names::DYNAMOMETER).ended()) sorted_.flush();
+  if (shell_.inputs().watchdog(parameters_.force_input).ended()) sorted_.flush();
 }
 
 void KalmanNode::watchMeasurement() {
@@ -151,7 +156,7 @@ void KalmanNode::watchMeasurement() {
       m.hitByHand();
     });
   }
-  const InputHealth* dead = shell_.inputs().dead({names::HAMMER, names::DYNAMOMETER});
+  const InputHealth* dead = shell_.inputs().dead({names::HAMMER, parameters_.force_input.c_str()});
   if (!dead) return;
   const std::string text = dead->topic() + " is silent";
   if (shell_.inputs().watchdog(names::HAMMER).ended()) {
@@ -161,6 +166,7 @@ void KalmanNode::watchMeasurement() {
     sorted_.flush();
   }
   if (parameters_.command_machine) measure_.refuseWaiting(text, GOAL_PATIENCE);
+  calibrate_.lost(text);
 }
 
 std::pair<int, std::string> KalmanNode::judge(const SpindleSensorHealth* spindle) {
@@ -175,7 +181,7 @@ std::pair<int, std::string> KalmanNode::judge(const SpindleSensorHealth* spindle
     return {Level::ERROR,
             "a sensor of the spindle was unloaded or overloaded: those samples are no measurement"};
   }
-  if (shell_.inputs().watchdog(names::DYNAMOMETER).dead())
+  if (shell_.inputs().watchdog(parameters_.force_input).dead())
     return {Level::STALE, "no samples from the force sensor"};
   if (!rotation_known_) return {Level::ERROR, "no transform of the force sensor"};
   if (health.gaps + health.not_finite + health.clipped > 0)
@@ -220,6 +226,7 @@ void KalmanNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
   status.add("inputs out of order", sorted_.late());
   status.add("waiting for", sorted_.waitingFor());
   status.add("last measurement of the sensor", measure_.lastMessage());
+  status.add("last step of a calibration", calibrate_.lastMessage());
 }
 
 }  // namespace smartmill::kalman

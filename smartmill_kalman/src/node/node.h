@@ -11,6 +11,7 @@
 #include <tf2_ros/buffer.h>
 #include <tf2_ros/transform_listener.h>
 
+#include "node/calibration_server.h"
 #include "node/parameters.h"
 #include "smartmill_ros/frf_server.h"
 #include "smartmill_ros/node_shell.h"
@@ -52,6 +53,7 @@ class KalmanNode {
   StrikeCaller strike_;
   SortedCompensation sorted_;
   FrfServer measure_;
+  CalibrationServer calibrate_;
 };
 
 }  // namespace smartmill::kalman

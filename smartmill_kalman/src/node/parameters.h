@@ -2,7 +2,10 @@
 
 #include <string>
 
+#include "smartmill_core/error.h"
+#include "smartmill_core/names.h"
 #include "smartmill_core/parameters/parameter_table.h"
+#include "smartmill_core/signal/force_channels.h"
 #include "smartmill_kalman/compensation/sorted_compensation.h"
 
 namespace smartmill::kalman {
@@ -10,6 +13,7 @@ namespace smartmill::kalman {
 /// Parameters of kalman_node and of `compensate` on a bag.
 struct NodeParameters {
   std::string model;  ///< may stay empty where the tool is given one
+  std::string force_input = names::DYNAMOMETER;
   std::string sensor_matrix, spindle_sensor;
   double spindle_sensor_length = 0.139;
   CompensationParameters compensation;
@@ -27,10 +31,15 @@ struct NodeParameters {
     table.atLaunch("model", model,
                    "path of a smartmill-model/1 file whose force_sensor section gives the sensor's modes");
     table.section();
+    table.text(
+        "force_input", force_input,
+        "topic of the force sensor; daq/spindle_force: of the one in the spindle, taps go on the tool");
     table.text("sensor_matrix", sensor_matrix,
                "smartmill-sensor-matrix/1 file (compensate --coupled --matrix-out): cross-talk is taken out");
-    table.text("spindle_sensor", spindle_sensor,
-               "smartmill-spindle-sensor/1 file: daq/dynamometer brings six sensors x1 x2 y1 y2 z1 z2");
+    table.text(
+        "spindle_sensor", spindle_sensor,
+        "smartmill-spindle-sensor/1 file: force_input brings six sensors x1 x2 y1 y2 z1 z2; without, they "
+        "are calibrated first (action kalman/calibrate)");
     table.number("spindle_sensor_length", spindle_sensor_length, "m", Range::positive(),
                  "of tool and holder, for spindle_sensor");
     compensation.declare(table);
@@ -48,9 +57,12 @@ struct NodeParameters {
                "false: replay; daq/strike is not called, the recorded blows answer");
     taps.declare(table);
   }
+  /// Whether the force acts on a sensor in the spindle: taps go on the tool then.
+  bool inSpindle() const { return force_input == names::SPINDLE_FORCE; }
   /// @throws Error naming key and value.
   void validate() const {
     checkBounds(*this);
+    if (force_input.empty()) throw Error("force_input: a topic is due");
     compensation.validate();
     taps.validate();
   }

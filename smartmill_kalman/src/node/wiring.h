@@ -22,6 +22,7 @@ void connect(Source& source, SortedCompensation& sorted) {
 /// What the parameters say of the sensor beyond its modes. @throws Error on a bad file.
 inline void useFiles(SortedCompensation& sorted, const NodeParameters& parameters) {
   if (!parameters.sensor_matrix.empty()) sorted.useMatrix(readSensorMatrix(parameters.sensor_matrix));
+  sorted.setSpindleSensorLength(parameters.spindle_sensor_length);
   if (!parameters.spindle_sensor.empty()) {
     sorted.useSpindleSensor(readSpindleSensor(parameters.spindle_sensor), parameters.spindle_sensor_length);
   }

@@ -187,6 +187,7 @@ void SensorMeasurement::evaluate() {
   result_.frf.point = result_.modes.point = goal_.point;
   result_.frf.direction = result_.modes.direction = goal_.direction;
   result_.modes.unit = "1";
+  for (const Hit& hit : hits_) result_.hit_stamps.push_back(hit.stamp);
   try {
     for (const Hit& hit : hits_) {
       const auto quiet = static_cast<std::ptrdiff_t>(QUIET_SHARE * static_cast<double>(hit.pre_trigger));

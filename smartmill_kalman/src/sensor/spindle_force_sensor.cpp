@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::kalman {
@@ -27,24 +28,16 @@ ModalModel ideal() {
   return model;
 }
 
-/// Of the six sensors. @throws Error when one is missing or not in N.
-std::array<std::size_t, 6> columnsOf(const SampleBlock& block) {
-  std::array<std::size_t, 6> column{};
-  for (std::size_t k = 0; k < 6; ++k) {
-    column[k] = block.channel(SPINDLE_SENSOR_CHANNELS[k]);
-    if (block.units.at(column[k]) != "N") {
-      throw Error(std::string("spindle sensor: channel ") + SPINDLE_SENSOR_CHANNELS[k] + " is in " +
-                  block.units[column[k]] + ", N is due");
-    }
-  }
-  return column;
-}
-
 }  // namespace
 
 SpindleForceSensor::SpindleForceSensor(const SpindleSensorCalibration& calibration, double length)
     : calibration_(calibration), length_(length) {
   calibration.validate();
+  if (length < calibration.lengths[0] || length > calibration.lengths[1]) {
+    throw Error(formatted(
+        "spindle_sensor_length: %.1f mm of tool and holder is outside the calibrated %.1f .. %.1f mm",
+        length / units::MM, calibration.lengths[0] / units::MM, calibration.lengths[1] / units::MM));
+  }
   constant_ = {calibration.x.at(length), calibration.y.at(length), calibration.z.at(length)};
   for (std::size_t axis = 0; axis < 3; ++axis) {
     if (!(constant_[axis] > 0.0)) {
@@ -61,6 +54,18 @@ SpindleForceSensor::SpindleForceSensor(const SpindleSensorCalibration& calibrati
   xz_ = share(calibration.xz);
   sensor_.fill(ideal());
   reset();
+}
+
+std::array<std::size_t, 6> SpindleForceSensor::columnsOf(const SampleBlock& block) {
+  std::array<std::size_t, 6> column{};
+  for (std::size_t k = 0; k < 6; ++k) {
+    column[k] = block.channel(SPINDLE_SENSOR_CHANNELS[k]);
+    if (block.units.at(column[k]) != "N") {
+      throw Error(std::string("spindle sensor: channel ") + SPINDLE_SENSOR_CHANNELS[k] + " is in " +
+                  block.units[column[k]] + ", N is due");
+    }
+  }
+  return column;
 }
 
 bool SpindleForceSensor::isSixChannels(const SampleBlock& block) {

@@ -20,6 +20,8 @@ namespace smartmill::kalman {
 namespace {
 
 constexpr const char* AXES = "xyz";
+constexpr double PROOF = 9.0;           // [1] of chi squared by which a beam's law must fit better
+constexpr double LENGTH_MARGIN = 2e-3;  // [m] that constants hold beyond the lengths of their readings
 constexpr const char* FORMAT = "smartmill-spindle-sensor/1";
 
 ModalModel ideal() {
@@ -89,31 +91,34 @@ LengthConstants constantsOf(const StaticReadings& readings, double length) {
   return found;
 }
 
-/// Line over length of 1 / share.
-LengthLine lineOf(const std::vector<LengthConstants>& lengths, int row, int column) {
+/// Weighted line over length of the constants, or of their reciprocals, and what it leaves.
+std::pair<LengthLine, double> fitLine(const std::vector<LengthConstants>& lengths, int row, int column,
+                                      bool reciprocal) {
   Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
   Eigen::Vector2d right = Eigen::Vector2d::Zero();
   double middle = 0.0, weights = 0.0;
-  std::vector<std::array<double, 3>> points;  // length, constant, weight
+  std::vector<std::array<double, 3>> points;  // length, value, weight
   for (const LengthConstants& l : lengths) {
-    const double c = 1.0 / l.share[row][column];
-    const double std_dev = std::max(l.std_dev[row][column] * c * c, 1e-12 * std::abs(c));
-    points.push_back({l.length, c, 1.0 / (std_dev * std_dev)});
+    const double share = l.share[row][column], value = reciprocal ? share : 1.0 / share;
+    const double moves = reciprocal ? 1.0 : value * value;
+    const double std_dev = std::max(l.std_dev[row][column] * moves, 1e-12 * std::abs(value));
+    points.push_back({l.length, value, 1.0 / (std_dev * std_dev)});
     middle += points.back()[0] * points.back()[2];
     weights += points.back()[2];
   }
   middle /= weights;
   LengthLine line;
+  line.reciprocal = reciprocal;
   if (points.size() == 1) {
     line.offset = points[0][1];
     line.slope_std = 0.0;
     line.offset_std = 1.0 / std::sqrt(points[0][2]);
-    return line;
+    return {line, 0.0};
   }
-  for (const auto& [length, c, weight] : points) {
+  for (const auto& [length, value, weight] : points) {
     const Eigen::Vector2d row_of(length - middle, 1.0);
     normal += weight * row_of * row_of.transpose();
-    right += weight * c * row_of;
+    right += weight * value * row_of;
   }
   const Eigen::Matrix2d covariance = linear::inverseSymmetric(Eigen::MatrixXd(normal));
   const Eigen::Vector2d x = covariance * right;
@@ -121,7 +126,18 @@ LengthLine lineOf(const std::vector<LengthConstants>& lengths, int row, int colu
   line.offset = x(1) - x(0) * middle;
   line.slope_std = std::sqrt(covariance(0, 0));
   line.offset_std = std::sqrt(covariance(1, 1) + middle * middle * covariance(0, 0));
-  return line;
+  double chi2 = 0.0;
+  for (const auto& [length, value, weight] : points)
+    chi2 += weight * std::pow(value - line.slope * length - line.offset, 2);
+  return {line, chi2};
+}
+
+/// Constant over length: a line, unless readings at three lengths or more prove that the reciprocal is one.
+LengthLine lineOf(const std::vector<LengthConstants>& lengths, int row, int column) {
+  const auto [line, chi2] = fitLine(lengths, row, column, false);
+  if (lengths.size() < 3) return line;
+  const auto [beam, beam_chi2] = fitLine(lengths, row, column, true);
+  return chi2 - beam_chi2 > PROOF ? beam : line;
 }
 
 /// Cross-talk that is there at every length.
@@ -136,6 +152,7 @@ LengthLine readLine(const StrictYaml& yaml) {
   LengthLine line;
   line.slope = yaml.number("slope_per_mm") / units::MM;
   line.offset = yaml.number("offset");
+  if (yaml.has("line_of")) line.reciprocal = yaml.oneOf("line_of", {"constant", "share"}) == "share";
   if (const auto s = yaml.optionalNumber("slope_per_mm_std", Range::notNegative()))
     line.slope_std = *s / units::MM;
   if (const auto s = yaml.optionalNumber("offset_std", Range::notNegative())) line.offset_std = *s;
@@ -148,7 +165,7 @@ std::string text(const std::string& key, const LengthLine& line) {
       key + ": {slope_per_mm: " + yamlNumber(line.slope * units::MM) + ", offset: " + yamlNumber(line.offset);
   if (std::isfinite(line.slope_std)) out += ", slope_per_mm_std: " + yamlNumber(line.slope_std * units::MM);
   if (std::isfinite(line.offset_std)) out += ", offset_std: " + yamlNumber(line.offset_std);
-  return out + "}\n";
+  return out + (line.reciprocal ? ", line_of: share}\n" : "}\n");
 }
 
 ModalModel readCourse(const StrictYaml& yaml) {
@@ -259,6 +276,10 @@ SpindleSensorCalibration readSpindleSensor(const std::string& file) {
   cross("yx", c.yx, c.dynamic_yx);
   cross("yz", c.yz, c.dynamic_yz);
   cross("xz", c.xz, c.dynamic_xz);
+  if (yaml.has("length_mm")) {
+    const auto lengths = yaml.numbers("length_mm", 2, Range::positive());
+    c.lengths = {lengths[0] * units::MM, lengths[1] * units::MM};
+  }
   const auto preload = yaml.numbers("preload_n", 6, Range::positive());
   std::copy(preload.begin(), preload.end(), c.preload.begin());
   c.least_compression = yaml.optionalNumber("least_compression_n", Range::notNegative()).value_or(0.0);
@@ -295,6 +316,11 @@ void writeSpindleSensor(const SpindleSensorCalibration& c, const std::string& fi
   if (c.yx) out += text("yx", *c.yx) + text("dynamic_yx", c.dynamic_yx);
   if (c.yz) out += text("yz", *c.yz) + text("dynamic_yz", c.dynamic_yz);
   if (c.xz) out += text("xz", *c.xz) + text("dynamic_xz", c.dynamic_xz);
+  if (std::isfinite(c.lengths[1])) {
+    out += "# of tool and holder that they are known for\n" +
+           list("length_mm", c.lengths.begin(), c.lengths.end(), [](double l) { return l / units::MM; }) +
+           "\n";
+  }
   out += "# of x1 x2 y1 y2 z1 z2\n" + list("preload_n", c.preload.begin(), c.preload.end(), same) + "\n";
   out += "least_compression_n: " + yamlNumber(c.least_compression) + "\n";
   if (std::isfinite(c.range_limit)) out += "range_limit_n: " + yamlNumber(c.range_limit) + "\n";
@@ -344,6 +370,7 @@ StaticCalibration calibrateStatic(const StaticReadings& readings, const SpindleS
       }
     }
   }
+  result.calibration.lengths = {*lengths.begin() - LENGTH_MARGIN, *lengths.rbegin() + LENGTH_MARGIN};
   result.calibration.x = lineOf(result.lengths, 0, 0);
   result.calibration.y = lineOf(result.lengths, 1, 1);
   result.calibration.z = lineOf(result.lengths, 2, 2);

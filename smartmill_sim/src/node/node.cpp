@@ -13,6 +13,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/modal/results.h"
 #include "smartmill_core/names.h"
+#include "smartmill_core/signal/force_channels.h"
 #include "smartmill_ros/conversions.h"
 #include "smartmill_ros/frames.h"
 #include "smartmill_ros/node_main.h"
@@ -44,6 +45,7 @@ Node::Node(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
       world_(std::make_unique<World>(model_, parameters_.world)),
       hammer_(nh_.advertise<smartmill_msgs::SampleBlock>(names::HAMMER, STREAM_QUEUE)),
       dynamometer_(nh_.advertise<smartmill_msgs::SampleBlock>(names::DYNAMOMETER, STREAM_QUEUE)),
+      spindle_force_(nh_.advertise<smartmill_msgs::SampleBlock>(names::SPINDLE_FORCE, STREAM_QUEUE)),
       force_(nh_.advertise<smartmill_msgs::ForceBlock>(names::TRUE_FORCE, STREAM_QUEUE)),
       vibration_(nh_.advertise<smartmill_msgs::SampleBlock>(names::TRUE_VIBRATION, STREAM_QUEUE)),
       servo_(nh_.advertise<smartmill_msgs::SampleBlock>(names::daq("servo"), STREAM_QUEUE)),
@@ -61,6 +63,7 @@ Node::Node(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
 
   start_ = toSec(ros::Time::now());
   publishTruth();
+  offerHands();
   strike_server_ = nh_.advertiseService(names::STRIKE, &Node::strike, this);
   shell_.diagnose("simulated machine", [this](auto& status) { diagnose(status); });
   thread_ = std::thread([this] { run(); });
@@ -134,6 +137,9 @@ void Node::publish(const World::Block& block) {
   };
   hammer_.publish(toMsg(shifted(block.hammer)));
   dynamometer_.publish(toMsg(shifted(block.dynamometer), frames::DYNAMOMETER));
+  // The ring in the flange does not turn with the spindle.
+  if (!block.spindle_force.channels.empty())
+    spindle_force_.publish(toMsg(shifted(block.spindle_force), frames::MACHINE));
   if (server_) {
     for (const SpindleAngle& angle : block.angle) angle_.publish(toMsg(shifted(angle)));
   } else {
@@ -273,6 +279,37 @@ void Node::offerPanel() {
     controller.raiseAlarm(static_cast<int>(request.values[0]), request.text);
     return {};
   });
+}
+
+void Node::offerHands() {
+  using Request = smartmill_msgs::PanelKey::Request;
+  const auto triple = [](const Request& r) {
+    return std::array<double, 3>{r.values[0], r.values[1], r.values[2]};
+  };
+  if (parameters_.world.spindle_sensor.present) {
+    offer("hang_weight", 3, [this, triple](const Request& request) -> std::string {
+      world_->pull(triple(request), false);
+      return {};
+    });
+    offer("press_workpiece", 3, [this, triple](const Request& request) -> std::string {
+      world_->pull(triple(request), true);
+      return {};
+    });
+    offer("tool_length", 1, [this](const Request& request) -> std::string {
+      try {
+        world_->setToolLength(request.values[0]);
+      } catch (const Error& e) {
+        return e.what();
+      }
+      return {};
+    });
+  }
+  if (parameters_.world.plate.present) {
+    offer("tap_point", 3, [this, triple](const Request& request) -> std::string {
+      world_->setTapPoint(triple(request));
+      return {};
+    });
+  }
 }
 
 void Node::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {

@@ -50,6 +50,8 @@ class Node {
   using Press = std::function<std::string(const smartmill_msgs::PanelKey::Request&)>;
   void offer(const std::string& key, std::size_t values, Press press);
   void offerPanel();
+  /// What an operator does by hand: hangs weights on the tool, changes it, taps elsewhere.
+  void offerHands();
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
   ros::NodeHandle nh_;
@@ -59,8 +61,8 @@ class Node {
   std::unique_ptr<focas::Server> server_;
 
   double start_ = 0.0;  // [s] stamp of sample 0
-  ros::Publisher hammer_, dynamometer_, angle_, force_, vibration_, servo_, motor_current_, coefficients_,
-      load_meter_;
+  ros::Publisher hammer_, dynamometer_, spindle_force_, angle_, force_, vibration_, servo_, motor_current_,
+      coefficients_, load_meter_;
   KeptTopic<smartmill_msgs::Frf> frf_;
   KeptTopic<smartmill_msgs::ModalModel> modes_;
   ros::ServiceServer strike_server_;

@@ -8,6 +8,7 @@
 #include <random>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/signal/force_channels.h"
 #include "smartmill_core/units.h"
 #include "smartmill_sim/controller/servo_recorder.h"
 #include "smartmill_sim/twin/cutting_machine.h"
@@ -21,7 +22,8 @@ constexpr std::size_t LOOK = 64;       // samples between two looks at where the
 constexpr double HAMMER_DELAY = 0.03;  // [s] of the solenoid
 constexpr double TURNING = 1.0;        // [rad/s] a slower spindle cannot cut
 constexpr double SAME_ANGLE = 1e-7;    // [rad]
-constexpr int TOUCHED = 3001, PLUNGED = 3002, SENSOR = 3003;  // external alarms
+constexpr std::uint64_t FLANGE_SEED = 0x1000, PLATE_SEED = 0x2000;  // apart from the world's own
+constexpr int TOUCHED = 3001, PLUNGED = 3002, SENSOR = 3003;        // external alarms
 
 bool same(const std::vector<ContactArc>& a, const std::vector<ContactArc>& b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const ContactArc& p, const ContactArc& q) {
@@ -49,6 +51,7 @@ std::optional<HammerStation> stationOf(const MachineModel& model, const WorldOpt
 void WorldOptions::validate() const {
   checkBounds(*this);
   hammer.validate();
+  spindle_sensor.validate();
 }
 
 class World::Impl {
@@ -74,6 +77,10 @@ class World::Impl {
     if (model.force_sensor.noise_rms) force_noise_ = *model.force_sensor.noise_rms;
     last_ = controller_.motion();
     machine_.resetLoadMeter(0.0);
+    const double step = 1.0 / (SAMPLE_RATE * options.substeps);
+    if (options.spindle_sensor.present)
+      flange_.emplace(options.spindle_sensor, step, SAMPLE_RATE, options.seed + FLANGE_SEED);
+    if (options.plate.present) plate_.emplace(options.plate, step, options.seed + PLATE_SEED);
   }
 
   Controller& controller() { return controller_; }
@@ -83,19 +90,23 @@ class World::Impl {
     const std::lock_guard<std::mutex> lock(mutex_);
     const std::size_t axis = direction == "x" ? 0 : direction == "y" ? 1 : direction == "z" ? 2 : 3;
     const double now = static_cast<double>(index_) / SAMPLE_RATE;
-    if ((blow_ && !blow_->over(now)) || (station_ && station_->busy(now))) {
+    if ((blow_ && !blow_->over(now)) || (tip_blow_ && !tip_blow_->over(now)) ||
+        (station_ && station_->busy(now))) {
       message = "a blow is still under way";
       return StrikeAnswer::failed;
     }
     const bool tool = point == "tool";
-    if (tool && station_ && axis < 2) {
+    const bool before_hammer = station_ && axis < 2 && (!flange_ || station_->facing(last_.position) == axis);
+    if (tool && before_hammer) {
       // Between two samples anywhere, as a real one.
       station_->fire(axis, now, now + HAMMER_DELAY + uniform() / SAMPLE_RATE, random_);
       message = "hammer fired in " + direction;
+    } else if (tool && flange_ && axis < 3) {
+      tip_blow_ = blowBy(now);
+      tip_blow_axis_ = axis;
+      message = "hammer fired on the tool's tip in " + direction;
     } else if (point == "force_sensor" && axis < 3) {
-      const double delay = options_.operator_delay > 0.0 ? options_.operator_delay : HAMMER_DELAY;
-      blow_ = Blow{now + delay + uniform() / SAMPLE_RATE, scattered(options_.tap_peak), options_.tap_contact,
-                   0.0};
+      blow_ = blowBy(now);
       blow_axis_ = axis;
       message = options_.operator_delay > 0.0 ? "hit the workpiece by hand in " + direction
                                               : "hammer fired on the workpiece in " + direction;
@@ -121,11 +132,30 @@ class World::Impl {
     follow(block, states);
   }
 
+  void pull(const std::array<double, 3>& force, bool on_table) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    pull_ = force;
+    pull_on_table_ = on_table;
+  }
+
+  void setToolLength(double length) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (!flange_) throw Error("tool length: the spindle has no force sensor that depends on it");
+    flange_->setLength(length);
+  }
+
+  void setTapPoint(const std::array<double, 3>& point) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    tap_point_ = point;
+  }
+
   void lose(std::uint64_t samples) {
     const std::lock_guard<std::mutex> lock(mutex_);
     index_ += samples;
     const double time = static_cast<double>(samples) / SAMPLE_RATE;
     if (blow_) blow_->begin += time;
+    if (tip_blow_) tip_blow_->begin += time;
+    if (flange_) flange_->lose(time);
     if (station_) station_->shift(time);
   }
 
@@ -143,6 +173,12 @@ class World::Impl {
     return peak * std::clamp(1.0 + options_.force_scatter * normal_(random_), 0.5, 1.5);
   }
   double noise(double rms) { return rms * normal_(random_); }
+  /// Of an automatic hammer or of a person.
+  Blow blowBy(double now) {
+    const double delay = options_.operator_delay > 0.0 ? options_.operator_delay : HAMMER_DELAY;
+    const double begin = now + delay + uniform() / SAMPLE_RATE;
+    return {begin, scattered(options_.tap_peak), options_.tap_contact, 0.0};
+  }
 
   void follow(Block& block, const std::vector<MotionState>& states) {
     begin(block);
@@ -178,7 +214,14 @@ class World::Impl {
     prepare(block.hammer, {"hammer", "gap"}, {"N", "V"});
     if (station_ && station_->hasCross())
       prepare(block.hammer, {"hammer", "gap", "gap_cross"}, {"N", "V", "V"});
-    prepare(block.dynamometer, {"fx", "fy", "fz"}, {"N", "N", "N"});
+    const auto named = [](auto first, auto last) { return std::vector<std::string>(first, last); };
+    prepare(block.dynamometer, named(PLATE_CHANNELS.begin(), PLATE_CHANNELS.begin() + (plate_ ? 6 : 3)),
+            {"N", "N", "N"});
+    if (plate_) block.dynamometer.units.insert(block.dynamometer.units.end(), 3, "N m");
+    if (flange_) {
+      prepare(block.spindle_force, named(SPINDLE_SENSOR_CHANNELS.begin(), SPINDLE_SENSOR_CHANNELS.end()),
+              std::vector<std::string>(6, "N"));
+    }
     prepare(block.vibration, {"x", "y"}, {"m", "m"});
     block.force.stamp = stamp;
     block.force.sample_rate = SAMPLE_RATE;
@@ -238,7 +281,27 @@ class World::Impl {
       if (station_) push = station_->push(at);
       input.tip_force = push.tip_force;
       if (blow_) tap += input.sensor_force[blow_axis_] = blow_->force(at);
+      const std::array<double, 3> blow = input.sensor_force;
+      std::array<double, 3> tip = pull_;
+      if (tip_blow_) {
+        const double hit = tip_blow_->force(at);
+        tip[tip_blow_axis_] += hit;
+        if (tip_blow_axis_ < 2) input.tip_force[tip_blow_axis_] += hit;
+        tap += hit;
+      }
+      for (std::size_t axis = 0; axis < 3 && pull_on_table_; ++axis) input.sensor_force[axis] += pull_[axis];
       const CuttingMachine::Output out = machine_.step(input);
+      if (flange_) {
+        flange_->step({out.force.fx + push.tip_force[0] + tip[0], out.force.fy + push.tip_force[1] + tip[1],
+                       out.force.fz + tip[2]},
+                      input.motion.angle, input.motion.speed);
+      }
+      if (plate_) {
+        std::array<double, 3> cut = out.applied;
+        for (std::size_t axis = 0; axis < 3; ++axis) cut[axis] -= blow[axis];
+        plate_->step(cut, {input.motion.centre[0], input.motion.centre[1], now.position[2]}, blow,
+                     tap_point_);
+      }
       if (station_) station_->hear(out.displacement);
       for (std::size_t axis = 0; axis < 3; ++axis) sensor[axis] += out.sensor[axis];
       for (std::size_t axis = 0; axis < 2; ++axis)
@@ -264,11 +327,17 @@ class World::Impl {
     block.hammer.samples.push_back(reading.gap);
     if (block.hammer.channels.size() > 2) block.hammer.samples.push_back(reading.cross);
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      block.dynamometer.samples.push_back(share * sensor[axis] + noise(force_noise_[axis]));
+      if (!plate_) block.dynamometer.samples.push_back(share * sensor[axis] + noise(force_noise_[axis]));
       block.force.force[axis].push_back(share * force[axis]);
     }
+    const auto append = [](SampleBlock& to, const std::array<double, 6>& shown) {
+      to.samples.insert(to.samples.end(), shown.begin(), shown.end());
+    };
+    if (plate_) append(block.dynamometer, plate_->read());
+    if (flange_) append(block.spindle_force, flange_->read());
     for (double d : displacement) block.vibration.samples.push_back(share * d);
     if (blow_ && blow_->over(time)) blow_.reset();
+    if (tip_blow_ && tip_blow_->over(time)) tip_blow_.reset();
   }
 
   WorldOptions options_;
@@ -291,6 +360,13 @@ class World::Impl {
   std::vector<ContactArc> arcs_;
   std::optional<Blow> blow_;  // on the workpiece
   std::size_t blow_axis_ = 0;
+  std::array<double, 3> tap_point_{};  // [m] of it, from the plate's origin
+  std::optional<Blow> tip_blow_;       // on the tool, by hand
+  std::size_t tip_blow_axis_ = 0;
+  std::array<double, 3> pull_{};  // [N] at the tool's tip
+  bool pull_on_table_ = false;
+  std::optional<SpindleSensor> flange_;
+  std::optional<Plate> plate_;
   double load_meter_ = 0.0;  // [V]
   double torque_ = 0.0;      // [N m] of the cut, summed over the samples of a block
 };
@@ -313,6 +389,18 @@ const ToolTip& World::toolTip() const {
 World::StrikeAnswer World::strike(const std::string& point, const std::string& direction,
                                   std::string& message) {
   return impl_->strike(point, direction, message);
+}
+
+void World::pull(const std::array<double, 3>& force, bool on_table) {
+  impl_->pull(force, on_table);
+}
+
+void World::setToolLength(double length) {
+  impl_->setToolLength(length);
+}
+
+void World::setTapPoint(const std::array<double, 3>& point) {
+  impl_->setTapPoint(point);
 }
 
 void World::advance(Block& block) {

@@ -14,6 +14,7 @@
 #include "smartmill_kalman/compensation/force_compensation.h"
 #include "smartmill_kalman/sensor/sensor_measurement.h"
 #include "smartmill_kalman/sensor/spindle_force_sensor.h"
+#include "smartmill_kalman/sensor/spindle_sensor_calibrator.h"
 
 namespace smartmill::kalman {
 
@@ -28,6 +29,7 @@ class SortedCompensation {
     std::function<void(const StrikeCommand&)> strike;
     std::function<void(const TapFeedback&)> feedback;
     std::function<void(const SensorResult&)> result;
+    std::function<void(const CalibrationResult&)> calibration;
   };
 
   /// @param sensor the believed sensor: serves the axes not measured @param hold_back [s], see StreamSorter.
@@ -39,9 +41,9 @@ class SortedCompensation {
 
   /// Blocks of six sensors in the spindle (channels x1 .. z2) become forces from now on; samples that are no
   /// measurement come out as NaN. @param length [m] of tool and holder. @throws Error.
-  void useSpindleSensor(const SpindleSensorCalibration& calibration, double length) {
-    spindle_.emplace(calibration, length);
-  }
+  void useSpindleSensor(const SpindleSensorCalibration& calibration, double length);
+  /// Length [m] of tool and holder for a calibration that is made here.
+  void setSpindleSensorLength(double length) { spindle_length_ = length; }
   /// The sensor's cross-talk serves from now on, its own axes instead of the believed ones until taps tell
   /// better.
   void useMatrix(const SensorMatrix& matrix) {
@@ -60,6 +62,11 @@ class SortedCompensation {
   /// @param begin told, when its time has come, whether the goal can be taken (false while another
   /// measurement runs); returns whether it is still wanted; may be empty
   void push(const MeasureFrfGoal& goal, std::function<bool(bool)> begin = {});
+  /// A step of the calibration of a spindle's sensor, at its stamp. @param begin as of the goal above
+  void push(const CalibrationGoal& goal, std::function<bool(bool)> begin = {});
+  /// Ends a reading, at the stamp of the newest input.
+  void cancelCalibration();
+  const SpindleSensorCalibrator& calibrator() const { return calibrator_; }
   /// Something that happened outside the streams, at the stamp of the newest input.
   void event(std::function<void(SensorMeasurement&)> what);
   /// Modes measured earlier (tool/modes of the force sensor) serve from their stamp on, unless the same or
@@ -87,6 +94,7 @@ class SortedCompensation {
 
  private:
   void drain();
+  void drainCalibration();
   SampleBlock toForces(const SampleBlock& block);
   void forward(const ForceBlock& measured, const ForceBlock& compensated);
   void useModelFile();
@@ -99,6 +107,10 @@ class SortedCompensation {
   std::array<double, 3> identified_{};  // [s] stamp of the modes in use, an axis each
   StreamSorter::Stream conditions_, goals_, hammers_, angles_, blocks_;
   std::optional<SpindleForceSensor> spindle_;
+  double spindle_length_ = 0.0;  // [m] 0: not told
+  std::optional<CuttingCondition> condition_;
+  TapParameters taps_;
+  SpindleSensorCalibrator calibrator_;
   std::optional<SensorMatrix> matrix_;
   std::deque<std::pair<std::uint64_t, std::uint64_t>> invalid_;  // samples [from, to) that are no measurement
   std::function<void()> restarted_;

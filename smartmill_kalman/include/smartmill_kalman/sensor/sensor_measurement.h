@@ -45,7 +45,8 @@ struct SensorResult {
   MeasuredModes modes;       ///< [1] static gain 1
   double noise_rms = 0.0;    ///< [N] of one sample of the sensor, from the samples before the hits
   double static_gain = 0.0;  ///< [1] measured, before the fit took it for 1; negative: blow against the axis
-  double static_gain_std = 0.0;  ///< [1]
+  double static_gain_std = 0.0;    ///< [1]
+  std::vector<double> hit_stamps;  ///< [s] triggers of the hits that count
 };
 
 struct TapFeedback {

@@ -47,6 +47,9 @@ class SpindleForceSensor {
   /// Whether a block is one of this sensor: it has the first of its channels.
   static bool isSixChannels(const SampleBlock& block);
 
+  /// Columns of the six sensors. @throws Error when one is missing or not in N.
+  static std::array<std::size_t, 6> columnsOf(const SampleBlock& block);
+
   /// Dynamics of an axis (shown over applied, static gain 1) through which the unbalance shows.
   void setSensor(std::size_t axis, const ModalModel& sensor) { sensor_.at(axis) = sensor; }
 

@@ -9,19 +9,22 @@
 #include <vector>
 
 #include "smartmill_core/modal/modal_model.h"
+#include "smartmill_core/signal/force_channels.h"
 
 namespace smartmill::kalman {
 
-/// Channels of a spindle-integrated sensor: three pairs of preloaded quartz rings, compression positive.
-constexpr std::array<const char*, 6> SPINDLE_SENSOR_CHANNELS{{"x1", "x2", "y1", "y2", "z1", "z2"}};
-
-/// A calibration constant over the length of tool and holder (Burzoni eq. 3-4): applied over shown force.
+/// A calibration constant over the length of tool and holder: applied over shown force. A line (Burzoni eq.
+/// 3-4), or its reciprocal is one, as a beam bends.
 struct LengthLine {
+  bool reciprocal = false;
   double slope = 0.0;                                           ///< [1/m]
   double offset = 0.0;                                          ///< [1]
   double slope_std = std::numeric_limits<double>::quiet_NaN();  ///< [1/m]
   double offset_std = std::numeric_limits<double>::quiet_NaN();
-  double at(double length) const { return slope * length + offset; }  ///< [1] at length [m]
+  double at(double length) const {  ///< [1] at length [m]
+    const double line = slope * length + offset;
+    return reciprocal ? 1.0 / line : line;
+  }
 };
 
 /// What turns six sensors into three forces (Burzoni ch. 3).
@@ -32,6 +35,8 @@ struct SpindleSensorCalibration {
   /// Course of the cross-talk over frequency with static gain 1 (eq. 3-7), driven by the force that the first
   /// axis shows. Ideal: static cross-talk (eq. 3-5).
   ModalModel dynamic_yx, dynamic_yz, dynamic_xz;
+  /// [m] of tool and holder that the constants are known for.
+  std::array<double, 2> lengths{{0.0, std::numeric_limits<double>::infinity()}};
   std::array<double, 6> preload{{0, 0, 0, 0, 0, 0}};  ///< [N] > 0 compression of each sensor at rest
   double least_compression = 0.0;                     ///< [N] >= 0 a sensor left with less is not measuring
   double range_limit = std::numeric_limits<double>::infinity();  ///< [N] compression beyond it is an overload
@@ -95,7 +100,9 @@ struct StaticCalibration {
 
 /// Constants by least squares over all readings of one length (offset and drift of every test among the
 /// unknowns), then their lines over length (eq. 3-4), weighted. One length: no slope. A cross-talk within two
-/// of its standard deviations is none. @param base gives what readings do not tell (preload, limits).
+/// of its standard deviations is none. A beam's reciprocal line is taken where three lengths or more prove
+/// it.
+/// @param base gives what readings do not tell (preload, limits).
 /// @throws Error when a direction was never loaded.
 StaticCalibration calibrateStatic(const StaticReadings& readings, const SpindleSensorCalibration& base);
 

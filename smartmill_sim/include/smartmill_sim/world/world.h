@@ -11,6 +11,8 @@
 #include "smartmill_core/signal/streams.h"
 #include "smartmill_sim/controller/controller.h"
 #include "smartmill_sim/world/motor_currents.h"
+#include "smartmill_sim/world/plate.h"
+#include "smartmill_sim/world/spindle_sensor.h"
 #include "smartmill_sim/world/station_traits.h"
 
 namespace smartmill::sim {
@@ -26,6 +28,8 @@ struct WorldOptions {
   int servo_trigger = 0;
   StationTraits hammer;
   MotorTraits motor;
+  SpindleSensorTraits spindle_sensor;
+  PlateTraits plate;
 
   void declare(ParameterTable& table) {
     table.number("seed", seed, "1", Range::notNegative(), "of noise and scatter");
@@ -42,6 +46,8 @@ struct WorldOptions {
                  "N word of the block that starts the trigger in daq/servo; 0: none");
     table.part("hammer_", hammer);
     table.part("motor_", motor);
+    table.part("spindle_sensor_", spindle_sensor);
+    table.part("plate_", plate);
     table.section();
   }
   /// @throws Error naming key and value.
@@ -60,7 +66,8 @@ class World {
   /// What the sensors deliver and what is true; stamps [s] count from sample 0.
   struct Block {
     SampleBlock hammer;       ///< hammer [N] positive in compression, gap [V]; gap_cross [V] where it stands
-    SampleBlock dynamometer;  ///< fx, fy, fz [N]
+    SampleBlock dynamometer;  ///< fx, fy, fz [N]; of a plate also mx, my, mz [N m]
+    SampleBlock spindle_force;  ///< x1 .. z2 [N]; without channels where the spindle has no such sensors
     std::array<SpindleAngle, ANGLES> angle;
     ForceBlock force;       ///< true force of the cut on the tool
     SampleBlock vibration;  ///< true displacement of the tip, x, y [m]
@@ -87,6 +94,14 @@ class World {
   /// Fires a hammer, once. May be called from any thread. @param point tool or force_sensor @param message
   /// one line
   StrikeAnswer strike(const std::string& point, const std::string& direction, std::string& message);
+
+  /// Something pulls at the tool's tip from now on. @param force [N] on the tool @param on_table against the
+  /// workpiece: the force sensor under it feels it too. May be called from any thread, as the next two.
+  void pull(const std::array<double, 3>& force, bool on_table);
+  /// Another tool and holder in the spindle. @param length [m] @throws Error where nothing depends on it.
+  void setToolLength(double length);
+  /// Where blows on the workpiece go. @param point [m] from the plate's origin
+  void setTapPoint(const std::array<double, 3>& point);
 
   /// The next BLOCK samples.
   void advance(Block& block);

@@ -1,0 +1,254 @@
+#include "smartmill_kalman/sensor/spindle_sensor_calibrator.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
+#include "smartmill_core/units.h"
+#include "smartmill_kalman/sensor/spindle_force_sensor.h"
+
+namespace smartmill::kalman {
+namespace {
+
+using Code = CalibrationResult::Code;
+
+constexpr double SAME_TIME = 1e-6;    // [s] stamps are rounded to nanoseconds
+constexpr double DUE = 0.05;          // [1] Burzoni 3.2.1
+constexpr double MOST_WAITING = 1e6;  // samples of one stream without the other's index
+
+}  // namespace
+
+SpindleSensorCalibrator::SpindleSensorCalibrator(const TapParameters& taps,
+                                                 const SpindleSensorCalibration& base)
+    : parameters_(taps), base_(base) {
+  readings_.file = "readings";
+  reference_.file = "reference readings";
+  collectors_.assign(
+      3, HitCollector({parameters_.trigger_force, parameters_.pre_trigger, parameters_.record_length}));
+}
+
+void SpindleSensorCalibrator::reset() {
+  *this = SpindleSensorCalibrator(parameters_, base_);
+}
+
+std::optional<CalibrationResult> SpindleSensorCalibrator::takeResult() {
+  return std::exchange(result_, std::nullopt);
+}
+
+void SpindleSensorCalibrator::finish(Code code, const std::string& message) {
+  CalibrationResult result;
+  result.code = code;
+  result.message = message;
+  result.readings = readings_.size();
+  goal_.reset();
+  result_ = result;
+}
+
+void SpindleSensorCalibrator::cancel() {
+  if (goal_) finish(Code::cancelled, "cancelled");
+}
+
+bool SpindleSensorCalibrator::handle(const CalibrationGoal& goal) {
+  if (goal_) return false;
+  begun_ = true;
+  if (goal.step == CalibrationGoal::Step::fit) {
+    fit();
+  } else if (goal.step == CalibrationGoal::Step::verify) {
+    verify();
+  } else if (goal.step == CalibrationGoal::Step::forget) {
+    reset();
+    begun_ = true;
+    finish(Code::ok, "readings and taps are forgotten");
+  } else if (!(goal.length > 0.0)) {
+    finish(Code::bad_goal, formatted("length %g m: above 0 is due", goal.length));
+  } else if (!(goal.duration > 0.0 && goal.duration <= 60.0)) {
+    finish(Code::bad_goal, formatted("duration %g s: above 0, at most 60 s are due", goal.duration));
+  } else if (!(std::isfinite(goal.load[0]) && std::isfinite(goal.load[1]) && std::isfinite(goal.load[2]))) {
+    finish(Code::bad_goal, "load: a number is due along each axis");
+  } else {
+    goal_ = goal;
+    sum_ = {};
+    time_sum_ = 0.0;
+    count_ = 0;
+    next_index_.reset();
+  }
+  return true;
+}
+
+void SpindleSensorCalibrator::handle(const SampleBlock& block) {
+  const std::array<std::size_t, 6> column = SpindleForceSensor::columnsOf(block);
+  if (goal_) read(block, column);
+  if (direction_.empty()) return;
+  for (std::size_t i = 0; i < block.size(); ++i) {
+    std::array<double, 6> sensors{};
+    for (std::size_t k = 0; k < 6; ++k) sensors[k] = block.at(i, column[k]);
+    means_.push_back({block.timeOf(i), block.first_index + i, block.sample_rate, pairMeans(sensors)});
+  }
+  join();
+}
+
+void SpindleSensorCalibrator::read(const SampleBlock& block, const std::array<std::size_t, 6>& column) {
+  const auto due = static_cast<std::size_t>(std::ceil(goal_->duration * block.sample_rate));
+  for (std::size_t i = 0; i < block.size(); ++i) {
+    const double time = block.timeOf(i);
+    if (time < goal_->stamp - SAME_TIME) continue;
+    if (next_index_ && *next_index_ != block.first_index + i)
+      return finish(Code::bad_data, "samples were lost during the reading");
+    next_index_ = block.first_index + i + 1;
+    for (std::size_t k = 0; k < 6; ++k) sum_[k] += block.at(i, column[k]);
+    time_sum_ += time;
+    if (++count_ < due) continue;
+    const double n = static_cast<double>(count_);
+    std::array<double, 6> mean{};
+    for (std::size_t k = 0; k < 6; ++k) mean[k] = sum_[k] / n;
+    for (std::size_t k = 0; k < 6; ++k) {
+      if (!std::isfinite(mean[k])) {
+        return finish(Code::bad_data,
+                      formatted("channel %s is not a number in the reading", SPINDLE_SENSOR_CHANNELS[k]));
+      }
+    }
+    StaticReadings& to = goal_->reference ? reference_ : readings_;
+    to.test.push_back(goal_->test);
+    to.time.push_back(time_sum_ / n);
+    to.length.push_back(goal_->length);
+    to.load.push_back(goal_->load);
+    to.sensors.push_back(mean);
+    if (!(tap_length_ > 0.0)) tap_length_ = goal_->length;
+    return finish(Code::ok, formatted("reading %zu: %.2f %.2f %.2f %.2f %.2f %.2f N", to.size(), mean[0],
+                                      mean[1], mean[2], mean[3], mean[4], mean[5]));
+  }
+}
+
+void SpindleSensorCalibrator::handleHammer(const SampleBlock& block) {
+  if (direction_.empty()) return;
+  const std::size_t c = block.channel("hammer");
+  for (std::size_t i = 0; i < block.size(); ++i) hammer_.push_back({block.first_index + i, block.at(i, c)});
+  join();
+}
+
+void SpindleSensorCalibrator::join() {
+  while (!hammer_.empty() && !means_.empty()) {
+    const Sample h = hammer_.front();
+    const Means m = means_.front();
+    if (h.index <= m.index) hammer_.pop_front();
+    if (m.index <= h.index) means_.pop_front();
+    if (h.index != m.index) continue;
+    tap_rate_ = m.rate;
+    std::array<Hit, 3> hit;
+    std::size_t whole = 0;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      HitCollector& collector = collectors_[axis];
+      if (!collector.armed() && !collector.recording()) collector.arm();
+      auto record = collector.add(m.time, m.index, m.rate, h.force, m.pair[axis]);
+      if (!record || !record->fault.empty()) continue;
+      hit[axis] = std::move(record->hit);
+      ++whole;
+    }
+    if (whole == 3) hits_.push_back(std::move(hit));
+  }
+  if (static_cast<double>(std::max(hammer_.size(), means_.size())) > MOST_WAITING) tapping("");
+}
+
+void SpindleSensorCalibrator::tapping(const std::string& direction, double length) {
+  direction_ = direction;
+  if (length > 0.0) tap_length_ = length;
+  hammer_.clear();
+  means_.clear();
+  hits_.clear();
+  for (HitCollector& collector : collectors_) collector.reset();
+}
+
+void SpindleSensorCalibrator::tapped(const SensorResult& result) {
+  const std::size_t along = direction_ == "x" ? 0 : direction_ == "y" ? 1 : 2;
+  if (!direction_.empty() && result.code == FrfCode::ok) {
+    taps_[along].clear();
+    for (const std::array<Hit, 3>& hit : hits_) {
+      const double stamp = hit[0].stamp;
+      const bool good = std::any_of(result.hit_stamps.begin(), result.hit_stamps.end(),
+                                    [stamp](double s) { return std::abs(s - stamp) < SAME_TIME; });
+      if (good) taps_[along].push_back({hit[0].response, hit[1].response, hit[2].response});
+    }
+  }
+  tapping("");
+}
+
+/// Courses of the cross-talk where there are taps. @return what was found, for the message
+std::string SpindleSensorCalibrator::fitCourses(SpindleSensorCalibration& c) const {
+  std::string text;
+  const auto course = [&](std::size_t along, std::size_t in, const std::optional<LengthLine>& line,
+                          ModalModel& model, const char* name) {
+    const auto& taps = taps_[along];
+    if (taps.empty() || !line) return;
+    const double constant = along == 0 ? c.x.at(tap_length_) : c.y.at(tap_length_);
+    std::vector<std::vector<double>> shown, cross;
+    for (const auto& tap : taps) {
+      shown.push_back(tap[along]);
+      cross.push_back(tap[in]);
+      for (std::vector<double>* record : {&shown.back(), &cross.back()}) {
+        double zero = 0.0;
+        const auto quiet = static_cast<std::size_t>(0.75 * parameters_.pre_trigger * tap_rate_);
+        for (std::size_t i = 0; i < quiet; ++i) zero += record->at(i) / static_cast<double>(quiet);
+        for (double& v : *record) v -= zero;
+      }
+      for (double& v : shown.back()) v *= constant;
+    }
+    try {
+      model = fitDynamicCrossTalk(shown, cross, line->at(tap_length_), tap_rate_, parameters_.fit_low,
+                                  parameters_.fit_high, parameters_.max_modes);
+      text += formatted(", %s with %zu modes", name, model.modes.size());
+    } catch (const Error&) {
+      text += std::string(", ") + name + " static alone";
+    }
+  };
+  course(1, 0, c.yx, c.dynamic_yx, "yx");
+  course(1, 2, c.yz, c.dynamic_yz, "yz");
+  course(0, 2, c.xz, c.dynamic_xz, "xz");
+  return text;
+}
+
+std::string SpindleSensorCalibrator::readingsTable() const {
+  std::string out =
+      "test,time[s],length[mm],load_x[N],load_y[N],load_z[N],x1[N],x2[N],y1[N],y2[N],z1[N],z2[N]\n";
+  for (std::size_t i = 0; i < readings_.size(); ++i) {
+    out += formatted("%d,%.9g,%.9g", readings_.test[i], readings_.time[i] - readings_.time[0],
+                     readings_.length[i] / units::MM);
+    for (const double load : readings_.load[i]) out += formatted(",%.9g", load);
+    for (const double sensor : readings_.sensors[i]) out += formatted(",%.9g", sensor);
+    out += "\n";
+  }
+  return out;
+}
+
+void SpindleSensorCalibrator::fit() {
+  try {
+    StaticCalibration found = calibrateStatic(readings_, base_);
+    const std::string courses = fitCourses(found.calibration);
+    const SpindleSensorCalibration& c = found.calibration;
+    finish(Code::ok, formatted("%zu readings at %zu lengths: constants x %.3f, y %.3f, z %.3f at %.0f mm",
+                               readings_.size(), found.lengths.size(), c.x.at(tap_length_),
+                               c.y.at(tap_length_), c.z.at(tap_length_), tap_length_ / units::MM) +
+                         courses);
+    result_->calibration = c;
+    base_ = c;
+  } catch (const Error& e) {
+    finish(Code::fit_failed, e.what());
+  }
+}
+
+void SpindleSensorCalibrator::verify() {
+  try {
+    const auto error = verifyStatic(reference_, base_);
+    const bool good = *std::max_element(error.begin(), error.end()) <= DUE;
+    finish(good ? Code::ok : Code::fit_failed,
+           formatted("largest difference to the reference x %.2f, y %.2f, z %.2f %% (%.0f due)",
+                     100.0 * error[0], 100.0 * error[1], 100.0 * error[2], 100.0 * DUE));
+    result_->readings = reference_.size();
+    result_->error = error;
+  } catch (const Error& e) {
+    finish(Code::fit_failed, e.what());
+  }
+}
+
+}  // namespace smartmill::kalman

@@ -1,0 +1,95 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <random>
+#include <vector>
+
+#include "smartmill_core/modal/modal_filter.h"
+#include "smartmill_core/modal/modal_model.h"
+#include "smartmill_core/parameters/parameter_table.h"
+
+namespace smartmill::sim {
+
+/// A ring of six preloaded quartz washers in the spindle's flange (Burzoni ch. 3). Defaults show, at a tool
+/// and holder of 139 mm, the constants of his Table 3.
+struct SpindleSensorTraits {
+  bool present = false;
+  double length = 0.139;
+  std::array<double, 3> reach{{0.166, 0.146, 0.166}};
+  std::array<double, 3> bending{{0.217, 0.195, 0.200}};
+  std::array<double, 3> pair_angle{{0.995, 0.0, -0.365}};
+  std::array<double, 3> mismatch{{0.002, -0.002, 0.134}};
+  double axial = 0.01601;
+  std::array<double, 3> preload{{6045.0, 6047.0, 6034.0}};
+  double range_limit = 36e3;
+  std::vector<double> x_frequency{430.0, 930.0, 1900.0}, x_damping{0.05, 0.04, 0.03};
+  std::vector<double> x_share{0.30, 0.50, 0.15};
+  std::vector<double> y_frequency{460.0, 1080.0, 2050.0}, y_damping{0.05, 0.04, 0.03};
+  std::vector<double> y_share{0.25, 0.55, 0.15};
+  std::vector<double> z_frequency{2100.0}, z_damping{0.04}, z_share{0.9};
+  double reference_length = 0.139;
+  double length_exponent = 0.6;
+  double plane_turn = 0.03;
+  double unbalance = 2.0e-5;
+  double unbalance_angle = 0.7;
+  double zero = 20.0;
+  double drift = 0.04;
+  double thermal = 15.0;
+  double thermal_time = 600.0;
+  double noise = 0.03;
+  double noise_turning = 0.25;
+  double noise_cut = 0.01;
+  double bearing = 0.05;
+  double bearing_order = 5.37;
+
+  void declare(ParameterTable& table);
+  /// @throws Error naming key and value.
+  void validate() const;
+};
+
+/// The ring in motion: a force on the tool's tip bends the spindle, whose modes hang on tool and holder, and
+/// the moment at the ring presses one washer of each pair and frees the other: each shows (length + reach) F
+/// over a lever, a line in the length of tool and holder (so that a calibration constant, its reciprocal, is
+/// none). A pair beside the axis that it is called after and two washers that do not answer alike make
+/// cross-talk.
+class SpindleSensor {
+ public:
+  /// @param step [s] of integration. @throws Error naming key and value.
+  SpindleSensor(const SpindleSensorTraits& traits, double step, double sample_rate, std::uint64_t seed);
+
+  /// Another tool and holder: the modes begin anew, at rest. @param length [m] @throws Error.
+  void setLength(double length);
+
+  /// Shown over applied force of an axis, as the main pair alone shows it, principal planes not turned.
+  const ModalModel& modes(std::size_t axis) const { return modes_.at(axis); }
+  /// Pair's mean [row] over a static force along [column] [1].
+  std::array<std::array<double, 3>, 3> shares() const;
+
+  /// One integration step. @param force [N] on the tool besides the unbalance @param angle [rad], speed
+  /// [rad/s] of the spindle
+  void step(const std::array<double, 3>& force, double angle, double speed);
+  /// The sample that these steps make: means over them, zero and drift, noise; a washer without compression
+  /// shows no less. @return x1 .. z2 [N]
+  std::array<double, 6> read();
+  /// Time goes on without it.
+  void lose(double time) { time_ += time; }
+
+ private:
+  void layOut();
+
+  SpindleSensorTraits traits_;
+  double step_, sample_;  // [s]
+  double length_;         // [m]
+  std::array<ModalModel, 3> modes_;
+  std::vector<ModalFilter> filters_;  // principal planes and axis
+  std::mt19937_64 random_;
+  std::normal_distribution<double> normal_;
+  std::array<double, 6> zero_{}, drift_{};  // [N], [N/s]
+  double time_ = 0.0, warm_ = 0.0;          // [s], [1] of the spindle
+  std::array<double, 3> moment_sum_{};      // [N] what the modes make of the force, summed over steps
+  double angle_ = 0.0, speed_ = 0.0, bearing_angle_ = 0.0;
+  int steps_ = 0;
+};
+
+}  // namespace smartmill::sim

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <array>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "smartmill_core/model/machine_model.h"
+#include "smartmill_kalman/compensation/sorted_compensation.h"
+#include "smartmill_sim/world/world.h"
+
+namespace smartmill::kalman {
+
+/// The simulated machine with its sensors, led by hand without ROS, and what SortedCompensation makes of one
+/// of them: the streams that the nodes would exchange, in one thread.
+class SpindleRig {
+ public:
+  /// @param use_plate the dynamometer's blocks are compensated; false: those of the sensor in the spindle
+  SpindleRig(const MachineModel& model, const sim::WorldOptions& options,
+             const CompensationParameters& filter, const TapParameters& taps, bool use_plate);
+
+  SortedCompensation& sorted() { return *sorted_; }
+  sim::World& world() { return world_; }
+  double now() const { return now_; }  ///< [s]
+
+  /// The machine stands or moves on. @param velocity [m/s] of the tool
+  void run(double seconds, const std::array<double, 3>& velocity = {});
+  void place(const std::array<double, 3>& position) { position_ = position; }
+  void spin(double speed) { speed_ = speed; }  ///< [rad/s]
+  void tell(CuttingCondition::Kind kind, const Engagement& engagement = {});
+
+  /// Weights as Burzoni hangs them (3.2), or the tool against the workpiece (3.2.1).
+  void readStatic(const std::vector<double>& lengths, const std::vector<double>& loads, bool reference);
+  /// The answer to a step of the calibration. @throws Error when none comes.
+  CalibrationResult ask(const CalibrationGoal& goal);
+  /// Taps of kalman/measure_frf. @throws Error when none comes.
+  SensorResult tap(const std::string& direction, int hits);
+
+  /// What the sensors showed, what was made of it and what was true, from start() to take().
+  struct Record {
+    std::array<std::vector<double>, 3> truth, measured, compensated, dynamometer;
+    std::array<std::vector<double>, 6> sensors;
+    std::vector<double> angle;  ///< [rad] of tooth 1
+  };
+  int slots();  ///< asked for before
+  void start();
+  /// Ends it.
+  Record take();
+
+ private:
+  void hear(const sim::World::Block& block);
+
+  MachineModel model_;
+  sim::World world_;
+  bool use_plate_;
+  std::unique_ptr<SortedCompensation> sorted_;
+  std::array<double, 3> position_{{0, 0, 0}};
+  double speed_ = 0.0, angle_ = 0.0, now_ = 0.0;
+  int tests_ = 0, slots_ = 0;
+  std::optional<CalibrationResult> calibration_;
+  std::optional<SensorResult> tapped_;
+  bool recording_ = false;
+  double from_ = 0.0;  // [s] of the record
+  Record record_;
+};
+
+/// A straight slot through the stock of the model along x, at constant speed; the record holds whole blocks
+/// from full engagement on. @param speed [rad/s] @param depth [m] @param feed [m] a tooth @param air [s]
+/// before it
+SpindleRig::Record cutSlot(SpindleRig& rig, const MachineModel& model, double speed, double depth,
+                           double feed, double air, double seconds);
+
+}  // namespace smartmill::kalman
