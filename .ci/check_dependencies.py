@@ -7,7 +7,7 @@ from packages import includes, packages, report, system_includes, text
 
 # First folder of a header, or name that CMake finds: name in package.xml. None: no package has to be declared.
 HEADERS = {
-    "Eigen": "eigen", "ceres": "libceres-dev", "fftw3.h": "fftw3", "gsl": "libgsl", "yaml-cpp": "yaml-cpp",
+    "Eigen": "eigen", "ceres": "libceres-dev", "fftw3.h": "fftw3", "sndfile.h": "libsndfile1-dev", "gsl": "libgsl", "yaml-cpp": "yaml-cpp",
     "nlohmann": "nlohmann-json-dev", "CLI": "cli11", "sqlite3.h": "sqlite3", "benchmark": "benchmark",
     "rapidcheck": "rapidcheck", "rapidcheck.h": "rapidcheck", "ros": "roscpp", "boost": "boost",
     "glog": "libgoogle-glog-dev", "unsupported": "eigen", "gtest": None, "gmock": None,

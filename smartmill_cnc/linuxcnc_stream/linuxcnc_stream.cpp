@@ -7,6 +7,7 @@
 #include <sys/shm.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <iostream>
 #include <list>
@@ -46,10 +47,12 @@ class Component {
       throw Error("no component of HAL can be made (code " + std::to_string(id_) + ")");
     }
     pins_ = static_cast<Pins*>(::hal_malloc(sizeof(Pins)));
-    const bool made = pins_ &&
-                      ::hal_pin_bit_new((prefix_ + ".permit").c_str(), HAL_IO, &pins_->permit, id_) == 0 &&
-                      ::hal_pin_bit_new((prefix_ + ".beat").c_str(), HAL_IO, &pins_->beat, id_) == 0 &&
-                      ::hal_pin_float_new((prefix_ + ".load").c_str(), HAL_IO, &pins_->load, id_) == 0;
+    const bool made =
+        pins_ && ::hal_pin_bit_new((prefix_ + ".permit").c_str(), HAL_IO, &pins_->permit, id_) == 0 &&
+        ::hal_pin_bit_new((prefix_ + ".beat").c_str(), HAL_IO, &pins_->beat, id_) == 0 &&
+        ::hal_pin_float_new((prefix_ + ".load").c_str(), HAL_IO, &pins_->load, id_) == 0 &&
+        ::hal_pin_float_new((prefix_ + ".feed-override").c_str(), HAL_IO, &pins_->feed, id_) == 0 &&
+        ::hal_pin_float_new((prefix_ + ".spindle-override").c_str(), HAL_IO, &pins_->spindle, id_) == 0;
     ::hal_ready(id_);
     if (!made || ::hal_link((prefix_ + ".permit").c_str(), PERMIT_SIGNAL) != 0 ||
         ::hal_link((prefix_ + ".beat").c_str(), BEAT_SIGNAL) != 0) {
@@ -59,6 +62,9 @@ class Component {
     }
     // A signal that the drive writes itself is left to it.
     loads_ = ::hal_link((prefix_ + ".load").c_str(), LOAD_SIGNAL) == 0;
+    overrides_ = ::hal_link((prefix_ + ".feed-override").c_str(), FEED_SIGNAL) == 0 &&
+                 ::hal_link((prefix_ + ".spindle-override").c_str(), SPINDLE_SIGNAL) == 0;
+    setOverrides({});
     if (::hal_stream_attach(&stream_, id_, SAMPLER_FIFO, SAMPLER_PINS) < 0) {
       ::hal_exit(id_);
       throw Error("the controller's configuration has no sampler '" + std::string(SAMPLER_PINS) + "'");
@@ -99,6 +105,16 @@ class Component {
     *pins_->permit = on;
     *pins_->beat = !*pins_->beat;
   }
+  /// motion.adaptive-feed goes up to 1. @return why not
+  Reply setOverrides(const SetOverrides& wanted) {
+    if (!overrides_) {
+      return {Reply::Code::refused, std::string("the controller's configuration has no signals '") +
+                                        FEED_SIGNAL + "' and '" + SPINDLE_SIGNAL + "'"};
+    }
+    *pins_->feed = std::clamp(wanted.feed, 0.0, 1.0);
+    *pins_->spindle = std::max(0.0, wanted.spindle);
+    return {};
+  }
   void setLoad(double load) {
     if (loads_) {
       *pins_->load = load;
@@ -108,7 +124,7 @@ class Component {
  private:
   struct Pins {
     hal_bit_t *permit, *beat;
-    hal_float_t* load;
+    hal_float_t *load, *feed, *spindle;
   };
 
   bool readOne() {
@@ -133,7 +149,7 @@ class Component {
   const std::string prefix_;
   const int id_;
   Pins* pins_ = nullptr;
-  bool loads_ = false;
+  bool loads_ = false, overrides_ = false;
   hal_stream_t stream_{};
   bool ahead_ = false;  // a sample that was read and not handed out
   std::uint32_t number_ = 0;
@@ -245,6 +261,8 @@ class Server {
     while (const std::optional<Received> received = client.next()) {
       if (const auto* load = std::get_if<SetLoad>(&received->message)) {
         component.setLoad(load->spindle_load);
+      } else if (const auto* overrides = std::get_if<SetOverrides>(&received->message)) {
+        client.send(component.setOverrides(*overrides), received->sequence);
       }
     }
   }

@@ -82,6 +82,22 @@ Answer<ArmCode> Bridge::arm(bool on) {
   return {ArmCode::not_connected, "motion is not armed: " + answer.failure().message};
 }
 
+OverrideAnswer Bridge::setOverrides(const Overrides& wanted, const std::string& reason) {
+  OverrideAnswer answer;
+  answer.code = OverrideCode::not_connected;
+  answer.message = "no connection to the " + controller_->name();
+  if (!controller_->connected() || !state_.connected) {
+    return answer;
+  }
+  const Result<OverrideAnswer> said = motion_.setOverrides(wanted, reason);
+  if (said) {
+    return *said;
+  }
+  notice(said.failure());
+  answer.message = said.failure().message;
+  return answer;
+}
+
 Answer<HoldCode> Bridge::hold() {
   if (!controller_->connected()) {
     return {HoldCode::not_connected, "no connection to the " + controller_->name()};

@@ -37,6 +37,7 @@ class BridgeTest : public ::testing::Test {
     FocasParameters focas;
     focas.port = port;
     focas.reply_timeout = reply_timeout;
+    focas.override_data = override_data_;
     MotionParameters motion;
     motion.read_only = false;
     motion.limits.travel = {{{-0.2, 0.2}, {-0.2, 0.2}, {-0.2, 0.2}}};
@@ -90,6 +91,7 @@ class BridgeTest : public ::testing::Test {
   std::unique_ptr<focas::Server> server_;
   std::uint16_t port_ = 0;
   std::unique_ptr<Bridge> bridge_;
+  int override_data_ = -1;
   double now_ = 100.0;  // [s]
   std::vector<std::string> notes_;
 };

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
 
 #include "bridge_rig.h"
 #include "fault_proxy.h"
@@ -395,6 +396,59 @@ TEST(BridgeConnect, ClosedPortIsOneLine) {
   EXPECT_EQ(
       notes[0].text,
       "cannot connect to the controller at 127.0.0.1:1: Connection refused; trying again every 1.0 to 8.0 s");
+}
+
+TEST_F(BridgeTest, OverridesGoToTheDataTableWhileAProgramRunsAndComeBack) {
+  override_data_ = 500;
+  connectBridge(port_);
+  const auto table = [&](int number) {
+    const std::map<int, int> data = machine_.get(machine_.data_table);
+    const auto found = data.find(number);
+    return found == data.end() ? -1 : found->second;
+  };
+  cycle();
+  EXPECT_EQ(bridge_->setOverrides({0.9, 0.9}, "").code, OverrideCode::not_armed);
+  arm();
+  cycle();
+  EXPECT_EQ(table(500), 100);  // whatever was left there
+  EXPECT_EQ(bridge_->setOverrides({0.9, 0.9}, "").message, "overrides: no program runs");
+  CuttingCondition condition;
+  condition.kind = CuttingCondition::Kind::cut;
+  condition.name = "slot_1";
+  condition.spindle_speed = units::radPerSecFromRpm(11000.0);
+  ASSERT_FALSE(bridge_->runProgram("slot", "S3000 M3\nN10 G0 X10\nN20 G1 X40 F1200\nM30\n", condition));
+  cycleUntil([&] { return bridge_->state().feed > 0.0; });
+  const OverrideAnswer taken = bridge_->setOverrides({0.403, 0.954}, "chatter");
+  EXPECT_EQ(taken.code, OverrideCode::ok) << taken.message;
+  EXPECT_DOUBLE_EQ(taken.taken.feed, 0.4);
+  EXPECT_DOUBLE_EQ(taken.taken.spindle, 0.95);
+  EXPECT_EQ(table(500), 40);
+  EXPECT_EQ(table(501), 95);
+  // Beyond the limits nothing is written.
+  for (const Overrides& wrong : {Overrides{0.1, 1.0}, Overrides{1.0, 1.3}, Overrides{1.0, 0.2},
+                                 Overrides{NAN, 1.0}, Overrides{1.0, 1.15}}) {
+    const OverrideAnswer answer = bridge_->setOverrides(wrong, "");
+    EXPECT_EQ(answer.code, OverrideCode::limit) << wrong.feed << " " << wrong.spindle;
+    EXPECT_EQ(answer.message.find('\n'), std::string::npos);
+  }
+  EXPECT_NE(bridge_->setOverrides({1.0, 1.15}, "").message.find("above the highest speed, 12000 rpm"),
+            std::string::npos);  // 1.15 x 11,000
+  EXPECT_EQ(table(501), 95);
+  EXPECT_EQ(finish().code, MotionCode::ok);
+  cycle();
+  EXPECT_EQ(table(500), 100);
+  EXPECT_EQ(table(501), 100);
+  EXPECT_TRUE(noted("feed 40 %, spindle 95.0 %: chatter"));
+}
+
+TEST_F(BridgeTest, OverridesThatTheControllerRefusesGiveOneLine) {
+  arm();
+  ASSERT_FALSE(bridge_->runProgram("slot", "N20 G1 X40 F1200\nM30\n", {}));
+  cycleUntil([&] { return bridge_->state().feed > 0.0; });
+  const OverrideAnswer answer = bridge_->setOverrides({0.9, 0.9}, "");
+  EXPECT_EQ(answer.code, OverrideCode::refused);
+  EXPECT_NE(answer.message.find("takes no overrides from outside"), std::string::npos) << answer.message;
+  EXPECT_EQ(finish().code, MotionCode::ok);
 }
 
 }  // namespace

@@ -29,6 +29,7 @@ class TestMachine : public focas::ControllerInterface {
   int starts = 0, ends = 0, cancels = 0, disconnects = 0, resets = 0;
   focas::EwCode refuse_start = focas::EW_OK;
   std::map<int, double> macros;
+  std::map<int, int> data_table;  ///< of the PMC
 
   TestMachine() { state.aut = focas::AUT_REMOTE; }
 
@@ -107,6 +108,16 @@ class TestMachine : public focas::ControllerInterface {
       *value = found->second;
     }
     return number > 9999 ? focas::EW_NUMBER : focas::EW_OK;
+  }
+  focas::EwCode writePmc(focas::PmcArea area, int first, const focas::Bytes& bytes) override {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (area != focas::PmcArea::d) {
+      return focas::EW_NUMBER;
+    }
+    for (std::size_t i = 0; i < bytes.size(); ++i) {
+      data_table[first + static_cast<int>(i)] = bytes[i];
+    }
+    return focas::EW_OK;
   }
   focas::EwCode writeMacro(int number, std::optional<double> value) override {
     const std::lock_guard<std::mutex> lock(mutex_);

@@ -62,6 +62,17 @@ void keep(const Options& o, CoefficientRecord record) {
   std::printf("  %s: %s\n", o.database.c_str(), is_new ? "kept" : "was there already");
 }
 
+/// Every cut of a bag.
+void keepCuts(const Options& o, std::vector<CoefficientRecord> cuts) {
+  if (o.database.empty() || !o.parameters.keep_cuts) return;
+  for (CoefficientRecord& cut : cuts) {
+    cut.rake = units::radFromDeg(o.rake);
+    cut.bag = o.source_path;
+  }
+  std::printf("  %s: %zu of %zu cuts new\n", o.database.c_str(), CoefficientDatabase(o.database).add(cuts),
+              cuts.size());
+}
+
 /// Means of the cuts of a campaign.
 CoefficientRecord recordOf(const Campaign& campaign, const MachineModel& model) {
   CoefficientRecord r;
@@ -170,7 +181,10 @@ void run(const Options& o) {
     const auto progress = [terminal](double share) {
       if (terminal) std::fprintf(stderr, "\rreading %3.0f %%%s", 100.0 * share, share >= 1.0 ? "\n" : "");
     };
-    const auto results = identifyFromBag(o.source_path, readMachineModel(model_file), parameters, progress);
+    std::vector<CoefficientRecord> cuts;
+    const auto results = identifyFromBag(o.source_path, readMachineModel(model_file), parameters, progress,
+                                         {}, [&](const CoefficientRecord& cut) { cuts.push_back(cut); });
+    keepCuts(o, std::move(cuts));
     for (const IdentifyResult& result : results) {
       if (result.code != IdentifyResult::Code::ok) throw Error(o.source_path + ": " + result.message);
       std::printf("%s\n", result.message.c_str());

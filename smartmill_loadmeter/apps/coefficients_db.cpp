@@ -9,6 +9,7 @@
 #include "smartmill_core/units.h"
 #include "smartmill_loadmeter/database/database.h"
 #include "smartmill_loadmeter/database/oblique.h"
+#include "smartmill_loadmeter/database/recommend.h"
 
 namespace {
 
@@ -64,6 +65,26 @@ void find(const Options& o) {
               cuttingSection(found->set.value, found->set.std_dev).c_str());
 }
 
+void answer(const Options& o) {
+  mustExist(o.file);
+  CoefficientQuery query;
+  query.tool = o.tool;
+  query.material = o.material;
+  query.cutting_speed = o.cutting_speed * units::M_PER_MIN;
+  query.feed_per_tooth = o.feed * units::MM;
+  query.diameter = o.diameter * units::MM;
+  query.helix = units::radFromDeg(o.helix);
+  query.rake = units::radFromDeg(o.rake);
+  const CoefficientDatabase database(o.file);
+  const auto found = recommendCut(database, query);
+  if (!found) throw Error(o.file + ": nothing in '" + o.material + "'; known: " + database.contents());
+  std::printf("%s\n", found->message.c_str());
+  for (const WayAnswer& way : found->ways)
+    std::printf("#   %s: Ktc %.1f +- %.1f N/mm2, %d records\n", nameOf(way.way),
+                way.set.value.ktc / units::N_PER_MM2, way.set.std_dev.ktc / units::N_PER_MM2, way.records);
+  std::printf("%s", cuttingSection(found->set.value, found->set.std_dev).c_str());
+}
+
 void predictFor(const Options& o) {
   mustExist(o.file);
   std::vector<ObliqueSet> sets;
@@ -112,6 +133,16 @@ int main(int argc, char** argv) {
   predict_command.option("--material", o.material, "workpiece material").required();
   predict_command.option("--rake", o.rake, "[deg] normal rake").required();
   predict_command.option("--helix", o.helix, "[deg]").required();
+  const CommandOptions answer_command = line.command(
+      "answer",
+      "what to cut a material with this tool by, though they may never have met, and how sure it is");
+  answer_command.option("--tool", o.tool, "name of the tool").required();
+  answer_command.option("--material", o.material, "workpiece material").required();
+  answer_command.option("--rake", o.rake, "[deg] normal rake (default: what its records say)");
+  answer_command.option("--helix", o.helix, "[deg] (default: what its records say)");
+  answer_command.option("--diameter", o.diameter, "[mm]");
+  answer_command.option("--cutting-speed", o.cutting_speed, "[m/min]");
+  answer_command.option("--feed-per-tooth", o.feed, "[mm]");
   const CommandOptions merge_command = line.command("merge", "takes over what another machine's file has");
   merge_command.option("OTHER", o.other, "SQLite file").required();
   const CommandOptions export_command = line.command("export", "writes everything as .csv or .yaml");
@@ -123,6 +154,7 @@ int main(int argc, char** argv) {
     if (list_command.parsed()) list(o);
     if (find_command.parsed()) find(o);
     if (predict_command.parsed()) predictFor(o);
+    if (answer_command.parsed()) answer(o);
     if (merge_command.parsed()) {
       std::printf("%zu new\n", CoefficientDatabase(o.file).merge(o.other));
     }

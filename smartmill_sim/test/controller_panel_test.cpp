@@ -156,6 +156,18 @@ TEST(Panel, OverridesActAtOnce) {
   EXPECT_EQ(m.controller.actualFeed(), 0.0);
   EXPECT_EQ(m.controller.status().run, focas::RUN_START);
   m.controller.setOverrides(1.0, 1.0, 1.0);
+  // From outside, by the data table: its share multiplies the panel's, 0 says nothing.
+  EXPECT_EQ(m.controller.writePmc(focas::PmcArea::d, 500, {40, 90}), focas::EW_OK);
+  m.run(0.5);
+  EXPECT_NEAR(m.controller.actualFeed(), 1200.0, 1e-6);
+  EXPECT_NEAR(m.controller.spindleSpeed()[0], 900.0, 1e-6);
+  m.controller.setOverrides(0.5, 1.0, 1.0);
+  m.run(0.5);
+  EXPECT_NEAR(m.controller.actualFeed(), 600.0, 1e-6);
+  m.controller.setOverrides(1.0, 1.0, 1.0);
+  EXPECT_EQ(m.controller.writePmc(focas::PmcArea::d, 500, {0, 0}), focas::EW_OK);
+  m.run(0.5);
+  EXPECT_NEAR(m.controller.spindleSpeed()[0], 1000.0, 1e-6);
   m.runToEnd();
   expectAt(m, mm(200, 0, 0), "end");
 }

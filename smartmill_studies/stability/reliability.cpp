@@ -12,7 +12,8 @@ namespace {
 
 constexpr int SAMPLES = 180, REVOLUTIONS = 180;
 
-/// The model with the dynamics and coefficients of a drawn system: modes of x, then of y.
+}  // namespace
+
 MachineModel machineOf(const MachineModel& model, const RegenerativeSystem& drawn) {
   MachineModel machine = model;
   std::size_t k = 0;
@@ -29,8 +30,6 @@ MachineModel machineOf(const MachineModel& model, const RegenerativeSystem& draw
   machine.cutting->krc = drawn.kr;
   return machine;
 }
-
-}  // namespace
 
 std::array<double, 2> wilson(int k, int n) {
   if (n == 0) return {{0.0, 1.0}};

@@ -10,6 +10,9 @@
 
 namespace smartmill::stability {
 
+/// The model with the dynamics and coefficients of a drawn system: modes of x, then of y.
+MachineModel machineOf(const MachineModel& model, const RegenerativeSystem& drawn);
+
 struct ReliabilityOptions : StudyRange {
   int machines = 200;
   int draws = 200;      ///< [1] behind each prediction

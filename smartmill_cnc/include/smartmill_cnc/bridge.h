@@ -47,6 +47,8 @@ class Bridge {
   double positionIncrement() const { return increment_; }
 
   Answer<ArmCode> arm(bool on);
+  /// Of the running program, while motion is armed. @param reason for the log
+  OverrideAnswer setOverrides(const Overrides& wanted, const std::string& reason);
   /// Feed hold, while motion is armed.
   Answer<HoldCode> hold();
   Answer<MacroCode> setMacro(int number, double value);

@@ -1,5 +1,6 @@
 #include "smartmill_cnc/controller/focas_controller.h"
 
+#include <algorithm>
 #include <cmath>
 #include <exception>
 #include <utility>
@@ -8,6 +9,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/require.h"
 #include "smartmill_focas/client.h"
+#include "smartmill_focas/server.h"
 
 namespace smartmill::cnc {
 namespace {
@@ -99,6 +101,34 @@ class FocasController : public Controller {
       return Failure{Failure::Kind::refused, "#" + std::to_string(number) + " is the bridge's own variable"};
     }
     return attempt(plainLine, [&] { client_.writeMacro(number, value); });
+  }
+
+  bool takesOverrides() const override { return parameters_.override_data >= 0; }
+  // G12 and G30 themselves the ladder writes in each of its scans, from the panel's switches.
+  Result<Overrides> setOverrides(const Overrides& wanted) override {
+    if (!takesOverrides()) {
+      return Failure{Failure::Kind::refused,
+                     name() + " takes no overrides from outside: override_data names no rungs of its ladder"};
+    }
+    constexpr std::int32_t DATA_TABLE = static_cast<std::int32_t>(focas::PmcArea::d), BYTES = 0;
+    const auto percent = [](double share) {
+      return static_cast<std::uint8_t>(std::clamp(std::lround(100.0 * share), 1L, 254L));
+    };
+    const focas::Bytes bytes{percent(wanted.feed), percent(wanted.spindle)};
+    const Status written = attempt(plainLine, [&] {
+      const std::int32_t first = parameters_.override_data;
+      focas::SubRequest request(focas::OP_PMC_WRITE, first, first + 1, DATA_TABLE, BYTES, bytes);
+      request.c1 = 2;
+      const focas::SubReply reply = client_.exchange({request}).front();
+      if (reply.code != focas::EW_OK) {
+        throw FocasError("pmc_wrpmcrng D" + std::to_string(first) + ": error " + std::to_string(reply.code),
+                         reply.code);
+      }
+    });
+    if (!written) {
+      return written.failure();
+    }
+    return Overrides{0.01 * bytes[0], 0.01 * bytes[1]};
   }
 
   DialectOptions dialect() const override {

@@ -64,7 +64,10 @@ void setp(std::ostringstream& hal, const char* pin, double value) {
 }
 
 void spindleOf(std::ostringstream& hal) {
-  hal << "net s-cmd spindle.0.speed-out => drive.in0 atspeed.in1\n"
+  hal << "net s-said spindle.0.speed-out => override.in0\n"
+      << "net " << SPINDLE_SIGNAL << " override.in1\nsets " << SPINDLE_SIGNAL << " 1\n"
+      << "net " << FEED_SIGNAL << " motion.adaptive-feed\nsets " << FEED_SIGNAL << " 1\n"
+      << "net s-cmd override.out => drive.in0 atspeed.in1\n"
          "net s-drive drive.out => power.in1\n"
          "net s-on motion.motion-enabled => power.sel\n"
          "net s-power power.out => ramp.in\n"
@@ -89,13 +92,14 @@ std::string halOf(double spindle_acceleration) {
          "loadrt [EMCMOT]EMCMOT servo_period_nsec=[EMCMOT]SERVO_PERIOD num_joints=[KINS]JOINTS "
          "num_spindles=1\n"
          "loadrt sim_spindle names=spin\nloadrt limit2 names=ramp\nloadrt near names=atspeed,stands\n"
-         "loadrt scale names=rps,rpm\nloadrt mux2 names=drive,power\nloadrt orient names=orient\n"
+         "loadrt scale names=rps,rpm\nloadrt mult2 names=override\nloadrt mux2 names=drive,power\nloadrt "
+         "orient names=orient\n"
          "loadrt pid names=opid\nloadrt oneshot names=lives\nloadrt and2 names=may,chain\n"
          "loadrt sampler depth=4000 cfg="
       << SAMPLER_PINS << "\n";
   for (const char* function :
        {"lives", "may", "chain", "motion-command-handler", "motion-controller", "orient", "opid.do-pid-calcs",
-        "rpm", "drive", "power", "ramp", "spin", "rps", "atspeed", "stands", "sampler.0"}) {
+        "rpm", "override", "drive", "power", "ramp", "spin", "rps", "atspeed", "stands", "sampler.0"}) {
     hal << "addf " << function << " servo-thread\n";
   }
   setp(hal, "ramp.maxv", spindle_acceleration);

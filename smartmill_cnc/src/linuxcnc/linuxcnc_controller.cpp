@@ -1,5 +1,6 @@
 #include "smartmill_cnc/linuxcnc/linuxcnc_controller.h"
 
+#include <algorithm>
 #include <cmath>
 #include <sstream>
 #include <utility>
@@ -70,9 +71,10 @@ Failure::Kind kindOf(Reply::Code code) {
 
 class LinuxCncController : public Controller {
  public:
-  LinuxCncController(const LinuxCncParameters& parameters, std::shared_ptr<const ServoStream> stream,
+  LinuxCncController(const LinuxCncParameters& parameters, std::shared_ptr<ServoStream> stream,
                      double (*now)())
       : folder_(parameters.folder),
+        timeout_(parameters.timeout),
         client_(parameters.folder, parameters.timeout),
         stream_(std::move(stream)),
         now_(now) {}
@@ -165,6 +167,15 @@ class LinuxCncController : public Controller {
     return tell({Word::abort, 0, 0.0, {}});
   }
   Status abort() override { return abandonPrograms(); }
+  bool takesOverrides() const override { return true; }
+  Result<Overrides> setOverrides(const Overrides& wanted) override {
+    const Overrides taken{std::min(1.0, wanted.feed), wanted.spindle};
+    const Reply reply = stream_->setOverrides({taken.feed, taken.spindle}, timeout_);
+    if (reply.code != Reply::Code::done) {
+      return Failure{kindOf(reply.code), reply.text};
+    }
+    return taken;
+  }
   Status hold() override { return tell({Word::hold, 0, 0.0, {}}); }
 
  private:
@@ -238,8 +249,9 @@ class LinuxCncController : public Controller {
   }
 
   const std::string folder_;
+  const double timeout_;  // [s]
   GatewayClient client_;
-  std::shared_ptr<const ServoStream> stream_;
+  std::shared_ptr<ServoStream> stream_;
   double (*now_)();
   Stillness silence_;
   std::uint64_t servo_count_ = 0;
@@ -252,7 +264,7 @@ class LinuxCncController : public Controller {
 }  // namespace
 
 std::string linuxCncText(const std::string& program) {
-  std::string text = "G21 G94 G61.1\n", line;
+  std::string text = "G21 G94 G61.1 M52 P1\n", line;
   std::istringstream lines(program);
   for (std::size_t count = 1; std::getline(lines, line); ++count) {
     text += line.empty() ? "" : line.front() == '#' ? line + "\n" : blockText(line, count);
@@ -261,8 +273,7 @@ std::string linuxCncText(const std::string& program) {
 }
 
 std::unique_ptr<Controller> makeLinuxCncController(const LinuxCncParameters& parameters,
-                                                   std::shared_ptr<const ServoStream> stream,
-                                                   double (*now)()) {
+                                                   std::shared_ptr<ServoStream> stream, double (*now)()) {
   if (parameters.folder.empty()) {
     throw Error("linuxcnc_folder: the folder of the machine is due");
   }

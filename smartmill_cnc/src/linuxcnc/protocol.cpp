@@ -15,7 +15,7 @@ static_assert(sizeof(double) == 8, "doubles travel as their eight bytes");
 /// The kinds by their place in Message, from 1, and how long their payloads may be.
 constexpr std::size_t SAMPLE = 9 * sizeof(double);  // [byte]
 constexpr std::array<std::size_t, std::variant_size_v<Message>> LONGEST{
-    LONGEST_PROGRAM + 32, LONGEST_TEXT + 32, 0, LONGEST_TEXT + 256, 16 + ServoBlock::MOST* SAMPLE, 8};
+    LONGEST_PROGRAM + 32, LONGEST_TEXT + 32, 0, LONGEST_TEXT + 256, 16 + ServoBlock::MOST* SAMPLE, 8, 16};
 
 class Packer {
  public:
@@ -222,6 +222,16 @@ void pack(const SetLoad& m, Packer& p) {
 
 void unpack(SetLoad& m, Unpacker& u) {
   m.spindle_load = u.finite();
+}
+
+void pack(const SetOverrides& m, Packer& p) {
+  p.number(m.feed);
+  p.number(m.spindle);
+}
+
+void unpack(SetOverrides& m, Unpacker& u) {
+  m.feed = u.finite();
+  m.spindle = u.finite();
 }
 
 /// The message of a kind, by its place in Message.

@@ -47,8 +47,87 @@ Status MotionMachine::step(const Reading& reading, double now) {
       endStop();
       return {};
     case Phase::idle:
-      return {};
+      return putOverridesBack();
   }
+  return {};
+}
+
+// --- overrides
+
+std::string MotionMachine::overrideFault(const Overrides& wanted) const {
+  const MotionLimits& limits = parameters_.limits;
+  const auto outside = [](const char* what, double value, double low, double high) {
+    const bool within = value >= low && value <= high;
+    return within ? std::string()
+                  : std::string(what) + " override " + fixedDecimals(100.0 * value, 1) +
+                        " %: " + fixedDecimals(100.0 * low, 0) + " .. " + fixedDecimals(100.0 * high, 0) +
+                        " % is allowed";
+  };
+  std::string fault = outside("feed", wanted.feed, limits.min_feed_override, limits.max_feed_override);
+  if (fault.empty()) {
+    fault = outside("spindle", wanted.spindle, limits.min_spindle_override, limits.max_spindle_override);
+  }
+  const double programmed = motion_.condition ? motion_.condition->spindle_speed
+                                              : reading_->state.spindle_speed / overrides_.spindle;
+  if (fault.empty() && wanted.spindle * programmed > limits.max_spindle_speed) {
+    fault = "spindle override " + fixedDecimals(100.0 * wanted.spindle, 1) + " %: above the highest speed, " +
+            fixedDecimals(units::rpmFromRadPerSec(limits.max_spindle_speed), 0) + " rpm";
+  }
+  if (fault.empty() && wanted.feed * reading_->state.feed > overrides_.feed * limits.max_feed) {
+    fault = "feed override " + fixedDecimals(100.0 * wanted.feed, 1) + " %: above the highest feed, " +
+            fixedDecimals(limits.max_feed / units::MM * 60.0, 0) + " mm/min";
+  }
+  return fault;
+}
+
+Result<OverrideAnswer> MotionMachine::setOverrides(const Overrides& wanted, const std::string& reason) {
+  const auto refuse = [](OverrideCode code, const std::string& why) {
+    OverrideAnswer answer;
+    answer.code = code;
+    answer.message = why;
+    return answer;
+  };
+  if (!armed_) {
+    return refuse(OverrideCode::not_armed, "overrides: motion is not armed");
+  }
+  if (phase_ != Phase::sending && phase_ != Phase::running) {
+    return refuse(OverrideCode::not_armed, "overrides: no program runs");
+  }
+  const std::string fault = overrideFault(wanted);
+  if (!fault.empty()) {
+    return refuse(OverrideCode::limit, fault);
+  }
+  const Result<Overrides> taken = controller_.setOverrides(wanted);
+  if (!taken) {
+    if (taken.failure().kind == Failure::Kind::lost) {
+      return taken.failure();
+    }
+    return refuse(OverrideCode::refused, "overrides: " + taken.failure().message);
+  }
+  overridden_ = true;
+  overrides_ = *taken;
+  OverrideAnswer answer;
+  answer.taken = *taken;
+  answer.message = "feed " + fixedDecimals(100.0 * taken->feed, 0) + " %, spindle " +
+                   fixedDecimals(100.0 * taken->spindle, 1) + " %";
+  log_.info(answer.message + (reason.empty() ? "" : ": " + reason));
+  return answer;
+}
+
+Status MotionMachine::putOverridesBack() {
+  if (!std::exchange(overridden_, false)) {
+    return {};
+  }
+  overrides_ = {};
+  const Result<Overrides> taken = controller_.setOverrides({});
+  if (taken) {
+    return {};
+  }
+  if (taken.failure().kind == Failure::Kind::lost) {
+    overridden_ = true;
+    return taken.failure();
+  }
+  log_.warning("overrides are not put back to 100 %: " + taken.failure().message);
   return {};
 }
 
@@ -108,6 +187,8 @@ Result<Answer<ArmCode>> MotionMachine::arm() {
                            "motion is not armed: " + lineOf(opened.failure())};
   }
   setArmed(true);
+  // Whoever drove it before may have left some.
+  overridden_ = controller_.takesOverrides();
   return Answer<ArmCode>{ArmCode::ok, "motion is armed"};
 }
 

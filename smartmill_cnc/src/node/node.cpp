@@ -85,6 +85,7 @@ CncNode::CncNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
   arm_service_ = nh.advertiseService(names::ARM_MOTION, &CncNode::armMotion, this);
   hold_service_ = nh.advertiseService(names::FEED_HOLD, &CncNode::feedHold, this);
   macro_service_ = nh.advertiseService(names::SET_MACRO, &CncNode::setMacro, this);
+  override_service_ = nh.advertiseService(names::SET_OVERRIDES, &CncNode::setOverrides, this);
   shell_.diagnose("controller", [this](auto& status) { diagnose(status); });
   thread_ = std::thread([this] { run(); });
 }
@@ -327,6 +328,19 @@ bool CncNode::setMacro(smartmill_msgs::SetMacro::Request& request,
       ask<Answer<MacroCode>>([this, number, value] { return bridge_.setMacro(number, value); });
   response.code = static_cast<std::uint8_t>(answer ? answer->code : MacroCode::not_connected);
   response.message = answer ? answer->message : "the controller does not answer";
+  return true;
+}
+
+bool CncNode::setOverrides(smartmill_msgs::SetOverrides::Request& request,
+                           smartmill_msgs::SetOverrides::Response& response) {
+  const Overrides wanted{request.feed, request.spindle};
+  const std::string reason = request.reason;
+  const auto answer =
+      ask<OverrideAnswer>([this, wanted, reason] { return bridge_.setOverrides(wanted, reason); });
+  response.code = static_cast<std::uint8_t>(answer ? answer->code : OverrideCode::not_connected);
+  response.message = answer ? answer->message : "the controller does not answer";
+  response.feed = answer ? answer->taken.feed : 1.0;
+  response.spindle = answer ? answer->taken.spindle : 1.0;
   return true;
 }
 

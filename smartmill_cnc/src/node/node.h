@@ -20,6 +20,7 @@
 #include "smartmill_msgs/OrientSpindleAction.h"
 #include "smartmill_msgs/RunProgramAction.h"
 #include "smartmill_msgs/SetMacro.h"
+#include "smartmill_msgs/SetOverrides.h"
 #include "smartmill_ros/node_shell.h"
 
 namespace smartmill::cnc {
@@ -63,6 +64,8 @@ class CncNode {
   bool armMotion(smartmill_msgs::ArmMotion::Request& request, smartmill_msgs::ArmMotion::Response& response);
   bool feedHold(smartmill_msgs::FeedHold::Request& request, smartmill_msgs::FeedHold::Response& response);
   bool setMacro(smartmill_msgs::SetMacro::Request& request, smartmill_msgs::SetMacro::Response& response);
+  bool setOverrides(smartmill_msgs::SetOverrides::Request& request,
+                    smartmill_msgs::SetOverrides::Response& response);
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
   const NodeParameters parameters_;
@@ -74,7 +77,7 @@ class CncNode {
 
   ros::Publisher state_publisher_, load_publisher_, condition_publisher_, alarms_publisher_;
   tf2_ros::TransformBroadcaster broadcaster_;
-  ros::ServiceServer arm_service_, hold_service_, macro_service_;
+  ros::ServiceServer arm_service_, hold_service_, macro_service_, override_service_;
   std::unique_ptr<Server<smartmill_msgs::RunProgramAction>> run_program_;
   std::unique_ptr<Server<smartmill_msgs::JogAction>> jog_;
   std::unique_ptr<Server<smartmill_msgs::OrientSpindleAction>> orient_;

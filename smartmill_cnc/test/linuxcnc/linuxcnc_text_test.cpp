@@ -26,7 +26,7 @@ std::string textOf(const std::string& program) {
 // RS-274/NGC counts dwells in seconds; a Fanuc waits for a spindle that stops, M66 lets LinuxCNC do so.
 TEST(LinuxCncText, SaysTheSameInTheOtherDialect) {
   EXPECT_EQ(textOf("G91 G1 F600 X10.5\nG4 P1500\nG4 X2.5\nS4000 M3\nG0 Z-1\nM30\n"),
-            "G21 G94 G61.1\n"
+            "G21 G94 G61.1 M52 P1\n"
             "G90\n"
             "M67 E0 Q2\nG91 G1 F600.0000 X10.5000\n"
             "G4 P1.5000\n"

@@ -47,7 +47,8 @@ std::vector<Message> everyKind() {
           Ask{},
           someStatus(),
           someBlock(3),
-          SetLoad{0.25}};
+          SetLoad{0.25},
+          SetOverrides{0.4, 1.125}};
 }
 
 std::string refusalOf(const std::string& bytes) {

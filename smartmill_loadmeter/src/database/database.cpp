@@ -404,7 +404,8 @@ FoundCoefficients findCoefficients(const CoefficientDatabase& database, const st
                                    const std::string& material) {
   FoundCoefficients found;
   found.set = database.find(tool, material);
-  if (found.set) {
+  // A cut of production is one among many: together they say more than the newest.
+  if (found.set && found.set->source != SOURCE_PRODUCTION) {
     found.message = "source " + found.set->source + ", " + std::to_string(found.set->tests) + " tests";
     return found;
   }
@@ -413,6 +414,10 @@ FoundCoefficients findCoefficients(const CoefficientDatabase& database, const st
   query.material = material;
   if (const auto estimate = database.estimate(query)) {
     found.set = estimate->set;
+    if (!estimate->other_tool) {
+      found.message = std::to_string(estimate->records) + " identifications and cuts together";
+      return found;
+    }
     found.message = "nothing with '" + tool + "' yet: from " + std::to_string(estimate->records) + " of '" +
                     estimate->set.tool + "' and other tools, uncertainty widened";
     return found;

@@ -232,6 +232,37 @@ void LoadMeterIdentification::follow(const LoadTest& cut) {
   reading.engagement = cut.condition.engagement;
   reading.cutting_time = cut.duration;
   production_->update(reading);
+  tell(cut);
+}
+
+void LoadMeterIdentification::tell(const LoadTest& cut) {
+  const CuttingCondition& c = cut.condition;
+  double& age = edge_age_[c.tool_name];
+  age += cut.duration;
+  if (!cut_) return;
+  CoefficientRecord record;
+  record.set.stamp = cut.stamp;
+  record.set.tool = c.tool_name;
+  record.set.material = c.material;
+  record.set.source = SOURCE_PRODUCTION;
+  record.set.tests = 1;
+  record.set.value = record.set.std_dev = NOT_IDENTIFIED;
+  const double alone = std::sqrt(static_cast<double>(production_->readings()));
+  record.set.value.ktc = production_->ktc(), record.set.std_dev.ktc = alone * production_->ktcStd();
+  record.set.value.kte = production_->kte(), record.set.std_dev.kte = alone * production_->kteStd();
+  record.covariance[CoefficientRecord::covarianceIndex(0, 0)] = std::pow(record.set.std_dev.ktc, 2);
+  record.covariance[CoefficientRecord::covarianceIndex(3, 3)] = std::pow(record.set.std_dev.kte, 2);
+  record.covariance[CoefficientRecord::covarianceIndex(0, 3)] = alone * alone * production_->covariance();
+  record.teeth = c.tool.teeth;
+  record.diameter = c.tool.diameter;
+  record.helix = c.tool.helix;
+  record.cutting_speed = 0.5 * c.tool.diameter * cut.speed;
+  record.feed_per_tooth = c.engagement.feed_per_tooth;
+  record.axial_depth = c.engagement.axial_depth;
+  record.entry = c.engagement.entry;
+  record.exit = c.engagement.exit;
+  record.edge_age = age;
+  cut_(record);
 }
 
 void LoadMeterIdentification::handle(const IdentifyGoal& goal) {

@@ -5,6 +5,7 @@
 #include "node/wiring.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/units.h"
+#include "smartmill_loadmeter/database/recommend.h"
 #include "smartmill_ros/frames.h"
 #include "smartmill_ros/node_main.h"
 #include "smartmill_ros/parameter_reader.h"
@@ -37,6 +38,8 @@ LoadMeterNode::LoadMeterNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
              test.voltage.mean, test.voltage.std_dev, test.speed, test.readings);
     feedback();
   });
+  if (parameters_.keep_cuts)
+    identification_.identification().onCut([this](const CoefficientRecord& cut) { keep(cut); });
   publisher_ = nh.advertise<smartmill_msgs::CuttingCoefficients>(names::COEFFICIENTS, 1, true);
   if (!parameters_.motor_calibration.empty()) {
     identification_.identification().setMotors(readMotorCalibration(parameters_.motor_calibration));
@@ -45,6 +48,7 @@ LoadMeterNode::LoadMeterNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
   }
   connect(shell_.inputs(), parameters_, identification_);
   find_service_ = nh.advertiseService(names::FIND_COEFFICIENTS, &LoadMeterNode::find, this);
+  recommend_service_ = nh.advertiseService(names::RECOMMEND_CUT, &LoadMeterNode::recommend, this);
   shell_.diagnose("load meter", [this](auto& status) { diagnose(status); });
   shell_.every(WATCH_PERIOD, [this] { watch(); });
   server_.start();
@@ -151,6 +155,49 @@ bool LoadMeterNode::find(smartmill_msgs::FindCoefficients::Request& request,
   return true;
 }
 
+bool LoadMeterNode::recommend(smartmill_msgs::RecommendCut::Request& request,
+                              smartmill_msgs::RecommendCut::Response& response) {
+  using Response = smartmill_msgs::RecommendCut::Response;
+  CoefficientSet unknown;
+  unknown.value = unknown.std_dev = NOT_IDENTIFIED;
+  response.coefficients = toMsg(unknown);
+  response.code = Response::NOT_FOUND;
+  response.ktc_lower = response.ktc_upper = response.surprise = NOT_A_NUMBER;
+  CoefficientQuery query;
+  query.tool = request.tool;
+  query.material = request.material;
+  query.rake = request.rake;
+  query.helix = request.helix;
+  query.diameter = request.diameter;
+  query.cutting_speed = request.cutting_speed;
+  query.feed_per_tooth = request.feed_per_tooth;
+  try {
+    const std::optional<CutAnswer> answer = recommendCut(database_, query);
+    if (!answer) {
+      response.message = "nothing in '" + request.material + "'; known: " + database_.contents();
+      return true;
+    }
+    response.code = Response::OK;
+    response.message = answer->message;
+    response.way = static_cast<std::uint8_t>(answer->way);
+    response.coefficients = toMsg(answer->set);
+    response.ktc_lower = answer->ktc_lower;
+    response.ktc_upper = answer->ktc_upper;
+    response.surprise = answer->surprise;
+  } catch (const Error& error) {
+    response.message = error.what();
+  }
+  return true;
+}
+
+void LoadMeterNode::keep(const CoefficientRecord& cut) {
+  try {
+    kept_cuts_ += database_.add(cut);
+  } catch (const Error& error) {
+    ROS_ERROR("database: cut not kept: %s", error.what());
+  }
+}
+
 // Liveness only: when every input has fallen silent nothing more can come before what waits.
 void LoadMeterNode::watch() {
   if (!shell_.inputs().any().dead()) return;
@@ -179,6 +226,7 @@ void LoadMeterNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status
     status.addf("last cut's surprise", "%.1f sigma", production->surprise());
   }
   if (!last_force_.empty()) status.add("force by motor currents", last_force_);
+  status.add("cuts kept", kept_cuts_);
   status.add("late inputs", identification_.late());
   status.add("waiting for", identification_.waitingFor());
   status.add("last result", last_message_);

@@ -12,6 +12,7 @@
 #include "smartmill_loadmeter/identification/sorted_identification.h"
 #include "smartmill_msgs/FindCoefficients.h"
 #include "smartmill_msgs/IdentifyCoefficientsAction.h"
+#include "smartmill_msgs/RecommendCut.h"
 #include "smartmill_ros/node_shell.h"
 
 namespace smartmill::loadmeter {
@@ -32,6 +33,9 @@ class LoadMeterNode {
   void feedback();
   bool find(smartmill_msgs::FindCoefficients::Request& request,
             smartmill_msgs::FindCoefficients::Response& response);
+  bool recommend(smartmill_msgs::RecommendCut::Request& request,
+                 smartmill_msgs::RecommendCut::Response& response);
+  void keep(const CoefficientRecord& cut);
   void publish(const MotorForce& force);
   void watch();
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
@@ -43,9 +47,10 @@ class LoadMeterNode {
   std::map<std::uint64_t, Server::GoalHandle> waiting_;
   std::uint64_t next_id_ = 1;
   std::string last_message_, last_force_;
+  std::size_t kept_cuts_ = 0;
 
   ros::Publisher publisher_, force_publisher_;
-  ros::ServiceServer find_service_;
+  ros::ServiceServer find_service_, recommend_service_;
   Server server_;
 };
 

@@ -12,6 +12,7 @@ namespace smartmill::loadmeter {
 struct NodeParameters {
   std::string model;
   std::string database;
+  bool keep_cuts = true;
   IdentificationParameters identification;
   std::string motor_calibration;
   double hold_back = 0.05;
@@ -27,6 +28,8 @@ struct NodeParameters {
     table.section();
     table.text("database", database,
                "path of the SQLite file that keeps what this machine identifies; empty: this run only");
+    table.flag("keep_cuts", keep_cuts,
+               "true: every cut enters the database, with its condition and what it says");
     identification.declare(table);
     table.section("Motor currents.");
     table.text("motor_calibration", motor_calibration,

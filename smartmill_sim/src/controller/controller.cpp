@@ -381,7 +381,11 @@ EwCode Controller::readPmc(focas::PmcArea area, int first, int last, focas::Byte
 
 EwCode Controller::writePmc(focas::PmcArea area, int first, const focas::Bytes& bytes) {
   const Lock lock(impl_->mutex);
-  return impl_->machine.pmc.write(area, first, bytes);
+  const EwCode code = impl_->machine.pmc.write(area, first, bytes);
+  if (area == focas::PmcArea::d) {
+    impl_->machine.followDataTable();
+  }
+  return code;
 }
 
 std::vector<focas::StoredProgram> Controller::programs() const {

@@ -165,8 +165,8 @@ PmcSignals ControlledMachine::signals() const {
   s.m_code = last_m_;
   s.s_code = static_cast<int>(std::lround(units::rpmFromRadPerSec(modal_.speed)));
   s.spindle_speed = units::rpmFromRadPerSec(speed);
-  s.feed_override = feed_override_;
-  s.spindle_override = spindle_override_;
+  s.feed_override = feed_override_ * feed_share_;
+  s.spindle_override = spindle_override_ * spindle_share_;
   return s;
 }
 
@@ -228,6 +228,22 @@ void ControlledMachine::feedHold() {
   held_since_ = now_;
   if (moving()) {
     move_.plan(now_, 0.0, options.axes.acceleration);
+  }
+}
+
+void ControlledMachine::followDataTable() {
+  focas::Bytes bytes;
+  pmc.read(focas::PmcArea::d, OVERRIDE_DATA, OVERRIDE_DATA + 1, &bytes);
+  const auto share = [](std::uint8_t percent) { return percent == 0 ? 1.0 : 0.01 * percent; };
+  feed_share_ = share(bytes[0]);
+  if (share(bytes[1]) != spindle_share_) {
+    spindle_share_ = share(bytes[1]);
+    if (turn_ != Turn::off) {
+      spindle_.ramp(now_, commandedSpeed());
+    }
+  }
+  if (!held_) {
+    replan();
   }
 }
 
@@ -448,7 +464,7 @@ void ControlledMachine::start(double time, const NcBlock& block) {
 }
 
 double ControlledMachine::commandedSpeed() const {
-  const double speed = std::min(modal_.speed * spindle_override_, options.spindle_max_speed);
+  const double speed = std::min(modal_.speed * spindle_override_ * spindle_share_, options.spindle_max_speed);
   return turn_ == Turn::backwards ? -speed : speed;
 }
 
@@ -573,7 +589,7 @@ double ControlledMachine::feedOf(const PathMove& move, bool rapid) const {
   if (modal_.per_turn) {
     feed = modal_.feed * unit() * std::abs(commandedSpeed()) / units::TWO_PI;
   }
-  return std::min({feed * feed_override_, options.axes.rapid,
+  return std::min({feed * feed_override_ * feed_share_, options.axes.rapid,
                    move.curveFeed(options.axes.acceleration).value_or(options.axes.rapid)});
 }
 

@@ -62,6 +62,8 @@ class ControlledMachine {
   void reset();
   void feedHold();
   void setOverrides(double feed, double rapid, double spindle);
+  /// The rungs of the ladder that multiply what the data table holds into the panel's overrides.
+  void followDataTable();
   focas::EwCode cycleStart();
   void alarm(const focas::AlarmMessage& message);
   void setSpindleTorque(double torque);
@@ -131,9 +133,10 @@ class ControlledMachine {
   double looked_ = -1.0;  // [s] for obstacles
 
   int mode_;
-  bool emergency_ = false, held_ = false, stopped_ = false;  // stopped: M0
-  double held_since_ = 0.0;                                  // [s]
-  double feed_override_ = 1.0, rapid_override_ = 1.0, spindle_override_ = 1.0;
+  bool emergency_ = false, held_ = false, stopped_ = false;                     // stopped: M0
+  double held_since_ = 0.0;                                                     // [s]
+  double feed_override_ = 1.0, rapid_override_ = 1.0, spindle_override_ = 1.0;  // of the panel
+  double feed_share_ = 1.0, spindle_share_ = 1.0;                               // of the data table
 
   PathMove move_;  // the last one, maybe over
   bool move_rapid_ = false;

@@ -19,6 +19,10 @@ struct PmcSignals {
   double feed_override = 1.0, spindle_override = 1.0;
 };
 
+/// Of the data table: percent that the ladder multiplies into the feed override; the next one into the
+/// spindle's. 0: nothing.
+constexpr int OVERRIDE_DATA = 500;
+
 /// Addresses of the PMC of a 30i (sizes of its first path). Signals of the control (F) and of the panel (G,
 /// X) stand for themselves: what is written there the ladder overwrites at once.
 class PmcMemory {

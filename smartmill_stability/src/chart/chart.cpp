@@ -10,7 +10,7 @@
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/units.h"
-#include "smartmill_stability/chart/uncertainty.h"
+#include "smartmill_stability/chart/risk.h"
 #include "smartmill_stability/solvers/solver.h"
 
 namespace smartmill::stability {
@@ -249,6 +249,16 @@ std::optional<RegenerativeSystem> ChartMaker::system(const Engagement& engagemen
   return system;
 }
 
+std::optional<UncertainSystem> ChartMaker::uncertainSystem(const Engagement& engagement) const {
+  const std::optional<RegenerativeSystem> mean = system(engagement);
+  if (!mean) return {};
+  LeastDeviations least;
+  least.frequency = parameters_.frequency_std;
+  least.damping = least.gain = least.cutting = parameters_.gain_std;
+  least.radial = parameters_.radial_std;
+  return measuredSystem(*mean, modes_.at("x").model, modes_.at("y").model, *coefficients_, least);
+}
+
 std::size_t ChartMaker::modesInX() const {
   return modes_.count("x") ? systemModes(modes_.at("x").model, 0).size() : 0;
 }
@@ -339,14 +349,29 @@ StabilityLimit ChartMaker::wideLimits(const Basis& given) const {
   return given.limits(speeds);
 }
 
+/// Of the limit at each speed, what the risk leaves of it; without modes nothing can be drawn.
+std::vector<double> ChartMaker::depthShares(const std::vector<double>& speeds) const {
+  constexpr int DRAWS = 100;
+  constexpr unsigned SEED = 1;
+  std::vector<double> shares(speeds.size(), std::numeric_limits<double>::infinity());
+  const std::optional<UncertainSystem> uncertain = uncertainSystem({});
+  if (parameters_.risk > 0.0 && uncertain) {
+    shares = depthsAtRisk(drawnLimits(*uncertain, speeds, DRAWS, SEED), speeds, parameters_.risk,
+                          parameters_.speed_margin);
+  }
+  return shares;
+}
+
 void ChartMaker::recommend(StabilityChart& chart, const StabilityLimit& wide) const {
   const std::vector<double>& speeds = chart.limit.spindle_speed;
+  const std::vector<double> shares = depthShares(speeds);
   std::vector<StabilityPoint> cuts, peaks;
   for (std::size_t k = 0; k < speeds.size(); ++k) {
     const double stable =
         around(wide, k + static_cast<std::size_t>(linesBeyond()), parameters_.speed_margin, std::less<>());
-    cuts.push_back(point(speeds[k], std::min((1.0 - parameters_.depth_margin) * stable, carried(chart, k)),
-                         chart.limit.depth[k], chart.limit.chatter_frequency[k]));
+    const double depth = std::min(
+        {(1.0 - parameters_.depth_margin) * stable, shares[k] * chart.limit.depth[k], carried(chart, k)});
+    cuts.push_back(point(speeds[k], depth, chart.limit.depth[k], chart.limit.chatter_frequency[k]));
   }
   for (std::size_t k = 0; k < cuts.size(); ++k) {
     const double rate = cuts[k].material_removal_rate;
@@ -485,41 +510,14 @@ WhatIfChart ChartMaker::whatIf(const WhatIf& request) const {
 void ChartMaker::addSpread(const RegenerativeSystem& system, WhatIfChart& chart) const {
   constexpr int DRAWS = 40;
   constexpr unsigned SEED = 1;
-  constexpr std::size_t LINES = 600;  // what they miss, mean and draws miss alike
-  constexpr double LOW = 0.1, HIGH = 0.9, UNKNOWN = 0.1, MOST = 0.5;
-  std::vector<ModeUncertainty> modes;
-  for (const char* direction : {"x", "y"}) {
-    const ModalModel& model = modes_.at(direction).model;
-    const std::size_t before = modes.size(), count = systemModes(model, 0).size();
-    for (const Mode& mode : model.modes) {
-      if (mode.gain == 0.0) continue;
-      const auto share = [&](double deviation, double value) {
-        return std::isfinite(deviation) ? std::min(MOST, std::abs(deviation / value)) : UNKNOWN;
-      };
-      modes.push_back({share(mode.frequency_std, mode.frequency),
-                       share(mode.damping_ratio_std, mode.damping_ratio), share(mode.gain_std, mode.gain)});
-    }
-    // What lies above the band counts as one mode more.
-    modes.resize(before + count, {UNKNOWN, UNKNOWN, UNKNOWN});
-  }
-  const CuttingCoefficients &value = coefficients_->value, &deviation = coefficients_->std_dev;
-  const double kt = std::isfinite(deviation.ktc) ? deviation.ktc / value.ktc : UNKNOWN;
-  const double kr = std::isfinite(deviation.krc) && value.krc > 0.0 ? deviation.krc / value.krc : kt;
-  const UncertainSystem uncertain(system, modes, kt, kr);
-  std::mt19937_64 random(SEED);
+  constexpr double LOW = 0.1, HIGH = 0.9;
   const std::vector<double>& speeds = chart.limit.spindle_speed;
-  double highest = 0.0;
-  for (const SystemMode& mode : system.modes) highest = std::max(highest, mode.frequency);
-  const auto zeroOrder = [&](const RegenerativeSystem& of) {
-    const RegenerativeProcess process{of.teeth, of.entry, of.exit, of.kt, of.kr / of.kt};
-    return zeroOrderLimit(process, responseOf(of.modes, 1.0, 2.0 * highest, LINES), speeds).depth;
-  };
-  const std::vector<double> mean = zeroOrder(system);
+  const DrawnLimits limits =
+      drawnLimits(measuredSystem(system, modes_.at("x").model, modes_.at("y").model, *coefficients_), speeds,
+                  DRAWS, SEED);
   std::vector<std::vector<double>> ratios(speeds.size());
-  for (int draw = 0; draw < DRAWS; ++draw) {
-    const std::vector<double> drawn = zeroOrder(uncertain.draw(random));
-    for (std::size_t k = 0; k < speeds.size(); ++k) ratios[k].push_back(drawn[k] / mean[k]);
-  }
+  for (const std::vector<double>& drawn : limits.drawn)
+    for (std::size_t k = 0; k < speeds.size(); ++k) ratios[k].push_back(drawn[k] / limits.mean[k]);
   for (std::size_t k = 0; k < speeds.size(); ++k) {
     std::sort(ratios[k].begin(), ratios[k].end());
     const auto at = [&](double share) { return ratios[k][static_cast<std::size_t>(share * (DRAWS - 1))]; };

@@ -12,6 +12,16 @@ void declarePoints(ChartParameters& p, ParameterTable& table) {
                "recommended depths stay this share below the limit");
   table.number("speed_margin", p.speed_margin, "1", Range::openHigh(0.0, 0.2),
                "and below it also for speeds this much off");
+  table.number("risk", p.risk, "1", Range::closed(0.0, 0.5),
+               "largest probability of chatter of a recommended cut, by the deviations of what was measured; "
+               "needs modes (tool/modes); 0: not asked for");
+  table.number("frequency_std", p.frequency_std, "1", Range::openHigh(0.0, 0.2),
+               "deviation of a mode's frequency besides its estimate's: a spindle that turns and warms up is "
+               "not the one tapped at rest");
+  table.number("gain_std", p.gain_std, "1", Range::openHigh(0.0, 0.5),
+               "the same of compliance, damping and cutting coefficients");
+  table.number("kr_std", p.radial_std, "1", Range::openHigh(0.0, 0.5),
+               "deviation of a radial coefficient that was not identified, over its value");
   table.number("load_share", p.load_share, "1", Range::openLow(0.0, 1.0),
                "of the spindle's torque and power that is used");
   table.number("recommended", p.recommended, "1", Range::closed(0, 100), "at most so many, one a pocket");

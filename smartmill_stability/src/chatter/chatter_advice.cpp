@@ -116,8 +116,14 @@ std::optional<ModeCorrection> correctFromChatter(const RegenerativeSystem& belie
   return best;
 }
 
-ChatterAdvisor::ChatterAdvisor(double low, double high, int teeth, Believed believed, Output output)
-    : low_(low), high_(high), teeth_(teeth), believed_(std::move(believed)), output_(std::move(output)) {
+ChatterAdvisor::ChatterAdvisor(double low, double high, int teeth, Believed believed, Output output,
+                               Output early)
+    : low_(low),
+      high_(high),
+      teeth_(teeth),
+      believed_(std::move(believed)),
+      output_(std::move(output)),
+      early_(std::move(early)) {
   if (!(low > 0.0) || !(high >= low)) throw Error("chatter advice: 0 < low <= high speed is due");
   if (teeth < 1) throw Error("chatter advice: teeth are due");
 }
@@ -128,12 +134,18 @@ void ChatterAdvisor::handle(const CuttingCondition& condition) {
   if (conditions_.size() > KEPT) conditions_.pop_front();
 }
 
+void ChatterAdvisor::handle(const CncState& state) {
+  if (state.connected) actual_speed_ = state.spindle_speed;
+}
+
+void ChatterAdvisor::restart() {
+  running_.clear();
+  advised_ = false;
+}
+
 void ChatterAdvisor::handle(const ChatterState& state) {
   const bool same = !running_.empty() && running_.front().condition == state.condition;
-  if (!state.valid || !state.chatter || !same) {
-    running_.clear();
-    advised_ = false;
-  }
+  if (!state.valid || !state.chatter || !same) restart();
   if (!state.valid || !state.chatter) return;
   running_.push_back(state);
   if (advised_ || running_.size() < 2) return;
@@ -156,7 +168,13 @@ void ChatterAdvisor::advise(const ChatterState& state) {
   advice.depth = condition.engagement.axial_depth;
   const int teeth = condition.tool.teeth > 0 ? condition.tool.teeth : teeth_;
   std::optional<RegenerativeSystem> system = believed_(condition);
-  const double speed = condition.spindle_speed;
+  // Nearer than this it is the commanded speed under load, further off a spindle that runs up or down.
+  constexpr double LOAD = 0.01, OVERRIDE = 0.5;
+  const double off = std::abs(actual_speed_ - condition.spindle_speed) / condition.spindle_speed;
+  const double speed = off > LOAD && off < OVERRIDE ? actual_speed_ : condition.spindle_speed;
+  advice.speed = speed;
+  advice.engagement = condition.engagement;
+  advice.teeth = teeth;
   // Deep enough to tell a pocket from the rest.
   const double most = 5.0 * advice.depth;
   if (system && speed > 0.0 && advice.depth > 0.0) {
@@ -183,19 +201,18 @@ void ChatterAdvisor::advise(const ChatterState& state) {
   }
   for (const double s : proposed) {
     constexpr double ALIKE = 0.01;
-    if (std::any_of(advice.speeds.begin(), advice.speeds.end(), [&](const ChatterAdvice::Speed& other) {
+    constexpr double UNKNOWN = std::numeric_limits<double>::quiet_NaN();
+    if (std::none_of(advice.speeds.begin(), advice.speeds.end(), [&](const ChatterAdvice::Speed& other) {
           return std::abs(other.speed / s - 1.0) < ALIKE;
         }))
-      continue;
-    ChatterAdvice::Speed one;
-    one.speed = s;
-    one.limit = one.frequency = std::numeric_limits<double>::quiet_NaN();
-    if (known) {
-      const Limit limit = makeSolver(Method::collocation, *system)->limit(s, most);
-      one.limit = limit.depth;
-      one.frequency = limit.frequency;
-    }
-    advice.speeds.push_back(one);
+      advice.speeds.push_back({s, UNKNOWN, UNKNOWN});
+  }
+  if (early_) early_(advice);
+  for (ChatterAdvice::Speed& one : advice.speeds) {
+    if (!known) break;
+    const Limit limit = makeSolver(Method::collocation, *system)->limit(one.speed, most);
+    one.limit = limit.depth;
+    one.frequency = limit.frequency;
   }
   if (known)
     std::stable_sort(advice.speeds.begin(), advice.speeds.end(), [](const auto& a, const auto& b) {

@@ -1,6 +1,7 @@
 #include "node/node.h"
 
 #include <algorithm>
+#include <chrono>
 
 #include <smartmill_msgs/ChatterAdvice.h>
 #include <smartmill_msgs/ChatterState.h>
@@ -17,7 +18,8 @@
 namespace smartmill::stability {
 namespace {
 
-constexpr double WATCH_PERIOD = 0.2;  // [s]
+constexpr double WATCH_PERIOD = 0.2;      // [s]
+constexpr double OVERRIDE_PERIOD = 0.02;  // [s]
 
 NodeParameters read(const ros::NodeHandle& private_nh) {
   NodeParameters parameters = ParameterReader::fromServer(private_nh).readAll<NodeParameters>();
@@ -47,22 +49,22 @@ StabilityNode::StabilityNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
       shell_(nh, private_nh, "none", parameters_.input_timeout),
       maker_(parameters_.chart, readMachineModel(parameters_.model)),
       detection_(parameters_.chatter, parameters_.hold_back,
-                 [this](const ChatterState& state) {
-                   publish(state);
-                   try {
-                     advisor_.handle(state);
-                   } catch (const Error& error) {
-                     ROS_ERROR("chatter advice: %s", error.what());
-                   }
-                 }),
+                 [this](const ChatterState& state) { judged(state); }),
       advisor_(
           parameters_.chart.speed_low, maker_.highestSpeed(), maker_.teeth(),
           [this](const CuttingCondition& condition) { return maker_.system(condition.engagement); },
-          [this](const ChatterAdvice& advice) { publish(advice); }),
+          [this](const ChatterAdvice& advice) { publish(advice); },
+          [this](const ChatterAdvice& advice) {
+            control_.handle(advice);
+            override();
+          }),
+      control_(parameters_.control, parameters_.chatter.revolutions,
+               [this](const Engagement& engagement) { return maker_.uncertainSystem(engagement); }),
       chart_(nh.advertise<smartmill_msgs::StabilityChart>(names::STABILITY_CHART, 1, true)),
       chatter_(nh.advertise<smartmill_msgs::ChatterState>(names::CHATTER_STATE, STREAM_QUEUE, true)),
       advice_(nh.advertise<smartmill_msgs::ChatterAdvice>(names::CHATTER_ADVICE, 10, true)),
-      predict_(nh.advertiseService(names::PREDICT_STABILITY, &StabilityNode::predict, this)) {
+      predict_(nh.advertiseService(names::PREDICT_STABILITY, &StabilityNode::predict, this)),
+      overrides_(nh.serviceClient<smartmill_msgs::SetOverrides>(names::SET_OVERRIDES)) {
   ros::NodeHandle aside(nh);
   aside.setCallbackQueue(&what_if_queue_);
   what_if_ = aside.advertiseService(names::WHAT_IF, &StabilityNode::whatIf, this);
@@ -71,6 +73,7 @@ StabilityNode::StabilityNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
   shell_.diagnose("stability chart", [this](auto& status) { diagnoseChart(status); });
   shell_.diagnose("chatter detection", [this](auto& status) { diagnoseChatter(status); });
   shell_.every(WATCH_PERIOD, [this] { watch(); });
+  if (parameters_.control.adaptive) shell_.every(OVERRIDE_PERIOD, [this] { override(); });
 }
 
 void StabilityNode::listen() {
@@ -81,8 +84,14 @@ void StabilityNode::listen() {
         const CuttingCondition condition = fromMsg(message);
         advisor_.handle(condition);
         detection_.push(condition);
+        control_.handle(condition);
       });
-  connect(inputs, parameters_, detection_);
+  if (parameters_.control.adaptive) {
+    inputs.on<smartmill_msgs::LoadSample>(
+        names::CNC_LOAD,
+        [this](const smartmill_msgs::LoadSample& message, double) { control_.handle(fromMsg(message)); });
+  }
+  connect(inputs, parameters_, streams_);
 }
 
 template <typename Measured>
@@ -99,6 +108,43 @@ void StabilityNode::measured(const Measured& measured) {
     chart_problem_ = error.what();
     throw;
   }
+}
+
+void StabilityNode::judged(const ChatterState& state) {
+  publish(state);
+  control_.handle(state);
+  try {
+    if (control_.moving()) {
+      advisor_.restart();
+    } else {
+      advisor_.handle(state);
+    }
+  } catch (const Error& error) {
+    ROS_ERROR("chatter advice: %s", error.what());
+  }
+}
+
+void StabilityNode::override() {
+  for (const std::string& note : control_.takeNotes()) ROS_WARN("%s", note.c_str());
+  if (answer_.valid()) {
+    if (answer_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return;
+    const smartmill_msgs::SetOverrides::Response answer = answer_.get();
+    control_.answer(answer.code == smartmill_msgs::SetOverrides::Response::OK, answer.message);
+  }
+  const std::optional<OverrideRequest> wish = control_.takeRequest();
+  if (!wish) return;
+  ROS_WARN("%s", wish->reason.c_str());
+  answer_ = std::async(std::launch::async, [client = overrides_, wish]() mutable {
+    smartmill_msgs::SetOverrides call;
+    call.request.feed = wish->feed;
+    call.request.spindle = wish->spindle;
+    call.request.reason = wish->reason;
+    if (!client.call(call)) {
+      call.response.code = smartmill_msgs::SetOverrides::Response::NOT_CONNECTED;
+      call.response.message = "no answer from " + client.getService();
+    }
+    return call.response;
+  });
 }
 
 void StabilityNode::publish(const ChatterState& state) {

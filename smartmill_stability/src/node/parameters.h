@@ -5,6 +5,7 @@
 #include "smartmill_core/parameters/parameter_table.h"
 #include "smartmill_stability/chart/chart.h"
 #include "smartmill_stability/chatter/chatter_detector.h"
+#include "smartmill_stability/control/milling_control.h"
 
 namespace smartmill::stability {
 
@@ -14,6 +15,7 @@ struct NodeParameters {
   ChartParameters chart;
   ChatterParameters chatter;
   std::string chatter_signal = "force";
+  MillingControlParameters control;
   double hold_back = 0.05;
   double input_timeout = 1.0;
 
@@ -30,6 +32,8 @@ struct NodeParameters {
         "chatter_signal", chatter_signal, {"force", "vibration", "sound"},
         "force (force/compensated), vibration (daq/vibration) or sound (daq/sound); severity has the "
         "signal's unit");
+    table.section("What is done about it: overrides of the running cut (service cnc/set_overrides).");
+    control.declare(table);
     table.section();
     table.number("hold_back", hold_back, "s", Range::notNegative(),
                  "how late an event may arrive and still be in order");
@@ -41,6 +45,7 @@ struct NodeParameters {
     checkBounds(*this);
     chart.validate();
     chatter.validate();
+    control.validate();
   }
 };
 

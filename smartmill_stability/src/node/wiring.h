@@ -7,8 +7,9 @@
 namespace smartmill::stability {
 
 /// The streams beside the cutting condition in which chatter shows, from a node's inputs or from a bag.
-template <class Source>
-void connect(Source& source, const NodeParameters& parameters, SortedDetection& detection) {
+/// @param detection a SortedDetection, or what stands before it
+template <class Source, class Detection>
+void connect(Source& source, const NodeParameters& parameters, Detection& detection) {
   feed<smartmill_msgs::CncState>(source, names::CNC_STATE, detection);
   feed<smartmill_msgs::SpindleAngle>(source, names::SPINDLE_ANGLE, detection);
   if (parameters.chatter_signal == "force") {

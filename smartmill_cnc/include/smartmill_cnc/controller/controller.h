@@ -76,6 +76,11 @@ struct Reading {
   bool program_done = false;     ///< every block of the program begun last has been executed
 };
 
+/// Factors on what a program says.
+struct Overrides {
+  double feed = 1.0, spindle = 1.0;  ///< [1]
+};
+
 /// How much of a program is with the controller.
 struct Transfer {
   std::size_t sent = 0, total = 0;  ///< [byte]
@@ -126,6 +131,12 @@ class Controller {
   virtual Transfer transfer() const = 0;
   /// Stops the axes at once, then abandonPrograms().
   virtual Status abort() = 0;
+  /// Whether it lets overrides be written from outside.
+  virtual bool takesOverrides() const { return false; }
+  /// @return what it took: it may round, or not go as far.
+  virtual Result<Overrides> setOverrides(const Overrides& /*wanted*/) {
+    return Failure{Failure::Kind::refused, name() + " takes no overrides from outside"};
+  }
   /// Feed hold: the axes stand where they are, the program goes on at the machine's own key. Not every wire
   /// has it.
   virtual Status hold() {

@@ -15,6 +15,7 @@ struct FocasParameters {
   int spindle = 1;
   int marker_macro = 100;
   int orient_macro = 1133;
+  int override_data = -1;
 
   void declare(ParameterTable& table) {
     table.text("host", host, "controller's name or address; a real one or the simulated one");
@@ -26,6 +27,11 @@ struct FocasParameters {
                  "variable #n that tells the end of a program; programs must leave it alone");
     table.number("orient_macro", orient_macro, "1", Range::closed(1, 99999),
                  "variable that M119 reads the spindle's angle from, 0 .. 4095");
+    table.number(
+        "override_data", override_data, "1", Range::closed(-1, 9998),
+        "PMC data table: the byte D of this number is a percentage that the machine's ladder multiplies "
+        "into the feed override, the next byte into the spindle's, 0 and 100 alike; -1: the ladder has "
+        "no such rungs, overrides are refused");
   }
 
   /// @throws Error naming key and value.

@@ -8,9 +8,11 @@
 namespace smartmill::cnc::linuxcnc {
 
 /// Names that the generated configuration and linuxcnc_stream share.
-constexpr const char* PERMIT_SIGNAL = "permit";  ///< bit: the machine may move
-constexpr const char* BEAT_SIGNAL = "beat";      ///< bit: changes while linuxcnc_stream lives
-constexpr const char* LOAD_SIGNAL = "load";      ///< float: spindle load, 1 is full scale
+constexpr const char* PERMIT_SIGNAL = "permit";          ///< bit: the machine may move
+constexpr const char* BEAT_SIGNAL = "beat";              ///< bit: changes while linuxcnc_stream lives
+constexpr const char* LOAD_SIGNAL = "load";              ///< float: spindle load, 1 is full scale
+constexpr const char* FEED_SIGNAL = "adaptive_feed";     ///< float: to motion.adaptive-feed (M52)
+constexpr const char* SPINDLE_SIGNAL = "spindle_scale";  ///< float: factor on spindle.0.speed-out
 constexpr const char* SAMPLER_PINS = "fffffffff";
 
 /// A configuration of LinuxCNC for a machine without any hardware: ideal axes with the model's travel, rapid

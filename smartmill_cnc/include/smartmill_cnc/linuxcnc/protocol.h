@@ -104,7 +104,13 @@ struct SetLoad {
   double spindle_load = 0.0;  ///< [1]
 };
 
-using Message = std::variant<Command, Reply, Ask, MachineStatus, ServoBlock, SetLoad>;
+/// To the stream: factors on the feed and on the spindle's speed. Answered by a Reply with the same sequence
+/// number.
+struct SetOverrides {
+  double feed = 1.0, spindle = 1.0;  ///< [1] >= 0
+};
+
+using Message = std::variant<Command, Reply, Ask, MachineStatus, ServoBlock, SetLoad, SetOverrides>;
 
 struct Received {
   std::uint16_t sequence = 0;

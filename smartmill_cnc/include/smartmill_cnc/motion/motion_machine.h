@@ -56,6 +56,8 @@ enum class MotionCode : std::uint8_t {
   busy = 8,
   bad_goal = 9
 };
+/// Codes of the service SetOverrides.
+enum class OverrideCode : std::uint8_t { ok = 0, not_connected = 1, not_armed = 2, limit = 3, refused = 4 };
 /// Codes of the service ArmMotion.
 enum class HoldCode : std::uint8_t { ok = 0, not_connected = 1, not_armed = 2, refused = 3 };
 enum class ArmCode : std::uint8_t { ok = 0, not_connected = 1, wrong_mode = 2, alarm = 3 };
@@ -68,6 +70,10 @@ struct Answer {
   std::string message;  ///< one line
 };
 using Outcome = Answer<MotionCode>;
+
+struct OverrideAnswer : Answer<OverrideCode> {
+  Overrides taken;  ///< only of OverrideCode::ok
+};
 
 struct Progress {
   std::size_t bytes_sent = 0, bytes_total = 0;
@@ -102,6 +108,9 @@ class MotionMachine {
   std::optional<Outcome> jog(const std::string& axis, double distance, double feed);
   /// @param angle [rad]
   std::optional<Outcome> orient(double angle);
+  /// Of the running program; with its end they go back to 1. @return a failure only when the connection went
+  /// with it.
+  Result<OverrideAnswer> setOverrides(const Overrides& wanted, const std::string& reason);
   /// Stops the running motion; its Outcome follows when it stands. @param why for the Outcome
   Status cancel(const std::string& why = "cancelled");
 
@@ -126,6 +135,8 @@ class MotionMachine {
   std::optional<Outcome> refusal(const std::string& name) const;
   std::optional<std::size_t> axisIndex(int axis) const;
   std::string alarmLine() const;
+  std::string overrideFault(const Overrides& wanted) const;
+  Status putOverridesBack();
   std::string modeLine() const;
   std::string lineOf(const Failure& failure) const;
   void setArmed(bool armed);
@@ -148,6 +159,8 @@ class MotionMachine {
   Log& log_;
 
   bool armed_ = false;
+  bool overridden_ = false;         // overrides may differ from 1
+  Overrides overrides_;             // taken last
   std::optional<Reading> reading_;  // of the last step, none before the first and after a loss
   double now_ = 0.0;                // [s]
   Phase phase_ = Phase::idle;

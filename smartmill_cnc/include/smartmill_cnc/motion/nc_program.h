@@ -14,6 +14,8 @@ struct MotionLimits {
   double max_spindle_speed = 0.0;
   double max_dwell = 60.0;
   double max_jog = 0.1;
+  double min_feed_override = 0.3, max_feed_override = 1.2;
+  double min_spindle_override = 0.5, max_spindle_override = 1.2;
 
   /// Without the travel.
   void declare(ParameterTable& table) {
@@ -21,6 +23,12 @@ struct MotionLimits {
     table.number("max_spindle_speed", max_spindle_speed, "rad/s", Range::notNegative(), "0: the model's");
     table.number("max_dwell", max_dwell, "s", Range::positive(), "of one G4");
     table.number("max_jog", max_jog, "m", Range::positive(), "of one jog");
+    table.number("min_feed_override", min_feed_override, "1", Range::closed(0.01, 1.0),
+                 "least override of the feed that is passed on");
+    table.number("max_feed_override", max_feed_override, "1", Range::closed(1.0, 2.0), "the largest");
+    table.number("min_spindle_override", min_spindle_override, "1", Range::closed(0.1, 1.0),
+                 "least override of the spindle");
+    table.number("max_spindle_override", max_spindle_override, "1", Range::closed(1.0, 2.0), "the largest");
   }
   /// @throws Error naming key and value.
   void validate() const;

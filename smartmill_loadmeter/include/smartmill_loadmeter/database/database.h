@@ -13,6 +13,9 @@
 
 namespace smartmill::loadmeter {
 
+/// Source of a record that a cut of production has left.
+constexpr const char* SOURCE_PRODUCTION = "production";
+
 /// One identification as this machine keeps it. NaN (and an empty word): not known.
 struct CoefficientRecord {
   static constexpr double UNKNOWN = std::numeric_limits<double>::quiet_NaN();

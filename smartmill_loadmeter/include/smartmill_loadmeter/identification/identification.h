@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <limits>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -107,6 +108,10 @@ class LoadMeterIdentification {
   /// Force of each cut by its motors.
   void onMotorForce(std::function<void(const MotorForce&)> callback) { motor_force_ = std::move(callback); }
   void onTest(std::function<void(const LoadTest&)> callback) { test_ = std::move(callback); }
+  /// Every cut whose friction is known, for the database: condition, age of the edge, and the running
+  /// estimate with it, whose standard deviations are those of one cut among as many as it rests on, so that
+  /// the records of a run of cuts say together what the run does.
+  void onCut(std::function<void(const CoefficientRecord&)> callback) { cut_ = std::move(callback); }
 
   void handle(const CncState& state);
   void handle(const LoadSample& sample);
@@ -135,6 +140,7 @@ class LoadMeterIdentification {
   LoadTest steadyTest() const;
   void keep(LoadTest test);
   void follow(const LoadTest& cut);
+  void tell(const LoadTest& cut);
   IdentifyResult identify(const IdentifyGoal& goal) const;
   std::string addFromMotors(const std::vector<LoadTest>& cuts, CoefficientRecord* record) const;
   void readMotorsOf(LoadTest* test);
@@ -145,6 +151,8 @@ class LoadMeterIdentification {
   IdentificationParameters parameters_;
   std::function<void(const IdentifyResult&)> result_;
   std::function<void(const LoadTest&)> test_;
+  std::function<void(const CoefficientRecord&)> cut_;
+  std::map<std::string, double> edge_age_;  // [s] of cutting, by tool
 
   std::optional<CuttingCondition> condition_;
   std::optional<double> speed_since_, path_since_;  // [s] steady since then

@@ -11,6 +11,7 @@
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/parameters/parameter_table.h"
 #include "smartmill_core/units.h"
+#include "smartmill_stability/chart/uncertainty.h"
 #include "smartmill_stability/chart/what_if.h"
 #include "smartmill_stability/solvers/solver.h"
 #include "smartmill_stability/solvers/zero_order.h"
@@ -35,6 +36,8 @@ struct ChartParameters {
   double max_depth = 0.02;
   double depth_margin = 0.2;
   double speed_margin = 0.01;
+  double risk = 0.05;
+  double frequency_std = 0.01, gain_std = 0.05, radial_std = 0.3;
   double load_share = 0.9;
   int recommended = 5;
   double unstable_factor = 1.75;
@@ -74,6 +77,8 @@ class ChartMaker {
   /// The machine as measured in a cut with other angles (a cut that has none: those of the chart); empty
   /// while modes of x and y or the tangential coefficient are missing.
   std::optional<RegenerativeSystem> system(const Engagement& engagement) const;
+  /// The same with the deviations of what was measured and the least ones of the parameters.
+  std::optional<UncertainSystem> uncertainSystem(const Engagement& engagement) const;
   int teeth() const { return tool_geometry_.teeth; }
   std::size_t modesInX() const;                                   ///< of system(): those of y follow
   double highestSpeed() const { return parameters_.speed_high; }  ///< [rad/s]
@@ -99,6 +104,7 @@ class ChartMaker {
   int linesBeyond() const;
   /// A little beyond both ends of the chart, so that the margin of speed holds there too.
   StabilityLimit wideLimits(const Basis& given) const;
+  std::vector<double> depthShares(const std::vector<double>& speeds) const;
   void recommend(StabilityChart& chart, const StabilityLimit& wide) const;
   void proposeUnstable(StabilityChart& chart, const StabilityLimit& wide) const;
   StabilityPoint point(double speed, double depth, double limit, double frequency) const;

@@ -31,6 +31,11 @@ class UncertainSystem {
   /// percents of its section uncertainty_percent. @param system built from the same model: systemModes(x, y)
   static UncertainSystem of(const MachineModel& model, const RegenerativeSystem& system);
 
+  /// The same deviations about another system of as many modes.
+  UncertainSystem about(const RegenerativeSystem& system) const {
+    return {system, modes_, kt_share_, kr_share_};
+  }
+
   RegenerativeSystem draw(std::mt19937_64& random) const;
   const RegenerativeSystem& mean() const { return system_; }
 

@@ -55,8 +55,11 @@ struct ChatterAdvice {
     double limit = 0.0;      ///< [m] by the corrected system; NaN without a believed one
     double frequency = 0.0;  ///< [Hz] at that limit
   };
-  std::vector<Speed> speeds;                                          ///< fastest first
-  double depth = 0.0;                                                 ///< [m] of the cut
+  std::vector<Speed> speeds;  ///< fastest first
+  double depth = 0.0;         ///< [m] of the cut
+  double speed = 0.0;         ///< [rad/s] of the cut
+  Engagement engagement;      ///< of the cut
+  int teeth = 0;
   std::optional<ModeCorrection> correction;                           ///< of the believed system
   double believed_frequency = 0.0;                                    ///< [Hz] of the corrected mode before
   double believed_limit = std::numeric_limits<double>::quiet_NaN();   ///< [m] at the speed of the cut
@@ -71,12 +74,17 @@ class ChatterAdvisor {
   using Believed = std::function<std::optional<RegenerativeSystem>(const CuttingCondition&)>;
   using Output = std::function<void(const ChatterAdvice&)>;
   /// @param low, high [rad/s] speeds to propose @param teeth where the condition names none
-  ChatterAdvisor(double low, double high, int teeth, Believed believed, Output output);
+  /// @param early gets the advice before limits are sought at the proposed speeds, which takes longest
+  ChatterAdvisor(double low, double high, int teeth, Believed believed, Output output, Output early = {});
 
   /// Conditions may come ahead of the verdicts of the cut before.
   void handle(const CuttingCondition& condition);
+  /// The speed that an override made of the commanded one.
+  void handle(const CncState& state);
   /// @throws Error as the solvers on an impossible believed system.
   void handle(const ChatterState& state);
+  /// The cut goes on in another way: what was seen until now tells nothing of it.
+  void restart();
 
  private:
   void advise(const ChatterState& state);
@@ -84,10 +92,11 @@ class ChatterAdvisor {
   double low_, high_;
   int teeth_;
   Believed believed_;
-  Output output_;
+  Output output_, early_;
   std::deque<CuttingCondition> conditions_;  // the newest few
   std::vector<ChatterState> running_;        // of the present episode
   bool advised_ = false;
+  double actual_speed_ = 0.0;  // [rad/s]
 };
 
 }  // namespace smartmill::stability

@@ -1,0 +1,124 @@
+#include "smartmill_loadmeter/database/recommend.h"
+
+#include <cmath>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/units.h"
+#include "smartmill_loadmeter/database/oblique.h"
+
+namespace smartmill::loadmeter {
+namespace {
+
+using units::radFromDeg;
+
+CoefficientRecord record(const std::string& tool, const std::string& material, double ktc, double share,
+                         double stamp = 1.0) {
+  CoefficientRecord r;
+  r.set.stamp = stamp;
+  r.set.tool = tool;
+  r.set.material = material;
+  r.set.source = "force";
+  r.set.value = r.set.std_dev = NOT_IDENTIFIED;
+  r.set.value.ktc = ktc, r.set.std_dev.ktc = share * ktc;
+  r.set.value.kte = 2e4, r.set.std_dev.kte = share * 2e4;
+  return r;
+}
+
+/// The titanium of Budak, Altintas and Armarego (1996) without its dependence on chip thickness.
+CoefficientRecord titanium(const std::string& tool, double rake_deg, double helix_deg) {
+  const ShearZone zone{613e6, radFromDeg(30.0 + 0.5 * rake_deg), radFromDeg(19.1 + 0.29 * rake_deg)};
+  const CuttingCoefficients k = obliqueCoefficients(zone, radFromDeg(rake_deg), radFromDeg(helix_deg));
+  CoefficientRecord r = record(tool, "titanium", k.ktc, 0.01);
+  r.set.value.krc = k.krc, r.set.std_dev.krc = 0.01 * k.krc;
+  r.set.value.kac = k.kac, r.set.std_dev.kac = 0.02 * std::abs(k.kac);
+  r.rake = radFromDeg(rake_deg);
+  r.helix = radFromDeg(helix_deg);
+  return r;
+}
+
+CoefficientQuery asked(const std::string& tool, const std::string& material) {
+  CoefficientQuery query;
+  query.tool = tool;
+  query.material = material;
+  return query;
+}
+
+TEST(RecommendCut, thePairItselfIsSurest) {
+  CoefficientDatabase database("");
+  database.add(record("a", "steel", 2e9, 0.01));
+  database.add(record("b", "steel", 2.2e9, 0.01));
+  database.add(record("b", "aluminium", 0.8e9, 0.01));
+  const auto answer = recommendCut(database, asked("a", "steel"));
+  ASSERT_TRUE(answer);
+  EXPECT_EQ(answer->way, AnswerWay::pair);
+  EXPECT_DOUBLE_EQ(answer->set.value.ktc, 2e9);
+  EXPECT_LT(answer->ktc_lower, 2e9);
+  EXPECT_GT(answer->ktc_upper, 2e9);
+  EXPECT_EQ(answer->message.find('\n'), std::string::npos);
+}
+
+// Two tools, two materials, three pairs cut: in logs the fourth is their sum, K = 0.8 x 1.1.
+TEST(RecommendCut, standardCutsCarryOverToAPairThatNeverMet) {
+  CoefficientDatabase database("");
+  database.add(record("a", "steel", 2e9, 0.01));
+  database.add(record("b", "steel", 2.2e9, 0.01));
+  database.add(record("a", "aluminium", 0.8e9, 0.01));
+  const auto answer = recommendCut(database, asked("b", "aluminium"));
+  ASSERT_TRUE(answer);
+  EXPECT_EQ(answer->way, AnswerWay::standard_cuts);
+  EXPECT_NEAR(answer->set.value.ktc, 0.88e9, 1e-3 * 0.88e9);
+  // It is not surer than three pairs, each with a scatter of its own, can make it.
+  EXPECT_GT(answer->set.std_dev.ktc, 0.05 * 0.88e9);
+  EXPECT_LT(answer->set.std_dev.ktc, 0.2 * 0.88e9);
+}
+
+TEST(RecommendCut, withoutAChainOfCommonCutsOtherToolsSpeak) {
+  CoefficientDatabase database("");
+  database.add(record("a", "steel", 2e9, 0.01));
+  database.add(record("b", "aluminium", 0.8e9, 0.01));
+  const auto answer = recommendCut(database, asked("b", "steel"));
+  ASSERT_TRUE(answer);
+  EXPECT_EQ(answer->way, AnswerWay::other_tool);
+  EXPECT_DOUBLE_EQ(answer->set.value.ktc, 2e9);
+  EXPECT_GT(answer->set.std_dev.ktc, 0.1 * 2e9);
+  EXPECT_TRUE(std::isnan(answer->surprise));
+  EXPECT_FALSE(recommendCut(database, asked("a", "brass")));
+  EXPECT_THROW(recommendCut(database, asked("", "steel")), Error);
+}
+
+TEST(RecommendCut, theShearZoneKnowsAToolThatHasCutNothing) {
+  CoefficientDatabase database("");
+  database.add(titanium("a", 0.0, 30.0));
+  database.add(titanium("b", 6.0, 30.0));
+  database.add(titanium("c", 12.0, 45.0));
+  CoefficientQuery query = asked("new", "titanium");
+  query.rake = radFromDeg(9.0);
+  query.helix = radFromDeg(40.0);
+  const auto answer = recommendCut(database, query);
+  ASSERT_TRUE(answer);
+  EXPECT_EQ(answer->way, AnswerWay::shear_zone);
+  const double truth = titanium("new", 9.0, 40.0).set.value.ktc;
+  EXPECT_NEAR(answer->set.value.ktc, truth, 0.05 * truth);
+  EXPECT_LT(answer->ktc_lower, truth);
+  EXPECT_GT(answer->ktc_upper, truth);
+}
+
+TEST(RecommendCut, waysThatDisagreeMakeItLessSure) {
+  CoefficientDatabase database("");
+  database.add(record("a", "steel", 2e9, 0.01));
+  database.add(record("b", "steel", 2.2e9, 0.01));
+  database.add(record("a", "aluminium", 0.8e9, 0.01));
+  const auto before = recommendCut(database, asked("b", "aluminium"));
+  database.add(record("b", "aluminium", 1.6e9, 0.1));
+  const auto after = recommendCut(database, asked("b", "aluminium"));
+  ASSERT_TRUE(before && after);
+  EXPECT_GT(after->surprise, 2.0);
+  EXPECT_GT(after->ktc_upper / after->ktc_lower, before->ktc_upper / before->ktc_lower);
+  EXPECT_NE(after->message.find("other ways differ"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace smartmill::loadmeter

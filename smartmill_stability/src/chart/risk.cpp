@@ -1,0 +1,154 @@
+#include "smartmill_stability/chart/risk.h"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <random>
+
+#include "smartmill_core/error.h"
+#include "smartmill_stability/solvers/zero_order.h"
+
+namespace smartmill::stability {
+namespace {
+
+constexpr double UNKNOWN = 0.1;  // [1] deviation of what has none
+constexpr double MOST = 0.5;     // [1]
+
+double shareOf(double deviation, double value, double least) {
+  const double share = std::isfinite(deviation) && value != 0.0 ? std::abs(deviation / value) : UNKNOWN;
+  return std::min(MOST, std::hypot(share, least));
+}
+
+std::unique_ptr<FloquetSolver> solverOf(const RegenerativeSystem& system) {
+  SolverOptions options;
+  options.nodes = 8;
+  options.tolerance = 1e-3;
+  options.many = true;
+  return makeFloquetSolver(Method::collocation, system, options);
+}
+
+/// Drawn machines, made when they are asked for.
+class Drawn {
+ public:
+  Drawn(const UncertainSystem& system, const RiskOptions& options)
+      : system_(system), options_(options), random_(options.seed) {}
+
+  /// Share of the machines that chatter at a speed or a margin beside it; nothing as soon as it is above the
+  /// risk.
+  std::optional<double> probability(double speed, double depth) {
+    int chattering = 0;
+    for (int i = 0; i < options_.draws; ++i) {
+      while (static_cast<int>(solvers_.size()) <= i) solvers_.push_back(solverOf(system_.draw(random_)));
+      for (const double side : {0.0, options_.speed_margin, -options_.speed_margin}) {
+        const auto& solver = solvers_[static_cast<std::size_t>(i)];
+        if (solver->multiplier(speed * (1.0 + side), depth).radius() <= 1.0) continue;
+        ++chattering;
+        break;
+      }
+      if (chattering > options_.risk * options_.draws) return std::nullopt;
+    }
+    return static_cast<double>(chattering) / options_.draws;
+  }
+
+ private:
+  const UncertainSystem& system_;
+  RiskOptions options_;
+  std::mt19937_64 random_;
+  std::vector<std::unique_ptr<FloquetSolver>> solvers_;
+};
+
+}  // namespace
+
+UncertainSystem measuredSystem(const RegenerativeSystem& system, const ModalModel& x, const ModalModel& y,
+                               const CoefficientSet& coefficients, const LeastDeviations& least) {
+  std::vector<ModeUncertainty> modes;
+  for (const ModalModel* model : {&x, &y}) {
+    const std::size_t before = modes.size(), count = systemModes(*model, 0).size();
+    for (const Mode& mode : model->modes) {
+      if (mode.gain == 0.0) continue;
+      modes.push_back({shareOf(mode.frequency_std, mode.frequency, least.frequency),
+                       shareOf(mode.damping_ratio_std, mode.damping_ratio, least.damping),
+                       shareOf(mode.gain_std, mode.gain, least.gain)});
+    }
+    // What lies above the band counts as one mode more.
+    modes.resize(before + count, {UNKNOWN, UNKNOWN, UNKNOWN});
+  }
+  const CuttingCoefficients &value = coefficients.value, &deviation = coefficients.std_dev;
+  const double kt = shareOf(deviation.ktc, value.ktc, least.cutting);
+  const bool radial = std::isfinite(deviation.krc) && value.krc > 0.0;
+  const double kr = radial ? shareOf(deviation.krc, value.krc, least.cutting) : std::hypot(kt, least.radial);
+  return UncertainSystem(system, modes, kt, std::min(MOST, kr));
+}
+
+DrawnLimits drawnLimits(const UncertainSystem& system, const std::vector<double>& speeds, int draws,
+                        unsigned seed) {
+  constexpr std::size_t LINES = 600;  // what they miss, mean and draws miss alike
+  if (draws < 1) throw Error("draws: " + std::to_string(draws) + ", at least 1 is due");
+  double highest = 0.0;
+  for (const SystemMode& mode : system.mean().modes) highest = std::max(highest, mode.frequency);
+  const auto zeroOrder = [&](const RegenerativeSystem& of) {
+    const RegenerativeProcess process{of.teeth, of.entry, of.exit, of.kt, of.kr / of.kt};
+    return zeroOrderLimit(process, responseOf(of.modes, 1.0, 2.0 * highest, LINES), speeds).depth;
+  };
+  DrawnLimits limits;
+  limits.mean = zeroOrder(system.mean());
+  std::mt19937_64 random(seed);
+  for (int draw = 0; draw < draws; ++draw) limits.drawn.push_back(zeroOrder(system.draw(random)));
+  return limits;
+}
+
+std::vector<double> depthsAtRisk(const DrawnLimits& limits, const std::vector<double>& speeds, double risk,
+                                 double speed_margin) {
+  const std::size_t draws = limits.drawn.size();
+  std::vector<double> shares;
+  std::vector<double> least(draws);
+  std::size_t from = 0, to = 0;
+  for (std::size_t k = 0; k < speeds.size(); ++k) {
+    while (speeds[from] < speeds[k] * (1.0 - speed_margin)) ++from;
+    while (to + 1 < speeds.size() && speeds[to + 1] <= speeds[k] * (1.0 + speed_margin)) ++to;
+    to = std::max(to, k);
+    for (std::size_t draw = 0; draw < draws; ++draw) {
+      const std::vector<double>& depth = limits.drawn[draw];
+      least[draw] = *std::min_element(depth.begin() + static_cast<std::ptrdiff_t>(from),
+                                      depth.begin() + static_cast<std::ptrdiff_t>(to) + 1);
+    }
+    // So many machines may chatter; the next one's limit is what remains.
+    const auto at = static_cast<std::ptrdiff_t>(std::floor(risk * static_cast<double>(draws)));
+    std::nth_element(least.begin(), least.begin() + at, least.end());
+    const double depth = least[static_cast<std::size_t>(at)];
+    const double share = depth / limits.mean[k];
+    shares.push_back(std::isnan(share) ? 1.0 : share);
+  }
+  return shares;
+}
+
+std::optional<StableSpeed> stableSpeed(const UncertainSystem& system, double depth, double low, double high,
+                                       const RiskOptions& options) {
+  constexpr double STEP = 0.004;  // [1] between speeds that are tried
+  if (!(depth > 0.0) || !(low > 0.0) || !(high >= low))
+    throw Error("stable speed: a depth above 0 and 0 < low <= high are due");
+  if (options.draws < 1) throw Error("draws: " + std::to_string(options.draws) + ", at least 1 is due");
+  const auto mean = solverOf(system.mean());
+  std::vector<double> speeds;
+  std::vector<bool> stable;
+  for (double s = low; s <= high * (1.0 + 1e-9); s *= 1.0 + STEP) {
+    speeds.push_back(s);
+    stable.push_back(mean->multiplier(s, depth).radius() < 1.0);
+  }
+  Drawn drawn(system, options);
+  for (std::size_t k = speeds.size(); k-- > 0;) {
+    std::size_t below = k, above = k;
+    while (stable[k] && below > 0 && stable[below - 1]) --below;
+    while (stable[k] && above + 1 < speeds.size() && stable[above + 1]) ++above;
+    // Beyond what is asked nothing is known; there the drawn machines judge.
+    const bool room_below = below == 0 || speeds[below] <= speeds[k] * (1.0 - options.speed_margin);
+    const bool room_above =
+        above + 1 == speeds.size() || speeds[above] >= speeds[k] * (1.0 + options.speed_margin);
+    if (!stable[k] || !room_below || !room_above) continue;
+    if (const std::optional<double> probability = drawn.probability(speeds[k], depth))
+      return StableSpeed{speeds[k], *probability, speeds[below], speeds[above]};
+  }
+  return std::nullopt;
+}
+
+}  // namespace smartmill::stability

@@ -1,0 +1,254 @@
+#include "smartmill_stability/control/milling_control.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/units.h"
+#include "smartmill_stability/solvers/model_system.h"
+#include "smartmill_stability_testing/benchmark.h"
+
+namespace smartmill::stability {
+namespace {
+
+constexpr double RPM = units::TWO_PI / 60.0;
+
+/// A slot whose zero-order pockets lie where tooth passing meets the one mode.
+RegenerativeSystem system() {
+  return systemOf(readMachineModel(MODEL_FILE), 90.0, 180.0);
+}
+
+UncertainSystem believed(double frequency = 0.005) {
+  const RegenerativeSystem mean = system();
+  return UncertainSystem(mean, std::vector<ModeUncertainty>(mean.modes.size(), {frequency, 0.05, 0.05}), 0.05,
+                         0.1);
+}
+
+class Control : public ::testing::Test {
+ protected:
+  Control() { start(); }
+
+  void start(bool known = true) {
+    parameters_.adaptive = true;
+    control_ = std::make_unique<MillingControl>(parameters_, 16,
+                                                [known](const Engagement&) -> std::optional<UncertainSystem> {
+                                                  if (known) return believed();
+                                                  return std::nullopt;
+                                                });
+    cut_.kind = CuttingCondition::Kind::cut;
+    cut_.name = "slot";
+    cut_.spindle_speed = 10000.0 * RPM;
+    cut_.engagement = {units::PI / 2.0, units::PI, 1e-3, 0.1e-3};
+    control_->handle(cut_);
+    state(0.0, cut_.spindle_speed);
+  }
+  void state(double stamp, double speed, bool armed = true) {
+    CncState s;
+    s.stamp = stamp;
+    s.connected = true;
+    s.armed = armed;
+    s.spindle_speed = speed;
+    control_->handle(s);
+  }
+  void verdict(double stamp, bool chatter) {
+    ChatterState s;
+    s.stamp = stamp;
+    s.condition = "slot";
+    s.valid = true;
+    s.chatter = chatter;
+    control_->handle(s);
+  }
+  /// @param share of the limit at the cut's speed
+  ChatterAdvice advice(double stamp, double share) {
+    ChatterAdvice a;
+    a.stamp = stamp;
+    a.episode.condition = "slot";
+    a.episode.frequency = 1000.0;
+    a.speed = cut_.spindle_speed;
+    a.engagement = cut_.engagement;
+    a.depth = share * makeSolver(Method::collocation, system())->limit(cut_.spindle_speed, 1.0).depth;
+    return a;
+  }
+  void load(double stamp, double value) {
+    LoadSample l;
+    l.stamp = stamp;
+    l.spindle_load = value;
+    control_->handle(l);
+  }
+
+  MillingControlParameters parameters_;
+  std::unique_ptr<MillingControl> control_;
+  CuttingCondition cut_;
+};
+
+TEST_F(Control, theSpindleGoesWhereDrawnMachinesAreStableAndTheFeedWithIt) {
+  const ChatterAdvice a = advice(1.0, 1.5);
+  control_->handle(a);
+  const auto wish = control_->takeRequest();
+  ASSERT_TRUE(wish);
+  EXPECT_TRUE(wish->chatter);
+  EXPECT_NEAR(wish->feed, wish->spindle, 1e-12);
+  EXPECT_GE(wish->spindle, 0.8);
+  EXPECT_LE(wish->spindle, 1.2);
+  // Another seed, more draws: the probability is what was promised, within the binomial's spread.
+  EXPECT_LT(chatterProbability(believed(), wish->spindle * cut_.spindle_speed, a.depth, 200, 99), 0.12);
+  EXPECT_NE(wish->reason.find("chatter at 1000 Hz"), std::string::npos) << wish->reason;
+  EXPECT_EQ(wish->reason.find('\n'), std::string::npos);
+  EXPECT_FALSE(control_->takeRequest());
+}
+
+TEST_F(Control, itSettlesAndSaysSo) {
+  control_->handle(advice(1.0, 1.5));
+  const auto wish = control_->takeRequest();
+  ASSERT_TRUE(wish);
+  control_->answer(true, "");
+  EXPECT_TRUE(control_->moving());
+  const double speed = wish->spindle * cut_.spindle_speed, turn = units::TWO_PI / speed;
+  state(1.1, speed);
+  verdict(1.1 + 10.0 * turn, true);  // its window reaches back before the move
+  EXPECT_TRUE(control_->moving());
+  verdict(1.1 + 30.0 * turn, false);
+  EXPECT_FALSE(control_->moving());
+  const auto notes = control_->takeNotes();
+  ASSERT_EQ(notes.size(), 1u);
+  EXPECT_NE(notes[0].find("slot: the cut has settled"), std::string::npos) << notes[0];
+}
+
+TEST_F(Control, nothingHappensDisarmedOrUnasked) {
+  state(0.5, cut_.spindle_speed, false);
+  control_->handle(advice(1.0, 1.5));
+  EXPECT_FALSE(control_->takeRequest());
+  parameters_.adaptive = false;
+  const MillingControlParameters off = parameters_;
+  start();
+  parameters_ = off;
+  control_ = std::make_unique<MillingControl>(off, 16, [](const Engagement&) { return believed(); });
+  control_->handle(cut_);
+  state(0.0, cut_.spindle_speed);
+  control_->handle(advice(1.0, 1.5));
+  EXPECT_FALSE(control_->takeRequest());
+}
+
+TEST_F(Control, whereNoSpeedBearsItTheFeedGoesToItsFloorAndTheNextCutIsSaid) {
+  const ChatterAdvice a = advice(1.0, 40.0);
+  control_->handle(a);
+  const auto wish = control_->takeRequest();
+  ASSERT_TRUE(wish);
+  EXPECT_EQ(wish->feed, 0.4);
+  EXPECT_EQ(wish->spindle, 1.0);
+  EXPECT_NE(wish->reason.find("no speed from 8000 to 12000 rpm"), std::string::npos) << wish->reason;
+  control_->answer(true, "");
+  control_->handle(advice(2.0, 1.5));
+  EXPECT_FALSE(control_->takeRequest());
+  // The cut after it begins anew.
+  cut_.stamp = 3.0;
+  control_->handle(cut_);
+  state(3.1, cut_.spindle_speed);
+  control_->handle(advice(4.0, 1.5));
+  EXPECT_TRUE(control_->takeRequest());
+}
+
+TEST_F(Control, aNextCutIsStableAndRemovesMoreThanHalfAsDeep) {
+  const ChatterAdvice a = advice(1.0, 12.0);
+  control_->handle(a);
+  const auto wish = control_->takeRequest();
+  ASSERT_TRUE(wish);
+  if (wish->next_speed == 0.0) GTEST_SKIP() << "borne at once";
+  EXPECT_LT(chatterProbability(believed(), wish->next_speed, wish->next_depth, 200, 7), 0.12);
+}
+
+TEST_F(Control, aRefusalIsSaidOnceAndEndsTheAttemptsInThisCut) {
+  control_->handle(advice(1.0, 1.5));
+  ASSERT_TRUE(control_->takeRequest());
+  control_->answer(false, "overrides: the panel has the say");
+  EXPECT_EQ(control_->spindle(), 1.0);
+  const auto notes = control_->takeNotes();
+  ASSERT_EQ(notes.size(), 1u);
+  EXPECT_EQ(notes[0], "slot: overrides stay as they are: overrides: the panel has the say");
+  control_->handle(advice(2.0, 1.5));
+  EXPECT_FALSE(control_->takeRequest());
+  EXPECT_TRUE(control_->takeNotes().empty());
+}
+
+TEST_F(Control, aSpindleThatDoesNotFollowIsGivenUp) {
+  control_->handle(advice(1.0, 1.5));
+  ASSERT_TRUE(control_->takeRequest());
+  control_->answer(true, "");
+  state(1.5, cut_.spindle_speed);
+  EXPECT_TRUE(control_->moving());
+  state(3.5, cut_.spindle_speed);
+  EXPECT_FALSE(control_->moving());
+  EXPECT_EQ(control_->takeNotes().size(), 1u);
+}
+
+TEST_F(Control, withoutModesItGoesToTheNearestSpeedInStep) {
+  start(false);
+  ChatterAdvice a = advice(1.0, 1.5);
+  for (const double rpm : {15000.0, 11200.0, 9500.0, 4000.0}) {
+    ChatterAdvice::Speed s;
+    s.speed = rpm * RPM;
+    s.limit = std::nan("");
+    a.speeds.push_back(s);
+  }
+  control_->handle(a);
+  const auto wish = control_->takeRequest();
+  ASSERT_TRUE(wish);
+  EXPECT_NEAR(wish->spindle, 0.95, 1e-9);
+}
+
+// The rules that users of such controls asked for.
+TEST_F(Control, loadLeadsTheFeedDownFiveTimesAsFastAsUp) {
+  parameters_.load_target = 0.6;
+  parameters_.feed_rise = 0.05;
+  start();
+  double t = 1.0;
+  const auto run = [&](double value, double seconds) {
+    for (const double end = t + seconds; t < end; t += 0.02) {
+      load(t, value);
+      if (control_->takeRequest()) control_->answer(true, "");
+    }
+  };
+  run(1.2, 1.0);
+  const double down = 1.0 - control_->feed();
+  EXPECT_NEAR(down, 0.25, 0.03);  // 5 x 0.05 a second
+  run(std::nan(""), 5.0);         // unknown: nothing changes
+  EXPECT_NEAR(control_->feed(), 1.0 - down, 1e-12);
+  const double before = control_->feed();
+  run(0.1, 2.0);
+  EXPECT_NEAR(control_->feed() - before, 0.1, 0.03);
+  run(5.0, 20.0);
+  EXPECT_EQ(control_->feed(), 0.4);  // the floor
+  EXPECT_EQ(control_->spindle(), 1.0);
+  // A load after a silence is the first of its kind.
+  t += 30.0;
+  load(t, 0.0);
+  EXPECT_FALSE(control_->takeRequest());
+}
+
+TEST(StableSpeed, noSpeedMeansNone) {
+  EXPECT_FALSE(stableSpeed(believed(), 1.0, 800.0, 1200.0));
+  EXPECT_THROW(stableSpeed(believed(), 0.0, 800.0, 1200.0), Error);
+}
+
+// With coefficients alone uncertain a limit goes with 1 / K: the share of depth at a risk is the log-normal's
+// quantile, whatever the speed.
+TEST(DepthsAtRisk, followTheClosedForm) {
+  RegenerativeSystem mean = system();
+  constexpr double SHARE = 0.2;
+  const UncertainSystem uncertain(mean, std::vector<ModeUncertainty>(mean.modes.size()), SHARE, 0.0);
+  mean.kr = 0.0;
+  const UncertainSystem tangential(mean, std::vector<ModeUncertainty>(mean.modes.size()), SHARE, 0.0);
+  std::vector<double> speeds;
+  for (int i = 0; i < 20; ++i) speeds.push_back(900.0 + 20.0 * i);
+  const DrawnLimits limits = drawnLimits(tangential, speeds, 800, 3);
+  const double sigma = std::sqrt(std::log1p(SHARE * SHARE));
+  const double expected = 1.0 / std::exp(1.644854 * sigma - 0.5 * sigma * sigma);
+  for (const double share : depthsAtRisk(limits, speeds, 0.05, 0.0)) EXPECT_NEAR(share, expected, 0.045);  // 4 sigma of 800 draws
+  // A margin of speed can only take away.
+  const auto wide = depthsAtRisk(limits, speeds, 0.05, 0.03), none = depthsAtRisk(limits, speeds, 0.05, 0.0);
+  for (std::size_t k = 0; k < speeds.size(); ++k) EXPECT_LE(wide[k], none[k] + 1e-12);
+}
+
+}  // namespace
+}  // namespace smartmill::stability
