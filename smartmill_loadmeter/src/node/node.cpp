@@ -47,6 +47,9 @@ LoadMeterNode::LoadMeterNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
   find_service_ = nh.advertiseService(names::FIND_COEFFICIENTS, &LoadMeterNode::find, this);
   shell_.diagnose("load meter", [this](auto& status) { diagnose(status); });
   shell_.every(WATCH_PERIOD, [this] { watch(); });
+  if (!parameters_.fleet.empty())
+    pusher_ =
+        std::make_unique<FleetPusher>(parameters_.database, parameters_.fleet, parameters_.fleet_period);
   server_.start();
 }
 
@@ -179,6 +182,12 @@ void LoadMeterNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status
     status.addf("last cut's surprise", "%.1f sigma", production->surprise());
   }
   if (!last_force_.empty()) status.add("force by motor currents", last_force_);
+  if (pusher_) {
+    const FleetPusher::State fleet = pusher_->state();
+    status.add("not sent to the fleet [records]", fleet.behind);
+    status.add("fleet", fleet.message);
+    if (fleet.failing && fleet.behind > 0) status.mergeSummary(Level::WARN, "fleet: " + fleet.message);
+  }
   status.add("late inputs", identification_.late());
   status.add("waiting for", identification_.waitingFor());
   status.add("last result", last_message_);
