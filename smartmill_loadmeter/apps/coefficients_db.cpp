@@ -12,6 +12,7 @@
 #include "smartmill_core/units.h"
 #include "smartmill_loadmeter/database/database.h"
 #include "smartmill_loadmeter/database/fleet.h"
+#include "smartmill_loadmeter/database/fleet_model.h"
 #include "smartmill_loadmeter/database/oblique.h"
 
 namespace {
@@ -139,6 +140,26 @@ void members(const Options& o) {
   }
 }
 
+// What machines share and what is each one's own, from Ktc; then the next cut of each.
+void learn(const Options& o) {
+  mustExist(o.file);
+  const auto records = CoefficientDatabase(o.file).records("", "");
+  const FleetModel model(observationsOf(records, &CuttingCoefficients::ktc));
+  const FleetDeviations s = model.deviations();
+  std::printf(
+      "# Ktc scatters by %.2f %% between machines, %.2f %% between batches, %.2f %% between tools, %.2f %% "
+      "from cut to cut\n",
+      100.0 * s.machine, 100.0 * s.batch, 100.0 * s.tool, 100.0 * s.noise);
+  for (const MachineEffect& m : model.machines()) {
+    std::printf("%s: %+.2f +- %.2f %% beside the fleet, from %d, odd with probability %.3f",
+                m.machine.c_str(), 100.0 * m.effect, 100.0 * m.std_dev, m.observations, m.odd);
+    if (const auto next = model.predict(m.machine, o.material, o.tool))
+      std::printf("; next cut Ktc %.1f +- %.1f N/mm2%s", next->value / units::N_PER_MM2,
+                  next->std_dev / units::N_PER_MM2, next->own > 0 ? "" : " (it has none)");
+    std::printf("%s\n", m.odd > 0.5 ? (": " + m.meaning()).c_str() : "");
+  }
+}
+
 /// Commands about a fleet's server.
 class FleetCommands {
  public:
@@ -148,7 +169,10 @@ class FleetCommands {
         migrate_(line.command("migrate",
                               "DATABASE is a server: makes its tables, or brings older ones up to date")),
         enrol_(line.command("enrol", "DATABASE is a server: gives a machine its login")),
-        members_(line.command("members", "DATABASE is a server: its machines, and how far behind each is")) {
+        members_(line.command("members", "DATABASE is a server: its machines, and how far behind each is")),
+        learn_(line.command("fleet", "what the machines of these records share, and which is odd")) {
+    learn_.option("--tool", o.tool, "of the next cut");
+    learn_.option("--material", o.material, "of the next cut");
     push_.option("URL", o.other, "postgresql://USER@HOST/DATABASE").required();
     push_.flag("--all", o.all, "everything anew, for a server restored from an older copy");
     pull_.option("URL", o.other, "postgresql://USER@HOST/DATABASE").required();
@@ -163,10 +187,11 @@ class FleetCommands {
     if (migrate_.parsed()) migrate(o);
     if (enrol_.parsed()) enrolOne(o);
     if (members_.parsed()) members(o);
+    if (learn_.parsed()) learn(o);
   }
 
  private:
-  CommandOptions push_, pull_, migrate_, enrol_, members_;
+  CommandOptions push_, pull_, migrate_, enrol_, members_, learn_;
 };
 
 }  // namespace
