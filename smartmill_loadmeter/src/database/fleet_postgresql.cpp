@@ -1,6 +1,7 @@
 // The fleet's server: fleet_server.h by PostgreSQL. Tables: fleet_schema.cpp.
 #include <algorithm>
 #include <cmath>
+#include <string_view>
 
 #include "fleet_connection.h"
 #include "fleet_schema.h"
@@ -14,22 +15,14 @@ namespace {
 constexpr int BATCH = 2000;  // records that come at once
 
 void appendWord(const std::string& word, std::string* line) {
+  constexpr std::string_view SPECIAL = "\\\t\n\r", LETTER = "\\tnr";
   for (const char c : word) {
-    switch (c) {
-      case '\\':
-        *line += "\\\\";
-        break;
-      case '\t':
-        *line += "\\t";
-        break;
-      case '\n':
-        *line += "\\n";
-        break;
-      case '\r':
-        *line += "\\r";
-        break;
-      default:
-        *line += c;
+    const std::size_t at = SPECIAL.find(c);
+    if (at == std::string_view::npos) {
+      *line += c;
+    } else {
+      *line += '\\';
+      *line += LETTER[at];
     }
   }
 }
