@@ -11,6 +11,7 @@ HEADERS = {
     "nlohmann": "nlohmann-json-dev", "CLI": "cli11", "sqlite3.h": "sqlite3", "benchmark": "benchmark",
     "rapidcheck": "rapidcheck", "rapidcheck.h": "rapidcheck", "ros": "roscpp", "boost": "boost",
     "glog": "libgoogle-glog-dev", "unsupported": "eigen", "gtest": None, "gmock": None,
+    "libpq-fe.h": None,  # optional: ./setup --with-fleet
     "arpa": None, "netinet": None, "sys": None, "linux": None,
 }
 FOUND = {

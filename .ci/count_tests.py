@@ -7,8 +7,8 @@ import pathlib
 import sys
 import xml.etree.ElementTree as ElementTree
 
-# What needs packages that are optional (./setup --with-linuxcnc) may be skipped everywhere.
-OPTIONAL = ("LinuxCncMachine",)
+# What needs packages that are optional (./setup --with-linuxcnc, --with-fleet) may be skipped everywhere.
+OPTIONAL = ("LinuxCncMachine", "FleetDatabase")
 
 
 def verdict(case):

@@ -1,13 +1,18 @@
+#include <unistd.h>
+
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <string>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/io/text_file.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/program.h"
 #include "smartmill_core/units.h"
 #include "smartmill_loadmeter/database/database.h"
+#include "smartmill_loadmeter/database/fleet.h"
+#include "smartmill_loadmeter/database/fleet_model.h"
 #include "smartmill_loadmeter/database/oblique.h"
 #include "smartmill_loadmeter/database/recommend.h"
 
@@ -17,12 +22,13 @@ using namespace smartmill;             // NOLINT
 using namespace smartmill::loadmeter;  // NOLINT
 
 struct Options {
-  std::string file, tool, material, other;
+  std::string file, tool, material, other, shop, login, password_file;
+  bool all = false;
   double cutting_speed = NAN, feed = NAN, diameter = NAN, helix = NAN, rake = NAN, age = NAN;
 };
 
 void mustExist(const std::string& file) {
-  if (!std::filesystem::exists(file)) throw Error(file + ": cannot be read");
+  if (!isFleet(file) && !std::filesystem::exists(file)) throw Error(file + ": cannot be read");
 }
 
 bool isCsv(const std::string& file) {
@@ -107,12 +113,116 @@ void predictFor(const Options& o) {
               units::degFromRad(zone.friction_angle), cuttingSection(k.value, k.std_dev).c_str());
 }
 
+void progressOf(const char* verb, const FleetTransfer& done) {
+  if (isatty(STDERR_FILENO)) std::fprintf(stderr, "\r%zu %s", done.offered, verb);
+}
+
+void transfer(const Options& o, bool out) {
+  mustExist(o.file);
+  CoefficientDatabase local(o.file);
+  const char* verb = out ? "sent" : "came";
+  const auto progress = [&](const FleetTransfer& done) { progressOf(verb, done); };
+  const FleetTransfer done = out ? push(local, o.other, progress, o.all) : pull(local, o.other, progress);
+  if (isatty(STDERR_FILENO)) std::fprintf(stderr, "\r");
+  std::printf("%zu new of %zu %s\n", done.fresh, done.offered, verb);
+}
+
+void migrate(const Options& o) {
+  const int found = migrateFleet(o.file);
+  if (found == FLEET_SCHEMA) {
+    std::printf("tables are of version %d already\n", found);
+  } else if (found > 0) {
+    std::printf("tables of version %d are of version %d now\n", found, FLEET_SCHEMA);
+  } else {
+    std::printf("tables of version %d made\n", FLEET_SCHEMA);
+  }
+}
+
+void enrolOne(const Options& o) {
+  std::string password = o.password_file.empty() ? "" : readText(o.password_file);
+  while (!password.empty() && (password.back() == '\n' || password.back() == '\r')) password.pop_back();
+  FleetMember member;
+  member.name = o.other;
+  member.login = o.login.empty() ? o.other : o.login;
+  member.shop = o.shop;
+  enrol(o.file, member, password);
+  std::printf("'%s' of shop '%s' logs in as '%s'\n", member.name.c_str(), member.shop.c_str(),
+              member.login.c_str());
+}
+
+void members(const Options& o) {
+  for (const FleetMember& m : fleetMembers(o.file)) {
+    std::printf("%s of %s: %zu records", m.name.c_str(), m.shop.c_str(), m.records);
+    if (std::isfinite(m.silent)) {
+      std::printf(", last push %.0f s ago, %zu behind then\n", m.silent, m.behind);
+    } else {
+      std::printf(", no push yet\n");
+    }
+  }
+}
+
+// What machines share and what is each one's own, from Ktc; then the next cut of each.
+void learn(const Options& o) {
+  mustExist(o.file);
+  const auto records = CoefficientDatabase(o.file).records("", "");
+  const FleetModel model(observationsOf(records, &CuttingCoefficients::ktc));
+  const FleetDeviations s = model.deviations();
+  std::printf(
+      "# Ktc scatters by %.2f %% between machines, %.2f %% between batches, %.2f %% between tools, %.2f %% "
+      "from cut to cut\n",
+      100.0 * s.machine, 100.0 * s.batch, 100.0 * s.tool, 100.0 * s.noise);
+  for (const MachineEffect& m : model.machines()) {
+    std::printf("%s: %+.2f +- %.2f %% beside the fleet, from %d, odd with probability %.3f",
+                m.machine.c_str(), 100.0 * m.effect, 100.0 * m.std_dev, m.observations, m.odd);
+    if (const auto next = model.predict(m.machine, o.material, o.tool))
+      std::printf("; next cut Ktc %.1f +- %.1f N/mm2%s", next->value / units::N_PER_MM2,
+                  next->std_dev / units::N_PER_MM2, next->own > 0 ? "" : " (it has none)");
+    std::printf("%s\n", m.odd > 0.5 ? (": " + m.meaning()).c_str() : "");
+  }
+}
+
+/// Commands about a fleet's server.
+class FleetCommands {
+ public:
+  FleetCommands(CommandLine& line, Options& o)
+      : push_(line.command("push", "sends what a fleet's server has not got yet")),
+        pull_(line.command("pull", "takes over what the shop's other machines sent to a fleet's server")),
+        migrate_(line.command("migrate",
+                              "DATABASE is a server: makes its tables, or brings older ones up to date")),
+        enrol_(line.command("enrol", "DATABASE is a server: gives a machine its login")),
+        members_(line.command("members", "DATABASE is a server: its machines, and how far behind each is")),
+        learn_(line.command("fleet", "what the machines of these records share, and which is odd")) {
+    learn_.option("--tool", o.tool, "of the next cut");
+    learn_.option("--material", o.material, "of the next cut");
+    push_.option("URL", o.other, "postgresql://USER@HOST/DATABASE").required();
+    push_.flag("--all", o.all, "everything anew, for a server restored from an older copy");
+    pull_.option("URL", o.other, "postgresql://USER@HOST/DATABASE").required();
+    enrol_.option("MACHINE", o.other, "name of the machine").required();
+    enrol_.option("--shop", o.shop, "whose machines read each other's records").required();
+    enrol_.option("--login", o.login, "of the server (default: the machine's name)");
+    enrol_.option("--password-file", o.password_file, "its password; default: left as it is");
+  }
+  void run(const Options& o) const {
+    if (push_.parsed()) transfer(o, true);
+    if (pull_.parsed()) transfer(o, false);
+    if (migrate_.parsed()) migrate(o);
+    if (enrol_.parsed()) enrolOne(o);
+    if (members_.parsed()) members(o);
+    if (learn_.parsed()) learn(o);
+  }
+
+ private:
+  CommandOptions push_, pull_, migrate_, enrol_, members_, learn_;
+};
+
 }  // namespace
 
 int main(int argc, char** argv) {
   CommandLine line("What a machine has identified: the database of cutting coefficients.");
   Options o;
-  line.option("DATABASE", o.file, "SQLite file of the machine").required();
+  line.option("DATABASE", o.file,
+              "SQLite file of the machine; or a fleet's server, postgresql://USER@HOST/DATABASE")
+      .required();
   const auto pair = [&](const CommandOptions& command) {
     command.option("--tool", o.tool, "name of the tool (default: any)");
     command.option("--material", o.material, "workpiece material (default: any)");
@@ -150,7 +260,9 @@ int main(int argc, char** argv) {
   pair(export_command);
   const CommandOptions import_command = line.command("import", "reads .csv or .yaml in");
   import_command.option("FILE", o.other, "file to read").required();
+  const FleetCommands fleet_commands(line, o);
   return runProgram(line, argc, argv, [&] {
+    fleet_commands.run(o);
     if (list_command.parsed()) list(o);
     if (find_command.parsed()) find(o);
     if (predict_command.parsed()) predictFor(o);

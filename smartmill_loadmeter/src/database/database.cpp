@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <set>
 
+#include "fleet_server.h"
 #include "record_fields.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
@@ -19,9 +20,6 @@ namespace {
 
 constexpr int SCHEMA = 1;
 constexpr int BUSY_TIMEOUT = 30000;  // [ms] that a writer waits for others
-constexpr int NO_SPEED = -1000000;   // bucket of records without a cutting speed
-constexpr int BUCKETS = 7;           // half octaves of speed looked at on each side
-constexpr int NEWEST = 16;           // records of a bucket that count
 
 class Statement {
  public:
@@ -40,8 +38,8 @@ class Statement {
                                            : sqlite3_bind_null(statement_, at);
     if (code != SQLITE_OK) fail();
   }
-  void bind(int at, int number) {
-    if (sqlite3_bind_int(statement_, at, number) != SQLITE_OK) fail();
+  void bind(int at, std::int64_t number) {
+    if (sqlite3_bind_int64(statement_, at, number) != SQLITE_OK) fail();
   }
   /// @return a row is there.
   bool step() {
@@ -59,6 +57,7 @@ class Statement {
     return sqlite3_column_double(statement_, column);
   }
   int integer(int column) const { return sqlite3_column_int(statement_, column); }
+  std::int64_t whole(int column) const { return sqlite3_column_int64(statement_, column); }
 
  private:
   [[noreturn]] void fail() const { throw Error(file_ + ": " + sqlite3_errmsg(db_)); }
@@ -66,13 +65,6 @@ class Statement {
   const std::string& file_;
   sqlite3_stmt* statement_ = nullptr;
 };
-
-std::string columns() {
-  std::string list;
-  for (const WordField& f : wordFields()) list += (list.empty() ? "" : ", ") + f.name;
-  for (const NumberField& f : numberFields()) list += ", " + f.name;
-  return list;
-}
 
 CoefficientRecord recordOf(const Statement& row) {
   CoefficientRecord record;
@@ -82,34 +74,18 @@ CoefficientRecord recordOf(const Statement& row) {
   return record;
 }
 
-// Two FNV-1a hashes of everything that was identified: the same everywhere, so that merging twice adds
-// nothing.
-std::string identityOf(CoefficientRecord record) {
-  std::string text;
-  for (const WordField& f : wordFields()) {
-    if (f.name != "version") text += f.at(record) + '\x1f';
-  }
-  for (const NumberField& f : numberFields()) text += exactNumber(f.get(record, f.index)) + '\x1f';
-  std::uint64_t a = 14695981039346656037ull, b = 1099511628211ull * 2654435761ull;
-  for (const char c : text) {
-    a = (a ^ static_cast<unsigned char>(c)) * 1099511628211ull;
-    b = (b ^ static_cast<unsigned char>(c)) * 1099511628211ull + 0x9e3779b97f4a7c15ull;
-  }
-  return formatted("%016llx%016llx", static_cast<unsigned long long>(a), static_cast<unsigned long long>(b));
-}
-
-int bucketOf(double cutting_speed) {
-  if (!(cutting_speed > 0.0)) return NO_SPEED;
-  return static_cast<int>(std::floor(2.0 * std::log2(cutting_speed)));
-}
-
 }  // namespace
 
 struct CoefficientDatabase::Impl {
   std::string file;
   sqlite3* db = nullptr;
+  std::unique_ptr<FleetServer> fleet;  // in the file's place
 
   explicit Impl(const std::string& path) : file(path.empty() ? ":memory:" : path) {
+    if (isFleet(path)) {
+      fleet = connectFleet(path);
+      return;
+    }
     const int code = sqlite3_open_v2(
         file.c_str(), &db, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_FULLMUTEX, nullptr);
     try {
@@ -178,6 +154,10 @@ struct CoefficientDatabase::Impl {
         execute("PRAGMA user_version=" + std::to_string(SCHEMA));
       });
     }
+    // Beside the schema: what a program that knows no fleet leaves alone.
+    Statement sent(db, file, "SELECT 1 FROM sqlite_master WHERE name = 'sent'");
+    if (!sent.step())
+      execute("CREATE TABLE IF NOT EXISTS sent (fleet TEXT PRIMARY KEY, last INTEGER, at REAL)");
     if (version() != SCHEMA) {
       throw Error(file + ": schema " + std::to_string(version()) + " is not one this version knows (" +
                   std::to_string(SCHEMA) + ")");
@@ -195,6 +175,8 @@ struct CoefficientDatabase::Impl {
       throw;
     }
   }
+
+  std::int64_t sentUpTo(const std::string& to) const;
 
   std::string where(const std::string& tool, const std::string& material) const {
     std::string sql;
@@ -223,32 +205,44 @@ bool CoefficientDatabase::add(const CoefficientSet& set) {
 }
 
 std::size_t CoefficientDatabase::add(const std::vector<CoefficientRecord>& records) {
+  std::vector<CoefficientRecord> complete = records;
+  for (CoefficientRecord& record : complete) {
+    if (record.version.empty()) record.version = SMARTMILL_VERSION;
+  }
+  if (impl_->fleet) return impl_->fleet->add(complete);
   std::size_t added = 0;
-  impl_->transaction([&] {
-    std::string marks = "?1, ?2";
-    const std::size_t count = wordFields().size() + numberFields().size();
-    for (std::size_t i = 0; i < count; ++i) marks += ", ?" + std::to_string(i + 3);
-    Statement insert(impl_->db, impl_->file,
-                     "INSERT OR IGNORE INTO coefficients (identity, speed_bucket, " + columns() +
-                         ") VALUES (" + marks + ")");
-    for (CoefficientRecord record : records) {
-      if (!std::isfinite(record.set.stamp)) throw Error(impl_->file + ": stamp of a record is not a number");
-      if (record.version.empty()) record.version = SMARTMILL_VERSION;
-      int at = 1;
-      insert.bind(at++, identityOf(record));
-      insert.bind(at++, bucketOf(record.cutting_speed));
-      for (const WordField& f : wordFields()) insert.bind(at++, f.at(record));
-      for (const NumberField& f : numberFields()) insert.bind(at++, f.get(record, f.index));
-      insert.step();
-      added += static_cast<std::size_t>(sqlite3_changes(impl_->db));
-      insert.reset();
-    }
-  });
+  impl_->transaction([&] { added = insert(complete); });
+  return added;
+}
+
+std::size_t CoefficientDatabase::insert(const std::vector<CoefficientRecord>& records) {
+  std::size_t added = 0;
+  std::string marks = "?1, ?2";
+  const std::size_t count = wordFields().size() + numberFields().size();
+  for (std::size_t i = 0; i < count; ++i) marks += ", ?" + std::to_string(i + 3);
+  Statement insert(impl_->db, impl_->file,
+                   "INSERT OR IGNORE INTO coefficients (identity, speed_bucket, " + columns() + ") VALUES (" +
+                       marks + ")");
+  for (CoefficientRecord record : records) {
+    if (!std::isfinite(record.set.stamp)) throw Error(impl_->file + ": stamp of a record is not a number");
+    int at = 1;
+    insert.bind(at++, identityOf(record));
+    insert.bind(at++, std::int64_t{bucketOf(record.cutting_speed)});
+    for (const WordField& f : wordFields()) insert.bind(at++, f.at(record));
+    for (const NumberField& f : numberFields()) insert.bind(at++, f.get(record, f.index));
+    insert.step();
+    added += static_cast<std::size_t>(sqlite3_changes(impl_->db));
+    insert.reset();
+  }
   return added;
 }
 
 std::optional<CoefficientSet> CoefficientDatabase::find(const std::string& tool,
                                                         const std::string& material) const {
+  if (impl_->fleet) {
+    const auto newest = impl_->fleet->newest(tool, material);
+    return newest ? std::optional(newest->set) : std::nullopt;
+  }
   Statement s(impl_->db, impl_->file,
               "SELECT " + columns() + " FROM coefficients" + impl_->where(tool, material) +
                   " ORDER BY stamp DESC, id DESC LIMIT 1");
@@ -259,6 +253,7 @@ std::optional<CoefficientSet> CoefficientDatabase::find(const std::string& tool,
 
 std::vector<CoefficientRecord> CoefficientDatabase::records(const std::string& tool,
                                                             const std::string& material) const {
+  if (impl_->fleet) return impl_->fleet->records(tool, material);
   Statement s(
       impl_->db, impl_->file,
       "SELECT " + columns() + " FROM coefficients" + impl_->where(tool, material) + " ORDER BY stamp, id");
@@ -269,6 +264,7 @@ std::vector<CoefficientRecord> CoefficientDatabase::records(const std::string& t
 }
 
 std::size_t CoefficientDatabase::size() const {
+  if (impl_->fleet) return impl_->fleet->size();
   Statement s(impl_->db, impl_->file, "SELECT count(*) FROM coefficients");
   return s.step() ? static_cast<std::size_t>(s.number(0)) : 0;
 }
@@ -281,10 +277,82 @@ std::size_t CoefficientDatabase::merge(const std::string& file) {
 }
 
 std::string CoefficientDatabase::contents() const {
-  Statement s(impl_->db, impl_->file, "SELECT DISTINCT tool, material FROM coefficients ORDER BY 1, 2");
   std::string text;
-  while (s.step()) text += (text.empty() ? "" : ", ") + s.word(0) + " / " + s.word(1);
+  const auto add = [&](const std::string& tool, const std::string& material) {
+    text += (text.empty() ? "" : ", ") + tool + " / " + material;
+  };
+  if (impl_->fleet) {
+    for (const auto& [tool, material] : impl_->fleet->pairs()) add(tool, material);
+  } else {
+    Statement s(impl_->db, impl_->file, "SELECT DISTINCT tool, material FROM coefficients ORDER BY 1, 2");
+    while (s.step()) add(s.word(0), s.word(1));
+  }
   return text.empty() ? "nothing" : text;
+}
+
+const std::string& CoefficientDatabase::file() const {
+  return impl_->file;
+}
+
+// Numbers of records follow the order in which they were kept: a file has one writer at a time.
+std::int64_t CoefficientDatabase::Impl::sentUpTo(const std::string& to) const {
+  Statement s(db, file, "SELECT last FROM sent WHERE fleet = ?1");
+  s.bind(1, to);
+  return s.step() ? s.whole(0) : 0;
+}
+
+CoefficientDatabase::Batch CoefficientDatabase::unsent(const std::string& fleet, std::size_t limit) const {
+  Batch batch;
+  Statement s(impl_->db, impl_->file,
+              "SELECT " + columns() + ", id FROM coefficients WHERE id > ?1 ORDER BY id LIMIT ?2");
+  s.bind(1, impl_->sentUpTo(fleet));
+  s.bind(2, static_cast<std::int64_t>(limit));
+  const int id = static_cast<int>(wordFields().size() + numberFields().size());
+  while (s.step()) {
+    batch.records.push_back(recordOf(s));
+    batch.last = s.whole(id);
+  }
+  return batch;
+}
+
+std::size_t CoefficientDatabase::unsentCount(const std::string& fleet) const {
+  Statement s(impl_->db, impl_->file, "SELECT count(*) FROM coefficients WHERE id > ?1");
+  s.bind(1, impl_->sentUpTo(fleet));
+  return s.step() ? static_cast<std::size_t>(s.whole(0)) : 0;
+}
+
+void CoefficientDatabase::markSent(const std::string& fleet, std::int64_t last) {
+  Statement s(impl_->db, impl_->file,
+              "INSERT OR REPLACE INTO sent (fleet, last, at) VALUES (?1, ?2, julianday('now'))");
+  s.bind(1, fleet);
+  s.bind(2, last);
+  s.step();
+}
+
+std::string CoefficientDatabase::lastFleet() const {
+  Statement s(impl_->db, impl_->file, "SELECT fleet FROM sent ORDER BY at DESC LIMIT 1");
+  return s.step() ? s.word(0) : "";
+}
+
+std::size_t CoefficientDatabase::addFrom(const std::string& fleet,
+                                         const std::vector<CoefficientRecord>& records) {
+  std::size_t added = 0;
+  impl_->transaction([&] {
+    const bool nothing_waits = unsentCount(fleet) == 0;
+    added = insert(records);
+    if (!nothing_waits || added == 0) return;
+    Statement last(impl_->db, impl_->file, "SELECT max(id) FROM coefficients");
+    last.step();
+    markSent(fleet, last.whole(0));
+  });
+  return added;
+}
+
+std::vector<std::string> CoefficientDatabase::identities() const {
+  Statement s(impl_->db, impl_->file, "SELECT identity FROM coefficients");
+  std::vector<std::string> found;
+  while (s.step()) found.push_back(s.word(0));
+  return found;
 }
 
 double distance(const CoefficientRecord& record, const CoefficientQuery& query, const DistanceScale& scale) {
@@ -305,6 +373,7 @@ double distance(const CoefficientRecord& record, const CoefficientQuery& query, 
 // Newest records of a pair about the asked cutting speed; any speed where there is none near.
 std::vector<CoefficientRecord> CoefficientDatabase::near(const std::string& tool,
                                                          const CoefficientQuery& query) const {
+  if (impl_->fleet) return impl_->fleet->near(tool, query);
   std::vector<CoefficientRecord> found;
   const std::string select =
       "SELECT " + columns() + " FROM coefficients" + impl_->where(tool, query.material);
@@ -320,7 +389,7 @@ std::vector<CoefficientRecord> CoefficientDatabase::near(const std::string& tool
     for (int b = -BUCKETS; b <= BUCKETS; ++b) buckets.push_back(bucketOf(query.cutting_speed) + b);
     for (const int bucket : buckets) {
       Impl::bindPair(s, tool, query.material);
-      s.bind(3, bucket);
+      s.bind(3, std::int64_t{bucket});
       collect(s);
     }
   }

@@ -1,6 +1,7 @@
 #include "record_fields.h"
 
 #include <cmath>
+#include <cstdint>
 
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/model/machine_model.h"
@@ -93,6 +94,32 @@ const std::vector<NumberField>& numberFields() {
 std::string exactNumber(double value) {
   if (!std::isfinite(value)) return {};
   return formatted("%.17g", value);
+}
+
+std::string columns() {
+  std::string list;
+  for (const WordField& f : wordFields()) list += (list.empty() ? "" : ", ") + f.name;
+  for (const NumberField& f : numberFields()) list += ", " + f.name;
+  return list;
+}
+
+std::string identityOf(CoefficientRecord record) {
+  std::string text;
+  for (const WordField& f : wordFields()) {
+    if (f.name != "version") text += f.at(record) + '\x1f';
+  }
+  for (const NumberField& f : numberFields()) text += exactNumber(f.get(record, f.index)) + '\x1f';
+  std::uint64_t a = 14695981039346656037ull, b = 1099511628211ull * 2654435761ull;
+  for (const char c : text) {
+    a = (a ^ static_cast<unsigned char>(c)) * 1099511628211ull;
+    b = (b ^ static_cast<unsigned char>(c)) * 1099511628211ull + 0x9e3779b97f4a7c15ull;
+  }
+  return formatted("%016llx%016llx", static_cast<unsigned long long>(a), static_cast<unsigned long long>(b));
+}
+
+int bucketOf(double cutting_speed) {
+  if (!(cutting_speed > 0.0)) return NO_SPEED;
+  return static_cast<int>(std::floor(2.0 * std::log2(cutting_speed)));
 }
 
 }  // namespace smartmill::loadmeter

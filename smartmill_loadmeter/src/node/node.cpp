@@ -51,6 +51,9 @@ LoadMeterNode::LoadMeterNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
   recommend_service_ = nh.advertiseService(names::RECOMMEND_CUT, &LoadMeterNode::recommend, this);
   shell_.diagnose("load meter", [this](auto& status) { diagnose(status); });
   shell_.every(WATCH_PERIOD, [this] { watch(); });
+  if (!parameters_.fleet.empty())
+    pusher_ =
+        std::make_unique<FleetPusher>(parameters_.database, parameters_.fleet, parameters_.fleet_period);
   server_.start();
 }
 
@@ -227,6 +230,12 @@ void LoadMeterNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status
   }
   if (!last_force_.empty()) status.add("force by motor currents", last_force_);
   status.add("cuts kept", kept_cuts_);
+  if (pusher_) {
+    const FleetPusher::State fleet = pusher_->state();
+    status.add("not sent to the fleet [records]", fleet.behind);
+    status.add("fleet", fleet.message);
+    if (fleet.failing && fleet.behind > 0) status.mergeSummary(Level::WARN, "fleet: " + fleet.message);
+  }
   status.add("late inputs", identification_.late());
   status.add("waiting for", identification_.waitingFor());
   status.add("last result", last_message_);

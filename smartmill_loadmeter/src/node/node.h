@@ -5,7 +5,9 @@
 
 #include <cstdint>
 #include <map>
+#include <memory>
 
+#include "node/fleet_pusher.h"
 #include "node/parameters.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_loadmeter/database/database.h"
@@ -44,6 +46,7 @@ class LoadMeterNode {
   NodeShell shell_;
   SortedIdentification identification_;
   CoefficientDatabase database_;
+  std::unique_ptr<FleetPusher> pusher_;
   std::map<std::uint64_t, Server::GoalHandle> waiting_;
   std::uint64_t next_id_ = 1;
   std::string last_message_, last_force_;

@@ -4,6 +4,7 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/parameters/parameter_table.h"
+#include "smartmill_loadmeter/database/fleet.h"
 #include "smartmill_loadmeter/identification/identification.h"
 
 namespace smartmill::loadmeter {
@@ -13,6 +14,8 @@ struct NodeParameters {
   std::string model;
   std::string database;
   bool keep_cuts = true;
+  std::string fleet;
+  double fleet_period = 60.0;
   IdentificationParameters identification;
   std::string motor_calibration;
   double hold_back = 0.05;
@@ -30,6 +33,11 @@ struct NodeParameters {
                "path of the SQLite file that keeps what this machine identifies; empty: this run only");
     table.flag("keep_cuts", keep_cuts,
                "true: every cut enters the database, with its condition and what it says");
+    table.text("fleet", fleet,
+               "address of the fleet's server, postgresql://USER@HOST/DATABASE, to which the file is pushed; "
+               "empty: none");
+    table.number("fleet_period", fleet_period, "s", Range::openLow(0.0, 86400.0),
+                 "between pushes; a server that is away is asked again after it");
     identification.declare(table);
     table.section("Motor currents.");
     table.text("motor_calibration", motor_calibration,
@@ -45,6 +53,11 @@ struct NodeParameters {
   void validate() const {
     checkBounds(*this);
     identification.validate();
+    if (isFleet(database))
+      throw Error("database: a file is due, a machine does not wait for a server (fleet)");
+    if (!fleet.empty() && !isFleet(fleet))
+      throw Error("fleet: '" + fleet + "': postgresql://USER@HOST/DATABASE is due");
+    if (!fleet.empty() && database.empty()) throw Error("fleet: without a database there is nothing to push");
     if (!motor_calibration.empty() && !identification.motor.any())
       throw Error("motor_phase_per_metre: all 0, and motor_phase_per_revolution too: no current can be read");
   }

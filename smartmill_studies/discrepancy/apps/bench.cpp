@@ -14,10 +14,11 @@
 #include "discrepancy/bench_case.h"
 #include "discrepancy/bench_score.h"
 #include "plant/draw.h"
-#include "smartmill_core/error.h"
 #include "smartmill_core/model/effect_catalogue.h"
 #include "smartmill_core/program.h"
+#include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_discrepancy/gap/twin_runner.h"
+#include "study_case.h"
 
 namespace {
 
@@ -29,7 +30,8 @@ struct Options {
   std::string out;
   std::vector<std::string> only;
   plant::Counts counts;
-  int threads = 2, only_case = -1;
+  StudyCase one;
+  int threads = 2, cases = 0;
   std::uint64_t seed = 1;
   bool keep = false;
 };
@@ -47,16 +49,31 @@ std::vector<std::string> namesOf(const Options& o) {
 // What an earlier run of the same bench has left, by case.
 std::map<int, json> readLines(const std::string& file) {
   std::map<int, json> lines;
-  std::ifstream in(file);
-  for (std::string text; std::getline(in, text);) {
-    const json line = json::parse(text, nullptr, false);
-    if (!line.is_discarded()) lines[line["case"]] = line;  // a line cut off by an end is done again
-  }
+  for (const json& line : readJsonLines(file)) lines[line["case"]] = line;
   return lines;
 }
 
+// Without a folder that is named, only the line stays.
+void runOne(const Options& o, const plant::Case& hidden) {
+  const TemporaryFolder scratch;
+  const auto progress = [](const std::string& line) { std::fprintf(stderr, "%s\n", line.c_str()); };
+  const std::string folder =
+      (o.out.empty() ? scratch.file("") : o.out + "/") + "case_" + std::to_string(o.one.number);
+  const json line = runBenchCase(hidden, o.one.number, folder, progress);
+  if (!o.keep && line["right"]) std::filesystem::remove_all(folder);
+  o.one.print(line);
+}
+
 void run(const Options& o) {
-  const std::vector<plant::Case> cases = plant::drawCases(o.counts, namesOf(o), o.seed);
+  if (o.one.scores()) return scoreBench(readJsonLines(o.one.lines), o.out.empty() ? "." : o.out);
+  std::vector<plant::Case> cases = plant::drawCases(o.counts, namesOf(o), o.seed);
+  if (o.cases > static_cast<int>(cases.size()))
+    throw UsageError("--cases: " + std::to_string(cases.size()) +
+                     " are drawn by --singles, --pairs and so on");
+  if (o.cases > 0) cases.resize(static_cast<std::size_t>(o.cases));
+  o.one.check(static_cast<int>(cases.size()));
+  if (o.one.one()) return runOne(o, cases[static_cast<std::size_t>(o.one.number)]);
+  if (o.out.empty()) throw UsageError("--out: a folder of cases and scores is due");
   std::filesystem::create_directories(o.out);
   const std::string file = o.out + "/cases.jsonl";
   std::map<int, json> lines = readLines(file);
@@ -64,11 +81,10 @@ void run(const Options& o) {
   std::mutex mutex;
   runParallel(cases.size(), o.threads, [&](std::size_t k) {
     const int number = static_cast<int>(k);
-    if (o.only_case >= 0 ? number != o.only_case : lines.count(number) > 0) return;
+    if (lines.count(number) > 0) return;
     const std::string folder = o.out + "/case_" + std::to_string(number);
     const auto progress = [&](const std::string& line) {
       std::ofstream(folder + ".log", std::ios::app) << line << "\n";
-      if (o.only_case >= 0) std::fprintf(stderr, "%s\n", line.c_str());
     };
     const json line = runBenchCase(cases[k], number, folder, progress);
     if (!o.keep && line["right"]) std::filesystem::remove_all(folder);
@@ -78,7 +94,6 @@ void run(const Options& o) {
     std::fprintf(stderr, "%zu of %zu cases\n", lines.size() + 1, cases.size());
     lines[number] = line;
   });
-  if (o.only_case >= 0) return;
   std::vector<json> all;
   for (const auto& [number, line] : lines) {
     if (number < static_cast<int>(cases.size())) all.push_back(line);
@@ -94,14 +109,16 @@ int main(int argc, char** argv) {
       "Blind bench of explain: hides causes in drawn machines, whose physics is another one than the twin's, "
       "and "
       "scores what is named. Goes on where an earlier run into the same folder ended."};
-  line.option("-o,--out", o.out, "folder of cases and scores").required();
+  line.option("-o,--out", o.out, "folder of cases and scores; with --case it may be left out");
   line.option("--singles", o.counts.singles, "cases of each single effect");
   line.option("--pairs", o.counts.pairs, "pairs of effects");
   line.option("--triples", o.counts.triples, "cases of three effects");
   line.option("--none", o.counts.none, "cases with nothing hidden");
   line.option("--outside", o.counts.outside, "cases with a cause outside the catalogue");
   line.option("--only", o.only, "effects to draw from, comma separated").commas();
-  line.option("--case", o.only_case, "only this case of those drawn, with its progress");
+  line.option("--cases", o.cases, "the first of those drawn (default: all)").notNegative();
+  line.option("--case", o.one.number, "only this case of those drawn, its progress on standard error");
+  o.one.addScore(line);
   line.option("--seed", o.seed, "of everything drawn");
   line.option("--threads", o.threads, "cases at a time").within(1, 64);
   line.flag("--keep", o.keep, "keep the campaigns of right cases too");

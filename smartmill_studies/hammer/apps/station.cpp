@@ -10,6 +10,7 @@
 
 #include "hammer/station_score.h"
 #include "smartmill_core/program.h"
+#include "study_case.h"
 
 namespace {
 
@@ -19,23 +20,22 @@ using nlohmann::json;
 struct Options {
   hammer::StationStudy study;
   std::string out = "hammer_station";
-  int machines = 500, only = -1;
+  StudyCase one;
+  int machines = 500;
 };
 
 void run(const Options& o) {
+  if (o.one.scores()) {
+    std::printf("%s\n", hammer::scoreStations(readJsonLines(o.one.lines)).dump(1).c_str());
+    return;
+  }
+  o.one.check(o.machines);
+  if (o.one.one()) return o.one.print(hammer::runStation(o.study, o.one.number));
   std::filesystem::create_directories(o.out);
   const std::string file =
       o.out + "/stations_" + std::to_string(o.study.seed) + "_" + std::to_string(o.study.hits) + ".jsonl";
   std::map<int, json> lines;
-  std::ifstream in(file);
-  for (std::string text; std::getline(in, text);) {
-    const json line = json::parse(text, nullptr, false);
-    if (!line.is_discarded()) lines[line["machine"]] = line;  // a line cut off by an end is done again
-  }
-  if (o.only >= 0) {
-    std::printf("%s\n", hammer::runStation(o.study, o.only).dump().c_str());
-    return;
-  }
+  for (const json& line : readJsonLines(file)) lines[line["machine"]] = line;
   std::ofstream table(file, std::ios::app);
   for (int number = 0; number < o.machines; ++number) {
     if (lines.count(number) > 0) continue;
@@ -58,10 +58,10 @@ int main(int argc, char** argv) {
       "Measures drawn tools in drawn machines with the automatic hammer and scores the answers. One line of "
       "JSON a machine in OUT/stations_SEED_HITS.jsonl; goes on where an earlier run ended; prints the "
       "score."};
-  line.option("--machines", o.machines, "to draw").within(1, 100000).showDefault();
+  o.one.addTo(line, "--machines,--cases", o.machines, "to draw");
+  o.one.addScore(line);
   line.option("--seed", o.study.seed, "of everything drawn").showDefault();
   line.option("--hits", o.study.hits, "a measurement").within(1, 100).showDefault();
-  line.option("--machine", o.only, "only this one, its line on standard output");
   line.option("-o,--out", o.out, "folder of the lines").showDefault();
   return runProgram(line, argc, argv, [&] { run(o); });
 }

@@ -10,6 +10,7 @@
 #include "loadmeter/turning_scene.h"
 #include "smartmill_core/program.h"
 #include "smartmill_core/signal/statistics.h"
+#include "study_case.h"
 
 namespace {
 
@@ -63,6 +64,15 @@ void machines(unsigned first, int count) {
   std::printf("\n");
 }
 
+// The same machine as in the whole study of that seed.
+nlohmann::json lineOf(unsigned first, int number) {
+  const Faults faults;
+  const CaseErrors e = judge(drawCase(first + static_cast<unsigned>(number), faults), faults);
+  return {{"case", number},  {"thesis_ktc", e.thesis_ktc}, {"thesis_kte", e.thesis_kte}, {"ktc", e.ktc},
+          {"kte", e.kte},    {"z_ktc", e.z_ktc},           {"z_kte", e.z_kte},           {"depth", e.depth},
+          {"terms", e.terms}};
+}
+
 void split(const char* name, const VarianceSplit& s, double process, double sensor) {
   std::printf(
       "%s: dynamometer %.1f N, %.0f N2 (put in %.0f); current %.1f N, %.0f N2; its share %.0f N2 (put in "
@@ -103,9 +113,12 @@ int main(int argc, char** argv) {
   CommandLine line("Randomised cases with known truth: what the estimators reach.");
   int count = 200;
   unsigned first = 1;
-  line.option("--cases", count, "how many").showDefault().within(2, 100000);
+  StudyCase one;
+  one.addTo(line, "--cases", count, "how many");
   line.option("--seed", first, "of the first case").showDefault();
   return runProgram(line, argc, argv, [&] {
+    one.check(count);
+    if (one.one()) return one.print(lineOf(first, one.number));
     machines(first, count);
     turning(first);
   });

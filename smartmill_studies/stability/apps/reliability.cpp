@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <fstream>
 #include <string>
+#include <vector>
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/program.h"
@@ -11,6 +12,7 @@
 #include "smartmill_stability/chart/picture.h"
 #include "stability/reliability.h"
 #include "stability/study_request.h"
+#include "study_case.h"
 
 namespace {
 
@@ -19,20 +21,41 @@ using namespace smartmill;
 struct Request : stability::StudyRequest {
   int machines = 200, draws = 200, bins = 4;
   bool solver_only = false;
+  StudyCase one;
 };
 
-void run(const Request& request) {
-  const MachineModel model = request.machine();
-  stability::ReliabilityOptions options{request.range()};
-  if (request.bins < 1 || request.bins > 100) throw Error("--bins: 1..100 is due");
-  options.machines = request.machines;
-  options.draws = request.draws;
-  options.by_twin = !request.solver_only;
-  const auto points = reliabilityStudy(model, request.system(model), options, [](double share) {
-    std::fprintf(stderr, "\r%3.0f %%", 100.0 * share);
-  });
-  std::fprintf(stderr, "\n");
-  const auto bins = reliabilityBins(points, request.bins, options.by_twin);
+/// One machine, drawn by a seed of its own.
+void runOne(const Request& request, const MachineModel& model, stability::ReliabilityOptions options) {
+  request.one.check(request.machines);
+  options.machines = 1;
+  options.seed = static_cast<unsigned>(seedOfCase(options.seed, request.one.number));
+  const stability::ReliabilityPoint p = reliabilityStudy(model, request.system(model), options).front();
+  request.one.print({{"case", request.one.number},
+                     {"speed_rpm", units::rpmFromRadPerSec(p.speed)},
+                     {"depth_mm", p.depth / units::MM},
+                     {"predicted", p.predicted},
+                     {"chatters", p.chatters},
+                     {"seen", p.seen}});
+}
+
+/// Points of the lines that cases printed.
+std::vector<stability::ReliabilityPoint> pointsOf(const std::string& file) {
+  std::vector<stability::ReliabilityPoint> points;
+  for (const nlohmann::json& line : readJsonLines(file)) {
+    stability::ReliabilityPoint p;
+    p.speed = units::radPerSecFromRpm(line.at("speed_rpm"));
+    p.depth = line.at("depth_mm").get<double>() * units::MM;
+    p.predicted = line.at("predicted");
+    p.chatters = line.at("chatters");
+    p.seen = line.at("seen");
+    points.push_back(p);
+  }
+  return points;
+}
+
+void report(const Request& request, const std::vector<stability::ReliabilityPoint>& points) {
+  const bool by_twin = !request.solver_only;
+  const auto bins = reliabilityBins(points, request.bins, by_twin);
   std::ofstream csv(request.out);
   csv << "predicted,observed,low,high,count\n";
   std::printf("%10s %10s %19s %6s\n", "predicted", "observed", "95 % of observed", "cuts");
@@ -49,14 +72,30 @@ void run(const Request& request) {
   if (!csv) throw Error(request.out + ": cannot be written");
   std::printf(
       "%zu machines, observed %s: all together %+.2f standard errors, %d bins outside their interval\n",
-      points.size(), options.by_twin ? "in the simulator's records" : "by the solver",
-      reliabilityScore(points, options.by_twin), outside);
+      points.size(), by_twin ? "in the simulator's records" : "by the solver",
+      reliabilityScore(points, by_twin), outside);
   stability::drawBeside(
       request.out,
       "set xlabel 'Predicted probability of chatter'\nset ylabel 'Observed share'\nset xrange [0:1]\nset "
       "yrange [0:1]\nset size square\nplot x with lines dt 2 lc 'gray' title 'as predicted', %FILE skip 1 "
       "using "
       "1:2:3:4 with yerrorbars pt 7 lw 2 title 'observed, 95 % of the binomial'");
+}
+
+void run(const Request& request) {
+  const MachineModel model = request.machine();
+  stability::ReliabilityOptions options{request.range()};
+  if (request.bins < 1 || request.bins > 100) throw Error("--bins: 1..100 is due");
+  options.machines = request.machines;
+  options.draws = request.draws;
+  options.by_twin = !request.solver_only;
+  if (request.one.scores()) return report(request, pointsOf(request.one.lines));
+  if (request.one.one()) return runOne(request, model, options);
+  const auto points = reliabilityStudy(model, request.system(model), options, [](double share) {
+    std::fprintf(stderr, "\r%3.0f %%", 100.0 * share);
+  });
+  std::fprintf(stderr, "\n");
+  report(request, points);
 }
 
 }  // namespace
@@ -67,7 +106,8 @@ int main(int argc, char** argv) {
       "Reliability diagram of the probability of chatter: machines drawn from the model's standard "
       "deviations, each cut once in the simulator."};
   request.addTo(line);
-  line.option("--machines", request.machines, "drawn (200)");
+  request.one.addTo(line, "--machines,--cases", request.machines, "drawn");
+  request.one.addScore(line);
   line.option("--draws", request.draws, "behind each prediction (200)");
   line.option("--bins", request.bins, "of the predicted probability (4)");
   line.flag("--solver-only", request.solver_only, "the solver is the observer too, no simulator");

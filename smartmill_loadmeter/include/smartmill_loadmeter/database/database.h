@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <limits>
 #include <memory>
@@ -78,10 +79,12 @@ struct CoefficientEstimate {
 
 /// Everything a machine has identified: one SQLite file a machine, or in memory. Each add() is one durable
 /// transaction (write-ahead log, synchronised): when it has returned, no crash takes it back, and any number
-/// of processes may write at once. A record with the content of one that is there is kept once.
+/// of processes may write at once. A record with the content of one that is there is kept once. The same
+/// questions go to a fleet's server (fleet.h), where its address stands in the file's place.
 class CoefficientDatabase {
  public:
-  /// @param file empty: in memory. @throws Error naming a file that is no such database or cannot be opened.
+  /// @param file empty: in memory; postgresql://..: a fleet's server. @throws Error naming a file that is no
+  /// such database or cannot be opened.
   explicit CoefficientDatabase(const std::string& file);
   ~CoefficientDatabase();
   CoefficientDatabase(const CoefficientDatabase&) = delete;
@@ -111,7 +114,25 @@ class CoefficientDatabase {
   /// "tool / material" of what is known, for messages.
   std::string contents() const;
 
+  const std::string& file() const;
+
+  /// @{ Of a file, for a fleet (by its identity) to which it is handed on. Records are numbered as they come.
+  struct Batch {
+    std::vector<CoefficientRecord> records;
+    std::int64_t last = 0;  ///< number of the last one
+  };
+  Batch unsent(const std::string& fleet, std::size_t limit) const;  ///< oldest first
+  std::size_t unsentCount(const std::string& fleet) const;
+  void markSent(const std::string& fleet, std::int64_t last);  ///< all up to this number
+  /// The fleet that was handed on to last, by its identity; empty: none yet.
+  std::string lastFleet() const;
+  /// Records that came from the fleet are not to be handed back. @return how many were new.
+  std::size_t addFrom(const std::string& fleet, const std::vector<CoefficientRecord>& records);
+  std::vector<std::string> identities() const;
+  /// @}
+
  private:
+  std::size_t insert(const std::vector<CoefficientRecord>& records);
   std::vector<CoefficientRecord> near(const std::string& tool, const CoefficientQuery& query) const;
 
   struct Impl;

@@ -1,0 +1,218 @@
+// The fleet's server: fleet_server.h by PostgreSQL. Tables: fleet_schema.cpp.
+#include <algorithm>
+#include <cmath>
+#include <string_view>
+
+#include "fleet_connection.h"
+#include "fleet_schema.h"
+#include "fleet_server.h"
+#include "record_fields.h"
+
+namespace smartmill::loadmeter {
+
+namespace {
+
+constexpr int BATCH = 2000;  // records that come at once
+
+void appendWord(const std::string& word, std::string* line) {
+  constexpr std::string_view SPECIAL = "\\\t\n\r", LETTER = "\\tnr";
+  for (const char c : word) {
+    const std::size_t at = SPECIAL.find(c);
+    if (at == std::string_view::npos) {
+      *line += c;
+    } else {
+      *line += '\\';
+      *line += LETTER[at];
+    }
+  }
+}
+
+// A line of COPY's text format: identity, bucket, words, numbers.
+void appendLine(CoefficientRecord record, std::string* lines) {
+  *lines += identityOf(record) + "\t" + std::to_string(bucketOf(record.cutting_speed));
+  for (const WordField& f : wordFields()) {
+    *lines += '\t';
+    appendWord(f.at(record), lines);
+  }
+  for (const NumberField& f : numberFields()) {
+    const std::string number = exactNumber(f.get(record, f.index));
+    *lines += '\t' + (number.empty() ? "\\N" : number);
+  }
+  *lines += '\n';
+}
+
+CoefficientRecord recordOf(const FleetRows& rows, int row) {
+  CoefficientRecord record;
+  int column = 0;
+  for (const WordField& f : wordFields()) f.at(record) = rows.word(row, column++);
+  for (const NumberField& f : numberFields()) f.set(record, f.index, rows.number(row, column++));
+  return record;
+}
+
+std::vector<CoefficientRecord> recordsOf(const FleetRows& rows) {
+  std::vector<CoefficientRecord> records;
+  for (int row = 0; row < rows.size(); ++row) records.push_back(recordOf(rows, row));
+  return records;
+}
+
+std::string columnsOf(const std::string& table) {
+  std::string list;
+  for (const WordField& f : wordFields()) list += (list.empty() ? "" : ", ") + table + "." + f.name;
+  for (const NumberField& f : numberFields()) list += ", " + table + "." + f.name;
+  return list;
+}
+
+/// " WHERE material = $1 AND tool = $2" of what is asked, and its parameters.
+struct Pair {
+  std::string where;
+  std::vector<std::string> parameters;
+
+  Pair(const std::string& tool, const std::string& material) {
+    if (!material.empty()) add("material", material);
+    if (!tool.empty()) add("tool", tool);
+  }
+  void add(const std::string& column, const std::string& word) {
+    parameters.push_back(word);
+    where += (where.empty() ? " WHERE " : " AND ") + column + " = $" + std::to_string(parameters.size());
+  }
+};
+
+class PostgresqlServer : public FleetServer {
+ public:
+  explicit PostgresqlServer(const std::string& url) : connection_(url) {
+    identity_ = checkFleet(connection_);
+  }
+
+  std::string identity() override { return identity_; }
+
+  std::size_t add(const std::vector<CoefficientRecord>& records) override {
+    if (connection_.ask("SELECT (me()).id", {}).word(0, 0).empty())
+      connection_.fail("this login is no machine of the fleet, `coefficients_db URL enrol` makes it one");
+    const std::string list = "identity, speed_bucket, " + columns();
+    std::string lines;
+    for (const CoefficientRecord& record : records) {
+      if (!std::isfinite(record.set.stamp)) connection_.fail("stamp of a record is not a number");
+      appendLine(record, &lines);
+    }
+    std::size_t added = 0;
+    connection_.transaction("BEGIN", [&] {
+      connection_.run("CREATE TEMP TABLE incoming ON COMMIT DROP AS SELECT " + list +
+                      " FROM coefficients WITH NO DATA");
+      connection_.copyIn("COPY incoming (" + list + ") FROM STDIN", lines);
+      // In one order, or two machines with the same records wait for each other.
+      added = connection_
+                  .run("INSERT INTO coefficients (shop, machine_id, " + list +
+                       ") SELECT m.shop, m.id, incoming.* FROM incoming, me() m ORDER BY incoming.identity "
+                       "ON CONFLICT (shop, identity) DO NOTHING")
+                  .affected();
+    });
+    return added;
+  }
+
+  void notePush(const FleetTransfer& done, std::size_t behind) override {
+    connection_.ask(
+        "INSERT INTO push (machine_id, shop, offered, fresh, behind) SELECT m.id, m.shop, $1, $2, $3 FROM "
+        "me() m",
+        {std::to_string(done.offered), std::to_string(done.fresh), std::to_string(behind)});
+  }
+
+  std::optional<CoefficientRecord> newest(const std::string& tool, const std::string& material) override {
+    const Pair pair(tool, material);
+    const FleetRows rows = connection_.ask(
+        "SELECT " + columns() + " FROM coefficients" + pair.where + " ORDER BY stamp DESC, id DESC LIMIT 1",
+        pair.parameters);
+    if (rows.size() == 0) return std::nullopt;
+    return recordOf(rows, 0);
+  }
+
+  std::vector<CoefficientRecord> records(const std::string& tool, const std::string& material) override {
+    const Pair pair(tool, material);
+    return recordsOf(connection_.ask(
+        "SELECT " + columns() + " FROM coefficients" + pair.where + " ORDER BY stamp, id", pair.parameters));
+  }
+
+  std::vector<CoefficientRecord> near(const std::string& tool, const CoefficientQuery& query) override {
+    const Pair pair(tool, query.material);
+    const std::string newest = " ORDER BY stamp DESC LIMIT " + std::to_string(NEWEST);
+    std::vector<CoefficientRecord> found;
+    if (query.cutting_speed > 0.0) {
+      Pair buckets = pair;
+      buckets.parameters.push_back(std::to_string(bucketOf(query.cutting_speed)));
+      const std::string middle = "$" + std::to_string(buckets.parameters.size()) + "::int";
+      const std::string span = std::to_string(BUCKETS);
+      found = recordsOf(connection_.ask(
+          "SELECT " + columnsOf("c") + " FROM (SELECT " + std::to_string(NO_SPEED) +
+              " AS at UNION ALL SELECT " + middle + " + b FROM generate_series(-" + span + ", " + span +
+              ") b) buckets, LATERAL (SELECT * FROM coefficients" + buckets.where +
+              (buckets.where.empty() ? " WHERE" : " AND") + " speed_bucket = buckets.at" + newest + ") c",
+          buckets.parameters));
+    }
+    if (!found.empty()) return found;
+    return recordsOf(
+        connection_.ask("SELECT " + columns() + " FROM coefficients" + pair.where + newest, pair.parameters));
+  }
+
+  std::vector<std::pair<std::string, std::string>> pairs() override {
+    const FleetRows rows = connection_.run("SELECT DISTINCT tool, material FROM coefficients ORDER BY 1, 2");
+    std::vector<std::pair<std::string, std::string>> found;
+    for (int row = 0; row < rows.size(); ++row) found.emplace_back(rows.word(row, 0), rows.word(row, 1));
+    return found;
+  }
+
+  std::size_t size() override {
+    return static_cast<std::size_t>(connection_.run("SELECT count(*) FROM coefficients").number(0, 0));
+  }
+
+  void missing(const std::vector<std::string>& identities,
+               const std::function<void(const std::vector<CoefficientRecord>&)>& batch) override {
+    std::string lines;
+    for (const std::string& identity : identities) lines += identity + "\n";
+    connection_.transaction("BEGIN ISOLATION LEVEL REPEATABLE READ", [&] {
+      connection_.run("CREATE TEMP TABLE have (identity text) ON COMMIT DROP");
+      connection_.copyIn("COPY have FROM STDIN", lines);
+      connection_.run("ANALYZE have");
+      connection_.run("DECLARE lacking NO SCROLL CURSOR FOR SELECT " + columnsOf("c") +
+                      " FROM coefficients c WHERE NOT EXISTS (SELECT 1 FROM have h WHERE h.identity = "
+                      "c.identity) ORDER BY c.id");
+      while (true) {
+        const std::vector<CoefficientRecord> some =
+            recordsOf(connection_.run("FETCH " + std::to_string(BATCH) + " FROM lacking"));
+        if (some.empty()) break;
+        batch(some);
+      }
+    });
+  }
+
+  std::vector<FleetMember> members() override {
+    const FleetRows rows = connection_.run(
+        "SELECT m.name, m.login, m.shop, (SELECT count(*) FROM coefficients c WHERE c.shop = m.shop AND "
+        "c.machine_id = m.id), extract(epoch FROM now() - p.at), coalesce(p.behind, 0) FROM members() m LEFT "
+        "JOIN "
+        "LATERAL (SELECT at, behind FROM push WHERE push.shop = m.shop AND push.machine_id = m.id ORDER BY "
+        "at DESC "
+        "LIMIT 1) p ON true ORDER BY 1");
+    std::vector<FleetMember> found;
+    for (int row = 0; row < rows.size(); ++row) {
+      found.push_back({rows.word(row, 0), rows.word(row, 1), rows.word(row, 2),
+                       static_cast<std::size_t>(rows.number(row, 3)), rows.number(row, 4),
+                       static_cast<std::size_t>(rows.number(row, 5))});
+    }
+    return found;
+  }
+
+ private:
+  FleetConnection connection_;
+  std::string identity_;
+};
+
+}  // namespace
+
+bool fleetSupported() {
+  return true;
+}
+
+std::unique_ptr<FleetServer> connectFleet(const std::string& url) {
+  return std::make_unique<PostgresqlServer>(url);
+}
+
+}  // namespace smartmill::loadmeter

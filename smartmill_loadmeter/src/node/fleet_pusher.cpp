@@ -1,0 +1,60 @@
+#include "node/fleet_pusher.h"
+
+#include <chrono>
+#include <utility>
+
+#include "smartmill_core/error.h"
+#include "smartmill_loadmeter/database/fleet.h"
+
+namespace smartmill::loadmeter {
+
+FleetPusher::FleetPusher(std::string file, std::string url, double period)
+    : file_(std::move(file)), url_(std::move(url)), period_(period), thread_([this] { work(); }) {
+}
+
+FleetPusher::~FleetPusher() {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    end_ = true;
+  }
+  wake_.notify_all();
+  thread_.join();
+}
+
+FleetPusher::State FleetPusher::state() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return state_;
+}
+
+void FleetPusher::work() {
+  std::unique_lock<std::mutex> lock(mutex_);
+  while (!end_) {
+    lock.unlock();
+    pushOnce();
+    lock.lock();
+    wake_.wait_for(lock, std::chrono::duration<double>(period_), [this] { return end_; });
+  }
+}
+
+void FleetPusher::pushOnce() {
+  State next;
+  try {
+    CoefficientDatabase local(file_);
+    try {
+      const FleetTransfer done = push(local, url_);
+      next.message = std::to_string(done.fresh) + " new of " + std::to_string(done.offered) + " sent to " +
+                     withoutPassword(url_);
+    } catch (const Error& error) {
+      next.failing = true;
+      next.message = error.what();
+    }
+    next.behind = local.unsentCount(local.lastFleet());
+  } catch (const Error& error) {
+    next.failing = true;
+    next.message = error.what();
+  }
+  const std::lock_guard<std::mutex> lock(mutex_);
+  state_ = next;
+}
+
+}  // namespace smartmill::loadmeter

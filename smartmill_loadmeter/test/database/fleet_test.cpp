@@ -1,0 +1,300 @@
+#include "smartmill_loadmeter/database/fleet.h"
+
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <csignal>
+#include <memory>
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/testing/temporary_folder.h"
+#include "smartmill_loadmeter_testing/private_server.h"
+
+namespace smartmill::loadmeter {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+CoefficientRecord recordOf(const std::string& machine, int number) {
+  CoefficientRecord r;
+  r.set.tool = number % 2 ? "endmill 12" : "endmill\t\"16\" \\N";
+  r.set.material = "1018";
+  r.set.source = "load_meter";
+  r.set.stamp = 1700000000.0 + number / 3.0;
+  r.set.tests = 3;
+  r.set.value = {950e6 + number / 7.0, NAN, NAN, 17e3, NAN, NAN};
+  r.set.std_dev = {2e6, NAN, NAN, 100, NAN, NAN};
+  r.machine = machine;
+  r.cutting_speed = 0.5 + 0.01 * number;
+  r.covariance[CoefficientRecord::covarianceIndex(0, 3)] = -1.0 / 3.0;
+  r.bag = "night\nshift\r.bag";
+  return r;
+}
+
+void fill(CoefficientDatabase& database, const std::string& machine, int first, int count) {
+  std::vector<CoefficientRecord> records;
+  for (int i = 0; i < count; ++i) records.push_back(recordOf(machine, first + i));
+  database.add(records);
+}
+
+/// A server with three machines: a and b of one shop, c of another.
+class FleetDatabase : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    if (fleetSupported() && PrivateServer::available()) server_ = std::make_unique<PrivateServer>();
+  }
+  static void TearDownTestSuite() { server_.reset(); }
+
+  void SetUp() override {
+    if (!server_) GTEST_SKIP() << "./setup --with-fleet installs what is missing";
+    static int count = 0;
+    database_ = "fleet_" + std::to_string(++count);
+    server_->makeDatabase(database_);
+    migrateFleet(url("owner"));
+    for (const char* name : {"a", "b"}) enrolAs(name, "milling");
+    enrolAs("c", "turning");
+  }
+  void enrolAs(const std::string& name, const std::string& shop, const std::string& password = "") {
+    FleetMember member;
+    member.name = "machine " + name;
+    member.login = name;
+    member.shop = shop;
+    enrol(url("owner"), member, password);
+  }
+  std::string url(const std::string& login, const std::string& password = "") const {
+    return server_->url(login, password, database_);
+  }
+  std::string file(const std::string& name) const { return folder_.file(name + ".sqlite"); }
+
+  static std::unique_ptr<PrivateServer> server_;
+  TemporaryFolder folder_;
+  std::string database_;
+};
+
+std::unique_ptr<PrivateServer> FleetDatabase::server_;
+
+TEST_F(FleetDatabase, pushesWhatIsNewAndPullsItBitByBit) {
+  CoefficientDatabase a(file("a")), b(file("b"));
+  fill(a, "a", 0, 5000);
+  fill(b, "b", 0, 10);
+  const FleetTransfer first = push(a, url("a"));
+  EXPECT_EQ(first.offered, 5000u);
+  EXPECT_EQ(first.fresh, 5000u);
+  EXPECT_EQ(push(a, url("a")).offered, 0u) << "what was acknowledged is noted";
+  EXPECT_EQ(push(a, url("a"), {}, true).fresh, 0u) << "a record counts once";
+  fill(a, "a", 5000, 1);
+  EXPECT_EQ(a.unsentCount(a.lastFleet()), 1u);
+  EXPECT_EQ(push(a, url("a")).fresh, 1u);
+
+  EXPECT_EQ(push(b, url("b")).fresh, 10u);
+  EXPECT_EQ(pull(b, url("b")).fresh, 5001u);
+  EXPECT_EQ(pull(b, url("b")).offered, 0u);
+  EXPECT_EQ(push(b, url("b")).offered, 0u) << "what came from the fleet is not handed back";
+  EXPECT_EQ(b.size(), 5011u);
+  for (const CoefficientRecord& r : b.records("", "")) {
+    if (r.machine != "a") continue;
+    const int number = static_cast<int>(std::lround(3.0 * (r.set.stamp - 1700000000.0)));
+    const CoefficientRecord due = recordOf("a", number);
+    ASSERT_EQ(r.set.stamp, due.set.stamp);
+    ASSERT_EQ(r.set.value.ktc, due.set.value.ktc);
+    ASSERT_EQ(r.set.tool, due.set.tool);
+    ASSERT_EQ(r.bag, due.bag);
+    ASSERT_EQ(r.covariance[3], -1.0 / 3.0);
+    ASSERT_TRUE(std::isnan(r.set.value.krc));
+  }
+}
+
+TEST_F(FleetDatabase, pullKeepsWhatWaitsToBePushed) {
+  CoefficientDatabase a(file("a")), b(file("b"));
+  fill(a, "a", 0, 20);
+  push(a, url("a"));
+  fill(b, "b", 0, 7);
+  EXPECT_EQ(pull(b, url("b")).fresh, 20u);
+  EXPECT_EQ(push(b, url("b")).fresh, 7u);
+}
+
+TEST_F(FleetDatabase, answersAsTheFileDoes) {
+  CoefficientDatabase a(file("a"));
+  fill(a, "a", 0, 3000);
+  push(a, url("a"));
+  const CoefficientDatabase fleet(url("b"));
+  EXPECT_EQ(fleet.size(), 3000u);
+  EXPECT_EQ(fleet.contents(), a.contents());
+  EXPECT_EQ(fleet.find("endmill 12", "1018")->value.ktc, a.find("endmill 12", "1018")->value.ktc);
+  EXPECT_FALSE(fleet.find("endmill 12", "titanium"));
+  EXPECT_EQ(fleet.records("endmill 12", "1018").size(), a.records("endmill 12", "1018").size());
+  for (const double speed : {0.7, 3.0, 29.0, 0.0}) {
+    for (const char* tool : {"endmill 12", "unknown", ""}) {
+      const CoefficientQuery query{tool, "1018", speed};
+      const auto there = fleet.estimate(query), here = a.estimate(query);
+      ASSERT_TRUE(there && here);
+      EXPECT_EQ(there->records, here->records);
+      EXPECT_EQ(there->other_tool, here->other_tool);
+      EXPECT_NEAR(there->set.value.ktc, here->set.value.ktc, 1e-12 * here->set.value.ktc);
+      EXPECT_NEAR(there->set.std_dev.ktc, here->set.std_dev.ktc, 1e-9 * here->set.std_dev.ktc);
+    }
+  }
+}
+
+TEST_F(FleetDatabase, aShopSeesItsOwn) {
+  CoefficientDatabase a(file("a")), c(file("c"));
+  fill(a, "a", 0, 50);
+  fill(c, "c", 0, 5);
+  push(a, url("a"));
+  push(c, url("c"));
+  EXPECT_EQ(CoefficientDatabase(url("a")).size(), 50u);
+  EXPECT_EQ(CoefficientDatabase(url("c")).size(), 5u);
+  EXPECT_EQ(pull(c, url("c")).offered, 0u);
+  const std::vector<FleetMember> seen = fleetMembers(url("a"));
+  ASSERT_EQ(seen.size(), 2u);
+  EXPECT_EQ(seen[0].name, "machine a");
+  EXPECT_EQ(seen[0].records, 50u);
+  EXPECT_LT(seen[0].silent, 60.0);
+  EXPECT_TRUE(std::isnan(seen[1].silent));
+  // A stranger's file with the same records counts once in each shop.
+  EXPECT_EQ(CoefficientDatabase(url("c")).merge(file("a")), 50u);
+}
+
+TEST_F(FleetDatabase, refusesTwoOfOneNameAndStrangers) {
+  EXPECT_THAT(errorOf([&] { enrolAs("a", "turning"); }), HasSubstr("is enrolled otherwise"));
+  EXPECT_THAT(errorOf([&] { CoefficientDatabase(url("owner")).add(recordOf("x", 1)); }),
+              HasSubstr("no machine of the fleet"));
+}
+
+TEST_F(FleetDatabase, wrongAddressesAndPasswordsAreOneLine) {
+  CoefficientDatabase a(file("a"));
+  fill(a, "a", 0, 3);
+  EXPECT_THAT(errorOf([&] { push(a, "mysql://there"); }),
+              HasSubstr("'mysql://there': a fleet's server is due"));
+  EXPECT_THAT(errorOf([&] { push(a, "postgresql://a@/postgres?host=/tmp/nowhere"); }),
+              HasSubstr("/tmp/nowhere"));
+  EXPECT_THAT(errorOf([&] { push(a, url("stranger")); }), HasSubstr("role \"stranger\" does not exist"));
+  enrolAs("locked", "milling", "right 'word'");
+  const std::string wrong = errorOf([&] { push(a, url("locked", "secret_word")); });
+  EXPECT_THAT(wrong, AllOf(HasSubstr("password authentication failed"), Not(HasSubstr("secret_word")),
+                           Not(HasSubstr("\n"))));
+  EXPECT_EQ(push(a, url("locked", "right%20'word'")).fresh, 3u) << "nothing was lost on the way";
+}
+
+TEST_F(FleetDatabase, olderTablesAreToldAndBroughtUpWithAllTheyHold) {
+  server_->makeDatabase("old");
+  const std::string old = server_->url("owner", "", "old");
+  EXPECT_THAT(errorOf([&] { CoefficientDatabase database(old); }), HasSubstr("no fleet's tables"));
+  EXPECT_EQ(migrateFleet(old, 1), 0);
+  EXPECT_THAT(errorOf([&] { CoefficientDatabase database(old); }),
+              HasSubstr("tables of version 1, 2 is due: `coefficients_db URL migrate`"));
+  ASSERT_TRUE(server_->run("owner", "old",
+                           "INSERT INTO machine (name, login, shop) VALUES ('a', 'owner', 'milling')"));
+  ASSERT_TRUE(server_->run("owner", "old",
+                           "INSERT INTO coefficients (identity, shop, machine_id, speed_bucket, tool, "
+                           "material, source, machine, bag, version, "
+                           "stamp, ktc) VALUES ('1', 'milling', 1, 0, 't', 'm', '', '', '', '', 5, 7e8)"));
+  EXPECT_EQ(migrateFleet(old), 1);
+  EXPECT_EQ(migrateFleet(old), 2) << "again does nothing";
+  EXPECT_EQ(CoefficientDatabase(old).find("t", "m")->value.ktc, 7e8);
+  ASSERT_TRUE(server_->run("owner", "old", "UPDATE fleet SET schema = 3"));
+  EXPECT_THAT(errorOf([&] { CoefficientDatabase database(old); }), HasSubstr("newer than this program's 2"));
+}
+
+TEST_F(FleetDatabase, rowsOfOthersCanBeNeitherForgedNorChanged) {
+  CoefficientDatabase a(file("a"));
+  fill(a, "a", 0, 3);
+  push(a, url("a"));
+  const auto done = [&](const std::string& sql) { return server_->run("b", database_, sql); };
+  const std::string values =
+      "INSERT INTO coefficients (identity, shop, machine_id, speed_bucket, tool, material, source, machine, "
+      "bag, version) "
+      "VALUES ('x', 'milling', ";
+  EXPECT_FALSE(done(values + "1, 0, '', '', '', '', '', '')")) << "machine a's";
+  EXPECT_TRUE(done(values + "2, 0, '', '', '', '', '', '')")) << "its own";
+  EXPECT_FALSE(done("UPDATE coefficients SET ktc = 1"));
+  EXPECT_FALSE(done("DELETE FROM coefficients"));
+  EXPECT_FALSE(done("UPDATE fleet SET schema = 1"));
+}
+
+TEST_F(FleetDatabase, aClientKilledInMidPushLosesNothing) {
+  {
+    CoefficientDatabase a(file("a"));
+    fill(a, "a", 0, 9000);
+  }
+  const pid_t client = fork();
+  if (client == 0) {
+    CoefficientDatabase a(file("a"));
+    push(a, url("a"), [](const FleetTransfer&) { raise(SIGKILL); });
+    _exit(1);
+  }
+  int status = 0;
+  waitpid(client, &status, 0);
+  ASSERT_TRUE(WIFSIGNALED(status));
+  CoefficientDatabase a(file("a"));
+  EXPECT_EQ(CoefficientDatabase(url("a")).size(), 2000u) << "one batch was acknowledged";
+  EXPECT_EQ(push(a, url("a")).fresh, 7000u);
+  EXPECT_EQ(CoefficientDatabase(url("a")).size(), 9000u);
+}
+
+TEST_F(FleetDatabase, aServerKilledInMidPushLosesNothing) {
+  CoefficientDatabase a(file("a"));
+  fill(a, "a", 0, 6000);
+  std::size_t acknowledged = 0;
+  const std::string said = errorOf([&] {
+    push(a, url("a"), [&](const FleetTransfer& done) {
+      acknowledged = done.offered;
+      server_->kill();
+      usleep(200000);
+    });
+  });
+  EXPECT_THAT(said, Not(HasSubstr("\n")));
+  EXPECT_EQ(a.unsentCount(a.lastFleet()), said.empty() ? 0u : 6000u - acknowledged);
+  server_->start();
+  push(a, url("a"));
+  EXPECT_EQ(CoefficientDatabase(url("a")).size(), 6000u);
+}
+
+TEST_F(FleetDatabase, twoClientsWithTheSameRecordsCountThemOnce) {
+  for (const char* name : {"a", "b"}) {
+    CoefficientDatabase database(file(name));
+    fill(database, "a", 0, 4000);
+  }
+  FleetTransfer by_a, by_b;
+  std::thread other([&] {
+    CoefficientDatabase b(file("b"));
+    by_b = push(b, url("b"));
+  });
+  CoefficientDatabase a(file("a"));
+  by_a = push(a, url("a"));
+  other.join();
+  EXPECT_EQ(by_a.fresh + by_b.fresh, 4000u);
+  EXPECT_EQ(CoefficientDatabase(url("a")).size(), 4000u);
+}
+
+TEST(Fleet, addressesAreShownWithoutTheirPassword) {
+  EXPECT_EQ(withoutPassword("postgresql://mill:secret@shop.local:5432/fleet"),
+            "postgresql://mill@shop.local:5432/fleet");
+  EXPECT_EQ(withoutPassword("postgresql://mill@shop.local:5432/fleet"),
+            "postgresql://mill@shop.local:5432/fleet");
+  EXPECT_EQ(withoutPassword("postgresql://shop.local:5432/fleet"), "postgresql://shop.local:5432/fleet");
+  EXPECT_EQ(withoutPassword("postgresql:///fleet?user=mill&password=secret&host=/tmp"),
+            "postgresql:///fleet?user=mill&password=&host=/tmp");
+  EXPECT_TRUE(isFleet("postgresql:///fleet"));
+  EXPECT_FALSE(isFleet("machine.sqlite"));
+}
+
+TEST(Fleet, aBuildWithoutLibpqSaysSo) {
+  if (fleetSupported()) return;
+  const TemporaryFolder folder;
+  CoefficientDatabase local(folder.file("a.sqlite"));
+  EXPECT_THAT(errorOf([&] { push(local, "postgresql://mill@shop.local/fleet"); }),
+              HasSubstr("no libpq, `./setup --with-fleet`"));
+  EXPECT_THAT(errorOf([&] { CoefficientDatabase("postgresql://mill@shop.local/fleet"); }),
+              HasSubstr("./setup"));
+}
+
+}  // namespace
+}  // namespace smartmill::loadmeter
