@@ -10,6 +10,7 @@
 #include "smartmill_core/model/effect_catalogue.h"
 #include "smartmill_core/units.h"
 #include "smartmill_discrepancy/explain/places.h"
+#include "smartmill_discrepancy/explain/revolution.h"
 #include "smartmill_discrepancy/search/evidence.h"
 #include "smartmill_discrepancy/search/refinement.h"
 #include "smartmill_discrepancy/search/screening.h"
@@ -232,7 +233,16 @@ bool Nameless::addOne(SearchResult* found, const std::vector<Finding>& unexplain
     const std::vector<Fit> instead = fitsInstead(found);
     if (takeOne(instead, {before.nominal, {}, before.turns}, found)) return true;
   }
-  return takeOne(beside, before, found);
+  return takeOne(beside, before, found) || addRevolution(found, tangents, least);
+}
+
+// What no form of few values explains may still come again with each revolution.
+bool Nameless::addRevolution(SearchResult* found, const NominalTangents& tangents, double least) {
+  const TwinRunner& runner = bench_.quick().runner();
+  const auto left = revolutionLeft(runner, empiricalHypotheses(runner.data()), found->best);
+  if (!left || bench_.cancelled()) return false;
+  forms_.push_back({*left});
+  return takeOne(fitsBeside(found->best, tangents, 0.5 * least, least, 1, found), found->best.state, found);
 }
 
 bool Nameless::takeOne(std::vector<Fit> fits, const FitState& before, SearchResult* found) const {
