@@ -97,45 +97,85 @@ Course courseOf(const std::vector<Rest>& rests, std::size_t line) {
   return course;
 }
 
+// Level or cosine, and sine of an order, of one channel.
+using Order = std::array<Course, 2>;
+using Lines = std::map<double, std::map<std::string, Order>>;  // by order and channel
+
+double gainOf(const std::map<std::string, Order>& channels) {
+  double gain = 0.0;
+  for (const auto& [channel, order] : channels) gain += order[0].gain + order[1].gain;
+  return gain;
+}
+
+// Orders that tell more than their numbers cost.
+// @param cost [squares] of a number
+Lines linesOf(const std::map<std::string, std::vector<Rest>>& rests, double cost) {
+  std::size_t count = 0;
+  for (const auto& [channel, of_tests] : rests) {
+    for (const Rest& r : of_tests) count = std::max(count, r.lines.lines.size());
+  }
+  Lines lines;
+  for (std::size_t k = 0; 2 * k < count; ++k) {
+    std::map<std::string, Order> channels;
+    for (const auto& [channel, of_tests] : rests) {
+      Order& order = channels[channel];
+      order[0] = courseOf(of_tests, k == 0 ? 0 : 2 * k - 1);
+      if (k > 0) order[1] = courseOf(of_tests, 2 * k);
+    }
+    if (gainOf(channels) > cost * static_cast<double>(4 * channels.size()))
+      lines[static_cast<double>(k)] = std::move(channels);
+  }
+  return lines;
+}
+
+bool isTable(const Hypothesis& h) {
+  return h.effect == std::string(EMPIRICAL) + ":revolution";
+}
+
+// What a state's table says of each order already is added.
+void addTable(const Member& member, Lines* lines) {
+  const EffectEntry entry = member.hypothesis->entry(member.values);
+  const std::vector<double>& orders = entry.lists.at("order");
+  for (std::size_t k = 0; k < orders.size(); ++k) {
+    for (const std::string& channel : FORCES) {
+      const double* const four = &entry.lists.at(channel + "_n")[4 * k];
+      Order& order = (*lines)[orders[k]][channel];
+      for (std::size_t part = 0; part < 2; ++part) {
+        order[part].always += member.values[0] * four[part];
+        order[part].growing += member.values[0] * four[2 + part];
+      }
+    }
+  }
+}
+
 }  // namespace
 
 std::optional<Hypothesis> revolutionLeft(const TwinRunner& runner, const std::vector<Hypothesis>& all,
                                          const Fit& now) {
-  const auto form = std::find_if(all.begin(), all.end(), [](const Hypothesis& h) {
-    return h.effect == std::string(EMPIRICAL) + ":revolution";
-  });
+  const auto form = std::find_if(all.begin(), all.end(), isTable);
   const std::vector<std::size_t> cuts = cutsOfOneKind(runner);
   if (form == all.end() || cuts.empty()) return {};
   double chip = 0.0;
   for (const std::size_t t : cuts)
     chip = std::max(chip, runner.data().tests[t].test.engagement->feed_per_tooth);
   const std::map<std::string, std::vector<Rest>> rests = restsOf(runner, now, cuts, chip);
-  std::size_t lines = 0;
-  for (const auto& [channel, of_tests] : rests) {
-    if (of_tests.size() < LEAST_FEEDS) return {};
-    for (const Rest& r : of_tests) lines = std::max(lines, r.lines.lines.size());
-  }
-  const double cost = std::log(static_cast<double>(runner.size()));  // [squares] of a number
+  if (std::any_of(rests.begin(), rests.end(), [](const auto& r) { return r.second.size() < LEAST_FEEDS; }))
+    return {};
+  const double cost = std::log(static_cast<double>(runner.size()));
+  Lines lines = linesOf(rests, cost);
+  const bool again = !now.state.members.empty() && isTable(*now.state.members.back().hypothesis);
+  if (again) addTable(now.state.members.back(), &lines);
+  if (lines.empty()) return {};
   std::vector<double> orders;
   std::map<std::string, std::vector<double>> tables;
-  for (std::size_t k = 0; 2 * k < lines; ++k) {
-    std::map<std::string, std::array<Course, 2>> courses;
-    double gain = 0.0;
-    for (const auto& [channel, of_tests] : rests) {
-      std::array<Course, 2>& c = courses[channel];
-      c[0] = courseOf(of_tests, k == 0 ? 0 : 2 * k - 1);
-      if (k > 0) c[1] = courseOf(of_tests, 2 * k);
-      gain += c[0].gain + c[1].gain;
-    }
-    if (gain < cost * static_cast<double>(4 * courses.size())) continue;
-    orders.push_back(static_cast<double>(k));
+  for (auto& [k, channels] : lines) {
+    orders.push_back(k);
     for (const std::string& channel : FORCES) {
-      const std::array<Course, 2>& c = courses[channel];
-      for (const double v : {c[0].always, c[1].always, c[0].growing, c[1].growing})
+      const Order& order = channels[channel];
+      for (const double v : {order[0].always, order[1].always, order[0].growing, order[1].growing})
         tables[channel].push_back(v);
     }
   }
-  if (orders.empty()) return {};
   const CampaignTest& test = runner.data().tests[cuts.front()].test;
   Hypothesis placed = *form;
   placed.number("speed_rpm", units::rpmFromRadPerSec(test.spindle_speed))
@@ -146,6 +186,11 @@ std::optional<Hypothesis> revolutionLeft(const TwinRunner& runner, const std::ve
   placed.probe({0.0}, {{1.0}}).named(formatted("%zu orders", orders.size()));
   placed.handicap = cost * (4.0 * static_cast<double>(orders.size() * rests.size()) - 1.0);
   return placed;
+}
+
+bool hasRevolution(const FitState& state) {
+  return std::any_of(state.members.begin(), state.members.end(),
+                     [](const Member& m) { return isTable(*m.hypothesis); });
 }
 
 }  // namespace smartmill::discrepancy

@@ -189,8 +189,7 @@ EffectEntry effectEntry(const std::string& name, const std::map<std::string, dou
   for (const auto& [key, value] : numbers) check(known(key, EffectValue::number), value);
   for (const auto& [key, values] : lists) {
     const EffectParameter* p_of = findParameter(*kind, key);
-    const bool any_length =
-        p_of && (p_of->value == EffectValue::series || p_of->value == EffectValue::table);
+    const bool any_length = p_of && (p_of->value == EffectValue::series || p_of->value == EffectValue::table);
     const EffectParameter& p = known(key, any_length ? p_of->value : EffectValue::list);
     for (const double value : values) check(p, value);
   }

@@ -361,7 +361,7 @@ Forms resonances(const Scope& scope) {
 // What comes again with the revolution beside everything else: only the residual tells its shape, a fit how
 // much of it the tests ask for.
 Forms revolutions(const Scope& scope) {
-  EffectForm form({amplitude("share", {0.0, 2.0, 1e-4, 1.0})});
+  EffectForm form({amplitude("share", {0.0, 1.0, 1e-4, 1.0})});
   form.number("speed_rpm", 6000.0)
       .number("depth_mm", scope.largest_depth / units::MM)
       .number("chip_um", scope.largest_chip / units::UM)
