@@ -315,6 +315,35 @@ TEST(EffectsWithoutName, burstsTakeTheirTimesFromTheRecord) {
   }
 }
 
+// 3 cos(0) + 4 sin(0) always there, 1 cos(2 a) + 2 sin(2 a) at 0.1 mm a tooth, twice that at 0.2 mm.
+TEST(EffectsWithoutName, aForceOverTheRevolutionGrowsWithTheFeed) {
+  const MachineModel machine = mill(2, 0.0);
+  const EffectEntry table = effectEntry(
+      "empirical:revolution",
+      {{"share", 0.5}, {"speed_rpm", EVEN_RPM}, {"depth_mm", 1e3 * DEPTH}, {"chip_um", 100.0}}, {},
+      {{"order", {1.0, 2.0}},
+       {"fx_n", {3.0, 4.0, 0.0, 0.0, 0.0, 0.0, 1.0, 2.0}},
+       {"fy_n", std::vector<double>(8, 0.0)},
+       {"fz_n", std::vector<double>(8, 0.0)}});
+  const auto added = [&](const CampaignTest& test, double angle) {
+    return at(run(with(machine, {table}), test, 0.05), "fx", angle, EVEN_SPEED) -
+           at(run(machine, test, 0.05), "fx", angle, EVEN_SPEED);
+  };
+  for (const double angle : {0.0, 0.25 * PI, 0.5 * PI, 1.25 * PI}) {
+    const double always = 3.0 * std::cos(angle) + 4.0 * std::sin(angle);
+    const double growing = std::cos(2.0 * angle) + 2.0 * std::sin(2.0 * angle);
+    EXPECT_NEAR(added(slotCut(EVEN_RPM, DEPTH, 1e-4), angle), 0.5 * (always + growing), 1e-6);
+    EXPECT_NEAR(added(slotCut(EVEN_RPM, DEPTH, 2e-4), angle), 0.5 * (always + 2.0 * growing), 1e-6);
+  }
+  // Nothing is known of other depths and speeds, nor of air.
+  EXPECT_EQ(added(slotCut(EVEN_RPM, 1.5 * DEPTH, 1e-4), 0.5 * PI), 0.0);
+  EXPECT_EQ(added(slotCut(1.5 * EVEN_RPM, DEPTH, 1e-4), 0.5 * PI), 0.0);
+  EXPECT_EQ(added(airCut(EVEN_RPM), 0.5 * PI), 0.0);
+  EffectEntry short_list = table;
+  short_list.lists["fx_n"].pop_back();
+  EXPECT_THROW(makeEffect(short_list), Error);
+}
+
 TEST(EffectsWithoutName, everyFormHasItsClassAndCanDoNothing) {
   const MachineModel model = mill(4, 30.0);
   const EffectScope scope{model, {"fx", "fy", "fz", "load_meter"}};

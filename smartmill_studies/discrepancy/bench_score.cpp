@@ -122,42 +122,61 @@ void drawConfusion(const std::vector<json>& lines, const std::string& png) {
   picture.draw();
 }
 
-// Stated confidence of each named effect against the share that was really hidden.
-void drawReliability(const std::vector<json>& lines, const std::string& folder) {
-  const std::vector<double> edges{0.0, 0.8, 0.95, 0.99, 0.999, 1.0};
-  struct Bin {
-    double stated = 0.0, right = 0.0, all = 0.0;
+// Effects of one range of stated confidence.
+struct Bin {
+  double stated = 0.0;
+  Share named, resembling;
+
+  double all() const { return named.all + resembling.all; }
+  double right() const { return named.right + resembling.right; }
+};
+
+const std::vector<double> EDGES{0.0, 0.2, 0.5, 0.8, 0.95, 0.99, 0.999, 1.0};
+
+std::vector<Bin> binsOf(const std::vector<json>& lines) {
+  std::vector<Bin> bins(EDGES.size() - 1);
+  const auto add = [&](const json& effect, Share Bin::*kind) {
+    const double confidence = effect["confidence"];
+    std::size_t b = 0;
+    while (b + 2 < EDGES.size() && confidence >= EDGES[b + 1]) ++b;
+    bins[b].stated += confidence;
+    (bins[b].*kind).add(effect["right"]);
   };
-  std::vector<Bin> bins(edges.size() - 1);
   for (const json& line : lines) {
-    for (const json& n : line["named"]) {
-      const double confidence = n["confidence"];
-      std::size_t b = 0;
-      while (b + 2 < edges.size() && confidence >= edges[b + 1]) ++b;
-      bins[b].stated += confidence;
-      bins[b].all += 1.0;
-      bins[b].right += n["right"].get<bool>();
-    }
+    for (const json& effect : line["named"]) add(effect, &Bin::named);
+    if (!line.contains("resembling")) continue;  // a line of an older bench
+    for (const json& effect : line["resembling"]) add(effect, &Bin::resembling);
   }
+  return bins;
+}
+
+// Stated confidence of each effect, named or only resembling, against the share that was really hidden.
+void drawReliability(const std::vector<json>& lines, const std::string& folder) {
+  const std::vector<Bin> bins = binsOf(lines);
   std::string data;
   std::ofstream csv(folder + "/reliability.csv");
-  csv << "stated,right,effects\n";
-  for (const Bin& b : bins) {
-    if (b.all == 0.0) continue;
-    const auto [low, high] = wilson(b.right / b.all, b.all);
-    data += formatted("%.5f %.5f %.5f %.5f\n", b.stated / b.all, b.right / b.all, low, high);
-    csv << b.stated / b.all << "," << b.right / b.all << "," << b.all << "\n";
-    std::printf("stated confidence %.4f: %.0f of %.0f named effects right\n", b.stated / b.all, b.right,
-                b.all);
+  csv << "from,to,stated,right,low,high,named_right,named,resembling_right,resembling\n";
+  std::printf("stated confidence  mean    really hidden (95 %% interval)  named    only resembling\n");
+  for (std::size_t b = 0; b < bins.size(); ++b) {
+    const Bin& bin = bins[b];
+    if (bin.all() == 0.0) continue;
+    const double stated = bin.stated / bin.all(), right = bin.right() / bin.all();
+    const auto [low, high] = wilson(right, bin.all());
+    data += formatted("%.5f %.5f %.5f %.5f\n", stated, right, low, high);
+    csv << formatted("%g,%g,%.5f,%.5f,%.5f,%.5f,%d,%d,%d,%d\n", EDGES[b], EDGES[b + 1], stated, right, low,
+                     high, bin.named.right, bin.named.all, bin.resembling.right, bin.resembling.all);
+    std::printf("%5.3f .. %5.3f     %6.4f  %6.4f (%.2f .. %.2f)           %3d of %-3d %3d of %d\n", EDGES[b],
+                EDGES[b + 1], stated, right, low, high, bin.named.right, bin.named.all, bin.resembling.right,
+                bin.resembling.all);
   }
   if (data.empty()) return;
   Gnuplot picture(folder + "/reliability.png", 700, 650, 10);
-  picture
-      << "$r << EOD\n"
-      << data
-      << "EOD\nset title 'reliability of the stated confidence'\nset xlabel 'stated'\nset ylabel 'share "
-         "right'\nset xrange [0.4:1.02]\nset yrange [0:1.05]\nset key left\nplot x with lines dt 2 lc 'gray' "
-         "title 'ideal', $r using 1:2:3:4 with yerrorbars pt 7 title 'named effects'\n";
+  picture << "$r << EOD\n"
+          << data
+          << "EOD\nset title 'reliability of the stated confidence'\nset xlabel 'stated'\nset ylabel 'share "
+             "right'\nset xrange [-0.02:1.02]\nset yrange [0:1.05]\nset key left\nplot x with lines dt 2 lc "
+             "'gray' title 'ideal', $r using 1:2:3:4 with yerrorbars pt 7 title 'effects named or "
+             "resembling'\n";
   picture.draw();
 }
 

@@ -228,18 +228,20 @@ double noiseBetweenLines(const std::vector<double>& values) {
 
 std::optional<Dataset> briefOf(const Dataset& data) {
   constexpr double TURNS = 6.0;
-  constexpr double WORTH = 0.75;  // [1] of the samples
+  constexpr double WORTH = 0.75;  // [1] of the samples of fit cuts, which cost what a search costs
   Dataset brief = data;
+  double all = 0.0, kept = 0.0;
   for (TestData& t : brief.tests) {
     if (t.test.kind != TestKind::cut || t.heldout || t.phase_estimated) continue;
     const double turn = units::TWO_PI / t.test.spindle_speed * t.test.sample_rate;  // [samples]
     const std::size_t size = std::max(LEAST_SAMPLES, t.first_cut + static_cast<std::size_t>(TURNS * turn));
+    all += static_cast<double>(t.record.size());
+    kept += static_cast<double>(std::min(size, t.record.size()));
     if (size >= t.record.size()) continue;
     t.record.time.resize(size);
     for (std::vector<double>& column : t.record.columns) column.resize(size);
   }
-  const auto share = static_cast<double>(brief.samples()) / static_cast<double>(data.samples());
-  if (share > WORTH) return {};
+  if (kept >= WORTH * all) return {};
   return brief;
 }
 

@@ -15,7 +15,8 @@ Resemblance resemblanceOf(const Member& member, const Standing& standing) {
   const double percent = 100.0 * std::max(asked.share, 0.0);
   return {member.hypothesis->effect, member.hypothesis->variant,
           "nearest shape in the catalogue, but " +
-              formatted("the %s ask for %.0f +- %.0f %% of it", tests, percent, 100.0 * asked.std_dev)};
+              formatted("the %s ask for %.0f +- %.0f %% of it", tests, percent, 100.0 * asked.std_dev),
+          standing.confidence()};
 }
 
 // An effect of fewer values that explains as much, as far as the tests can tell: the simpler name.

@@ -10,6 +10,7 @@
 #include "smartmill_core/model/effect_catalogue.h"
 #include "smartmill_core/units.h"
 #include "smartmill_discrepancy/explain/places.h"
+#include "smartmill_discrepancy/explain/revolution.h"
 #include "smartmill_discrepancy/search/evidence.h"
 #include "smartmill_discrepancy/search/refinement.h"
 #include "smartmill_discrepancy/search/screening.h"
@@ -226,13 +227,51 @@ bool Nameless::addOne(SearchResult* found, const std::vector<Finding>& unexplain
   const bool named = std::any_of(before.members.begin(), before.members.end(), [](const Member& m) {
     return !findEffect(m.hypothesis->effect)->empirical();
   });
-  // One cause in the place of several names is the simpler answer.
-  if (named && !tried_instead_) {
+  // One cause in the place of several names is the simpler answer, where they leave something.
+  constexpr double NEXT_TO_NOTHING = 0.02;  // [1] of the noise's squares
+  const bool left = found->best.chi2 > (1.0 + NEXT_TO_NOTHING) * bench_.samples();
+  if (named && left && !tried_instead_) {
     tried_instead_ = true;
     const std::vector<Fit> instead = fitsInstead(found);
     if (takeOne(instead, {before.nominal, {}, before.turns}, found)) return true;
   }
-  return takeOne(beside, before, found);
+  return takeOne(beside, before, found) || addRevolution(found, tangents, least);
+}
+
+// What no form of few values explains may still come again with each revolution.
+bool Nameless::addRevolution(SearchResult* found, const NominalTangents& tangents, double least) {
+  if (hasRevolution(found->best.state)) return false;
+  const TwinRunner& runner = bench_.quick().runner();
+  const auto left = revolutionLeft(runner, empiricalHypotheses(runner.data()), found->best);
+  if (!left || bench_.cancelled()) return false;
+  forms_.push_back({*left});
+  const std::vector<Fit> fits = fitsBeside(found->best, tangents, 0.5 * least, least, 1, found);
+  if (!takeOne(fits, found->best.state, found)) return false;
+  settleRevolution(found);
+  return true;
+}
+
+// In the fit every sample counted alike, and values moved to what comes again in no other test; the table
+// takes back what it can say of that with the weights of its own.
+void Nameless::settleRevolution(SearchResult* found) {
+  const TwinRunner& runner = bench_.quick().runner();
+  FitState state = found->best.state;
+  const NominalTangents tangents = bench_.linearise(state);
+  Fit here = bench_.quick().fit(state, &tangents, {0, 1e-8, true});
+  if (!here.converged) return;
+  const auto settled = revolutionLeft(runner, empiricalHypotheses(runner.data()), here);
+  if (!settled) return;
+  forms_.push_back({*settled});
+  state.members.back() = {&forms_.back().front(), {1.0}};
+  here = bench_.quick().fit(state, &tangents, {0, 1e-8, true});
+  if (!here.converged) return;
+  const std::size_t last = state.members.size() - 1;
+  for (std::size_t m = 0; m < last && m < found->lacking.size(); ++m) {
+    for (Member& other : found->lacking[m].members) {
+      if (other.hypothesis == found->best.state.members[last].hypothesis) other = state.members[last];
+    }
+  }
+  found->best = std::move(here);
 }
 
 bool Nameless::takeOne(std::vector<Fit> fits, const FitState& before, SearchResult* found) const {

@@ -248,16 +248,35 @@ std::string ofResonance(const FoundEffect& effect) {
       100.0 * valueOf(effect, "damping_ratio"), valueOf(effect, "gain"));
 }
 
+std::string ofRevolution(const FoundEffect& effect) {
+  return formatted(
+      "at %.0f rpm and %.3g mm depth more comes again with each revolution than the model tells, straight "
+      "over "
+      "the feed: the table serves between the feeds that were cut, and its cause is not known",
+      valueOf(effect, "speed_rpm"), valueOf(effect, "depth_mm"));
+}
+
 }  // namespace
 
 std::string sentenceOf(const FoundEffect& effect) {
   static const std::map<std::string, std::function<std::string(const FoundEffect&)>> SENTENCES{
-      {"chip_thickness", ofChip}, {"cutting_time", ofTime}, {"depth_profile", ofProfile},
-      {"lost_edge", ofLostEdge},  {"curve", ofCurve},       {"tone", ofTone},
-      {"order", ofOrder},         {"settling", ofSettling}, {"tooth_factor", ofTeeth},
-      {"edge_life", ofLife},      {"step", ofStep},         {"ramp", ofRamp},
-      {"approach", ofApproach},   {"bursts", ofBursts},     {"transfer", ofTransfer},
-      {"resonance", ofResonance}};
+      {"chip_thickness", ofChip},
+      {"cutting_time", ofTime},
+      {"depth_profile", ofProfile},
+      {"lost_edge", ofLostEdge},
+      {"curve", ofCurve},
+      {"tone", ofTone},
+      {"order", ofOrder},
+      {"settling", ofSettling},
+      {"tooth_factor", ofTeeth},
+      {"edge_life", ofLife},
+      {"step", ofStep},
+      {"ramp", ofRamp},
+      {"approach", ofApproach},
+      {"bursts", ofBursts},
+      {"transfer", ofTransfer},
+      {"resonance", ofResonance},
+      {"revolution", ofRevolution}};
   const EffectKind* kind = findEffect(effect.name);
   if (!kind || !kind->empirical()) return "";
   return SENTENCES.at(kind->form)(effect);

@@ -68,14 +68,17 @@ double dot(const std::vector<double>& a, const std::vector<double>& b) {
 }
 
 // Squares that the orders leave: conjugate gradients on the normal equations (Hestenes & Stiefel 1952, CGLS).
-double squaresLeft(const Orders& orders, std::vector<double> left) {
+// @param lines receives level and orders
+double squaresLeft(const Orders& orders, std::vector<double> left, std::vector<double>* lines) {
   std::vector<double> s = orders.transposed(left), p = s;
   double gamma = dot(s, s);
   const double first = gamma;
+  lines->assign(s.size(), 0.0);
   for (int step = 0; step < MOST_STEPS && gamma > CLOSE * first; ++step) {
     const std::vector<double> q = orders.times(p);
     const double alpha = gamma / dot(q, q);
     for (std::size_t i = 0; i < left.size(); ++i) left[i] -= alpha * q[i];
+    for (std::size_t i = 0; i < p.size(); ++i) (*lines)[i] += alpha * p[i];
     s = orders.transposed(left);
     const double next = dot(s, s);
     for (std::size_t i = 0; i < p.size(); ++i) p[i] = s[i] + next / gamma * p[i];
@@ -98,7 +101,8 @@ std::optional<Repeatability> repeatability(const std::vector<double>& values,
   result.samples = values.size();
   result.variance = dot(about, about) / samples;
   const double free = samples - 2.0 * static_cast<double>(orders) - 1.0;
-  result.floor = std::sqrt(squaresLeft(Orders(angle, orders), std::move(about)) / free);
+  result.floor = std::sqrt(squaresLeft(Orders(angle, orders), std::move(about), &result.lines) / free);
+  result.lines[0] += level;
   return result;
 }
 

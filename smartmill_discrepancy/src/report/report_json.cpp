@@ -98,8 +98,10 @@ void writeReport(const Explanation& e, const std::string& folder) {
   report["where"] = findingsOf(e.where);
   report["effects"] = effectsOf(e.effects);
   report["resembles"] = Json::array();
-  for (const Resemblance& r : e.resembles)
+  for (const Resemblance& r : e.resembles) {
     report["resembles"].push_back({{"name", r.name}, {"variant", r.variant}, {"reason", r.reason}});
+    if (r.confidence) report["resembles"].back()["confidence"] = *r.confidence;
+  }
   report["not_separable"] = e.not_separable;
   report["suggested_test"] = e.suggested_test ? Json(*e.suggested_test) : Json(nullptr);
   if (e.suggested_cut) report["suggested_cut"] = cutOf(*e.suggested_cut);

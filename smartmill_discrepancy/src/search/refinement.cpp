@@ -41,12 +41,14 @@ FitOptions weighted(FitOptions options, double weight) {
 // end when no value moves by much of its standard deviation: in a narrow valley the cost says little.
 Settled settle(Workbench& bench, FitState from, Fit* best) {
   constexpr int PASSES = 6;
-  constexpr double SETTLED = 0.1;
+  constexpr double SETTLED = 0.1, SAME_TANGENTS = 2.0;  // standard deviations
   Settled settled;
+  bool tangents_hold = false;
   for (int pass = 0; pass <= PASSES; ++pass) {
     const bool turned = bench.turnPhases(from) > PHASE_SETTLED * std::sqrt(settled.weight);
     double squares = 0.0;
-    settled.tangents = bench.linearise(from, &squares);
+    settled.tangents = tangents_hold ? bench.lineariseBy(std::move(settled.tangents), from, &squares)
+                                     : bench.linearise(from, &squares);
     // Where structure is left the noise does not tell how well values are known; what is stated of them does.
     settled.weight = std::max(1.0, squares / bench.samples());
     // All tangents at one point: only these tell what is known along a valley.
@@ -57,7 +59,10 @@ Settled settle(Workbench& bench, FitState from, Fit* best) {
     settled.converged = true;
     if (pass == PASSES || bench.cancelled()) break;
     const Fit next = bench.quick().fit(from, &settled.tangents, weighted({6, 1e-5, true}, settled.weight));
-    if (!next.converged || (moved(from, next.state, covariance) < SETTLED && !turned)) break;
+    if (!next.converged) break;
+    const double by = moved(from, next.state, covariance);
+    if (by < SETTLED && !turned) break;
+    tangents_hold = by < SAME_TANGENTS && !turned;
     from = next.state;
   }
   return settled;

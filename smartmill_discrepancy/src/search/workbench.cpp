@@ -114,8 +114,9 @@ NominalTangents Workbench::linearise(const FitState& state, double* exact_square
   return quick_.nominalTangents(state);
 }
 
-NominalTangents Workbench::lineariseBy(NominalTangents tangents, const FitState& state) {
-  correctAt(state, nullptr);
+NominalTangents Workbench::lineariseBy(NominalTangents tangents, const FitState& state,
+                                       double* exact_squares) {
+  correctAt(state, exact_squares);
   tangents.at = state.nominal;
   tangents.turns = state.turns;
   tangents.turns.resize(quick_.turns().size(), 0.0);

@@ -41,15 +41,20 @@ inline CampaignTest slot(const std::string& name, double rpm, double feed_mm, do
 }
 
 /// Slots at three feeds and three speeds, a quarter of an hour long.
+inline std::vector<CampaignTest> slotsOfManyKinds() {
+  return {slot("a", 4500, 0.06, 90),  slot("b", 4500, 0.03, 180), slot("c", 4500, 0.1, 270),
+          slot("d", 3000, 0.06, 360), slot("e", 7200, 0.06, 540), slot("f", 7200, 0.1, 720),
+          slot("g", 3000, 0.03, 810), slot("h", 4500, 0.06, 900)};
+}
+
 /// @param record of a test, drawn with a seed
 inline Explanation explained(const std::function<Record(const CampaignTest&, std::uint64_t seed)>& record,
-                             const std::string& folder, const ExplainOptions& options = {}) {
+                             const std::string& folder, const ExplainOptions& options = {},
+                             const std::vector<CampaignTest>& tests = slotsOfManyKinds()) {
   Campaign campaign;
   campaign.folder = folder;
   campaign.model_file = "model.yaml";
-  campaign.tests = {slot("a", 4500, 0.06, 90),  slot("b", 4500, 0.03, 180), slot("c", 4500, 0.1, 270),
-                    slot("d", 3000, 0.06, 360), slot("e", 7200, 0.06, 540), slot("f", 7200, 0.1, 720),
-                    slot("g", 3000, 0.03, 810), slot("h", 4500, 0.06, 900)};
+  campaign.tests = tests;
   writeMachineModel(believed(), folder + "/model.yaml");
   writeCampaign(campaign, folder);
   std::uint64_t seed = 1;

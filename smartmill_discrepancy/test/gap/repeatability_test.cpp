@@ -51,6 +51,18 @@ TEST(Repeatability, theFloorOfNoiseIsTheNoise) {
   }
 }
 
+// The lines are those that the course was made of: 100 / k^2, late by 0.3 k^2.
+TEST(Repeatability, tellsLevelAndLines) {
+  const Course c = course(256.37, 7680, 0.0, 1);
+  const std::vector<double> lines = repeatability(c.values, c.angle)->lines;
+  EXPECT_NEAR(lines[0], 40.0, 1e-3);
+  for (int k = 1; k <= 20; ++k) {
+    const auto at = static_cast<std::size_t>(2 * k - 1);
+    EXPECT_NEAR(lines[at], 100.0 / (k * k) * std::cos(0.3 * k * k), 1e-3) << k;
+    EXPECT_NEAR(lines[at + 1], 100.0 / (k * k) * std::sin(0.3 * k * k), 1e-3) << k;
+  }
+}
+
 TEST(Repeatability, whatComesAgainExactlyHasNoFloor) {
   const Course c = course(256.37, 4000, 0.0, 1);
   EXPECT_LT(repeatability(c.values, c.angle)->floor, 1e-3);

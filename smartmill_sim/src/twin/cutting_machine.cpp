@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/units.h"
 
 namespace smartmill::sim {
 namespace {
@@ -199,6 +200,11 @@ void CuttingMachine::takeOver(const Input& input) {
   --steps_to_update_;
   now_.angle = input.motion.angle;
   now_.speed = input.motion.speed;
+  now_.chip = now_.depth = 0.0;
+  if (!cutting() || now_.speed == 0.0) return;
+  const std::array<double, 2>& feed = input.motion.velocity;
+  now_.chip = std::hypot(feed[0], feed[1]) * units::TWO_PI / (std::abs(now_.speed) * model_.tool->teeth);
+  now_.depth = arcs_.front().depth;
 }
 
 CuttingForce CuttingMachine::cut(const Input& input) {

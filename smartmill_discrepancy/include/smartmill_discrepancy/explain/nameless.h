@@ -38,6 +38,8 @@ class Nameless {
 
  private:
   bool addOne(SearchResult* found, const std::vector<Finding>& unexplained);
+  bool addRevolution(SearchResult* found, const NominalTangents& tangents, double least);
+  void settleRevolution(SearchResult* found);
   std::vector<Fit> fitsBeside(const Fit& now, const NominalTangents& tangents, double promised, double least,
                               std::size_t most, SearchResult* found) const;
   std::vector<Fit> fitsInstead(SearchResult* found) const;

@@ -12,6 +12,8 @@ struct Repeatability {
   double floor =
       0.0;  ///< [unit] RMS of what does not come again: the least that a model of a steady cut leaves
   std::size_t samples = 0;  ///< used
+  /// [unit] Level, then cosine and sine of each order of the spindle.
+  std::vector<double> lines;
 
   double repeats() const { return variance > 0.0 ? 1.0 - floor * floor / variance : 0.0; }  ///< [1] share
 };

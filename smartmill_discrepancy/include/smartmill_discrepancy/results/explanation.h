@@ -40,6 +40,7 @@ struct FoundEffect {
 /// An effect of the catalogue that comes nearest to what is left and does not hold.
 struct Resemblance {
   std::string name, variant, reason;
+  std::optional<double> confidence = {};  ///< as FoundEffect::confidence, where the tests were asked
 };
 
 /// Gap of one channel of one test before and after.

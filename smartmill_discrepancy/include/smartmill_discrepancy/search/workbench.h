@@ -45,7 +45,8 @@ class Workbench {
   /// @param exact_squares receives what the exact twin leaves there; may be nullptr
   NominalTangents linearise(const FitState& state, double* exact_squares = nullptr);
   /// The same with the tangents of another state, which serve a fit on its way.
-  NominalTangents lineariseBy(NominalTangents tangents, const FitState& state);
+  NominalTangents lineariseBy(NominalTangents tangents, const FitState& state,
+                              double* exact_squares = nullptr);
 
   /// Whether some cut of a tool with modes shows its displacement: such tools are searched guided by it, so
   /// that no candidate runs away, and judged freely.

@@ -80,6 +80,8 @@ struct Instant {
   double start_time = 0.0;   ///< [s] of the record since the machine was cold
   double edge_time = 0.0;    ///< [s] that the edge has cut
   double cut_time = 0.0;     ///< [s] since this cut began
+  double chip = 0.0;         ///< [m] feed per tooth of this cut, 0: the tool cuts nothing
+  double depth = 0.0;        ///< [m] axial depth of this cut, as commanded
 };
 
 /// What effects set anew while the machine runs, from its nominal state each time.

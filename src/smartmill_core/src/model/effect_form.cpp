@@ -211,6 +211,11 @@ EffectForm& EffectForm::number(const std::string& key, double value) {
   return *this;
 }
 
+EffectForm& EffectForm::list(const std::string& key, const Values& values) {
+  fixed_.lists[key] = values;
+  return *this;
+}
+
 EffectForm& EffectForm::straight(const Values& reaches) {
   for (const double reach : reaches) {
     Probe probe{nulls(), {}, false};

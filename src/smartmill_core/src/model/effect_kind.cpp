@@ -189,8 +189,8 @@ EffectEntry effectEntry(const std::string& name, const std::map<std::string, dou
   for (const auto& [key, value] : numbers) check(known(key, EffectValue::number), value);
   for (const auto& [key, values] : lists) {
     const EffectParameter* p_of = findParameter(*kind, key);
-    const bool series = p_of && p_of->value == EffectValue::series;
-    const EffectParameter& p = known(key, series ? EffectValue::series : EffectValue::list);
+    const bool any_length = p_of && (p_of->value == EffectValue::series || p_of->value == EffectValue::table);
+    const EffectParameter& p = known(key, any_length ? p_of->value : EffectValue::list);
     for (const double value : values) check(p, value);
   }
   for (const auto& [key, word] : words) {
@@ -229,7 +229,10 @@ std::string itemOf(const std::string& key, std::size_t item) {
 
 std::vector<std::pair<std::string, double>> numbersOf(const EffectEntry& entry) {
   std::vector<std::pair<std::string, double>> numbers(entry.numbers.begin(), entry.numbers.end());
+  const EffectKind* kind = findEffect(entry.name);
   for (const auto& [key, list] : entry.lists) {
+    const EffectParameter* p = kind ? findParameter(*kind, key) : nullptr;
+    if (p && p->value == EffectValue::table) continue;
     for (std::size_t k = 0; k < list.size(); ++k) numbers.emplace_back(itemOf(key, k), list[k]);
   }
   const auto add = [&](const std::string& axis, const ModalModel& modes) {

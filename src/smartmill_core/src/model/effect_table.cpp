@@ -34,6 +34,7 @@ std::string keyText(const EffectParameter& p) {
       return p.key + " (" + p.unit + ", one a tooth" + rangeText(p) +
              (p.sum ? ", sum " + shortNumber(*p.sum) + ")" : ")");
     case EffectValue::series:
+    case EffectValue::table:
       return p.key + " (" + p.unit + ", any number of them" + rangeText(p) + ")";
     case EffectValue::modes:
       return p.key + " (modes as in tool_tip; absent: none)";

@@ -358,6 +358,18 @@ Forms resonances(const Scope& scope) {
   return forms;
 }
 
+// What comes again with the revolution beside everything else: only the residual tells its shape, a fit how
+// much of it the tests ask for.
+Forms revolutions(const Scope& scope) {
+  EffectForm form({amplitude("share", {0.0, 1.0, 1e-4, 1.0})});
+  form.number("speed_rpm", 6000.0)
+      .number("depth_mm", scope.largest_depth / units::MM)
+      .number("chip_um", scope.largest_chip / units::UM)
+      .list("order", {1.0});
+  for (const std::string& channel : FORCES) form.list(channel + "_n", {0.0, 0.0, 0.0, 0.0});
+  return {form};
+}
+
 // Of teeth, chips and the law.
 std::vector<EffectKind> cuttingForms() {
   const Range positive = Range::positive(), not_negative = Range::notNegative();
@@ -419,6 +431,17 @@ std::vector<EffectKind> channelForms() {
                 {oneOf("channel", CHANNELS), key("corner_hz", "Hz", positive), key("below", "1"),
                  key("above", "1")},
                 {Need::forces}, transfers),
+      empirical(
+          "channel", "revolution", Stage::sensor_output,
+          "share times a sum over orders of the spindle is added to each force channel while the tool "
+          "cuts at this speed and depth: of each order the cosine and the sine of what is always "
+          "there, then of what grows with feed per tooth / chip_um",
+          "Fourier series over a revolution, straight over the feed",
+          {key("share", "1", not_negative), key("speed_rpm", "rpm", positive),
+           key("depth_mm", "mm", positive), key("chip_um", "um", positive),
+           key("order", "1", not_negative, EffectValue::table), key("fx_n", "N", {}, EffectValue::table),
+           key("fy_n", "N", {}, EffectValue::table), key("fz_n", "N", {}, EffectValue::table)},
+          {Need::cuts, Need::forces}, revolutions),
       empirical("channel", "curve", Stage::signal,
                 "a channel that should show f shows f + odd f|f| + even f^2 + cubic f^3, f in kN",
                 "static characteristic to third order",

@@ -232,7 +232,8 @@ EffectEntry readEffect(const StrictYaml& map, const MachineModel& model) {
         effect.words[p.key] = map.oneOf(p.key, p.words);
         break;
       case EffectValue::list:
-      case EffectValue::series: {
+      case EffectValue::series:
+      case EffectValue::table: {
         const bool per_tooth = p.value == EffectValue::list && model.tool;
         const std::size_t teeth = per_tooth ? static_cast<std::size_t>(model.tool->teeth) : 0;
         effect.lists[p.key] = readPerTooth(map, p.key, teeth, p.range, p.sum);
@@ -330,7 +331,8 @@ void writeEffect(std::ostream& out, const EffectEntry& effect) {
         break;
       }
       case EffectValue::list:
-      case EffectValue::series: {
+      case EffectValue::series:
+      case EffectValue::table: {
         const auto values = effect.lists.find(p.key);
         if (values == effect.lists.end()) break;
         out << "  " << p.key << ": " << list(values->second, 1.0) << "\n";

@@ -40,6 +40,7 @@ enum class EffectValue {
   word,
   list,    ///< of numbers, one a tooth
   series,  ///< of numbers, as many as the file has
+  table,   ///< a series that is one shape: no fit moves its numbers, no report lists them
   modes    ///< of the tool tip, as in the section tool_tip
 };
 
@@ -176,7 +177,8 @@ EffectEntry drawEffect(const std::string& name, const MachineModel& machine, Eff
 /// Name of one item of a list: pitch_deg[0].
 std::string itemOf(const std::string& key, std::size_t item);
 
-/// Numbers of an entry with the names a report uses: offset_um; pitch_deg[0]; x[0].frequency_hz.
+/// Numbers of an entry with the names a report uses: offset_um; pitch_deg[0]; x[0].frequency_hz. Without
+/// tables.
 std::vector<std::pair<std::string, double>> numbersOf(const EffectEntry& entry);
 
 /// A document (Markdown) with the catalogue as a table for people between the lines that begin with

@@ -97,6 +97,7 @@ struct EffectForm {
   EffectForm& onlyAfter(const std::string& variant);                   ///< that must have been found before
   EffectForm& word(const std::string& key, const std::string& value);  ///< that no coordinate moves
   EffectForm& number(const std::string& key, double value);            ///< the same
+  EffectForm& list(const std::string& key, const Values& values);      ///< the same
   /// A probe with one point a coordinate at null + reach. Several: what the effect does is not in proportion
   /// to it, and one amplitude is tried from several distances.
   EffectForm& straight(const Values& reaches);
