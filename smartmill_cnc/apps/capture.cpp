@@ -1,5 +1,6 @@
 // rosrun smartmill_cnc capture HOST: a session with a controller, decoded line by line and written to a file.
 
+#include <atomic>
 #include <chrono>
 #include <csignal>
 #include <cstdio>
@@ -19,6 +20,12 @@ volatile std::sig_atomic_t stop_requested = 0;
 
 extern "C" void requestStop(int) {
   stop_requested = 1;
+}
+
+/// Who is asked stands behind the tap: messages name him.
+std::string inPlaceOf(const std::string& tap, const std::string& there, std::string message) {
+  const std::size_t at = message.find(tap);
+  return at == std::string::npos ? message : message.replace(at, tap.size(), there);
 }
 
 }  // namespace
@@ -45,7 +52,9 @@ int main(int argc, char** argv) {
       throw Error(file + ": cannot be written");
     }
     focas::beginRecording(out);
+    std::atomic<bool> heard{false};  // a frame of the controller's
     const auto tell = [&](const focas::RecordedFrame& frame) {
+      heard = heard || !frame.from_client;
       focas::append(out, frame);
       std::printf("%s\n", focas::describe(frame).c_str());
       std::fflush(stdout);
@@ -55,14 +64,16 @@ int main(int argc, char** argv) {
     const focas::Tap tap(static_cast<std::uint16_t>(listen_port), host, static_cast<std::uint16_t>(port),
                          timeout, tell);
     if (listen_port == 0) {
-      focas::Client client;
       try {
+        focas::Client client;
         client.connect("127.0.0.1", tap.port(), timeout);
-      } catch (const focas::ConnectionError&) {
-        throw Error("controller at " + host + ":" + std::to_string(port) + " does not answer");
+        focas::askEverything(client);
+        client.close();
+      } catch (const focas::FocasError& e) {
+        const std::string there = host + ":" + std::to_string(port);
+        const std::string why = inPlaceOf("127.0.0.1:" + std::to_string(tap.port()), there, e.what());
+        throw Error(heard ? why : there + " does not answer as a controller: " + why);
       }
-      focas::askEverything(client);
-      client.close();
     }
     while (listen_port != 0 && stop_requested == 0) {
       std::this_thread::sleep_for(std::chrono::milliseconds(50));

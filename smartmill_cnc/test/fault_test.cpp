@@ -337,7 +337,7 @@ TEST_F(FaultTest, AHalfOpenDncCircuitIsFound) {
     // What is on its way arrives: one who has gone does not send it again and again.
     std::this_thread::sleep_for(std::chrono::milliseconds(200));
     proxy.deaf = true;
-    // The kernel's own time, 2.2 s, of which this test's does not know.
+    // The kernel's own time, 1.8 s, of which this test's does not know.
     const auto began = std::chrono::steady_clock::now();
     while (bridge_->state().connected && std::chrono::steady_clock::now() - began < std::chrono::minutes(1)) {
       cycle();

@@ -314,6 +314,9 @@ class Follower {
       }
       const double length = *axis[i] * units::MM;
       position_[i] = relative_ ? position_[i] + length : length + offset_[i];
+      if (!std::isfinite(position_[i])) {
+        outside(std::string("the controller does not tell where ") + AXES[i] + " stands");
+      }
       const std::array<double, 2>& travel = limits_.travel[i];
       if (position_[i] < travel[0] - POSITION_TOLERANCE || position_[i] > travel[1] + POSITION_TOLERANCE) {
         outside(std::string(1, AXES[i]) + " would go to " + shown(position_[i] / units::MM) + " mm, limits " +

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <limits>
+
 #include "smartmill_core/error.h"
 #include "smartmill_core/units.h"
 
@@ -44,6 +46,18 @@ TEST(NcProgram, WholeDialect) {
   EXPECT_NEAR(c.end[0], 0.040, 1e-12);
   EXPECT_NEAR(c.end[1], -0.0055, 1e-12);
   EXPECT_NEAR(c.end[2], -0.002, 1e-12);
+}
+
+/// A controller may show a position as vacant.
+TEST(NcProgram, FromAPlaceThatIsNotKnownNothingMoves) {
+  StartPosition start;
+  start.machine[1] = start.absolute[1] = std::numeric_limits<double>::quiet_NaN();
+  for (const char* program : {"G0 X1 Y1", "G91 G0 Y0.1"}) {
+    const NcCheck c = check(program, start);
+    EXPECT_EQ(c.verdict, NcVerdict::outside_limits) << program;
+    EXPECT_EQ(c.message, "line 1: the controller does not tell where Y stands");
+  }
+  EXPECT_EQ(check("G91 G0 X1\nS3000 M3\n", start).verdict, NcVerdict::good);
 }
 
 TEST(NcProgram, NotUnderstoodNamesTheLine) {

@@ -88,10 +88,10 @@ void Client::Impl::readSystemInfo(const OpenReply& open_reply) {
   const Bytes data = ask("cnc_sysinfo", SubRequest(OP_SYSTEM_INFO));
   decode("cnc_sysinfo", data, [&](Reader& reader) {
     reader.skip(4);
-    info.cnc_type = reader.text(2);
-    info.mt_type = reader.text(2);
-    info.series = reader.text(4);
-    info.version = reader.text(4);
+    info.cnc_type = reader.line(2);
+    info.mt_type = reader.line(2);
+    info.series = reader.line(4);
+    info.version = reader.line(4);
     const std::string count = reader.text(2);
     int axes = 0;
     for (char c : count) {

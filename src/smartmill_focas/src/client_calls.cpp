@@ -10,7 +10,7 @@ namespace {
 constexpr std::size_t NAME_WIDTH = 4;  // [byte]
 
 std::string name(Reader& reader) {
-  std::string text = reader.text(NAME_WIDTH);
+  std::string text = reader.line(NAME_WIDTH);
   text.erase(std::find_if(text.rbegin(), text.rend(), [](char c) { return c > ' '; }).base(), text.end());
   return text;
 }
@@ -151,7 +151,7 @@ std::vector<AlarmMessage> Client::alarmMessages() {
       alarm.type = reader.i32();
       alarm.axis = reader.i32();
       const std::int32_t length = reader.i32();
-      alarm.text = reader.text(TEXT_WIDTH);
+      alarm.text = reader.line(TEXT_WIDTH);
       alarm.text.resize(std::min(alarm.text.size(), static_cast<std::size_t>(std::max(length, 0))));
       alarms.push_back(std::move(alarm));
     }

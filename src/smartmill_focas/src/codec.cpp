@@ -171,6 +171,13 @@ std::string Reader::text(std::size_t width) {
   return std::string(start, std::find(start, start + width, 0));
 }
 
+std::string Reader::line(std::size_t width) {
+  std::string content = text(width);
+  std::replace_if(
+      content.begin(), content.end(), [](char c) { return c < ' ' || c > '~'; }, '?');
+  return content;
+}
+
 Reader& Reader::skip(std::size_t count) {
   take(count);
   return *this;

@@ -126,7 +126,7 @@ void Connection::connectSocket(Circuit& circuit, Clock::time_point deadline) {
   int error = circuit.socket.valid() ? 0 : errno;
   if (error == 0) {
     prepareSocket(circuit.socket.get());
-    keepAlive(circuit.socket.get());
+    keepAlive(circuit.socket.get(), &circuit == &stream ? DEAF_PROBES : KEEP_ALIVE_PROBES);
     if (&circuit == &stream) {
       ::setsockopt(circuit.socket.get(), SOL_SOCKET, SO_SNDBUF, &STREAM_SEND_BUFFER,
                    sizeof STREAM_SEND_BUFFER);

@@ -131,7 +131,7 @@ std::string contentOf(Layout layout, const Bytes& data) {
     case Layout::doubles:
       return listed(data.size() / 8, [&] { return number(reader.f64()); });
     case Layout::names:
-      return listed(data.size() / 4, [&] { return reader.text(4); });
+      return listed(data.size() / 4, [&] { return reader.line(4); });
     case Layout::text:
       return "\"" + inText(data) + "\"";
     case Layout::numbered:

@@ -28,9 +28,12 @@ void prepareSocket(int fd) {
   ::setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
 }
 
-void keepAlive(int fd) {
-  const int on = 1;
-  const int idle = 1, interval = 1, probes = 2;  // [s], [s], [1]
+namespace {
+constexpr int IDLE = 1;  // [s] without a word of the other side, then it is asked
+}
+
+void keepAlive(int fd, int probes) {
+  const int on = 1, idle = IDLE, interval = 1;  // [s]
   ::setsockopt(fd, SOL_SOCKET, SO_KEEPALIVE, &on, sizeof on);
   ::setsockopt(fd, IPPROTO_TCP, TCP_KEEPIDLE, &idle, sizeof idle);
   ::setsockopt(fd, IPPROTO_TCP, TCP_KEEPINTVL, &interval, sizeof interval);
@@ -38,18 +41,26 @@ void keepAlive(int fd) {
 }
 
 bool isDeaf(int fd) {
-  constexpr std::uint32_t UNACKNOWLEDGED_MS = 1900, IDLE_MS = 2200;
+  constexpr std::uint32_t DEAF_MS = 1800, ASKED_EVERY_MS = 250;
   tcp_info info{};
   socklen_t size = sizeof info;
   int waiting = 0;
   if (::getsockopt(fd, IPPROTO_TCP, TCP_INFO, &info, &size) != 0 || ::ioctl(fd, TIOCOUTQ, &waiting) != 0) {
     return false;
   }
-  if (info.tcpi_unacked > 0) {
-    return info.tcpi_last_ack_recv > UNACKNOWLEDGED_MS;
+  const std::uint32_t silent = info.tcpi_last_ack_recv;  // [ms]
+  if (info.tcpi_unacked == 0) {
+    if (waiting > 0) {
+      return false;  // with text held back the other side is asked ever more rarely whether it has room
+    }
+    const std::uint32_t asked_from = 1000 * IDLE;
+    if (silent > asked_from && info.tcpi_probes <= (silent - asked_from) / ASKED_EVERY_MS) {
+      // Set anew, it makes Linux ask at once (tcp_sock_set_keepidle), not only each second.
+      const int idle = IDLE;
+      ::setsockopt(fd, IPPROTO_TCP, TCP_KEEPIDLE, &idle, sizeof idle);
+    }
   }
-  // With text held back the other side is asked ever more rarely whether it has room.
-  return waiting == 0 && info.tcpi_last_ack_recv > IDLE_MS;
+  return silent > DEAF_MS;
 }
 
 Transfer readSome(int fd, FrameReader& reader, std::size_t max_bytes) {

@@ -37,13 +37,15 @@ enum class Transfer { done, would_block, closed };
 /// No blocking, no Nagle, not inherited by child processes.
 void prepareSocket(int fd);
 
-/// A peer that has gone without a word is an error of an idle socket after three seconds; one lost packet is
-/// none.
-void keepAlive(int fd);
+constexpr int KEEP_ALIVE_PROBES = 2;
+/// A peer that has gone without a word is an error of an idle socket one second after so many questions of a
+/// second each; one lost packet is none.
+void keepAlive(int fd, int probes = KEEP_ALIVE_PROBES);
 
-/// Nothing comes back from the other side any more: no word that what was sent has arrived for 1.9 s, or none
-/// to the questions of keepAlive() for 2.2 s (one lost packet is none). A side that takes nothing for want of
-/// room still answers.
+constexpr int DEAF_PROBES = 5;  ///< that keepAlive() needs for isDeaf()
+/// Nothing has come back from the other side for 1.8 s: no word that what was sent has arrived, or none to
+/// the questions that are put to it after one second of silence, four a second (a lost packet or two are
+/// none). A side that takes nothing for want of room still answers. To be asked many times a second.
 bool isDeaf(int fd);
 
 /// Reads at most max_bytes into the reader.

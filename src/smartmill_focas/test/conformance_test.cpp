@@ -252,6 +252,12 @@ TEST_F(ConformanceTest, TenThousandBytesOfMergedRequestsAreAnsweredInOrder) {
   }
 }
 
+TEST(Describe, NamesThatAreNoTextStayInTheLine) {
+  const Frame frame{REPLY_VERSION, FRAME_DATA, DIR_REPLY,
+                    hex("0001 0018 0001 0001 0089 000000000000 0008 580a1b5b ff000000")};
+  EXPECT_EQ(describe(frame), "axis names = X??[ ?");
+}
+
 TEST(Describe, OneLineTellsWhatAFrameSays) {
   const auto line = [](const std::string& bytes) {
     const Bytes data = hex(bytes);

@@ -242,6 +242,8 @@ class Reader {
   Bytes bytes(std::size_t count);
   /// Up to the first zero byte, at most width; always consumes width.
   std::string text(std::size_t width);
+  /// The same as part of a line: what cannot be printed comes as '?'.
+  std::string line(std::size_t width);
   Reader& skip(std::size_t count);
   std::size_t left() const { return size_ - position_; }
 
