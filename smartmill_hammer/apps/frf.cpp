@@ -48,9 +48,9 @@ struct Options {
 };
 
 const std::map<std::string, TapFormat> FORMATS = {
-    {"auto", TapFormat::automatic}, {"bag", TapFormat::bag}, {"csv", TapFormat::csv},
-    {"text", TapFormat::text},      {"frf", TapFormat::frf}, {"dynoware", TapFormat::dynoware},
-    {"uff", TapFormat::uff}};
+    {"auto", TapFormat::automatic}, {"bag", TapFormat::bag},    {"csv", TapFormat::csv},
+    {"text", TapFormat::text},      {"frf", TapFormat::frf},    {"dynoware", TapFormat::dynoware},
+    {"uff", TapFormat::uff},        {"sound", TapFormat::sound}};
 const std::map<std::string, FrfAverage> AVERAGES = {
     {"h1", FrfAverage::h1}, {"h2", FrfAverage::h2}, {"hv", FrfAverage::hv}};
 
@@ -311,8 +311,8 @@ int main(int argc, char** argv) {
       .required();
   line.option("-o,--out", o.out, "folder for frf.csv, frf.frf, frf.uff, modes.yaml, hits.csv and pictures")
       .showDefault();
-  line.option("--format", o.format, "auto (by content), bag, csv, dynoware, frf, text or uff")
-      .oneOf({"auto", "bag", "csv", "dynoware", "frf", "text", "uff"})
+  line.option("--format", o.format, "auto (by content), bag, csv, dynoware, frf, sound, text or uff")
+      .oneOf({"auto", "bag", "csv", "dynoware", "frf", "sound", "text", "uff"})
       .showDefault();
   line.option("--low", o.low, "modes from here [Hz] (bags: fit_low of --params)").notNegative();
   line.option("--high", o.high, "to here [Hz], up to where hits must have force; 0: the whole record")
@@ -326,6 +326,9 @@ int main(int argc, char** argv) {
   line.option("--force-channel", o.channels.force,
               "column or channel of the hammer, where it is not named so");
   line.option("--response-channel", o.channels.response, "column or channel of the response");
+  line.option("--sound-channels", o.channels.sound,
+              "of WAV, FLAC or AIFF: NUMBER:NAME=SCALE,..., what full scale is in SI units, e.g. "
+              "1:hammer=2000,2:acceleration=500");
   line.option("--stickout-mm", o.tip.stickout,
               "tool out of the holder: the direct FRF at the tip, of one struck above it")
       .notNegative();

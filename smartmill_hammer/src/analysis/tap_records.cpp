@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "smartmill_core/campaign/record.h"
+#include "smartmill_core/campaign/sound_record.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/io/csv.h"
@@ -185,7 +186,7 @@ TapRecord readTapDynoware(const std::string& file, const ChannelNames& channels)
   }
   if (force.empty()) throw Error(file + ": no channel is named hammer; name it with --force-channel");
   if (kind.empty()) throw Error(file + ": no response in m/s2, m or N; name it with --response-channel");
-  return tapOf(readDynoware(file, {{"hammer", force}, {kind, response}}), {"", kind});
+  return tapOf(readDynoware(file, {{"hammer", force}, {kind, response}}), {"", kind, ""});
 }
 
 /// Of a function's values; where the file does not say, by their unit.
@@ -366,6 +367,7 @@ TapFormat detectFormat(const std::string& file) {
   if (first.rfind("#ROSBAG ", 0) == 0) return TapFormat::bag;
   if (first.rfind("DynoWare", 0) == 0) return TapFormat::dynoware;
   if (isUff(file)) return TapFormat::uff;
+  if (isSoundFile(file)) return TapFormat::sound;
   if (first.find('[') != std::string::npos && first.find("time") != std::string::npos) return TapFormat::csv;
   if (first.rfind("frequency", 0) == 0) return TapFormat::frf;
   std::string second;
@@ -374,13 +376,25 @@ TapFormat detectFormat(const std::string& file) {
   if (one.size() >= 3 && two.size() >= 3 && two[0] > one[0])
     return two[0] - one[0] < LARGEST_TIME_STEP ? TapFormat::text : TapFormat::frf;
   throw Error(file +
-              ": neither a bag, a DynoWare export, a universal file, nor CSV with "
+              ": neither a bag, a DynoWare export, a universal file, a sound file, nor CSV with "
               "time[s],hammer[N],acceleration[m/s2] "
               "(or displacement[m], or a force), nor three columns of numbers");
 }
 
 TapRecord readTapCsv(const std::string& file, const ChannelNames& channels) {
   return tapOf(readCsv(file), channels);
+}
+
+/// The hammer is named so; the response is the first other channel.
+TapRecord readTapSound(const std::string& file, const ChannelNames& channels) {
+  if (channels.sound.empty())
+    throw Error(file + ": a sound file does not say what its channels are; name them with --sound-channels");
+  const std::vector<SoundChannel> named = soundChannels(channels.sound);
+  ChannelNames names{"hammer", "", ""};
+  for (const SoundChannel& channel : named)
+    if (names.response.empty() && channel.name != names.force) names.response = channel.name;
+  if (names.response.empty()) throw Error(file + ": --sound-channels names no response");
+  return tapOf(readSoundRecord(file, named), names);
 }
 
 TapRecord readTapText(const std::string& file) {
@@ -404,6 +418,8 @@ TapFile readTapFile(const std::string& file, TapFormat format, const ChannelName
       return {{readTapText(file)}, {}};
     case TapFormat::dynoware:
       return {{readTapDynoware(file, channels)}, {}};
+    case TapFormat::sound:
+      return {{readTapSound(file, channels)}, {}};
     case TapFormat::uff:
       return readTapUff(file);
     case TapFormat::frf:

@@ -19,7 +19,8 @@ enum class TapFormat {
   text,       ///< three columns without header: time [s], force [N], acceleration [m/s2]
   frf,        ///< three columns without header, or frf.csv: frequency [Hz], Re, Im of the receptance
   dynoware,   ///< Kistler DynoWare export: hammer and response among its channels
-  uff         ///< universal file, dataset 58: hits over time, or FRFs
+  uff,        ///< universal file, dataset 58: hits over time, or FRFs
+  sound       ///< WAV, FLAC, AIFF: hammer and response among its channels
 };
 
 /// @throws Error naming the file when it is none of these.
@@ -34,9 +35,10 @@ struct TapRecord {
   ResponseKind kind = ResponseKind::displacement;
 };
 
-/// Channels of a DynoWare export, or columns of a CSV; empty: told by name, unit and size.
+/// Channels of a DynoWare export or a sound file, or columns of a CSV; empty: told by name, unit and size.
 struct ChannelNames {
   std::string force, response;
+  std::string sound;  ///< of a sound file: NUMBER:NAME=SCALE,..., see soundChannels()
 };
 
 /// A measured FRF as a file holds it, made a receptance where it is none [m/N], or force over force [1].

@@ -39,7 +39,7 @@ CampaignTest readTest(const StrictYaml& map) {
   test.file = fileInside(map);
   test.sample_rate = map.number("sample_rate_hz", POSITIVE);
   if (map.has("file_format")) {
-    test.file_format = map.oneOf("file_format", {"dynoware"});
+    test.file_format = map.oneOf("file_format", {"dynoware", "sound"});
     const StrictYaml channels = map.map("channels");
     for (const std::string& key : channels.keys()) {
       if (key == "fx" || key == "fy" || key == "fz") test.channels[key] = channels.word(key);

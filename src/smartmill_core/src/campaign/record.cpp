@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <string_view>
 
+#include "smartmill_core/campaign/sound_record.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/io/csv.h"
@@ -223,8 +224,16 @@ std::vector<double>& Record::add(const std::string& name) {
 
 Record readRecord(const Campaign& campaign, const CampaignTest& test) {
   const std::string path = campaign.pathOf(test);
-  return test.file_format == "dynoware" ? readDynowareAt(path, test.channels, test.sample_rate)
-                                        : readCsvAt(path, test.sample_rate);
+  if (test.file_format == "dynoware") return readDynowareAt(path, test.channels, test.sample_rate);
+  if (test.file_format != "sound") return readCsvAt(path, test.sample_rate);
+  std::string channels;
+  for (const auto& [name, number] : test.channels) {
+    const std::size_t scale = std::min(number.find('='), number.size());
+    channels += (channels.empty() ? "" : ",") + number.substr(0, scale) + ":" + name + number.substr(scale);
+  }
+  const Record record = readSoundRecord(path, soundChannels(channels));
+  checkTime(record, 1, test.sample_rate);
+  return record;
 }
 
 Record readRecord(const Campaign& campaign, const CampaignTest& test, const MachineModel& model) {
@@ -234,6 +243,26 @@ Record readRecord(const Campaign& campaign, const CampaignTest& test, const Mach
     if (!record.has(name)) continue;
     for (double& value : record.add(name)) value = -value;
   }
+  return record;
+}
+
+Record readSoundRecord(const std::string& file, const std::vector<SoundChannel>& channels) {
+  SoundFile sound = readSoundFile(file);
+  Record record;
+  record.file = file;
+  for (const SoundChannel& channel : channels) {
+    if (!kindOf(channel.name) || channel.name == "time")
+      throw Error(file + ": channel '" + channel.name + "' is no column of a record");
+    if (record.has(channel.name)) throw Error(file + ": channel '" + channel.name + "' stands twice");
+    if (channel.number > sound.channels.size())
+      throw Error(file + ": channel " + std::to_string(channel.number) + " (" + channel.name +
+                  "): the file has " + std::to_string(sound.channels.size()));
+    std::vector<double> values = sound.channels[channel.number - 1];
+    for (double& v : values) v *= channel.scale;
+    record.add(channel.name) = std::move(values);
+  }
+  for (std::size_t i = 0; i < sound.channels[0].size(); ++i)
+    record.time.push_back(static_cast<double>(i) / sound.sample_rate);
   return record;
 }
 

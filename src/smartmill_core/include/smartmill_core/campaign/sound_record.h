@@ -1,0 +1,15 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "smartmill_core/campaign/record.h"
+#include "smartmill_core/io/sound_file.h"
+
+namespace smartmill {
+
+/// Channels of a sound file as a record: names as in formats.md, scaled to SI units. @throws Error naming the
+/// file: a channel that it has not, a name that is no column of a record or stands twice.
+Record readSoundRecord(const std::string& file, const std::vector<SoundChannel>& channels);
+
+}  // namespace smartmill
