@@ -33,6 +33,7 @@ class LoadMeterNode {
   bool find(smartmill_msgs::FindCoefficients::Request& request,
             smartmill_msgs::FindCoefficients::Response& response);
   void publish(const MotorForce& force);
+  void publish(const ForceEstimate& force);
   void watch();
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
@@ -44,7 +45,7 @@ class LoadMeterNode {
   std::uint64_t next_id_ = 1;
   std::string last_message_, last_force_;
 
-  ros::Publisher publisher_, force_publisher_;
+  ros::Publisher publisher_, force_publisher_, estimate_publisher_;
   ros::ServiceServer find_service_;
   Server server_;
 };
