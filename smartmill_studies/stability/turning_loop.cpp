@@ -143,6 +143,41 @@ SecondOrder readOff(const std::vector<double>& frequency, const std::vector<Comp
   return found;
 }
 
+namespace {
+
+/// A segment's estimates, those before it known. @param tool_before spectra of tool over chip of the segment
+/// before, then of this
+KimSegment kimSegment(const std::vector<double>& chips, const std::vector<double>& deflections,
+                      const std::vector<double>& tools, const std::vector<KimSegment>& earlier,
+                      std::vector<Complex>* tool_before) {
+  KimSegment segment;
+  const auto power = cross(chips, chips), work = cross(chips, deflections);
+  std::vector<Complex> tool_now = cross(chips, tools);
+  for (std::size_t l = 0; l < power.size(); ++l) {
+    segment.frequency.push_back(LINE * static_cast<double>(l + 1));
+    segment.ratio.push_back(work[l] / power[l]);
+    tool_now[l] /= power[l];
+  }
+  segment.used = segment.ratio;
+  if (earlier.size() >= 2) {
+    const std::vector<Complex>& g = earlier.back().used;
+    const std::vector<Complex>& older = earlier[earlier.size() - 2].used;
+    for (std::size_t l = 0; l < g.size(); ++l) {
+      const Complex moved = tool_now[l] - (*tool_before)[l];
+      segment.used[l] = g[l];
+      if (std::abs(moved) > 1e-9)
+        segment.used[l] += (segment.ratio[l] - tool_now[l]) / moved * (g[l] - older[l]);
+    }
+  }
+  segment.read = readOff(segment.frequency, segment.used, LOW, HIGH);
+  // K / K_m is that of the first estimate throughout (section 4).
+  if (!earlier.empty()) segment.read.gain = earlier.front().read.gain;
+  *tool_before = tool_now;
+  return segment;
+}
+
+}  // namespace
+
 KimRun runKim(const TurningLoop& loop) {
   KimRun run;
   sim::Lathe lathe(loop.lathe);
@@ -150,7 +185,7 @@ KimRun runKim(const TurningLoop& loop) {
   const double back = TWO_PI / loop.lathe.spindle_speed * loop.lathe.rate;
   std::unique_ptr<ModalFilter> filter;
   std::vector<double> chips, deflections, tools;
-  std::vector<Complex> tool_before, g_before, tool_now;
+  std::vector<Complex> tool_before;
   double chip_before = loop.lathe.chip;
   const auto samples = static_cast<std::size_t>(loop.duration * loop.lathe.rate);
   for (std::size_t i = 0; i < samples; ++i) {
@@ -174,30 +209,8 @@ KimRun runKim(const TurningLoop& loop) {
     lathe.command(commandBlock(i, loop.lathe.rate, command));
     if (i % every == 0) chips.push_back(chip), deflections.push_back(deflection), tools.push_back(tool);
     if (chips.size() < SEGMENT_SAMPLES) continue;
-    KimSegment segment;
-    const auto power = cross(chips, chips), work = cross(chips, deflections);
-    tool_now = cross(chips, tools);
-    for (std::size_t l = 0; l < power.size(); ++l) {
-      segment.frequency.push_back(LINE * static_cast<double>(l + 1));
-      segment.ratio.push_back(work[l] / power[l]);
-      tool_now[l] /= power[l];
-    }
-    segment.used = segment.ratio;
-    if (run.segments.size() >= 2) {
-      const std::vector<Complex>& g = run.segments.back().used;
-      const std::vector<Complex>& older = run.segments[run.segments.size() - 2].used;
-      for (std::size_t l = 0; l < g.size(); ++l) {
-        const Complex moved = tool_now[l] - tool_before[l];
-        segment.used[l] = g[l];
-        if (std::abs(moved) > 1e-9)
-          segment.used[l] += (segment.ratio[l] - tool_now[l]) / moved * (g[l] - older[l]);
-      }
-    }
-    segment.read = readOff(segment.frequency, segment.used, LOW, HIGH);
-    // K / K_m is that of the first estimate throughout (section 4).
-    if (!run.segments.empty()) segment.read.gain = run.segments.front().read.gain;
+    const KimSegment segment = kimSegment(chips, deflections, tools, run.segments, &tool_before);
     filter = std::make_unique<ModalFilter>(segment.read.modal(), loop.lathe.rate, Hold::first_order);
-    tool_before = tool_now;
     run.segments.push_back(segment);
     chips.clear(), deflections.clear(), tools.clear();
   }

@@ -134,6 +134,35 @@ Rows rowsOf(const ForceReadings& r, const ForceEstimateParameters& p) {
   return rows;
 }
 
+/// The coefficients (Ktc, ratios, Kte, ratios; in units of the prior's sizes) that readings and prior like
+/// best.
+Eigen::VectorXd solve(const Mechanics& mechanics, const std::vector<Row>& rows,
+                      const std::array<double, 6>& prior, const std::array<double, 6>& scatter) {
+  const auto count = static_cast<Eigen::Index>(rows.size());
+  const fit::FunctionResiduals residuals(count + 6, [&](const Eigen::VectorXd& at, Eigen::VectorXd& out) {
+    const auto due = mechanics.of(at);
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const Row& row = rows[static_cast<std::size_t>(i)];
+      out[i] = (due[row.quantity] - row.value) / row.std_dev;
+    }
+    for (Eigen::Index c = 0; c < 6; ++c) {
+      const auto j = static_cast<std::size_t>(c);
+      out[count + c] = (at[c] - prior[j]) / scatter[j];
+    }
+  });
+  std::vector<fit::Parameter> start;
+  for (std::size_t c = 0; c < 6; ++c) {
+    fit::Parameter one;
+    one.start = prior[c];
+    one.scale = scatter[c];
+    if (c == 0 || c == 3) one.low = 1e-3;
+    start.push_back(one);
+  }
+  const fit::Result solved = fit::minimise(residuals, start);
+  if (!solved.usable()) throw Error("force of a cut: " + solved.message);
+  return solved.value;
+}
+
 }  // namespace
 
 void ForceEstimateParameters::declare(ParameterTable& table) {
@@ -174,28 +203,7 @@ ForceEstimate estimateForce(const ForceReadings& readings, const ForceEstimatePa
   const std::array<double, 6> scatter{{KTC_STD / KTC, p.radial_ratio_std, p.axial_ratio_std, KTE_STD / KTE,
                                        p.radial_edge_ratio_std, p.axial_edge_ratio_std}};
   const auto count = static_cast<Eigen::Index>(rows.rows.size());
-  const fit::FunctionResiduals residuals(count + 6, [&](const Eigen::VectorXd& at, Eigen::VectorXd& out) {
-    const auto due = mechanics.of(at);
-    for (Eigen::Index i = 0; i < count; ++i) {
-      const Row& row = rows.rows[static_cast<std::size_t>(i)];
-      out[i] = (due[row.quantity] - row.value) / row.std_dev;
-    }
-    for (Eigen::Index c = 0; c < 6; ++c) {
-      const auto j = static_cast<std::size_t>(c);
-      out[count + c] = (at[c] - prior[j]) / scatter[j];
-    }
-  });
-  std::vector<fit::Parameter> start;
-  for (std::size_t c = 0; c < 6; ++c) {
-    fit::Parameter one;
-    one.start = prior[c];
-    one.scale = scatter[c];
-    if (c == 0 || c == 3) one.low = 1e-3;
-    start.push_back(one);
-  }
-  const fit::Result solved = fit::minimise(residuals, start);
-  if (!solved.usable()) throw Error("force of a cut: " + solved.message);
-  const Eigen::VectorXd& at = solved.value;
+  const Eigen::VectorXd at = solve(mechanics, rows.rows, prior, scatter);
   ForceEstimate found;
   found.stamp = readings.stamp;
   found.name = readings.name;

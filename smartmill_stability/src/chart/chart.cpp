@@ -11,6 +11,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/units.h"
 #include "smartmill_stability/chart/uncertainty.h"
+#include "smartmill_stability/solvers/cross_modes.h"
 #include "smartmill_stability/solvers/solver.h"
 
 namespace smartmill::stability {
@@ -237,7 +238,7 @@ std::optional<RegenerativeSystem> ChartMaker::system(const Engagement& engagemen
   const CuttingCoefficients& cutting = coefficients_->value;
   const bool given = engagement.exit > engagement.entry;
   RegenerativeSystem system;
-  system.modes = systemModes(modes_.at("x").model, modes_.at("y").model);
+  system.modes = crossModes(modes_.at("x").model, modes_.at("y").model, crossFrf());
   system.teeth = tool_geometry_.teeth;
   system.pitch = tool_geometry_.pitch;
   system.helix = tool_geometry_.helix;
@@ -247,6 +248,17 @@ std::optional<RegenerativeSystem> ChartMaker::system(const Engagement& engagemen
   system.kt = cutting.ktc;
   system.kr = std::isfinite(cutting.krc) ? cutting.krc : parameters_.radial_ratio * cutting.ktc;
   return system;
+}
+
+/// The cross receptance that was measured, either way; without lines: none.
+FrequencyResponse ChartMaker::crossFrf() const {
+  for (const char* direction : {"xy", "yx"}) {
+    const auto found = frfs_.find(direction);
+    if (found != frfs_.end() && found->second.frf.unit == "m/N")
+      return certainLines(found->second.frf.band(parameters_.frequency_low, parameters_.frequency_high),
+                          parameters_.line_error);
+  }
+  return {};
 }
 
 std::size_t ChartMaker::modesInX() const {
