@@ -1,4 +1,5 @@
 #include "../src/node/parameters.h"
+#include "../src/node/lathe_parameters.h"
 
 #include "smartmill_ros/testing/shipped_parameters.h"
 
@@ -8,6 +9,8 @@ namespace {
 TEST(Parameters, TheShippedFileIsTheTable) {
   expectShipped<NodeParameters>("../launch/config/sim.yaml", "smartmill_sim sim_node");
   EXPECT_NO_THROW(NodeParameters().validate());
+  expectShipped<LatheParameters>("../launch/config/lathe.yaml", "smartmill_sim lathe_node");
+  EXPECT_NO_THROW(LatheParameters().validate());
 }
 
 }  // namespace

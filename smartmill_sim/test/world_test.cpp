@@ -228,6 +228,43 @@ TEST(World, ASlotByNcTextGivesClosedFormForceAndLoad) {
   EXPECT_EQ(mean(machine.force[0], 0, static_cast<std::size_t>(1.2 * World::SAMPLE_RATE)), 0.0);
 }
 
+// Servo Guide's start trigger at a block (Dunwoody section 6.1): it rises when that block begins, which is
+// where the blocks before it end, and stays.
+TEST(World, TheServoRecordIsTriggeredByItsBlock) {
+  WorldOptions options;
+  options.servo_trigger = 30;
+  options.motor.currents = true;
+  World world(millThatCuts(), options);
+  const std::string program = "N10 G90 G0 X-60\nN20 S6000 M3\nN25 G4 P500\nN30 G1 F6000 X-50\nN40 X-80\n";
+  ASSERT_EQ(world.controller().dncStart(), focas::EW_OK);
+  ASSERT_EQ(world.controller().dncData(program.data(), program.size()), program.size());
+  ASSERT_EQ(world.controller().dncEnd(), focas::EW_OK);
+  double risen = -1.0;
+  std::vector<double> before, after;  // currents of X in the dwell, and while it runs at constant speed after
+  for (int k = 0; k < 150; ++k) {
+    World::Block b;
+    world.advance(b);
+    ASSERT_EQ(b.motor_current.channels, (std::vector<std::string>{"x", "y", "z", "spindle"}));
+    for (std::size_t i = 0; i < b.servo.size(); ++i) {
+      const bool triggered = b.servo.at(i, b.servo.channel("trigger")) > 0.5;
+      if (triggered && risen < 0.0) {
+        risen = b.servo.timeOf(i);
+        EXPECT_EQ(b.servo.at(i, b.servo.channel("sequence")), 30.0);
+      }
+      EXPECT_TRUE(triggered || risen < 0.0);  // never falls again
+      if (!triggered) before.push_back(b.servo.at(i, b.servo.channel("current_x")));
+      const double since = b.servo.timeOf(i) - risen;
+      if (risen > 0.0 && since > 0.04 && since < 0.06)
+        after.push_back(b.servo.at(i, b.servo.channel("current_x")));
+    }
+  }
+  // 40 mm at 0.5 m/s and 5 m/s2: 0.18 s; the spindle is not waited for; dwell 0.5 s. Samples of 1 ms.
+  EXPECT_NEAR(risen, 0.18 + 0.5, 4e-3);
+  EXPECT_NEAR(before.back(), 0.0, 1e-9);
+  // At 0.1 m/s the drive carries friction, 150 N + 600 N s/m x 0.1 m/s, and the screw's 15 N at most.
+  EXPECT_NEAR(mean(after, 0, after.size()) * 628.0, 210.0, 16.0);
+}
+
 // The force follows the angle that the encoder tells.
 TEST(World, ForceAndAngleBelongTogether) {
   MachineModel model = millThatCuts();

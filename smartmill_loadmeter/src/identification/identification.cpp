@@ -17,11 +17,19 @@ std::string countOf(std::size_t n, const char* what) {
   return std::to_string(n) + " " + what + (n == 1 ? "" : "s");
 }
 
+// [rad] of the feed in the X-Y plane.
+double headingOf(const CuttingCondition& condition) {
+  const auto& from = condition.steady_from;
+  const auto& to = condition.steady_to;
+  return std::atan2(to[1] - from[1], to[0] - from[0]);
+}
+
 }  // namespace
 
 void IdentificationParameters::validate() const {
   checkBounds(*this);
   motor.validate();
+  checkBounds(force);
 }
 
 LoadMeterIdentification::LoadMeterIdentification(const MachineModel& model,
@@ -43,6 +51,7 @@ void LoadMeterIdentification::reset() {
   last_reading_ = last_state_ = 0.0;
   readings_.clear();
   motor_record_.clear();
+  force_record_.clear();
   path_first_.reset();
   path_last_.reset();
   air_cuts_.clear();
@@ -66,12 +75,16 @@ void LoadMeterIdentification::handle(const CncState& state) {
   if (path_since_ && (!on_path || gap)) {
     if (condition_->kind == CuttingCondition::Kind::cut) dropAfter(state.stamp - parameters_.guard_time);
     motor_record_.dropAfter(state.stamp - parameters_.guard_time);
+    force_record_.dropAfter(state.stamp - parameters_.guard_time);
     path_since_.reset();
   }
   if (!on_path) return;
   if (!path_since_) {
     path_since_ = state.stamp;
-    if (!path_first_) motor_record_.clear();  // standing still before it
+    if (!path_first_) {  // standing still before it
+      motor_record_.clear();
+      force_record_.clear();
+    }
   }
   PathPoint point{state.stamp, {}};
   const std::array<const char*, 3> names{"X", "Y", "Z"};
@@ -83,17 +96,23 @@ void LoadMeterIdentification::handle(const CncState& state) {
   path_last_ = point;
 }
 
-void LoadMeterIdentification::handle(const SampleBlock& block) {
-  if (!motors_ || !condition_ || condition_->kind == CuttingCondition::Kind::none) return;
-  if (!speed_since_ || block.stamp - last_reading_ > parameters_.maximum_gap) return;
+// Whether a block of another sensor belongs to the steady part of a test.
+bool LoadMeterIdentification::counts(double stamp) const {
+  if (!condition_ || condition_->kind == CuttingCondition::Kind::none) return false;
+  if (!speed_since_ || stamp - last_reading_ > parameters_.maximum_gap) return false;
   double since = *speed_since_;
   // In air without motion the spindle alone is read.
-  if (!path_since_ && (path_first_ || condition_->kind == CuttingCondition::Kind::cut)) return;
+  if (!path_since_ && (path_first_ || condition_->kind == CuttingCondition::Kind::cut)) return false;
   if (path_since_) since = std::max(since, *path_since_);
-  if (block.stamp < since + parameters_.settle_time_constants * timeConstant(spindle_.load_meter_bandwidth)) {
-    return;
-  }
-  motor_record_.add(block);
+  return stamp >= since + parameters_.settle_time_constants * timeConstant(spindle_.load_meter_bandwidth);
+}
+
+void LoadMeterIdentification::handle(const SampleBlock& block) {
+  if (motors_ && counts(block.stamp)) motor_record_.add(block);
+}
+
+void LoadMeterIdentification::handle(const ForceBlock& block) {
+  if (counts(block.stamp)) force_record_.add(block);
 }
 
 void LoadMeterIdentification::readMotorsOf(LoadTest* test) {
@@ -132,6 +151,7 @@ void LoadMeterIdentification::handle(const LoadSample& sample) {
   if (speed_since_ && (!steady || gap)) {
     dropAfter(sample.stamp - parameters_.guard_time);
     motor_record_.dropAfter(sample.stamp - parameters_.guard_time);
+    force_record_.dropAfter(sample.stamp - parameters_.guard_time);
     speed_since_.reset();
   }
   if (!steady) return;
@@ -164,6 +184,7 @@ void LoadMeterIdentification::closeTest() {
   if (condition_ && condition_->kind != CuttingCondition::Kind::none) {
     dropAfter(last_reading_ - parameters_.guard_time);
     motor_record_.dropAfter(last_reading_ - parameters_.guard_time);
+    force_record_.dropAfter(last_reading_ - parameters_.guard_time);
     if (readings_.size() < static_cast<std::size_t>(parameters_.minimum_readings)) {
       dropped_.push_back("'" + condition_->name + "' has " + countOf(readings_.size(), "steady reading") +
                          ", " + std::to_string(parameters_.minimum_readings) + " are due");
@@ -173,6 +194,7 @@ void LoadMeterIdentification::closeTest() {
   }
   readings_.clear();
   motor_record_.clear();
+  force_record_.clear();
   path_first_.reset();
   path_last_.reset();
 }
@@ -198,19 +220,50 @@ LoadTest LoadMeterIdentification::steadyTest() const {
 
 void LoadMeterIdentification::keep(LoadTest test) {
   readMotorsOf(&test);
+  test.sensor = force_record_.reading();
   const bool cut = test.condition.kind == CuttingCondition::Kind::cut;
   (cut ? cuts_ : air_cuts_).push_back(test);
   if (cut) follow(test);
   if (test_) test_(test);
   if (motor_force_ && test.force) motor_force_(*test.force);
+  if (cut && force_) estimate(test);
 }
 
-void LoadMeterIdentification::follow(const LoadTest& cut) {
-  TorqueReading reading;
+// All three components by all that was measured of the cut; a sensor's zero and noise are those of the last
+// air cut.
+void LoadMeterIdentification::estimate(const LoadTest& cut) const {
+  ForceReadings readings;
+  readings.stamp = cut.stamp;
+  readings.name = cut.condition.name;
+  readings.tool = cut.condition.tool;
+  readings.engagement = cut.condition.engagement;
+  readings.heading = headingOf(cut.condition);
+  readings.load_torque = cuttingTorque(cut);
+  if (cut.force) {
+    readings.motor_torque = cut.force->torque;
+    readings.motor_force = cut.force->force;
+  }
+  if (cut.sensor) {
+    std::optional<ForceReading> air;
+    for (const LoadTest& test : air_cuts_) {
+      if (test.sensor) air = test.sensor;
+    }
+    for (std::size_t a = 0; a < 3; ++a) {
+      readings.sensor_force[a] = cut.sensor->meanOver(air, a);
+      readings.sensor_rms[a] = cut.sensor->rmsOver(air, a);
+    }
+  }
+  try {
+    force_(estimateForce(readings, parameters_.force));
+  } catch (const Error&) {
+    // Nothing was measured of it: friction is not known yet, no motor, no sensor.
+  }
+}
+
+std::optional<Estimate> LoadMeterIdentification::cuttingTorque(const LoadTest& cut) const {
   try {
     const IdleTorque idle = idleTorque(air_cuts_, spindle_, spindle_uncertainty_);
     const double watt = spindle_.load_meter_gain * cut.speed;
-    reading.torque = cut.voltage.mean / watt - idle.torque(cut);
     const std::vector<double> gradient = idle.gradient(cut);
     double variance = std::pow(cut.torqueStdAsVoltage() / watt, 2);
     for (std::size_t i = 0; i < idle.unknowns; ++i) {
@@ -218,10 +271,18 @@ void LoadMeterIdentification::follow(const LoadTest& cut) {
         variance += gradient[i] * idle.covariance[i * idle.unknowns + j] * gradient[j];
       }
     }
-    reading.torque_std = std::sqrt(variance);
+    return Estimate{cut.voltage.mean / watt - idle.torque(cut), std::sqrt(variance)};
   } catch (const Error&) {
-    return;  // one air cut so far: the friction is not known yet
+    return std::nullopt;  // one air cut so far: the friction is not known yet
   }
+}
+
+void LoadMeterIdentification::follow(const LoadTest& cut) {
+  const std::optional<Estimate> torque = cuttingTorque(cut);
+  if (!torque) return;
+  TorqueReading reading;
+  reading.torque = torque->value;
+  reading.torque_std = torque->std_dev;
   if (!(reading.torque_std > 0.0)) return;
   const std::string of = cut.condition.tool_name + "\n" + cut.condition.material;
   if (!production_ || of != production_of_) {
@@ -270,6 +331,7 @@ void LoadMeterIdentification::handle(const IdentifyGoal& goal) {
     // The condition that holds stays: its test begins anew.
     readings_.clear();
     motor_record_.clear();
+    force_record_.clear();
     air_cuts_.clear();
     cuts_.clear();
     dropped_.clear();
@@ -343,9 +405,7 @@ std::string LoadMeterIdentification::addFromMotors(const std::vector<LoadTest>& 
     JointReading r;
     r.tool = cut.condition.tool;
     r.engagement = cut.condition.engagement;
-    const auto& from = cut.condition.steady_from;
-    const auto& to = cut.condition.steady_to;
-    r.heading = std::atan2(to[1] - from[1], to[0] - from[0]);
+    r.heading = headingOf(cut.condition);
     const double watt = spindle_.load_meter_gain * cut.speed;
     const Estimate torque{cut.voltage.mean / watt - idle.torque(cut), cut.torqueStdAsVoltage() / watt};
     if (torque.std_dev > 0.0) r.torque = torque;

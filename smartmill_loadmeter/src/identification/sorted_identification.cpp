@@ -12,6 +12,7 @@ SortedIdentification::SortedIdentification(const MachineModel& model,
   states_ = sorter_.addRegular(names::CNC_STATE);
   loads_ = sorter_.addRegular(names::CNC_LOAD);
   motors_ = sorter_.addOptional(names::MOTOR_CURRENT);
+  forces_ = sorter_.addOptional(names::FORCE_COMPENSATED);
   conditions_ = sorter_.addLatched(names::CUTTING_CONDITION);
   goals_ = sorter_.addEvents(names::IDENTIFY_COEFFICIENTS);
   sorter_.onRestart([this] {
@@ -34,6 +35,9 @@ void SortedIdentification::push(const LoadSample& sample) {
 }
 void SortedIdentification::push(const SampleBlock& block) {
   sort(motors_, block);
+}
+void SortedIdentification::push(const ForceBlock& block) {
+  sort(forces_, block);
 }
 void SortedIdentification::push(const CuttingCondition& condition) {
   sort(conditions_, condition);

@@ -92,7 +92,8 @@ MotorReading readMotors(const MotorRecord& record, const MotorParameters& parame
       continue;
     }
     try {
-      (spindle ? reading.spindle_range : reading.range[c]) = phaseRange(samples, record.rate(), frequency);
+      (spindle ? reading.spindle_range : reading.range[c]) =
+          phaseRange(samples, record.rate(), frequency, spindle ? parameters.largest_slip : 0.0);
     } catch (const Error& error) {
       reading.reason[c] = error.what();
     }

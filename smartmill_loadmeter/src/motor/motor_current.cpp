@@ -57,7 +57,7 @@ int levelFor(double frequency, double sample_rate) {
   return std::clamp(level, 0, COARSEST);
 }
 
-double phaseRange(const std::vector<double>& current, double sample_rate, double frequency) {
+double phaseRange(const std::vector<double>& current, double sample_rate, double frequency, double slip) {
   const double periods = static_cast<double>(current.size()) * frequency / sample_rate;
   if (!(periods >= 2.0)) throw Error("phase current: less than two periods in the record");
   const std::vector<double> smooth = denoise(current, levelFor(frequency, sample_rate));
@@ -84,7 +84,8 @@ double phaseRange(const std::vector<double>& current, double sample_rate, double
     amplitude = std::hypot(found[1], found[2]);
     found_at = offset;
   };
-  for (int step = -4; step <= 4; ++step) tryAt(0.25 * step);
+  const int steps = 4 + static_cast<int>(std::ceil(4.0 * slip * periods));
+  for (int step = -4; step <= steps; ++step) tryAt(0.25 * step);
   const double middle = found_at;
   for (int step = -4; step <= 4; ++step) tryAt(middle + 0.05 * step);
   return 2.0 * amplitude;

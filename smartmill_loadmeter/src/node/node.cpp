@@ -1,9 +1,11 @@
 #include "node/node.h"
 
 #include <geometry_msgs/WrenchStamped.h>
+#include <smartmill_msgs/ForceEstimate.h>
 
 #include "node/wiring.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/force_names.h"
 #include "smartmill_core/units.h"
 #include "smartmill_loadmeter/database/recommend.h"
 #include "smartmill_ros/frames.h"
@@ -46,6 +48,8 @@ LoadMeterNode::LoadMeterNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
     identification_.identification().onMotorForce([this](const MotorForce& force) { publish(force); });
     force_publisher_ = nh.advertise<geometry_msgs::WrenchStamped>(names::FORCE_OF_MOTORS, 10, true);
   }
+  identification_.identification().onForce([this](const ForceEstimate& force) { publish(force); });
+  estimate_publisher_ = nh.advertise<smartmill_msgs::ForceEstimate>(names::FORCE_ESTIMATE, 10, true);
   connect(shell_.inputs(), parameters_, identification_);
   find_service_ = nh.advertiseService(names::FIND_COEFFICIENTS, &LoadMeterNode::find, this);
   recommend_service_ = nh.advertiseService(names::RECOMMEND_CUT, &LoadMeterNode::recommend, this);
@@ -71,6 +75,25 @@ void LoadMeterNode::publish(const MotorForce& force) {
   force_publisher_.publish(message);
   last_force_ = "'" + force.name + "': " + force.text();
   ROS_INFO("motors, test %s", last_force_.c_str());
+}
+
+void LoadMeterNode::publish(const ForceEstimate& force) {
+  smartmill_msgs::ForceEstimate message;
+  message.header.stamp = fromSec(force.stamp);
+  message.header.frame_id = frames::MACHINE;
+  message.cut = force.name;
+  const auto fill = [](const std::array<Estimate, 3>& from, auto& value, auto& std_dev) {
+    value.x = from[0].value, value.y = from[1].value, value.z = from[2].value;
+    std_dev.x = from[0].std_dev, std_dev.y = from[1].std_dev, std_dev.z = from[2].std_dev;
+  };
+  fill(force.mean, message.mean, message.mean_std);
+  fill(force.rms, message.rms, message.rms_std);
+  message.torque = force.torque.value;
+  message.torque_std = force.torque.std_dev;
+  message.surprise = force.surprise;
+  message.sources = force.sources;
+  estimate_publisher_.publish(message);
+  ROS_INFO("force, test '%s': %s", force.name.c_str(), force.text().c_str());
 }
 
 void LoadMeterNode::goal(Server::GoalHandle handle) {

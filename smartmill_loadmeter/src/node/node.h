@@ -39,6 +39,7 @@ class LoadMeterNode {
                  smartmill_msgs::RecommendCut::Response& response);
   void keep(const CoefficientRecord& cut);
   void publish(const MotorForce& force);
+  void publish(const ForceEstimate& force);
   void watch();
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
@@ -52,7 +53,7 @@ class LoadMeterNode {
   std::string last_message_, last_force_;
   std::size_t kept_cuts_ = 0;
 
-  ros::Publisher publisher_, force_publisher_;
+  ros::Publisher publisher_, force_publisher_, estimate_publisher_;
   ros::ServiceServer find_service_, recommend_service_;
   Server server_;
 };

@@ -18,6 +18,7 @@ struct NodeParameters {
   double fleet_period = 60.0;
   IdentificationParameters identification;
   std::string motor_calibration;
+  bool force_sensor = false;
   double hold_back = 0.05;
   double input_timeout = 3.0;
 
@@ -43,6 +44,10 @@ struct NodeParameters {
     table.text("motor_calibration", motor_calibration,
                "path of what `calibrate --standard-cuts` wrote; empty: daq/motor_current is not used");
     table.part("motor_", identification.motor);
+    table.section("Force of each cut by all that is measured of it (force/estimate).");
+    table.flag("force_sensor", force_sensor,
+               "whether force/compensated takes part, beside load meter and motors");
+    table.part("force_", identification.force);
     table.section("Streams.");
     table.number("hold_back", hold_back, "s", Range::notNegative(),
                  "an event may arrive after its stamp and still be in order");

@@ -15,6 +15,8 @@ void connect(Source& source, const NodeParameters& parameters, SortedIdentificat
   feed<smartmill_msgs::CuttingCondition>(source, names::CUTTING_CONDITION, identification);
   if (!parameters.motor_calibration.empty())
     feed<smartmill_msgs::SampleBlock>(source, names::MOTOR_CURRENT, identification);
+  if (parameters.force_sensor)
+    feed<smartmill_msgs::ForceBlock>(source, names::FORCE_COMPENSATED, identification);
 }
 
 }  // namespace smartmill::loadmeter

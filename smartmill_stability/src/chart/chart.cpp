@@ -11,6 +11,8 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/units.h"
 #include "smartmill_stability/chart/risk.h"
+#include "smartmill_stability/chart/uncertainty.h"
+#include "smartmill_stability/solvers/cross_modes.h"
 #include "smartmill_stability/solvers/solver.h"
 
 namespace smartmill::stability {
@@ -237,7 +239,7 @@ std::optional<RegenerativeSystem> ChartMaker::system(const Engagement& engagemen
   const CuttingCoefficients& cutting = coefficients_->value;
   const bool given = engagement.exit > engagement.entry;
   RegenerativeSystem system;
-  system.modes = systemModes(modes_.at("x").model, modes_.at("y").model);
+  system.modes = crossModes(modes_.at("x").model, modes_.at("y").model, crossFrf());
   system.teeth = tool_geometry_.teeth;
   system.pitch = tool_geometry_.pitch;
   system.helix = tool_geometry_.helix;
@@ -257,6 +259,17 @@ std::optional<UncertainSystem> ChartMaker::uncertainSystem(const Engagement& eng
   least.damping = least.gain = least.cutting = parameters_.gain_std;
   least.radial = parameters_.radial_std;
   return measuredSystem(*mean, modes_.at("x").model, modes_.at("y").model, *coefficients_, least);
+}
+
+/// The cross receptance that was measured, either way; without lines: none.
+FrequencyResponse ChartMaker::crossFrf() const {
+  for (const char* direction : {"xy", "yx"}) {
+    const auto found = frfs_.find(direction);
+    if (found != frfs_.end() && found->second.frf.unit == "m/N")
+      return certainLines(found->second.frf.band(parameters_.frequency_low, parameters_.frequency_high),
+                          parameters_.line_error);
+  }
+  return {};
 }
 
 std::size_t ChartMaker::modesInX() const {

@@ -47,9 +47,11 @@ std::optional<SampleBlock> ControlStream::handle(const SampleBlock& block) {
   next_index_ = block.first_index + block.size();
   last_stamp_ = block.stamp;
   SampleBlock commands;
-  commands.stamp = block.stamp;
+  const double lead = parameters_.controller.lead;
+  commands.stamp = block.stamp + lead;
   commands.sample_rate = block.sample_rate;
-  commands.first_index = block.first_index;
+  commands.first_index =
+      block.first_index + static_cast<std::uint64_t>(std::lround(lead * block.sample_rate));
   commands.channels = {"command"};
   commands.units = {"m"};
   for (std::size_t i = 0; i < block.size(); ++i) {

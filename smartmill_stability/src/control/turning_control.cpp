@@ -65,6 +65,8 @@ void ControllerParameters::validate() const {
   require(ratio >= 1.0 && std::abs(ratio - std::round(ratio)) < 1e-9, "rate over the estimator's", ratio,
           "a whole number");
   require("period [s]", period, Range::above(2.0 / rate));
+  require(std::abs(lead * rate - std::round(lead * rate)) < 1e-6, "lead in samples", lead * rate,
+          "a whole number");
 }
 
 AdaptiveChatterController::AdaptiveChatterController(const ControllerParameters& parameters)
@@ -72,20 +74,25 @@ AdaptiveChatterController::AdaptiveChatterController(const ControllerParameters&
   parameters_.validate();
 }
 
-double AdaptiveChatterController::pastMotion() const {
-  // motion_[0] is the newest: this sample's.
+double AdaptiveChatterController::pastSurface() const {
+  // surface_[0] is the newest: this sample's.
   const double back = parameters_.period * parameters_.rate;
   const auto i = static_cast<std::size_t>(back);
-  if (i + 1 >= motion_.size()) return 0.0;  // nothing was cut before
+  if (i + 1 >= surface_.size()) return 0.0;  // nothing was cut before
   const double share = back - static_cast<double>(i);
-  return motion_[i] + share * (motion_[i + 1] - motion_[i]);
+  return surface_[i] + share * (surface_[i + 1] - surface_[i]);
 }
 
 double AdaptiveChatterController::step(double deflection, double tool) {
-  motion_.push_front(deflection - tool);
+  surface_.push_front(deflection - tool);
   const auto longest = static_cast<std::size_t>(parameters_.period * parameters_.rate) + 3;
-  if (motion_.size() > longest) motion_.pop_back();
-  const double chip = parameters_.chip - motion_.front() + parameters_.overlap * pastMotion();
+  if (surface_.size() > longest) surface_.pop_back();
+  const double old = parameters_.chip + parameters_.overlap * pastSurface();
+  double chip = old - surface_.front();
+  if (parameters_.leaves_cut && chip < 0.0) {
+    surface_.front() = old;  // one feed further off
+    chip = 0.0;
+  }
   chips_.push_front(chip);
   // Memory of a lightly damped machine, for the start of a new filter.
   constexpr double MEMORY = 1.0;  // [s]
@@ -104,8 +111,60 @@ double AdaptiveChatterController::step(double deflection, double tool) {
     segment_deflection_.clear();
   }
   // The command lasts to the next sample: the machine's answer there, chip thickness going on as it went.
-  if (!filter_) return 0.0;
-  return filter_->peek(chips_.size() > 1 ? 2.0 * chips_[0] - chips_[1] : chip);
+  double command = 0.0;
+  if (filter_) {
+    const bool at_once = parameters_.lead == 0.0 && parameters_.actuator_delay == 0.0;
+    command = at_once ? filter_->peek(chips_.size() > 1 ? 2.0 * chips_[0] - chips_[1] : chip) : predicted();
+  }
+  issued_.push_front(command);
+  const double way = (parameters_.lead + parameters_.actuator_delay) * parameters_.rate;
+  if (issued_.size() > static_cast<std::size_t>(way) + 4) issued_.pop_back();
+  return command;
+}
+
+// Displacement that commands under way give the tool, so many samples after this one.
+double AdaptiveChatterController::issued(double after) const {
+  // issued_[0] acts from `lead` after the last sample on, through the actuator's delay.
+  const double age = (parameters_.lead + parameters_.actuator_delay) * parameters_.rate - after;
+  if (issued_.empty()) return 0.0;
+  if (age <= 0.0) return issued_.front();
+  const auto i = static_cast<std::size_t>(age);
+  if (i + 1 >= issued_.size()) return issued_.back();
+  const double share = age - static_cast<double>(i);
+  return issued_[i] + share * (issued_[i + 1] - issued_[i]);
+}
+
+// The machine's answer where this command will act: chips of a cut that goes on under the commands issued.
+double AdaptiveChatterController::predicted() {
+  ModalFilter ahead = *filter_;
+  const double scale = believed_.gain / active_.gain, back = parameters_.period * parameters_.rate;
+  const double due = 1.0 + (parameters_.lead + parameters_.actuator_delay) * parameters_.rate;
+  const auto steps = static_cast<int>(std::ceil(due - 1e-9));
+  double chip = chips_[0], before = 0.0, answer = 0.0;
+  coming_.clear();
+  for (int k = 1; k <= steps; ++k) {
+    const double tool = issued(k), age = back - k;
+    double past = 0.0;
+    if (age >= 0.0) {
+      const auto i = static_cast<std::size_t>(age);
+      if (i + 1 < surface_.size()) {
+        past = surface_[i] + (age - static_cast<double>(i)) * (surface_[i + 1] - surface_[i]);
+      }
+    } else {
+      past = coming_[std::min(coming_.size() - 1, static_cast<std::size_t>(-age))];
+    }
+    // The chip moves the machine within the sample: a few turns.
+    const double old = parameters_.chip + parameters_.overlap * past;
+    const auto chipAt = [&](double deflection) {
+      const double free = old - (deflection - tool);
+      return parameters_.leaves_cut ? std::max(0.0, free) : free;
+    };
+    for (int turn = 0; turn < 3; ++turn) chip = chipAt(scale * ahead.peek(chip));
+    before = answer;
+    answer = ahead.step(chip);
+    coming_.push_back(parameters_.leaves_cut && chip == 0.0 ? old : scale * answer - tool);
+  }
+  return steps > 1 ? answer + (steps - due) * (before - answer) : answer;
 }
 
 void AdaptiveChatterController::learn() {

@@ -27,6 +27,7 @@ inline ControllerParameters kimController(const TurningProcess& process) {
   parameters.rate = CONTROL_RATE;
   parameters.period = process.period;
   parameters.chip = process.chip;
+  parameters.leaves_cut = false;  // the process is linear
   return parameters;
 }
 

@@ -14,6 +14,8 @@
 #include "smartmill_loadmeter/calibration/load_meter.h"
 #include "smartmill_loadmeter/database/database.h"
 #include "smartmill_loadmeter/identification/production.h"
+#include "smartmill_loadmeter/motor/force_estimate.h"
+#include "smartmill_loadmeter/motor/force_record.h"
 #include "smartmill_loadmeter/motor/motor_chain.h"
 
 namespace smartmill::loadmeter {
@@ -27,9 +29,10 @@ struct IdentificationParameters {
   double maximum_gap = 0.5;
   double production_memory = 1800.0;
   double largest_runout = 3.0e-5;
-  MotorParameters motor;  ///< of daq/motor_current
+  MotorParameters motor;          ///< of daq/motor_current
+  ForceEstimateParameters force;  ///< of the force of each cut
 
-  /// Without the motors', whose keys have a prefix.
+  /// Without the motors' and the force's, whose keys have a prefix.
   void declare(ParameterTable& table) {
     table.number("speed_tolerance", speed_tolerance, "1", Range::open(0.0, 0.5),
                  "share of the commanded spindle speed within which it counts as reached");
@@ -82,7 +85,8 @@ struct LoadTest {
   double stamp = 0.0;     ///< [s] of its last reading
   double duration = 0.0;  ///< [s] steady
   std::optional<MotorReading> motor;
-  std::optional<MotorForce> force;  ///< of a cut, where motors are calibrated
+  std::optional<MotorForce> force;     ///< of a cut, where motors are calibrated
+  std::optional<ForceReading> sensor;  ///< of a force sensor, where one is listened to
 
   /// Mean of the readings. @param step [V] of the load meter.
   void takeMean(const Spindle& spindle, double step);
@@ -107,6 +111,8 @@ class LoadMeterIdentification {
   void setMotors(const MotorCalibration& calibration) { motors_ = calibration; }
   /// Force of each cut by its motors.
   void onMotorForce(std::function<void(const MotorForce&)> callback) { motor_force_ = std::move(callback); }
+  /// Force of each cut by all that was measured of it.
+  void onForce(std::function<void(const ForceEstimate&)> callback) { force_ = std::move(callback); }
   void onTest(std::function<void(const LoadTest&)> callback) { test_ = std::move(callback); }
   /// Every cut whose friction is known, for the database: condition, age of the edge, and the running
   /// estimate with it, whose standard deviations are those of one cut among as many as it rests on, so that
@@ -117,6 +123,8 @@ class LoadMeterIdentification {
   void handle(const LoadSample& sample);
   /// Topic daq/motor_current: channels x, y, z, spindle [A], phase currents by Hall sensors.
   void handle(const SampleBlock& block);
+  /// Topic force/compensated: what a force sensor shows of the tool's force.
+  void handle(const ForceBlock& block);
   void handle(const CuttingCondition& condition);
   void handle(const IdentifyGoal& goal);
 
@@ -136,6 +144,9 @@ class LoadMeterIdentification {
   };
   bool onPath(const CncState& state) const;
   void dropAfter(double stamp);
+  bool counts(double stamp) const;
+  std::optional<Estimate> cuttingTorque(const LoadTest& cut) const;
+  void estimate(const LoadTest& cut) const;
   void closeTest();
   LoadTest steadyTest() const;
   void keep(LoadTest test);
@@ -159,6 +170,8 @@ class LoadMeterIdentification {
   double last_reading_ = 0.0, last_state_ = 0.0;    // [s]
   std::vector<Reading> readings_;
   MotorRecord motor_record_;
+  ForceRecord force_record_;
+  std::function<void(const ForceEstimate&)> force_;
   std::optional<MotorCalibration> motors_;
   std::function<void(const MotorForce&)> motor_force_;
   struct PathPoint {

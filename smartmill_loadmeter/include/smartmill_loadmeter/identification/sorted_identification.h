@@ -25,6 +25,8 @@ class SortedIdentification {
   void push(const LoadSample& sample);
   /// daq/motor_current: may be absent; from its first block on it is waited for as the others are.
   void push(const SampleBlock& block);
+  /// force/compensated: likewise.
+  void push(const ForceBlock& block);
   void push(const CuttingCondition& condition);
   void push(const IdentifyGoal& goal);
 
@@ -41,7 +43,7 @@ class SortedIdentification {
 
   LoadMeterIdentification identification_;
   StreamSorter sorter_;
-  StreamSorter::Stream states_, loads_, motors_, conditions_, goals_;
+  StreamSorter::Stream states_, loads_, motors_, forces_, conditions_, goals_;
   double newest_ = 0.0;
 };
 

@@ -18,6 +18,7 @@ struct MotorParameters {
   std::array<double, 3> phase_per_metre{{0.0, 0.0, 0.0}};
   double phase_per_revolution = 0.0;
   double smallest_velocity = 1.0e-4;
+  double largest_slip = 0.02;
 
   void declare(ParameterTable& table) {
     table.list("phase_per_metre", phase_per_metre, "1/m", Range::openHigh(0.0, 1e7),
@@ -26,6 +27,8 @@ struct MotorParameters {
                  "electrical periods to a revolution of the spindle; 0: none");
     table.number("smallest_velocity", smallest_velocity, "m/s", Range::openLow(0.0, 0.1),
                  "below it an axis stands still: its force is not observable");
+    table.number("largest_slip", largest_slip, "1", Range::closed(0.0, 0.1),
+                 "of the spindle's phase frequency above the speed's; 0: a synchronous motor");
   }
   bool any() const;
   /// @throws Error naming key and value.

@@ -22,8 +22,10 @@ std::vector<double> denoise(const std::vector<double>& signal, int level);
 int levelFor(double frequency, double sample_rate);
 
 /// Range (twice the amplitude) of one phase's current: the de-noised signal's sine. @param frequency [Hz] of
-/// the phase. @return [A]. @throws Error with less than two periods.
-double phaseRange(const std::vector<double>& current, double sample_rate, double frequency);
+/// the phase. @param slip [1] share by which it may lie higher (induction motors under load). @return [A].
+/// @throws Error with less than two periods.
+double phaseRange(const std::vector<double>& current, double sample_rate, double frequency,
+                  double slip = 0.0);
 
 /// A straight line y = slope x + level, with its covariance.
 struct Line {

@@ -96,6 +96,7 @@ class ChartMaker {
   void addSpread(const RegenerativeSystem& system, WhatIfChart& chart) const;
   bool byCollocation() const;
   bool needsModes() const;
+  FrequencyResponse crossFrf() const;
   void use(const std::string& tool, double stamp);
   /// Depth that the spindle carries at a speed: torque and power limit [m].
   std::array<double, 2> loadLimits(double speed) const;

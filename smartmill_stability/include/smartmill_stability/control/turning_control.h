@@ -81,6 +81,9 @@ struct ControllerParameters {
   double chip = 1.0e-4;
   double drift = 0.01;
   double margin = -0.4;
+  double lead = 0.0;
+  double actuator_delay = 0.0;
+  bool leaves_cut = true;
 
   void declare(ParameterTable& table) {
     table.internal("rate", rate, "Hz", Range::positive());
@@ -91,6 +94,14 @@ struct ControllerParameters {
                  "change of the machine a segment that is granted");
     table.number("margin", margin, "1", Range::open(-0.5, 0.0),
                  "real part that a new controller must keep at two standard deviations");
+    table.number("lead", lead, "s", Range::closed(0.0, 0.5),
+                 "commands are for samples so much later: the way to the actuator and back; a whole number "
+                 "of samples");
+    table.number("actuator_delay", actuator_delay, "s", Range::closed(0.0, 0.1),
+                 "by which the actuator follows its commands late");
+    table.flag("leaves_cut", leaves_cut,
+               "whether a tool that vibrates out of the cut leaves the surface as it was; false: chips may "
+               "be negative");
     estimator.declare(table);
   }
   /// @throws Error naming key and value.
@@ -106,7 +117,8 @@ class AdaptiveChatterController {
   explicit AdaptiveChatterController(const ControllerParameters& parameters);
 
   /// One sample of deflection and tool displacement [m]. @return tool displacement to make until the next
-  /// sample [m]; 0 before the first estimate.
+  /// sample [m], or from `lead` after this one until the next: then it stands on a prediction, the machine as
+  /// believed under the chips that this and the commands under way will make. 0 before the first estimate.
   double step(double deflection, double tool);
 
   /// What each segment showed, in order.
@@ -116,12 +128,16 @@ class AdaptiveChatterController {
   const SecondOrder& active() const { return active_; }  ///< controller in force; gain 0: none
 
  private:
-  double pastMotion() const;
+  double pastSurface() const;
+  double predicted();
+  double issued(double after) const;
   void learn();
   void activate(const SecondOrder& model);
 
   ControllerParameters parameters_;
-  std::deque<double> motion_, chips_;  // newest first, at the control rate
+  std::deque<double> surface_, chips_;  // newest first, at the control rate
+  std::deque<double> issued_;           // commands that are under way, newest first
+  std::vector<double> coming_;          // surface that is predicted
   std::vector<double> segment_chip_, segment_deflection_;
   int phase_ = 0;
   SecondOrder believed_, active_;

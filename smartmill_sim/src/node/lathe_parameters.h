@@ -1,0 +1,33 @@
+#pragma once
+
+#include "smartmill_core/parameters/parameter_table.h"
+#include "smartmill_sim/turning/lathe.h"
+
+namespace smartmill::sim {
+
+/// Parameters of lathe_node.
+struct LatheParameters {
+  LatheTraits lathe;
+  double block = 5.0e-3;
+  bool await_commands = false;
+
+  void declare(ParameterTable& table) {
+    table.title(
+        "Parameters of lathe_node (package smartmill_sim): the simulated lathe with a fast tool servo. SI "
+        "units throughout.");
+    lathe.declare(table);
+    table.section();
+    table.number("block", block, "s", Range::closed(1e-4, 0.1), "of samples that are published together");
+    table.flag(
+        "await_commands", await_commands,
+        "time stands until commands have come for the samples that follow (on a computer with other work); "
+        "no real lathe waits");
+  }
+  /// @throws Error naming key and value.
+  void validate() const {
+    checkBounds(*this);
+    lathe.validate();
+  }
+};
+
+}  // namespace smartmill::sim

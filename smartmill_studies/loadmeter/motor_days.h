@@ -1,0 +1,55 @@
+#pragma once
+
+#include <array>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "smartmill_loadmeter/identification/identification.h"
+#include "smartmill_loadmeter/motor/motor_calibration.h"
+
+namespace smartmill::loadmeter {
+
+/// One day of a simulated machine with Hall sensors round its motors (smartmill_sim/world/motor_currents.h):
+/// slots in metals of several kinds along X, Y and both, each with an air pass before it.
+struct MotorDay {
+  double temperature = 20.0;  ///< [deg C]
+  unsigned seed = 1;
+  int cuts = 24;
+  double duration = 1.2;      ///< [s] of each pass
+  bool force_sensor = false;  ///< the twin's dynamometer takes part as force/compensated
+};
+
+/// A slot as the twin made it and as the product's estimator saw it.
+struct MotorCut {
+  double speed_rpm = 0.0, feed_per_tooth = 0.0, depth = 0.0;  ///< [rpm], [m], [m]
+  double radius = 0.0;                                        ///< [m] of the tool
+  std::array<double, 3> force{}, rms{};                       ///< [N] truth: mean, variation about it
+  double torque = 0.0;                                        ///< [N m] truth
+  MotorReading cut, air;                                      ///< ranges out of the signal chain
+  std::optional<MotorForce> motors;                           ///< where a calibration is given
+  std::optional<ForceEstimate> estimate;
+};
+
+/// Every sample goes through the product's estimator as the node feeds it. @param calibration empty: currents
+/// are read, no force is made of them. @throws Error
+std::vector<MotorCut> runDay(const MotorDay& day, const std::optional<MotorCalibration>& calibration,
+                             const std::function<void(double share)>& progress = {});
+
+/// Standard cuts (forces as a dynamometer elsewhere saw them) and this machine's currents.
+MotorCalibration calibrationOf(const std::vector<MotorCut>& cuts);
+
+/// Root mean square errors [N] of force along X and Y and of the tangential force T / r.
+struct DayErrors {
+  std::array<double, 3> regression{}, anfis{},
+      old_air{};  ///< old_air: regression with the first day's air cuts
+  std::array<int, 3> count{};
+  /// Of the estimator's forces X, Y, Z: error, share within 1.96 standard deviations, of means and
+  /// variations.
+  std::array<double, 3> estimate{}, inside{}, inside_rms{};
+};
+/// @param learnt the cuts of the first day, of which regression and ANFIS were made.
+DayErrors judgeDay(const std::vector<MotorCut>& learnt, const MotorCalibration& calibration,
+                   const std::vector<MotorCut>& cuts);
+
+}  // namespace smartmill::loadmeter

@@ -1,0 +1,86 @@
+#include "stability/turning_loop.h"
+
+#include <cmath>
+#include <limits>
+
+#include <gtest/gtest.h>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/units.h"
+
+namespace smartmill::stability {
+namespace {
+
+// Free: the growth of the linear process' dominant root, until the tool leaves the cut.
+TEST(TurningLoop, theFreeLatheGrowsAsItsRootAndThenLeavesTheCut) {
+  TurningLoop loop = kimLoop(1.0);
+  loop.controlled = false;
+  const TurningTrace trace = runTurning(loop);
+  EXPECT_NEAR(std::log(trace.vibration(3.0, 4.0) / trace.vibration(0.952, 1.952)), 1.0, 0.05);
+  loop = kimLoop(3.0);
+  loop.controlled = false;
+  const TurningTrace full = runTurning(loop);
+  EXPECT_NEAR(full.vibration(5.6, 6.1) / full.vibration(4.6, 5.1), 1.0, 0.02);
+  double least = 1.0;
+  for (const double f : full.force) least = std::min(least, f);
+  EXPECT_EQ(least, 0.0);
+}
+
+// Through blocks that are late, a servo with a bandwidth and a chip force that is not proportional.
+TEST(TurningLoop, chatterEndsOverATopicsDelay) {
+  for (const double exponent : {1.0, 0.7}) {
+    TurningLoop loop = kimLoop(2.0);
+    loop.block = 100, loop.way = 4;
+    loop.control.controller.lead = 0.05;
+    loop.lathe.chip_exponent = exponent;
+    loop.duration = 4.0;
+    const TurningTrace trace = runTurning(loop);
+    EXPECT_EQ(trace.late, 0u);
+    EXPECT_NEAR(trace.learnt.front().machine.frequency, 350.0, 1.0);
+    EXPECT_NEAR(trace.learnt.front().machine.damping_ratio, 0.02, 0.002);
+    EXPECT_GT(trace.vibration(1.0, 2.0), 8e-6);
+    EXPECT_LT(trace.vibration(3.5, 4.0), 0.05e-6) << exponent;
+  }
+}
+
+TEST(TurningLoop, anAccelerometerWillDo) {
+  TurningLoop loop = kimLoop(2.0);
+  loop.control.deflection_channel = "headstock";
+  loop.duration = 4.0;
+  EXPECT_LT(runTurning(loop).vibration(3.5, 4.0), 0.1e-6);
+}
+
+TEST(TurningLoop, aCommandThatIsLateIsCounted) {
+  TurningLoop loop = kimLoop(2.0);
+  loop.control.controller.lead = 0.0;
+  loop.duration = 2.2;
+  EXPECT_GT(runTurning(loop).late, 0u);
+}
+
+TEST(Lathe, refusesWhatIsWrong) {
+  const auto error = [](auto&& act) {
+    try {
+      act();
+    } catch (const Error& e) {
+      return std::string(e.what());
+    }
+    return std::string();
+  };
+  sim::LatheTraits traits;
+  traits.stiffness = {2e7, 3e7};
+  EXPECT_EQ(error([&] { sim::Lathe lathe(traits); }),
+            "frequency, damping_ratio, stiffness: 1, 1, 2 values, one of each a mode is due");
+  sim::Lathe lathe({});
+  SampleBlock commands;
+  commands.sample_rate = 1e4;
+  commands.channels = {"command"};
+  commands.units = {"V"};
+  commands.samples = {1e-6};
+  EXPECT_EQ(error([&] { lathe.command(commands); }), "command: the unit is V, m is due");
+  commands.units = {"m"};
+  commands.samples = {std::nan("")};
+  EXPECT_EQ(error([&] { lathe.command(commands); }), "command: a value is not finite");
+}
+
+}  // namespace
+}  // namespace smartmill::stability
