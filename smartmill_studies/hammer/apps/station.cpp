@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "hammer/station_score.h"
+#include "hammer/tip_figures.h"
 #include "smartmill_core/program.h"
 
 namespace {
@@ -22,6 +23,19 @@ struct Options {
   int machines = 500, only = -1;
 };
 
+/// One machine's figures 4.5 to 4.8 of the thesis.
+void draw(const hammer::StationFrfs& f, const std::string& folder) {
+  if (f.measured.size() == 0) return;
+  const studies::TipCurve direct{"struck and read at the tip", f.direct};
+  const studies::TipCurve measured{"measured, no correction", f.measured}, thesis{"eq. 4.44", f.thesis},
+      tip{"spindle and tool apart", f.tip};
+  studies::drawParts({{"true, at the heights of hammer and sensor", f.across}, measured},
+                     folder + "/figure_4_5.png");
+  studies::drawParts({direct, measured}, folder + "/figure_4_6.png");
+  studies::drawParts({direct, measured, thesis, tip}, folder + "/figure_4_7.png");
+  studies::drawSlotLimits({direct, measured, thesis, tip}, folder + "/figure_4_8.png");
+}
+
 void run(const Options& o) {
   std::filesystem::create_directories(o.out);
   const std::string file =
@@ -33,7 +47,9 @@ void run(const Options& o) {
     if (!line.is_discarded()) lines[line["machine"]] = line;  // a line cut off by an end is done again
   }
   if (o.only >= 0) {
-    std::printf("%s\n", hammer::runStation(o.study, o.only).dump().c_str());
+    hammer::StationFrfs frfs;
+    std::printf("%s\n", hammer::runStation(o.study, o.only, &frfs).dump().c_str());
+    draw(frfs, o.out);
     return;
   }
   std::ofstream table(file, std::ios::app);
@@ -61,7 +77,8 @@ int main(int argc, char** argv) {
   line.option("--machines", o.machines, "to draw").within(1, 100000).showDefault();
   line.option("--seed", o.study.seed, "of everything drawn").showDefault();
   line.option("--hits", o.study.hits, "a measurement").within(1, 100).showDefault();
-  line.option("--machine", o.only, "only this one, its line on standard output");
+  line.option("--machine", o.only,
+              "only this one: its line on standard output, the thesis's figures 4.5 to 4.8 in OUT");
   line.option("-o,--out", o.out, "folder of the lines").showDefault();
   return runProgram(line, argc, argv, [&] { run(o); });
 }
