@@ -244,6 +244,19 @@ void runFiles(const Options& options, const std::vector<TapFormat>& formats) {
   }
 }
 
+/// A cross FRF and the direct one of the same blows, fitted together: one set of poles, gains of both.
+void writeCross(const Options& options, const MeasureFrfResult& result, const NamedFrf& direct) {
+  ModalEstimateOptions search;
+  search.low = options.parameters.measurement.fit_low;
+  search.high = options.parameters.measurement.fit_high;
+  search.max_modes = options.max_modes;
+  const NamedFrf cross{"tool tip " + result.cross.direction, result.cross.frf};
+  const ModalEstimate both = estimateModes({cross.frf, direct.frf}, search);
+  std::printf("  %s together with %s: ", result.cross.direction.c_str(), result.frf.direction.c_str());
+  printEstimate(both, true);
+  write(options, "_" + result.cross.direction, {cross, direct}, both);
+}
+
 void runBag(const Options& options) {
   if (options.inputs.size() != 1) throw Error(options.inputs[1] + ": one bag at a time");
   if (options.model.empty()) throw Error("--model: a bag needs the machine model that the session ran with");
@@ -267,8 +280,7 @@ void runBag(const Options& options) {
         result.frf.frf};
     write(options, "_" + result.frf.direction, {frf}, estimate);
     if (++good == 1) write(options, "", {frf}, estimate);
-    if (result.cross.frf.size() > 0)
-      writeFrfCsv(result.cross.frf, options.out + "/frf_" + result.cross.direction + ".csv");
+    if (result.cross.frf.size() > 0) writeCross(options, result, frf);
   }
   std::filesystem::create_directories(options.out);
   writeHitsCsv(verdicts, options.out + "/hits.csv");

@@ -189,7 +189,22 @@ int thesisMoves(const StationStudy& study, int number, const DrawnStation& drawn
 
 }  // namespace
 
-json runStation(const StationStudy& study, int number) {
+namespace {
+
+StationFrfs figuresOf(const Truth& truth, const MeasureFrfResult& result, double factor) {
+  const FrequencyResponse& lines = result.measured_frf;
+  StationFrfs f{lines, lines, lines, lines, result.frf.frf};
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    f.direct.value[i] = truth.tip.response(lines.frequency[i]);
+    f.across.value[i] = truth.measured.response(lines.frequency[i]);
+    f.thesis.value[i] *= factor;
+  }
+  return f;
+}
+
+}  // namespace
+
+json runStation(const StationStudy& study, int number, StationFrfs* frfs) {
   const auto begun = std::chrono::steady_clock::now();
   const DrawnStation drawn = drawStation(study.seed, number);
   HammerParameters parameters;
@@ -238,6 +253,7 @@ json runStation(const StationStudy& study, int number) {
     line["cross"] = result.cross.frf.size() > 0;
     line["modes"] = modeLines(truth, result, factor, line);
     frfLines(truth, result, factor, line);
+    if (frfs) *frfs = figuresOf(truth, result, factor);
   }
   line["cpu"] = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
   return line;

@@ -111,8 +111,9 @@ void HammerSequence::addScatter(const FrequencyResponse& frf, ModalModel& model)
 }
 
 /// What repeats from blow to blow, and so no scatter shows: how well the sensor's curve is known by which the
-/// vibration is bent straight, and modes across the direction, of which the station's axes show a share.
-void HammerSequence::addSystematic(const FrequencyResponse& frf, ModalModel& model) const {
+/// vibration is bent straight, and modes across the direction, of which the station's axes show a share. The
+/// curve's part is added to the lines too.
+void HammerSequence::addSystematic(FrequencyResponse& frf, ModalModel& model) const {
   const double across = std::pow(parameters_.axes_turn_std, 2);
   for (Mode& mode : model.modes) {
     // Somewhere within its width a mode across bends the other: its phase by its share, its damping too.
@@ -136,6 +137,8 @@ void HammerSequence::addSystematic(const FrequencyResponse& frf, ModalModel& mod
     mode.damping_ratio_std = std::hypot(mode.damping_ratio_std, by.damping_ratio);
     mode.gain_std = std::hypot(mode.gain_std, by.gain);
   }
+  for (std::size_t k = 0; k < frf.size(); ++k)
+    frf.std_dev[k] = std::hypot(frf.std_dev[k], std::abs(change[k]));
 }
 
 ToolBeam HammerSequence::toolBeam() const {
@@ -222,7 +225,7 @@ void HammerSequence::evaluate() {
   result_.frf.direction = result_.modes.direction = goal_.direction;
   result_.modes.unit = options.unit;
   try {
-    const FrequencyResponse frf = averaged(hits_, sensor_);
+    FrequencyResponse frf = averaged(hits_, sensor_);
     ModalFitOptions fit_options;
     fit_options.low = parameters_.fit_low;
     fit_options.high = parameters_.fit_high;
@@ -236,7 +239,7 @@ void HammerSequence::evaluate() {
     addScatter(frf, fit.model);
     addSystematic(frf, fit.model);
     result_.modes.model = result_.measured = fit.model;
-    result_.measured_frf = frf;
+    result_.frf.frf = result_.measured_frf = frf;
     addCommon(result_.measured, relative);
     result_.modes.relative_error = fit.relative_error;
     result_.message = std::to_string(hits_.size() + second_hits_.size()) + " hits, " +

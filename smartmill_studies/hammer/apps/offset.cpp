@@ -8,14 +8,12 @@
 #include <string>
 
 #include "hammer/offset_cases.h"
+#include "hammer/tip_figures.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/io/csv.h"
-#include "smartmill_core/io/gnuplot.h"
 #include "smartmill_core/program.h"
 #include "smartmill_core/signal/statistics.h"
-#include "smartmill_core/units.h"
-#include "smartmill_stability/solvers/zero_order.h"
 
 namespace {
 
@@ -57,51 +55,6 @@ double softest(const FrequencyResponse& frf) {
   return -least;
 }
 
-/// The thesis's figure 4.8: the limit of a slot, of four teeth in aluminium, by the FRF of each way; above it
-/// the FRFs themselves (figures 4.6 and 4.7). x and y are alike.
-void draw(const OffsetOutcome& outcome, const std::string& png) {
-  using Rows = std::vector<std::vector<double>>;
-  constexpr double KT = 796e6, RADIAL = 0.21, SLOWEST = 3000.0, FASTEST = 20000.0;
-  const stability::RegenerativeProcess slot{4, 0.0, units::PI, KT, RADIAL};
-  std::vector<double> speeds;
-  for (double rpm = SLOWEST; rpm <= FASTEST; rpm += 20.0) speeds.push_back(units::radPerSecFromRpm(rpm));
-  const FrequencyResponse* frfs[] = {&outcome.truth, &outcome.frf[0], &outcome.frf[1], &outcome.frf[2]};
-  std::vector<StabilityLimit> limits;
-  for (const FrequencyResponse* frf : frfs)
-    limits.push_back(stability::zeroOrderLimit(slot, stability::responseOf(*frf, *frf), speeds));
-  Rows depths, sizes;
-  for (std::size_t i = 0; i < speeds.size(); ++i) {
-    depths.push_back({units::rpmFromRadPerSec(speeds[i])});
-    for (const StabilityLimit& limit : limits) depths.back().push_back(1e3 * limit.depth[i]);
-  }
-  for (std::size_t i = 0; i < outcome.truth.size(); ++i) {
-    sizes.push_back({outcome.truth.frequency[i]});
-    for (const FrequencyResponse* frf : frfs) sizes.back().push_back(1e6 * std::abs(frf->value[i]));
-  }
-  Gnuplot plot(png, 1100, 900);
-  plot.block("sizes", sizes);
-  plot.block("depths", depths);
-  const auto curves = [&](const char* block) {
-    const char* names[] = {"struck and read at the tip", "no correction", "eq. 4.44",
-                           "spindle and tool apart"};
-    const char* styles[] = {"lw 4 lc rgb '#b0b0b0'", "lw 1.5 dt 2 lc rgb '#c08040'",
-                            "lw 1.5 dt 4 lc rgb '#c02020'", "lw 1.5 lc rgb '#2060c0'"};
-    for (int k = 0; k < 4; ++k)
-      plot << (k == 0 ? "plot $" : ", $") << block << " using 1:" << k + 2 << " with lines " << styles[k]
-           << " title '" << names[k] << "'";
-    plot << "\n";
-  };
-  plot << "set multiplot layout 2,1\nset grid\nset lmargin 10\nset logscale y\nset xlabel 'frequency [Hz]'\n"
-          "set ylabel '|H| [um/N]'\nset xrange [100:5000]\n";
-  curves("sizes");
-  plot
-      << "unset logscale y\nset xlabel 'spindle speed [rpm]'\nset ylabel 'limit of a slot [mm]'\nset xrange ["
-      << SLOWEST << ":" << FASTEST << "]\nset yrange [0:*]\n";
-  curves("depths");
-  plot << "unset multiplot\n";
-  plot.draw();
-}
-
 void save(const OffsetOutcome& outcome, const std::string& folder, int machine) {
   std::filesystem::create_directories(folder);
   CsvWriter csv(
@@ -116,7 +69,11 @@ void save(const OffsetOutcome& outcome, const std::string& folder, int machine) 
             outcome.frf[2].std_dev[i], at(3).real(), at(3).imag());
   }
   csv.save(folder + "/machine_" + std::to_string(machine) + ".csv");
-  draw(outcome, folder + "/figure_4_8_machine_" + std::to_string(machine) + ".png");
+  drawSlotLimits({{"struck and read at the tip", outcome.truth},
+                  {"no correction", outcome.frf[0]},
+                  {"eq. 4.44", outcome.frf[1]},
+                  {"spindle and tool apart", outcome.frf[2]}},
+                 folder + "/figure_4_8_machine_" + std::to_string(machine) + ".png");
 }
 
 void run(const Request& request) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "hammer/station_score.h"
+#include "hammer/tip_figures.h"
 #include "smartmill_core/program.h"
 #include "study_case.h"
 
@@ -21,8 +22,22 @@ struct Options {
   hammer::StationStudy study;
   std::string out = "hammer_station";
   StudyCase one;
+  std::string figures;
   int machines = 500;
 };
+
+/// One machine's figures 4.5 to 4.8 of the thesis.
+void draw(const hammer::StationFrfs& f, const std::string& folder) {
+  if (f.measured.size() == 0) return;
+  const studies::TipCurve direct{"struck and read at the tip", f.direct};
+  const studies::TipCurve measured{"measured, no correction", f.measured}, thesis{"eq. 4.44", f.thesis},
+      tip{"spindle and tool apart", f.tip};
+  studies::drawParts({{"true, at the heights of hammer and sensor", f.across}, measured},
+                     folder + "/figure_4_5.png");
+  studies::drawParts({direct, measured}, folder + "/figure_4_6.png");
+  studies::drawParts({direct, measured, thesis, tip}, folder + "/figure_4_7.png");
+  studies::drawSlotLimits({direct, measured, thesis, tip}, folder + "/figure_4_8.png");
+}
 
 void run(const Options& o) {
   if (o.one.scores()) {
@@ -30,7 +45,14 @@ void run(const Options& o) {
     return;
   }
   o.one.check(o.machines);
-  if (o.one.one()) return o.one.print(hammer::runStation(o.study, o.one.number));
+  if (o.one.one()) {
+    hammer::StationFrfs frfs;
+    o.one.print(hammer::runStation(o.study, o.one.number, &frfs));
+    if (o.figures.empty()) return;
+    std::filesystem::create_directories(o.figures);
+    draw(frfs, o.figures);
+    return;
+  }
   std::filesystem::create_directories(o.out);
   const std::string file =
       o.out + "/stations_" + std::to_string(o.study.seed) + "_" + std::to_string(o.study.hits) + ".jsonl";
@@ -62,6 +84,7 @@ int main(int argc, char** argv) {
   o.one.addScore(line);
   line.option("--seed", o.study.seed, "of everything drawn").showDefault();
   line.option("--hits", o.study.hits, "a measurement").within(1, 100).showDefault();
+  line.option("--figures", o.figures, "with --case: folder for the thesis's figures 4.5 to 4.8 of it");
   line.option("-o,--out", o.out, "folder of the lines").showDefault();
   return runProgram(line, argc, argv, [&] { run(o); });
 }

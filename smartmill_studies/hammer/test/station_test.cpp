@@ -70,8 +70,6 @@ TEST(Station, MeasuresDrawnMachinesWithoutTouching) {
   EXPECT_LT(median(tip), 0.03);
 }
 
-// Struck along one axis, read across it: against the station's own cross receptance, in the lines where that
-// stands ten of their deviations above zero.
 // Of this one's five uneven teeth the flute that was found is not the first: where the others stand is not
 // known better than that.
 TEST(Station, UnevenTeethOfWhichAnyMayBeTheFluteThatWasFound) {
@@ -81,6 +79,8 @@ TEST(Station, UnevenTeethOfWhichAnyMayBeTheFluteThatWasFound) {
   EXPECT_EQ(line["code"], 0) << line["message"];
 }
 
+// Struck along one axis, read across it: against the station's own cross receptance, in the lines where that
+// stands ten of their deviations above zero.
 TEST(Station, TheCrossFrfIsThatOfTheStructure) {
   DrawnStation drawn = firstWith([](const DrawnStation& d) {
     return d.traits.cross_sensor && !d.out_of_range && d.traits.tooth == "flute";

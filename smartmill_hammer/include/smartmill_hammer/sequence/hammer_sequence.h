@@ -244,7 +244,7 @@ class HammerSequence {
   double hitProgress() const;
   FrequencyResponse averaged(const std::vector<Hit>& hits, const SensorState& sensor) const;
   void addScatter(const FrequencyResponse& frf, ModalModel& model) const;
-  void addSystematic(const FrequencyResponse& frf, ModalModel& model) const;
+  void addSystematic(FrequencyResponse& frf, ModalModel& model) const;
   ToolBeam toolBeam() const;
   std::vector<OffsetMeasurement> atHeights(const ModalModel& modes) const;
   TipCorrection tipOf(const ModalModel& modes) const;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include "modal_residuals.h"
 #include "modal_search.h"
@@ -30,6 +31,9 @@ constexpr double START_MISFIT = 0.01;
 constexpr double FROM_ZERO = 2.0, MASS_LINE = 0.3;
 /// How far the sense of rotation must stand out of its noise, in standard deviations.
 constexpr double CLEARLY = 3.0;
+/// A resonance answers above the noise: where the median coherence within its width is less in every FRF, the
+/// force had no power there (between the lobes of a pulse), and what bends is the average's own bias.
+constexpr double COHERENT = 0.3;
 /// Noise of a line is at least this share of the tallest: what digits of a file and of the solver leave.
 constexpr double DIGITS = 1e-7;
 
@@ -152,6 +156,34 @@ bool begin(ModalSearch& search, const std::vector<Pole>& candidates, int largest
   return true;
 }
 
+bool isCoherent(const std::vector<FrequencyResponse>& bands, const EstimatedMode& mode) {
+  bool told = false;
+  for (const FrequencyResponse& band : bands) {
+    if (band.coherence.size() != band.size() || band.size() < 2) continue;
+    const double step = band.frequency[1] - band.frequency[0];
+    const double reach = std::max(mode.frequency * mode.damping_ratio, 2.0 * step);
+    std::vector<double> about;
+    for (std::size_t i = 0; i < band.size(); ++i) {
+      if (std::abs(band.frequency[i] - mode.frequency) <= reach && std::isfinite(band.coherence[i]))
+        about.push_back(band.coherence[i]);
+    }
+    if (about.empty()) continue;
+    if (median(about) >= COHERENT) return true;
+    told = true;
+  }
+  return !told;
+}
+
+/// Proven modes on lines without coherence become doubts.
+void doubtIncoherent(const std::vector<FrequencyResponse>& bands, ModalEstimate& estimate) {
+  std::vector<EstimatedMode> proven;
+  for (const EstimatedMode& m : estimate.modes)
+    (isCoherent(bands, m) ? proven : estimate.doubts).push_back(m);
+  estimate.modes = std::move(proven);
+  std::sort(estimate.doubts.begin(), estimate.doubts.end(),
+            [](const EstimatedMode& a, const EstimatedMode& b) { return a.frequency < b.frequency; });
+}
+
 /// Lower and upper residual of what modes and doubts leave, by least squares.
 ModalFlanks flanksOf(const WeightedLines& lines, const ModalEstimate& estimate, std::size_t o) {
   const double reference = units::TWO_PI * lines.frequency[lines.size() / 2];
@@ -253,6 +285,7 @@ ModalEstimate estimateModes(const std::vector<FrequencyResponse>& frfs, const Mo
   search.addByMagnitude();
   result.modes = search.results(true);
   result.doubts = search.results(false);
+  doubtIncoherent(bands, result);
   for (std::size_t o = 0; o < lines.frfs(); ++o) result.flanks.push_back(flanksOf(start, result, o));
   return result;
 }
