@@ -278,7 +278,7 @@ class Rig:
         code = result.code if result else -1
         said = self.told(pattern)
         moved, quiet = self.stands() if stands else (0.0, True)
-        good = code in codes and line_has in message and "\n" not in message and re.search(pattern, said) and moved == 0.0 and quiet
+        good = code in codes and re.search(line_has, message) and "\n" not in message and re.search(pattern, said) and moved == 0.0 and quiet
         self.bad += not good
         verdict = ("nothing" if moved == 0.0 and quiet else f"{moved:.4f} mm, quiet: {quiet}") if stands else "the program, to its end"
         said = f"{before}; then {said}" if before else said
@@ -473,7 +473,7 @@ def of_the_panel(rig):
         rig.row(what, rig.result(client), codes, pattern, line)
         rig.recover()
     in_mid_jog(rig, "alarm 3003 in mid-jog", lambda: rig.panel("alarm", 3003.0, text="TOOL MET HAMMER x"), {ALARM}, "^ERROR: alarm .*3003",
-               "3003")
+               "3003|EW_ALARM")
 
 
 def of_the_sessions(rig):

@@ -19,6 +19,16 @@ class PollerTest : public ::testing::Test {
     return read;
   }
 
+  /// One that has been there goes; further attempts fail.
+  void loseConnection(const Failure& afterwards) {
+    cycle(0.0);
+    controller_.is_connected = false;
+    controller_.connecting = afterwards;
+    poller_.failed("the wire is cut");
+    poller_.lost();
+    for (int i = 0; i < 200; ++i) cycle(1.0 + 0.02 * i);
+  }
+
   ScriptedController controller_;
   Log log_;
   Poller poller_{controller_, 1.0, log_};
@@ -63,12 +73,7 @@ TEST_F(PollerTest, TimeThatJumpsBackDoesNotPutTheNextAttemptOff) {
 }
 
 TEST_F(PollerTest, LossIsOneLineAndSoIsTheReturn) {
-  cycle(0.0);
-  controller_.is_connected = false;
-  controller_.connecting = Failure{Failure::Kind::lost, "connection refused"};
-  poller_.failed("the wire is cut");
-  poller_.lost();
-  for (int i = 0; i < 200; ++i) cycle(1.0 + 0.02 * i);
+  loseConnection({Failure::Kind::lost, "connection refused"});
   EXPECT_EQ(log_.take().size(), 0u);
   ASSERT_EQ(notes_.size(), 2u);
   EXPECT_EQ(notes_[1], "the wire is cut; trying again every 1.0 to 8.0 s");
@@ -78,12 +83,7 @@ TEST_F(PollerTest, LossIsOneLineAndSoIsTheReturn) {
 }
 
 TEST_F(PollerTest, ThatAllSessionsAreTakenAfterALossIsNews) {
-  cycle(0.0);
-  controller_.is_connected = false;
-  controller_.connecting = Failure{Failure::Kind::refused, "all sessions are taken"};
-  poller_.failed("the wire is cut");
-  poller_.lost();
-  for (int i = 0; i < 200; ++i) cycle(1.0 + 0.02 * i);
+  loseConnection({Failure::Kind::refused, "all sessions are taken"});
   ASSERT_EQ(notes_.size(), 3u);
   EXPECT_EQ(notes_[2], "all sessions are taken; trying again every 1.0 to 8.0 s");
 }
