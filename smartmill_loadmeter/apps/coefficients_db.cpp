@@ -118,7 +118,7 @@ void progressOf(const char* verb, const FleetTransfer& done) {
 }
 
 void transfer(const Options& o, bool out) {
-  mustExist(o.file);
+  if (out) mustExist(o.file);
   CoefficientDatabase local(o.file);
   const char* verb = out ? "sent" : "came";
   const auto progress = [&](const FleetTransfer& done) { progressOf(verb, done); };

@@ -16,7 +16,9 @@ namespace smartmill::loadmeter {
 namespace {
 
 constexpr double UNSTATED = 0.05;  // [1] deviation of an observation that states none
-constexpr double CERTAIN = 1e-9;   // [1] least deviation of a cell
+// [1] half-normal beliefs of the deviations; they count where two or three machines tell little.
+constexpr FleetDeviations BELIEVED{0.15, 0.1, 0.3, 0.0};
+constexpr double CERTAIN = 1e-9;  // [1] least deviation of a cell
 
 /// All of one machine's observations of one group.
 struct Cell {
@@ -273,8 +275,11 @@ void FleetModel::Impl::average(const std::array<std::vector<double>, 3>& axes, b
     for (const double batch : axes[1]) {
       for (const double tool : axes[2]) {
         nodes.push_back(solve({machine, batch, tool, noise}));
-        // Flat in each deviation; the axes are logarithmic.
-        nodes.back().log_weight += std::log(machine * batch * tool);
+        // The axes are logarithmic.
+        nodes.back().log_weight +=
+            std::log(machine * batch * tool) -
+            0.5 * (std::pow(machine / BELIEVED.machine, 2) + std::pow(batch / BELIEVED.batch, 2) +
+                   std::pow(tool / BELIEVED.tool, 2));
       }
     }
   }

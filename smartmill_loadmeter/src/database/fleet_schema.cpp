@@ -44,7 +44,8 @@ std::string first() {
          record +
          ", UNIQUE (shop, identity));"
          "CREATE INDEX pair ON coefficients (shop, material, tool, speed_bucket, stamp DESC);"
-         "CREATE INDEX newest ON coefficients (shop, material, tool, stamp DESC);"
+         "CREATE INDEX newest ON coefficients (shop, material, tool, stamp DESC, id DESC);"
+         "CREATE INDEX newest_of_material ON coefficients (shop, material, stamp DESC, id DESC);"
          "CREATE INDEX material_speed ON coefficients (shop, material, speed_bucket, stamp DESC);"
          "CREATE INDEX brought ON coefficients (shop, machine_id);"
          "ALTER TABLE coefficients ENABLE ROW LEVEL SECURITY; ALTER TABLE coefficients FORCE ROW LEVEL "

@@ -11,6 +11,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "node/fleet_pusher.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_loadmeter_testing/private_server.h"
@@ -272,6 +273,31 @@ TEST_F(FleetDatabase, twoClientsWithTheSameRecordsCountThemOnce) {
   other.join();
   EXPECT_EQ(by_a.fresh + by_b.fresh, 4000u);
   EXPECT_EQ(CoefficientDatabase(url("a")).size(), 4000u);
+}
+
+TEST_F(FleetDatabase, theNodesPusherTellsHowFarBehindItIsAndCatchesUp) {
+  CoefficientDatabase a(file("a"));
+  fill(a, "a", 0, 5);
+  server_->stop();
+  FleetPusher pusher(file("a"), url("a"), 0.05);
+  const auto wait = [&](bool failing, std::size_t behind) {
+    FleetPusher::State state;
+    for (int tries = 0; tries < 1200; ++tries) {
+      state = pusher.state();
+      if (state.failing == failing && state.behind == behind) break;
+      usleep(50000);
+    }
+    return state;
+  };
+  const FleetPusher::State away = wait(true, 5);
+  EXPECT_EQ(away.behind, 5u);
+  EXPECT_THAT(away.message, AllOf(HasSubstr("connection to server"), Not(HasSubstr("\n"))));
+  server_->start();
+  EXPECT_FALSE(wait(false, 0).failing);
+  EXPECT_EQ(CoefficientDatabase(url("b")).size(), 5u);
+  fill(a, "a", 5, 1);
+  for (int tries = 0; tries < 1200 && CoefficientDatabase(url("b")).size() < 6; ++tries) usleep(50000);
+  EXPECT_EQ(CoefficientDatabase(url("b")).size(), 6u);
 }
 
 TEST(Fleet, addressesAreShownWithoutTheirPassword) {

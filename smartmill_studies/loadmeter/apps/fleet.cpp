@@ -145,7 +145,7 @@ std::size_t pushIntoDeath(Shop& shop, int machine, int batches, std::string* sai
   std::thread killer;
   const auto killSoon = [&] {
     killer = std::thread([&] {
-      std::this_thread::sleep_for(std::chrono::milliseconds(10 + 10 * batches));
+      std::this_thread::sleep_for(std::chrono::milliseconds(10 + batches));
       shop.server().kill();
     });
   };
@@ -313,6 +313,8 @@ bool fullDisk(const Options& o) {
     std::size_t there = 0;
     const std::size_t behind = local.unsentCount(local.lastFleet());
     if (std::system(("mount -o remount,size=400m " + mount).c_str()) != 0) throw Error("no remount");
+    // It may have ended by itself, or still run.
+    server.stop();
     server.start();
     there = CoefficientDatabase(server.url("mill")).size();
     const FleetTransfer rest = push(local, server.url("mill"));

@@ -58,8 +58,8 @@ struct MachineEffect {
 };
 
 /// Hierarchical model of a fleet. Machine and batch effects are best linear unbiased predictions given their
-/// deviations (Henderson's mixed model), these are averaged over the restricted likelihood with a flat prior
-/// in each deviation, odd machines are a second component of the machine's effect. O(observations + grid x
+/// deviations (Henderson's mixed model), these are averaged over the restricted likelihood and wide
+/// beliefs of each, odd machines are a second component of the machine's effect. O(observations + grid x
 /// machines x groups^2).
 class FleetModel {
  public:

@@ -1,0 +1,80 @@
+// studies/run, case and collect: what is done is what stands there whole.
+#include <unistd.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <string>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "smartmill_core/testing/temporary_folder.h"
+
+namespace smartmill {
+namespace {
+
+using ::testing::HasSubstr;
+
+class StudiesEngine : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (std::system("command -v parallel > /dev/null") != 0)
+      GTEST_SKIP() << "./setup --with-fleet installs GNU parallel";
+  }
+  /// @return its exit code; what it said: said().
+  int call(const std::string& command) {
+    return WEXITSTATUS(std::system((STUDIES "/" + command + " > " + folder_.file("said") + " 2>&1").c_str()));
+  }
+  static std::string contentOf(const std::string& file) {
+    std::ostringstream text;
+    text << std::ifstream(file).rdbuf();
+    return text.str();
+  }
+  std::string said() const { return contentOf(folder_.file("said")); }
+  std::string at(const std::string& name) const { return folder_.file(name); }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(StudiesEngine, goesOnWhereItEndedAndGivesTheSameTable) {
+  ASSERT_EQ(call("run self_test -j 2 --nice 0 -o " + at("a")), 0) << said();
+  std::filesystem::remove(at("a/cases/2.json"));
+  // What an end left half written counts for nothing.
+  std::ofstream(at("a/cases/2.json.part.host.1")) << "{\"case\": 2, ";
+  EXPECT_EQ(call("collect " + at("a")), 1);
+  EXPECT_THAT(said(), HasSubstr("3 of 4 cases are there"));
+  ASSERT_EQ(call("run self_test -j 1 --nice 0 -o " + at("a")), 0) << said();
+  ASSERT_EQ(call("collect " + at("a")), 0) << said();
+  EXPECT_THAT(said(), HasSubstr("4 of 4 cases"));
+
+  ASSERT_EQ(call("run self_test -j 1 --nice 0 -o " + at("b")), 0) << said();
+  ASSERT_EQ(call("collect " + at("b")), 0) << said();
+  EXPECT_FALSE(contentOf(at("a/table.md")).empty());
+  EXPECT_EQ(contentOf(at("a/table.md")), contentOf(at("b/table.md")));
+  EXPECT_EQ(contentOf(at("a/lines.jsonl")), contentOf(at("b/lines.jsonl")));
+
+  EXPECT_EQ(call("run self_test -j 1 --seed 5 -o " + at("a")), 1);
+  EXPECT_THAT(said(), HasSubstr("holds a run with another seed"));
+  // A case of another build is none of this study's.
+  std::string manifest = contentOf(at("a/study.json"));
+  manifest.replace(manifest.find("\"build\": \"") + 10, 4, "none");
+  std::ofstream(at("a/study.json")) << manifest;
+  std::filesystem::remove(at("a/cases/1.json"));
+  EXPECT_EQ(call("case " + at("a") + " 1"), 1);
+  EXPECT_THAT(said(), HasSubstr("is not the build of this study"));
+}
+
+TEST_F(StudiesEngine, refusesWhatItDoesNotKnow) {
+  EXPECT_EQ(call("run nothing -o " + at("a")), 2);
+  EXPECT_THAT(said(), HasSubstr("'nothing' is no study, there are bench"));
+  EXPECT_EQ(call("collect " + at("nowhere")), 1);
+  EXPECT_THAT(said(), HasSubstr("study.json: is no study's"));
+  std::ofstream(at("hosts")) << "two hosts\n";
+  EXPECT_EQ(call("run self_test --hosts " + at("hosts") + " -o " + at("c")), 1);
+  EXPECT_THAT(said(), HasSubstr("SLOTS/HOST is due"));
+}
+
+}  // namespace
+}  // namespace smartmill
