@@ -1,5 +1,5 @@
 #!/bin/sh
-# rosrun smartmill_studies live_friction.sh OUT [BREAKAWAY_NM] [SPEED_RPM]
+# smartmill_studies/discrepancy/live_friction.sh OUT [BREAKAWAY_NM] [SPEED_RPM]
 # The simulated mill hides friction of its spindle that grows as it turns slower. A session runs on it, the monitor keeps
 # what does not fit its model, loads as the controller tells them among it, and explain is asked what that is.
 # Ends with 0 when it names the friction with both values within three of its standard deviations.

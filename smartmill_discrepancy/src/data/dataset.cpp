@@ -232,9 +232,10 @@ std::optional<Dataset> briefOf(const Dataset& data) {
   Dataset brief = data;
   double all = 0.0, kept = 0.0;
   for (TestData& t : brief.tests) {
-    if (t.test.kind != TestKind::cut || t.heldout || t.phase_estimated) continue;
+    if (t.test.kind != TestKind::cut || t.heldout) continue;
     const double turn = units::TWO_PI / t.test.spindle_speed * t.test.sample_rate;  // [samples]
-    const std::size_t size = std::max(LEAST_SAMPLES, t.first_cut + static_cast<std::size_t>(TURNS * turn));
+    const std::size_t first = std::max(LEAST_SAMPLES, t.first_cut + static_cast<std::size_t>(TURNS * turn));
+    const std::size_t size = t.phase_estimated ? t.record.size() : first;
     all += static_cast<double>(t.record.size());
     kept += static_cast<double>(std::min(size, t.record.size()));
     if (size >= t.record.size()) continue;

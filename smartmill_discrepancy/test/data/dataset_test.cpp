@@ -42,20 +42,20 @@ TEST(Heldout, liesInsideTheRangeOfTheFit) {
 // Six turns of each fit cut, from its entry; a record of unknown angle, an air cut and what is held out stay.
 TEST(Brief, keepsTheFirstTurnsOfCuts) {
   Dataset data;
-  for (int k = 0; k < 4; ++k) {
+  for (int k = 0; k < 6; ++k) {
     TestData t;
     t.test.kind = k == 1 ? TestKind::air : TestKind::cut;
     t.test.spindle_speed = 2.0 * 3.14159265358979 * 100.0;  // 100 samples a turn
     t.test.sample_rate = 10000.0;
     t.first_cut = k == 1 ? 4000 : 200;
     t.heldout = k == 2;
-    t.phase_estimated = k == 3;
+    t.phase_estimated = k >= 3;
     t.channels = {"fx"};
     t.record.time.assign(4000, 0.0);
     t.record.add("fx").assign(4000, 1.0);
     data.tests.push_back(t);
   }
-  ASSERT_FALSE(briefOf(data));  // 12800 of 16000 samples
+  ASSERT_FALSE(briefOf(data));  // 12800 of the 16000 samples of fit cuts
   data.tests.resize(1);
   const auto brief = briefOf(data);
   ASSERT_TRUE(brief);

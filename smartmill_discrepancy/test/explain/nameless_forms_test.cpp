@@ -186,54 +186,6 @@ TEST(NamelessForms, aModeThatPassesOneForceOnToAnother) {
   EXPECT_NEAR(valueOf(e.effects[0], "gain"), 0.3, 0.01);
 }
 
-// A force over the revolution of which no line is worth a form of its own: orders 1 to 9, their phases those
-// of a quadratic chirp, a part that is always there and one that grows with the feed.
-double overTheTurn(const CampaignTest& test, double angle, double phase) {
-  const double chips = test.engagement->feed_per_tooth / 1e-4;
-  double force = 0.0;
-  for (int k = 1; k <= 9; ++k)
-    force += 1.5 * std::cos(k * angle + 0.7 * k * k + phase) +
-             2.5 * chips * std::cos(k * angle - 0.4 * k * k - phase);
-  return force;
-}
-
-Explanation slotsOfManyFeeds(const TemporaryFolder& folder, bool repeats) {
-  std::vector<CampaignTest> tests;
-  for (const double feed : {0.03, 0.045, 0.06, 0.075, 0.09, 0.105})
-    tests.push_back(slot("f" + std::to_string(tests.size()), 4500, feed,
-                         90.0 + 90.0 * static_cast<double>(tests.size())));
-  return explained(
-      [&](const CampaignTest& test, std::uint64_t seed) {
-        Record record = pure(test, 1.0, seed);
-        const double other = repeats ? 0.0 : 2.3 * static_cast<double>(seed * seed);
-        for (const auto& [channel, phase] : {std::pair{"fx", 0.0}, {"fy", 1.0}, {"fz", 2.0}}) {
-          std::vector<double>& f = record.add(channel);
-          for (std::size_t i = 0; i < f.size(); ++i) {
-            if (record.time[i] >= *test.engage_time)
-              f[i] += overTheTurn(test, record.column("spindle_angle")[i], phase + other);
-          }
-        }
-        addNoise(record, seed);
-        return record;
-      },
-      folder.file("."), quickly(), tests);
-}
-
-TEST(NamelessForms, aForceOverTheRevolution) {
-  const TemporaryFolder folder;
-  const Explanation e = slotsOfManyFeeds(folder, true);
-  expectBuilt(e, "revolution", "at 4500 rpm and 2 mm depth more comes again with each revolution");
-  EXPECT_NEAR(valueOf(e.effects[0], "share"), 1.0, 0.02);
-  const EffectEntry& entry = e.model.effects[0];
-  EXPECT_GE(entry.lists.at("order").size(), 9u);
-}
-
-TEST(NamelessForms, aRevolutionThatIsAnotherOneEachTimeIsLeftAlone) {
-  const TemporaryFolder folder;
-  const Explanation e = slotsOfManyFeeds(folder, false);
-  EXPECT_TRUE(e.effects.empty()) << e.sentence;
-}
-
 // Each record jumps at another time: nothing of it comes again.
 TEST(NamelessForms, jumpsAtAnyTimeAreLeftAlone) {
   const TemporaryFolder folder;
