@@ -31,6 +31,8 @@ constexpr double HIDDEN_LOW = 300.0, HIDDEN_STEP = 1.02;  // [Hz], [1]
 constexpr double HIDDEN_DAMPING = 0.03, GAIN_STD = 0.05;  // [1]
 /// What speaks for it over what speaks for a move, and the rows beyond the unknowns that can speak.
 constexpr double HIDDEN_EVIDENCE = 2.0;
+/// Mean square of the innovations over their variance from which something is missing, and with the mode.
+constexpr double UNEXPLAINED = 2.0, EXPLAINED = 4.0;
 constexpr Eigen::Index LEAST_LEFT = 12;
 
 /// Modes moved by p: log frequency, log damping of each in turn, x then y; then, where p goes on, what each
@@ -311,9 +313,9 @@ class CutFit {
 };
 
 /// A sensor with one more mode in each axis that has none such yet, where the innovations fall most.
-/// @return nothing where they do not fall by `least`, or where there are too few to tell
+/// @return nothing where there are too few to tell
 std::optional<Sensor> withHidden(const WeightedHarmonics& measured, const Sensor& sensor, const Basis& force,
-                                 const std::array<std::size_t, 2>& tapped, double least) {
+                                 const std::array<std::size_t, 2>& tapped) {
   const std::size_t modes = tapped[0] + tapped[1];
   const auto unknowns = static_cast<Eigen::Index>(TERMS + 3 * (modes + 2));
   if (sensor[0].modes.size() + sensor[1].modes.size() > modes || measured.rows() < unknowns + LEAST_LEFT)
@@ -321,8 +323,7 @@ std::optional<Sensor> withHidden(const WeightedHarmonics& measured, const Sensor
   const Eigen::MatrixXd even = measured.seen(sensor, force);
   const Eigen::VectorXd left = measured.innovations(sensor, force);
   Sensor best = sensor;
-  double most = least;
-  bool any = false;
+  double most = 0.0;
   for (double f = HIDDEN_LOW; f < measured.highest(); f *= HIDDEN_STEP) {
     Eigen::MatrixXd columns(measured.rows(), even.cols() + 2);
     columns.leftCols(even.cols()) = even;
@@ -332,7 +333,6 @@ std::optional<Sensor> withHidden(const WeightedHarmonics& measured, const Sensor
     const double fall = left.squaredNorm() - (left - columns * x).squaredNorm();
     if (fall <= most) continue;
     most = fall;
-    any = true;
     best = sensor;
     for (std::size_t axis = 0; axis < 2; ++axis) {
       const double gain = std::clamp(x(even.cols() + static_cast<Eigen::Index>(axis)), -0.2, 0.2);
@@ -340,7 +340,7 @@ std::optional<Sensor> withHidden(const WeightedHarmonics& measured, const Sensor
       best[axis].direct -= gain;
     }
   }
-  return any ? std::optional<Sensor>(best) : std::nullopt;
+  return best;
 }
 
 }  // namespace
@@ -383,7 +383,7 @@ std::optional<ModeFollower::Move> ModeFollower::look(const Harmonics& measured, 
   Move move;
   move.before = cut.squares();
   const double first = seen.innovations(*first_, cut.force()).squaredNorm();
-  const std::optional<Sensor> suspected = withHidden(seen, now, cut.force(), tapped, 0.0);
+  const std::optional<Sensor> suspected = withHidden(seen, now, cut.force(), tapped);
   cut.fitAll();
   move.after = cut.squares();
   move.sensor = cut.sensor();
@@ -392,21 +392,21 @@ std::optional<ModeFollower::Move> ModeFollower::look(const Harmonics& measured, 
     const Eigen::Index left = seen.rows() - static_cast<Eigen::Index>(TERMS) - of.freedom();
     return std::max(1.0, squares / static_cast<double>(std::max<Eigen::Index>(left, 1)));
   };
-  const double evidence = parameters_.evidence * scaleOf(residuals, move.after);
-  // What no move explains may be a mode that the taps have not shown.
-  if (suspected && withHidden(seen, move.sensor, cut.force(), tapped, evidence)) {
+  const double scale = scaleOf(residuals, move.after);
+  // What no move explains may be a mode that the taps have not shown. It must leave nothing unexplained.
+  if (suspected && scale > UNEXPLAINED) {
     const CutResiduals more = residualsOf(*suspected);
     CutFit hidden(more);
     hidden.fitAll();
-    const double fall = std::min(cut.cost(), unmoved) - hidden.cost();
-    if (fall > HIDDEN_EVIDENCE * parameters_.evidence * scaleOf(more, hidden.squares())) {
+    const double fall = std::min(cut.cost(), unmoved) - hidden.cost(), rest = scaleOf(more, hidden.squares());
+    if (rest < EXPLAINED && fall > HIDDEN_EVIDENCE * parameters_.evidence * rest) {
       radius_ = hidden.radii();
       move.after = hidden.squares();
       move.sensor = hidden.sensor();
       return move;
     }
   }
-  if (unmoved - cut.cost() > evidence) {
+  if ((unmoved - cut.cost()) / scale > parameters_.evidence) {
     radius_ = cut.radii();
     return move;
   }

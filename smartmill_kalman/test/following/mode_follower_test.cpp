@@ -93,6 +93,21 @@ TEST(ModeFollower, FindsAModeThatNoTapHasShown) {
   }
 }
 
+// A tool that is not what the follower believes is no mode of the sensor.
+TEST(ModeFollower, AbstainsWhereTheForceModelIsWrong) {
+  const double speed = units::radPerSecFromRpm(9000.0);
+  const ModalModel sensor = ReferenceCase::exactSensor();
+  ToolGeometry steeper = TOOL;
+  steeper.helix = units::radFromDeg(34.0);
+  const Engagement deeper{0.0, units::PI, 2.4e-3, 6e-5};
+  for (ModeFollower follower : {ModeFollower(steeper, SLOT, 33, {}), ModeFollower(TOOL, deeper, 33, {})}) {
+    const auto move = follower.look(harmonics(sensor, speed, 33), 0.05, {sensor, sensor}, speed);
+    if (!move) continue;
+    EXPECT_EQ(move->sensor[0].modes.size(), 3u);
+    EXPECT_EQ(move->sensor[1].modes.size(), 3u);
+  }
+}
+
 TEST(ModeFollower, LeavesWhatFitsAlone) {
   const double speed = units::radPerSecFromRpm(9000.0);
   const ModalModel believed = ReferenceCase::exactSensor();
