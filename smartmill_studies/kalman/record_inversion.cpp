@@ -17,10 +17,10 @@ using Complex = std::complex<double>;
 using Eigen::Index;
 using Eigen::MatrixXcd;
 
-/// Element of the matrix on the lines of a longer transform: the impulse response, with nothing between its
-/// end and its beginning. Lines above the band are faded out, for no tap has told them.
-std::vector<Complex> onLines(const std::vector<Complex>& element, double spacing, double bandwidth,
-                             std::size_t length) {
+constexpr double CHANCE = 1.5;  // [1] by which the noise of a stretch exceeds its mean now and then
+
+/// Impulse response of an element. Lines above the band are faded out, for no tap has told them.
+std::vector<double> impulseOf(const std::vector<Complex>& element, double spacing, double bandwidth) {
   const std::size_t samples = 2 * (element.size() - 1);
   std::vector<Complex> faded = element;
   for (std::size_t l = 0; l < faded.size(); ++l) {
@@ -29,7 +29,34 @@ std::vector<Complex> onLines(const std::vector<Complex>& element, double spacing
     faded[l] *= 0.5 * (1.0 + std::cos(units::PI * beyond));
   }
   faded.back() = faded.back().real();
-  const std::vector<double> impulse = inverseFourier(faded, samples);
+  return inverseFourier(faded, samples);
+}
+
+/// What rings has died away long before a tap's record ends; the rest is the taps' noise. Share of the
+/// impulse responses, all elements together, that is no noise, over time.
+std::vector<double> ringing(const std::vector<std::vector<double>>& impulses) {
+  constexpr std::size_t STEP = 64;  // samples
+  const std::size_t samples = impulses.front().size(), steps = samples / STEP;
+  std::vector<double> power(steps, 0.0);
+  for (const std::vector<double>& impulse : impulses) {
+    for (std::size_t i = 0; i < steps * STEP; ++i) power[i / STEP] += impulse[i] * impulse[i];
+  }
+  // The quietest quarter of the record is noise; what stands in it by chance is not counted twice.
+  std::vector<double> sorted = power;
+  std::sort(sorted.begin(), sorted.end());
+  double noise = 0.0;
+  for (std::size_t k = 0; k < steps / 4; ++k) noise += sorted[k] / static_cast<double>(steps / 4);
+  std::vector<double> share(samples, 0.0);
+  for (std::size_t i = 0; i < steps * STEP; ++i) {
+    const double signal = std::max(0.0, power[i / STEP] - CHANCE * noise);
+    share[i] = signal / (signal + noise);
+  }
+  return share;
+}
+
+/// An impulse response on the lines of a longer transform, with nothing between its end and its beginning.
+std::vector<Complex> onLines(const std::vector<double>& impulse, std::size_t length) {
+  const std::size_t samples = impulse.size();
   std::vector<double> longer(length, 0.0);
   const std::size_t early = samples / 8;  // fading leaves a little before the beginning
   std::copy(impulse.begin(), impulse.end() - static_cast<std::ptrdiff_t>(early), longer.begin());
@@ -52,6 +79,7 @@ struct LongMatrix {
 
   LongMatrix(const TransferMatrix& matrix, const Eigen::VectorXd& scale, double bandwidth, std::size_t length)
       : channels(scale.size()), floor(matrix.frequency.size(), 0.0) {
+    std::vector<std::vector<double>> impulses;
     for (Index i = 0; i < channels; ++i) {
       for (Index j = 0; j < channels; ++j) {
         std::vector<Complex> element;
@@ -60,8 +88,16 @@ struct LongMatrix {
           floor[l] +=
               std::pow(matrix.forward_std[l](i, j) * scale(j) / scale(i), 2) / static_cast<double>(channels);
         }
-        elements.push_back(onLines(element, matrix.frequency[1], bandwidth, length));
+        impulses.push_back(impulseOf(element, matrix.frequency[1], bandwidth));
       }
+    }
+    const std::vector<double> share = ringing(impulses);
+    double kept = 0.0;
+    for (const double s : share) kept += s * s / static_cast<double>(share.size());
+    for (double& variance : floor) variance *= kept;
+    for (std::vector<double>& impulse : impulses) {
+      for (std::size_t i = 0; i < impulse.size(); ++i) impulse[i] *= share[i];
+      elements.push_back(onLines(impulse, length));
     }
   }
   MatrixXcd at(std::size_t line) const {
