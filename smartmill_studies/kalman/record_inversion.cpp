@@ -17,10 +17,10 @@ using Complex = std::complex<double>;
 using Eigen::Index;
 using Eigen::MatrixXcd;
 
-constexpr double CHANCE = 1.5;  // [1] by which the noise of a stretch exceeds its mean now and then
-
-/// Impulse response of an element. Lines above the band are faded out, for no tap has told them.
-std::vector<double> impulseOf(const std::vector<Complex>& element, double spacing, double bandwidth) {
+/// Element of the matrix on the lines of a longer transform: the impulse response, with nothing between its
+/// end and its beginning. Lines above the band are faded out, for no tap has told them.
+std::vector<Complex> onLines(const std::vector<Complex>& element, double spacing, double bandwidth,
+                             std::size_t length) {
   const std::size_t samples = 2 * (element.size() - 1);
   std::vector<Complex> faded = element;
   for (std::size_t l = 0; l < faded.size(); ++l) {
@@ -29,34 +29,7 @@ std::vector<double> impulseOf(const std::vector<Complex>& element, double spacin
     faded[l] *= 0.5 * (1.0 + std::cos(units::PI * beyond));
   }
   faded.back() = faded.back().real();
-  return inverseFourier(faded, samples);
-}
-
-/// What rings has died away long before a tap's record ends; the rest is the taps' noise. Share of the
-/// impulse responses, all elements together, that is no noise, over time.
-std::vector<double> ringing(const std::vector<std::vector<double>>& impulses) {
-  constexpr std::size_t STEP = 64;  // samples
-  const std::size_t samples = impulses.front().size(), steps = samples / STEP;
-  std::vector<double> power(steps, 0.0);
-  for (const std::vector<double>& impulse : impulses) {
-    for (std::size_t i = 0; i < steps * STEP; ++i) power[i / STEP] += impulse[i] * impulse[i];
-  }
-  // The quietest quarter of the record is noise; what stands in it by chance is not counted twice.
-  std::vector<double> sorted = power;
-  std::sort(sorted.begin(), sorted.end());
-  double noise = 0.0;
-  for (std::size_t k = 0; k < steps / 4; ++k) noise += sorted[k] / static_cast<double>(steps / 4);
-  std::vector<double> share(samples, 0.0);
-  for (std::size_t i = 0; i < steps * STEP; ++i) {
-    const double signal = std::max(0.0, power[i / STEP] - CHANCE * noise);
-    share[i] = signal / (signal + noise);
-  }
-  return share;
-}
-
-/// An impulse response on the lines of a longer transform, with nothing between its end and its beginning.
-std::vector<Complex> onLines(const std::vector<double>& impulse, std::size_t length) {
-  const std::size_t samples = impulse.size();
+  const std::vector<double> impulse = inverseFourier(faded, samples);
   std::vector<double> longer(length, 0.0);
   const std::size_t early = samples / 8;  // fading leaves a little before the beginning
   std::copy(impulse.begin(), impulse.end() - static_cast<std::ptrdiff_t>(early), longer.begin());
@@ -71,6 +44,9 @@ double passed(double frequency, double bandwidth) {
   return 0.5 * (1.0 + std::cos(units::PI * beyond));
 }
 
+/// Misfit of a sensor that is a rigid body.
+constexpr double RIGID = 1.5;
+
 /// Forward matrix, scaled, on the lines of a transform of a longer record.
 struct LongMatrix {
   Index channels;
@@ -79,7 +55,6 @@ struct LongMatrix {
 
   LongMatrix(const TransferMatrix& matrix, const Eigen::VectorXd& scale, double bandwidth, std::size_t length)
       : channels(scale.size()), floor(matrix.frequency.size(), 0.0) {
-    std::vector<std::vector<double>> impulses;
     for (Index i = 0; i < channels; ++i) {
       for (Index j = 0; j < channels; ++j) {
         std::vector<Complex> element;
@@ -88,16 +63,8 @@ struct LongMatrix {
           floor[l] +=
               std::pow(matrix.forward_std[l](i, j) * scale(j) / scale(i), 2) / static_cast<double>(channels);
         }
-        impulses.push_back(impulseOf(element, matrix.frequency[1], bandwidth));
+        elements.push_back(onLines(element, matrix.frequency[1], bandwidth, length));
       }
-    }
-    const std::vector<double> share = ringing(impulses);
-    double kept = 0.0;
-    for (const double s : share) kept += s * s / static_cast<double>(share.size());
-    for (double& variance : floor) variance *= kept;
-    for (std::vector<double>& impulse : impulses) {
-      for (std::size_t i = 0; i < impulse.size(); ++i) impulse[i] *= share[i];
-      elements.push_back(onLines(impulse, length));
     }
   }
   MatrixXcd at(std::size_t line) const {
@@ -108,6 +75,72 @@ struct LongMatrix {
     }
     return here;
   }
+};
+
+/// Inverse of a rigid body on feet that measure: (K + i w C - w^2 M) (K + i w C)^-1 = I - w^2 M Z^-1, Z = K +
+/// i w C nearly real. So each element is 1 or 0 at rest, the real part of the rest a polynomial in w^2 and
+/// w^4, the imaginary in w^3 and w^5: four numbers told by all lines together, where a line alone tells two.
+class RigidInverse {
+ public:
+  /// @param bandwidth [Hz] up to which the lines count
+  RigidInverse(const TransferMatrix& matrix, const Eigen::VectorXd& scale, double bandwidth)
+      : size_(scale.size()), unit_(bandwidth) {
+    for (Index i = 0; i < size_; ++i) {
+      for (Index j = 0; j < size_; ++j) {
+        std::vector<Line> lines;
+        const double scaled = scale(j) / scale(i);
+        for (std::size_t l = 1; l < matrix.frequency.size() && matrix.frequency[l] <= bandwidth; ++l) {
+          const double std_dev = matrix.inverse_std[l](i, j) * scaled;
+          const Complex value = matrix.inverse[l](i, j) * scaled - (i == j ? 1.0 : 0.0);
+          if (std_dev > 0.0) lines.push_back({matrix.frequency[l] / unit_, 1.0 / std_dev, value});
+        }
+        elements_.push_back({fit(lines, 0), fit(lines, 1)});
+        for (const Line& line : lines)
+          squares_ += std::norm((line.value - value(elements_.back(), line.u)) * line.weight);
+        count_ += static_cast<double>(lines.size());
+      }
+    }
+  }
+
+  /// Mean square of what it leaves over, over the variance of the lines: 1 for a rigid body.
+  double misfit() const { return count_ > 0.0 ? squares_ / count_ : HUGE_VAL; }
+  MatrixXcd at(double frequency) const {
+    MatrixXcd here = MatrixXcd::Identity(size_, size_);
+    for (Index i = 0; i < size_; ++i) {
+      for (Index j = 0; j < size_; ++j)
+        here(i, j) += value(elements_[static_cast<std::size_t>(i * size_ + j)], frequency / unit_);
+    }
+    return here;
+  }
+
+ private:
+  struct Line {
+    double u, weight;  // [1] frequency over the bandwidth
+    Complex value;
+  };
+  using Element = std::array<Eigen::VectorXd, 2>;  // of the real part, of the imaginary
+
+  static Eigen::Vector2d powers(double u, std::size_t part) {
+    return (part == 0 ? 1.0 : u) * Eigen::Vector2d(u * u, u * u * u * u);
+  }
+  static Complex value(const Element& element, double u) {
+    return {powers(u, 0).dot(element[0]), powers(u, 1).dot(element[1])};
+  }
+  static Eigen::VectorXd fit(const std::vector<Line>& lines, std::size_t part) {
+    Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(2, 2);
+    Eigen::VectorXd right = Eigen::VectorXd::Zero(2);
+    for (const Line& line : lines) {
+      const Eigen::Vector2d row = line.weight * powers(line.u, part);
+      normal += row * row.transpose();
+      right += row * line.weight * (part == 0 ? line.value.real() : line.value.imag());
+    }
+    return linear::solveSymmetric(normal, right);
+  }
+
+  Index size_;
+  double unit_;                    // [Hz]
+  std::vector<Element> elements_;  // row by row
+  double squares_ = 0.0, count_ = 0.0;
 };
 
 /// @throws Error on another number of channels or rate, or when the matrix is only a band.
@@ -145,16 +178,21 @@ std::vector<std::vector<double>> invertRecord(const TransferMatrix& matrix,
   }
   const Eigen::VectorXd scale = matrix.scale();
   const LongMatrix forward(matrix, scale, bandwidth, length);
+  const RigidInverse rigid(matrix, scale, bandwidth);
+  const auto inverted = [&](std::size_t line, double f, const Eigen::VectorXcd& m) -> Eigen::VectorXcd {
+    if (rigid.misfit() < RIGID) return rigid.at(f) * m;
+    const MatrixXcd here = forward.at(line);
+    const double unknown = forward.floor[std::min(lines - 1, static_cast<std::size_t>(f / spacing + 0.5))];
+    const MatrixXcd square = here.adjoint() * here + unknown * MatrixXcd::Identity(size, size);
+    return linear::solveSymmetric(square, Eigen::VectorXcd(here.adjoint() * m));
+  };
   for (std::size_t i = 0; i < spectra.front().size(); ++i) {
     const double f = sample_rate * static_cast<double>(i) / static_cast<double>(length);
     const double weight = passed(f, bandwidth);
     Eigen::VectorXcd m = Eigen::VectorXcd::Zero(size);
     if (weight > 0.0) {
       for (Index c = 0; c < size; ++c) m(c) = spectra[static_cast<std::size_t>(c)][i] / scale(c);
-      const MatrixXcd here = forward.at(i);
-      const double unknown = forward.floor[std::min(lines - 1, static_cast<std::size_t>(f / spacing + 0.5))];
-      const MatrixXcd square = here.adjoint() * here + unknown * MatrixXcd::Identity(size, size);
-      m = weight * linear::solveSymmetric(square, Eigen::VectorXcd(here.adjoint() * m));
+      m = weight * inverted(i, f, m);
     }
     for (Index c = 0; c < size; ++c) spectra[static_cast<std::size_t>(c)][i] = m(c) * scale(c);
   }
