@@ -31,8 +31,9 @@ constexpr double HIDDEN_LOW = 300.0, HIDDEN_STEP = 1.02;  // [Hz], [1]
 constexpr double HIDDEN_DAMPING = 0.03, GAIN_STD = 0.05;  // [1]
 /// What speaks for it over what speaks for a move, and the rows beyond the unknowns that can speak.
 constexpr double HIDDEN_EVIDENCE = 2.0;
-/// Mean square of the innovations over their variance from which something is missing, and with the mode.
-constexpr double UNEXPLAINED = 2.0, EXPLAINED = 4.0;
+/// Mean square of the innovations over their variance from which something is missing; share of the cost that
+/// the mode may leave. A force model that is wrong (another helix, depth or exit) leaves a third and more.
+constexpr double UNEXPLAINED = 2.0, REMAINS = 0.25;
 constexpr Eigen::Index LEAST_LEFT = 12;
 
 /// Modes moved by p: log frequency, log damping of each in turn, x then y; then, where p goes on, what each
@@ -398,8 +399,9 @@ std::optional<ModeFollower::Move> ModeFollower::look(const Harmonics& measured, 
     const CutResiduals more = residualsOf(*suspected);
     CutFit hidden(more);
     hidden.fitAll();
-    const double fall = std::min(cut.cost(), unmoved) - hidden.cost(), rest = scaleOf(more, hidden.squares());
-    if (rest < EXPLAINED && fall > HIDDEN_EVIDENCE * parameters_.evidence * rest) {
+    const double fall = std::min(cut.cost(), unmoved) - hidden.cost();
+    const bool all_told = scaleOf(more, hidden.squares()) <= 1.0 && hidden.cost() < REMAINS * cut.cost();
+    if (all_told && fall > HIDDEN_EVIDENCE * parameters_.evidence) {
       radius_ = hidden.radii();
       move.after = hidden.squares();
       move.sensor = hidden.sensor();

@@ -70,12 +70,12 @@ ModalModel withOneMore() {
 // A mode that the taps have not shown: the force through the sensor that is found is the applied one.
 TEST(ModeFollower, FindsAModeThatNoTapHasShown) {
   const ModalModel believed = ReferenceCase::exactSensor(), is = withOneMore();
-  for (const double rpm : {9000.0, 15000.0}) {
+  for (const double rpm : {15000.0, 21750.0}) {
     const double speed = units::radPerSecFromRpm(rpm);
     const int count = static_cast<int>(5000.0 * units::TWO_PI / speed);
     ModeFollower follower(TOOL, SLOT, count, {});
     const auto seen = harmonics(is, speed, count);
-    const auto move = follower.look(seen, 0.05, {believed, believed}, speed);
+    const auto move = follower.look(seen, 0.03, {believed, believed}, speed);
     ASSERT_TRUE(move.has_value()) << rpm;
     for (std::size_t axis = 0; axis < 2; ++axis) {
       ASSERT_EQ(move->sensor[axis].modes.size(), 4u) << rpm;
@@ -100,7 +100,9 @@ TEST(ModeFollower, AbstainsWhereTheForceModelIsWrong) {
   ToolGeometry steeper = TOOL;
   steeper.helix = units::radFromDeg(34.0);
   const Engagement deeper{0.0, units::PI, 2.4e-3, 6e-5};
-  for (ModeFollower follower : {ModeFollower(steeper, SLOT, 33, {}), ModeFollower(TOOL, deeper, 33, {})}) {
+  const Engagement narrower{0.0, 0.9 * units::PI, 2e-3, 6e-5};
+  for (ModeFollower follower : {ModeFollower(steeper, SLOT, 33, {}), ModeFollower(TOOL, deeper, 33, {}),
+                                ModeFollower(TOOL, narrower, 33, {})}) {
     const auto move = follower.look(harmonics(sensor, speed, 33), 0.05, {sensor, sensor}, speed);
     if (!move) continue;
     EXPECT_EQ(move->sensor[0].modes.size(), 3u);
