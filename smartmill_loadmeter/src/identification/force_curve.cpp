@@ -108,7 +108,7 @@ void eachSample(const std::vector<AngleRecord>& records, const ToolGeometry& too
       if (!rowsAt(record.angle[i], tool, record.engagement, top, pieces, x, y)) continue;
       toRises(x, pieces + 3);
       toRises(y, pieces + 3);
-      visit(x, record.fx[i], y, record.fy[i]);
+      visit(x, record.fx[i], y, record.fy[i], static_cast<std::size_t>(&record - records.data()));
     }
   }
 }
@@ -151,22 +151,27 @@ ForceCurves fitForceCurves(const std::vector<AngleRecord>& records, const ToolGe
   if (!(top > 0.0)) throw Error("force curve: no chip is cut");
   const int n = pieces + 3;
   System system{Eigen::MatrixXd::Zero(2 * n, 2 * n), Eigen::VectorXd::Zero(2 * n)};
-  eachSample(records, tool, top, pieces, [&](const auto& x, double fx, const auto& y, double fy) {
-    system.normal.noalias() += x.transpose() * x + y.transpose() * y;
-    system.right += fx * x.transpose() + fy * y.transpose();
-    system.rows += 2;
-  });
+  eachSample(records, tool, top, pieces,
+             [&](const auto& x, double fx, const auto& y, double fy, std::size_t) {
+               system.normal.noalias() += x.transpose() * x + y.transpose() * y;
+               system.right += fx * x.transpose() + fy * y.transpose();
+               system.rows += 2;
+             });
   if (system.rows < 20 * static_cast<std::size_t>(n)) throw Error("force curve: too few samples in cut");
   const Eigen::VectorXd rises = notNegative(system.normal, system.right);
   // What is left, and how long it stays alike.
   double last_x = 0.0, last_y = 0.0;
-  eachSample(records, tool, top, pieces, [&](const auto& x, double fx, const auto& y, double fy) {
-    const double left_x = fx - x.dot(rises), left_y = fy - y.dot(rises);
-    system.squares += left_x * left_x + left_y * left_y;
-    system.neighbours += left_x * last_x + left_y * last_y;
-    last_x = left_x;
-    last_y = left_y;
-  });
+  // What a record leaves as a whole repeats from turn to turn: records are as many witnesses, not samples.
+  std::vector<Eigen::VectorXd> pulls(records.size(), Eigen::VectorXd::Zero(2 * n));
+  eachSample(records, tool, top, pieces,
+             [&](const auto& x, double fx, const auto& y, double fy, std::size_t r) {
+               const double left_x = fx - x.dot(rises), left_y = fy - y.dot(rises);
+               system.squares += left_x * left_x + left_y * left_y;
+               system.neighbours += left_x * last_x + left_y * last_y;
+               pulls[r] += left_x * x.transpose() + left_y * y.transpose();
+               last_x = left_x;
+               last_y = left_y;
+             });
   const double variance = system.squares / static_cast<double>(system.rows);
   const double alike = std::clamp(system.neighbours / system.squares, 0.0, 0.99);
   const double effective = variance * (1.0 + alike) / (1.0 - alike);
@@ -179,7 +184,16 @@ ForceCurves fitForceCurves(const std::vector<AngleRecord>& records, const ToolGe
     held.col(i).setZero();
     held(i, i) = 1e6 * system.normal.diagonal().maxCoeff();
   }
-  const Eigen::MatrixXd covariance = effective * linear::inverseSymmetric(held);
+  const Eigen::MatrixXd inverse = linear::inverseSymmetric(held);
+  Eigen::MatrixXd covariance = effective * inverse;
+  const double witnesses = static_cast<double>(records.size());
+  for (Eigen::VectorXd& pull : pulls) {
+    for (Eigen::Index i = 0; i < rises.size(); ++i) {
+      if (!(rises(i) > 0.0)) pull(i) = 0.0;
+    }
+    const Eigen::VectorXd moved = inverse * pull;
+    if (records.size() > 1) covariance += witnesses / (witnesses - 1.0) * moved * moved.transpose();
+  }
   ForceCurves curves;
   curves.rms = std::sqrt(variance);
   for (int part = 0; part < 2; ++part) {

@@ -61,7 +61,8 @@ class Node {
   std::unique_ptr<focas::Server> server_;
 
   double start_ = 0.0;  // [s] stamp of sample 0
-  ros::Publisher hammer_, dynamometer_, spindle_force_, angle_, force_, vibration_, servo_, coefficients_, load_meter_;
+  ros::Publisher hammer_, dynamometer_, spindle_force_, angle_, force_, vibration_, servo_, coefficients_,
+      load_meter_;
   KeptTopic<smartmill_msgs::Frf> frf_;
   KeptTopic<smartmill_msgs::ModalModel> modes_;
   ros::ServiceServer strike_server_;

@@ -114,6 +114,16 @@ double meanSquare(const std::vector<double>& v) {
   return std::pow(standardDeviation(v), 2);
 }
 
+void cutAll(SpindleRig& rig, const MachineModel& model, Data& data) {
+  for (const double rpm : RPM) {
+    std::fprintf(stderr, "cut at %.0f rpm\n", rpm);
+    data.cuts.push_back(kalman::cutSlot(rig, model, units::radPerSecFromRpm(rpm), 0.8e-3, 0.1e-3, 1.0, 0.6));
+    for (auto* force : {&data.cuts.back().truth, &data.cuts.back().measured, &data.cuts.back().compensated}) {
+      for (auto& axis : *force) axis.resize(data.cuts.back().compensated[2].size());
+    }
+  }
+}
+
 Data gather(const MachineModel& model, std::uint64_t seed, double band) {
   sim::WorldOptions world;
   world.seed = seed;
@@ -166,13 +176,7 @@ Data gather(const MachineModel& model, std::uint64_t seed, double band) {
     data.air[axis] = turning.measured[axis];
     data.r_air[axis] = meanSquare(turning.measured[axis]);
   }
-  for (const double rpm : RPM) {
-    std::fprintf(stderr, "cut at %.0f rpm\n", rpm);
-    data.cuts.push_back(kalman::cutSlot(rig, model, units::radPerSecFromRpm(rpm), 0.8e-3, 0.1e-3, 1.0, 0.6));
-    for (auto* force : {&data.cuts.back().truth, &data.cuts.back().measured, &data.cuts.back().compensated}) {
-      for (auto& axis : *force) axis.resize(data.cuts.back().compensated[2].size());
-    }
-  }
+  cutAll(rig, model, data);
   return data;
 }
 

@@ -69,7 +69,7 @@ TEST(ExpandedDisturbance, TellsWhatItIsMadeFor) {
   sensor.modes.push_back({930.0, 0.04, 0.8});
   sensor.direct = 0.2;
   const auto error = [&](double f) {
-    ModalFilter plant(sensor, RATE, Hold::zero_order);
+    ModalFilter plant(sensor, RATE, Hold::first_order);
     std::vector<double> measured, truth;
     for (int i = 0; i < 25600; ++i) {
       truth.push_back(50.0 + 100.0 * std::cos(units::TWO_PI * f * i / RATE));
