@@ -55,7 +55,7 @@ void readings(ros::NodeHandle& nh, Calibrate& client, double length, bool refere
       goal.duration = 0.1;
       EXPECT_TRUE(
           press(nh, reference ? "press_workpiece" : "hang_weight", {goal.load.x, goal.load.y, goal.load.z}));
-      ros::Duration(0.3).sleep();  // modes ring out
+      ros::Duration(0.15).sleep();  // modes ring out
       const auto result = ask(client, goal);
       EXPECT_EQ(result.code, result.OK) << result.message;
     }
@@ -83,7 +83,7 @@ TEST(SpindleSensor, IsCalibratedOnTheRunningMachine) {
   std::uint32_t test = 0;
   for (const double length : {0.110, 0.139, 0.170}) readings(nh, calibrate, length, false, test);
   const smartmill::TemporaryFolder folder;
-  fit.file = folder.path() + "/spindle.yaml";
+  fit.file = folder.file("spindle.yaml");
   const auto found = ask(calibrate, fit);
   ASSERT_EQ(found.code, found.OK) << found.message;
   EXPECT_EQ(found.readings, 36u);

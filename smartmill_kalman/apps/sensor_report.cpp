@@ -16,8 +16,10 @@
 #include "smartmill_core/io/csv.h"
 #include "smartmill_core/model/strict_yaml.h"
 #include "smartmill_core/program.h"
+#include "smartmill_core/signal/force_channels.h"
 #include "smartmill_core/units.h"
 #include "smartmill_kalman/sensor/state_space_checks.h"
+#include "smartmill_kalman/sensor/tap_file.h"
 #include "smartmill_kalman/sensor/transfer_matrix.h"
 
 namespace {
@@ -27,12 +29,9 @@ using kalman::MatrixTap;
 using kalman::TransferMatrix;
 
 constexpr double TOLD = 0.1;  // [1]
-constexpr std::array<const char*, 6> CHANNELS{{"fx", "fy", "fz", "mx", "my", "mz"}};
+constexpr auto& CHANNELS = PLATE_CHANNELS;
 
-struct Taps {
-  std::vector<MatrixTap> taps;
-  double rate = 0.0;  // [Hz]
-};
+using Taps = kalman::TapRecords;
 
 Taps fromCampaign(const std::string& path) {
   const Campaign campaign = readCampaign(path);
@@ -49,33 +48,6 @@ Taps fromCampaign(const std::string& path) {
     found.rate = test.sample_rate;
     found.taps.push_back(std::move(tap));
   }
-  return found;
-}
-
-Taps fromList(const std::string& path) {
-  const StrictYaml yaml = StrictYaml::fromFile(path);
-  yaml.oneOf("format", {"smartmill-taps/1"});
-  const int channels = yaml.integer("channels", 3, 6);
-  Taps found;
-  found.rate = yaml.number("sample_rate_hz", Range::positive());
-  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
-  std::vector<std::string> columns{"hammer[N]"};
-  for (int c = 0; c < channels; ++c)
-    columns.push_back(std::string(CHANNELS[static_cast<std::size_t>(c)]) + (c < 3 ? "[N]" : "[Nm]"));
-  for (const StrictYaml& entry : yaml.maps("taps")) {
-    MatrixTap tap;
-    const auto direction = entry.numbers("direction", 3), point = entry.numbers("point_mm", 3);
-    for (std::size_t i = 0; i < 3; ++i) {
-      tap.direction[i] = direction[i];
-      tap.point[i] = point[i] * units::MM;
-    }
-    auto table = readColumns((folder / entry.word("file")).string(), columns);
-    entry.finish();
-    tap.hammer = std::move(table[0]);
-    tap.channels.assign(std::make_move_iterator(table.begin() + 1), std::make_move_iterator(table.end()));
-    found.taps.push_back(std::move(tap));
-  }
-  yaml.finish();
   return found;
 }
 
@@ -195,7 +167,7 @@ int main(int argc, char** argv) {
   return runProgram(line, argc, argv, [&] {
     const Taps taps = std::filesystem::path(source).filename() != "campaign.yaml" &&
                               std::filesystem::path(source).extension() == ".yaml"
-                          ? fromList(source)
+                          ? kalman::readTapFile(source)
                           : fromCampaign(source);
     const TransferMatrix matrix = kalman::identifyTransferMatrix(taps.taps, taps.rate);
     const double told = toldTo(matrix, low);

@@ -43,8 +43,10 @@ void calibrate(const Request& request) {
   const SpindleSensorCalibration& c = found.calibration;
   const double length = found.lengths.front().length;
   const LengthLine none{0.0, std::nan("")};
-  std::printf("constants over the length L [mm] of tool and holder (applied over shown force), known for %.0f .. %.0f mm\n",
-              c.lengths[0] / units::MM, c.lengths[1] / units::MM);
+  std::printf(
+      "constants over the length L [mm] of tool and holder (applied over shown force), known for %.0f .. "
+      "%.0f mm\n",
+      c.lengths[0] / units::MM, c.lengths[1] / units::MM);
   printLine("x", c.x, base.x, length);
   printLine("y", c.y, base.y, length);
   printLine("z", c.z, base.z, length);

@@ -1,5 +1,6 @@
 #include "kalman/spindle_rig.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -39,6 +40,7 @@ SpindleRig::SpindleRig(const MachineModel& model, const sim::WorldOptions& optio
   outputs.calibration = [this](const CalibrationResult& result) { calibration_ = result; };
   // Without hold-back every block comes out as it goes in.
   sorted_ = std::make_unique<SortedCompensation>(filter, taps, ideal, 0.0, outputs);
+  sorted_->awaitCalibration();
 }
 
 void SpindleRig::run(double seconds, const std::array<double, 3>& velocity) {
@@ -74,6 +76,7 @@ void SpindleRig::hear(const sim::World::Block& block) {
       const SampleBlock& six = use_plate_ ? block.dynamometer : block.spindle_force;
       for (std::size_t k = 0; k < six.channels.size() && k < 6; ++k)
         record_.sensors[k].push_back(six.at(i, k));
+      record_.hammer.push_back(block.hammer.at(i, 0));
       const SpindleAngle& angle = block.angle[0];
       record_.angle.push_back(angle.angle + angle.speed * (block.force.stamp - angle.stamp) +
                               angle.speed * static_cast<double>(i) / sim::World::SAMPLE_RATE);
@@ -109,11 +112,6 @@ CalibrationResult SpindleRig::ask(const CalibrationGoal& goal) {
 
 void SpindleRig::readStatic(const std::vector<double>& lengths, const std::vector<double>& loads,
                             bool reference) {
-  if (!sorted_->calibrator().begun()) {
-    CalibrationGoal first;
-    first.step = CalibrationGoal::Step::forget;
-    ask(first);
-  }
   for (const double length : lengths) {
     world_.setToolLength(length);
     for (std::size_t axis = 0; axis < 3; ++axis, ++tests_) {
@@ -160,28 +158,43 @@ SpindleRig::Record SpindleRig::take() {
   return std::exchange(record_, {});
 }
 
-SpindleRig::Record cutSlot(SpindleRig& rig, const MachineModel& model, double speed, double depth,
-                           double feed, double air, double seconds) {
+SpindleRig::Record cutAlong(SpindleRig& rig, const MachineModel& model, double y,
+                            const Engagement& engagement, double speed, double air, double seconds,
+                            bool through) {
   const ToolGeometry& tool = model.needTool("cut");
   const Workpiece& stock = model.workpiece.value();
-  const double advance = feed * tool.teeth * speed / units::TWO_PI;  // [m/s]
-  // Every slot beside the ones before.
-  const double pitch = 1.15 * tool.diameter;
-  const int rows = static_cast<int>((stock.high[1] - stock.low[1]) / pitch);
-  const double y = stock.low[1] + pitch * (rig.slots() % rows + 0.5);
+  const double advance = engagement.feed_per_tooth * tool.teeth * speed / units::TWO_PI;  // [m/s]
   rig.spin(speed);
   rig.tell(CuttingCondition::Kind::air);
   rig.place({stock.low[0] - tool.radius() - 1e-3, y, stock.high[2] + 10e-3});
   rig.run(air);
-  rig.tell(CuttingCondition::Kind::cut, {0.0, units::PI, depth, feed});
-  rig.place({stock.low[0] - tool.radius() - 0.1e-3, y, stock.high[2] - depth});
-  rig.run((tool.radius() + 0.5e-3) / advance + 0.2, {advance, 0.0, 0.0});
+  rig.tell(CuttingCondition::Kind::cut, engagement);
+  rig.place({stock.low[0] - tool.radius() - 0.1e-3, y, stock.high[2] - engagement.axial_depth});
+  rig.run((tool.radius() + 0.5e-3) / advance + 0.1, {advance, 0.0, 0.0});
   rig.start();
   rig.run(seconds, {advance, 0.0, 0.0});
-  const SpindleRig::Record cut = rig.take();
+  SpindleRig::Record cut = rig.take();
+  if (through) {
+    const double way = stock.high[0] - stock.low[0] + 3.0 * tool.radius();
+    rig.run(way / advance - seconds, {advance, 0.0, 0.0});
+  }
   rig.place({stock.low[0], y, stock.high[2] + 10e-3});
   rig.tell(CuttingCondition::Kind::none);
+  // Blocks that waited for what came after them are left out.
+  for (auto* force : {&cut.truth, &cut.measured, &cut.dynamometer}) {
+    for (auto& axis : *force) axis.resize(std::min(axis.size(), cut.compensated[2].size()));
+  }
   return cut;
+}
+
+SpindleRig::Record cutSlot(SpindleRig& rig, const MachineModel& model, double speed, double depth,
+                           double feed, double air, double seconds) {
+  const Workpiece& stock = model.workpiece.value();
+  // Every slot beside the ones before.
+  const double pitch = 1.15 * model.needTool("cut").diameter;
+  const int rows = static_cast<int>((stock.high[1] - stock.low[1]) / pitch);
+  const double y = stock.low[1] + pitch * (rig.slots() % rows + 0.5);
+  return cutAlong(rig, model, y, {0.0, units::PI, depth, feed}, speed, air, seconds, false);
 }
 
 }  // namespace smartmill::kalman

@@ -40,7 +40,8 @@ class SpindleRig {
   struct Record {
     std::array<std::vector<double>, 3> truth, measured, compensated, dynamometer;
     std::array<std::vector<double>, 6> sensors;
-    std::vector<double> angle;  ///< [rad] of tooth 1
+    std::vector<double> hammer;  ///< [N]
+    std::vector<double> angle;   ///< [rad] of tooth 1
   };
   int slots();  ///< asked for before
   void start();
@@ -63,6 +64,13 @@ class SpindleRig {
   double from_ = 0.0;  // [s] of the record
   Record record_;
 };
+
+/// A straight pass along x at a y [m], at constant speed; the record holds whole blocks from full engagement
+/// on.
+/// @param speed [rad/s] @param air [s] before it @param through the tool goes on to the stock's end
+SpindleRig::Record cutAlong(SpindleRig& rig, const MachineModel& model, double y,
+                            const Engagement& engagement, double speed, double air, double seconds,
+                            bool through);
 
 /// A straight slot through the stock of the model along x, at constant speed; the record holds whole blocks
 /// from full engagement on. @param speed [rad/s] @param depth [m] @param feed [m] a tooth @param air [s]

@@ -47,6 +47,7 @@ SortedCompensation::SortedCompensation(const CompensationParameters& parameters,
     compensation_.reset();
     measurement_.reset();
     if (spindle_) spindle_->reset();
+    if (inverse_) inverse_->reset();
     calibrator_.reset();
     condition_.reset();
     invalid_.clear();
@@ -59,6 +60,11 @@ void SortedCompensation::useSpindleSensor(const SpindleSensorCalibration& calibr
   spindle_length_ = length;
   spindle_.emplace(calibration, length);
   calibrator_ = SpindleSensorCalibrator(taps_, calibration);
+}
+
+void SortedCompensation::useTransferMatrix(const TransferMatrix& matrix, double bandwidth) {
+  inverse_.emplace(MatrixInverse(matrix, bandwidth), believed_.measures_workpiece,
+                   [this](const ForceBlock& m, const ForceBlock& c) { forward(m, c); });
 }
 
 void SortedCompensation::useModelFile() {
@@ -81,12 +87,16 @@ void SortedCompensation::push(const SampleBlock& block) {
     if (SpindleForceSensor::isSixChannels(block)) {
       calibrator_.handle(block);
       drainCalibration();
-      if (!spindle_ && calibrator_.begun()) return;
+      if (uncalibrated()) return;
       const SampleBlock forces = toForces(block);
       compensation_.handle(forces);
       measurement_.handleSensor(forces);
     } else {
-      compensation_.handle(block);
+      if (inverse_) {
+        inverse_->handle(block);
+      } else {
+        compensation_.handle(block);
+      }
       measurement_.handleSensor(block);
     }
     drain();

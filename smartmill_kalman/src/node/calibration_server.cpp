@@ -49,7 +49,8 @@ smartmill_msgs::CalibrateForceSensorResult answer(Code code, const std::string& 
 struct CalibrationServer::Impl {
   Impl(ros::NodeHandle nh, SortedCompensation& thinking)
       : sorted(thinking),
-        server(nh, names::CALIBRATE_SENSOR, boost::function<void(Handle)>([this](Handle handle) { onGoal(handle); }),
+        server(nh, names::CALIBRATE_SENSOR,
+               boost::function<void(Handle)>([this](Handle handle) { onGoal(handle); }),
                boost::function<void(Handle)>([this](Handle handle) {
                  if (active && *active == handle) sorted.cancelCalibration();
                }),

@@ -65,6 +65,10 @@ KalmanNode::KalmanNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
                 }}),
       calibrate_(nh, sorted_) {
   useFiles(sorted_, parameters_);
+  if (parameters_.inSpindle() && parameters_.spindle_sensor.empty()) {
+    sorted_.awaitCalibration();
+    ROS_WARN("spindle_sensor: no calibration of the six sensors; they wait for kalman/calibrate");
+  }
   sorted_.onRestart([this] {
     measure_.restart();
     calibrate_.restart();
@@ -183,6 +187,7 @@ std::pair<int, std::string> KalmanNode::judge(const SpindleSensorHealth* spindle
   }
   if (shell_.inputs().watchdog(parameters_.force_input).dead())
     return {Level::STALE, "no samples from the force sensor"};
+  if (sorted_.uncalibrated()) return {Level::ERROR, "the spindle's sensors are not calibrated"};
   if (!rotation_known_) return {Level::ERROR, "no transform of the force sensor"};
   if (health.gaps + health.not_finite + health.clipped > 0)
     return {Level::WARN, "samples were lost, clipped or not numbers"};

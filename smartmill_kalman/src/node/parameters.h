@@ -14,7 +14,7 @@ namespace smartmill::kalman {
 struct NodeParameters {
   std::string model;  ///< may stay empty where the tool is given one
   std::string force_input = names::DYNAMOMETER;
-  std::string sensor_matrix, spindle_sensor;
+  std::string sensor_matrix, spindle_sensor, plate_taps;
   double spindle_sensor_length = 0.139;
   CompensationParameters compensation;
   double hold_back = 0.05;
@@ -42,6 +42,10 @@ struct NodeParameters {
         "are calibrated first (action kalman/calibrate)");
     table.number("spindle_sensor_length", spindle_sensor_length, "m", Range::positive(),
                  "of tool and holder, for spindle_sensor");
+    table.text("plate_taps", plate_taps,
+               "smartmill-taps/1 file: the sensor's 3x3 or 6x6 matrix is inverted up to bandwidth, in the "
+               "place of the "
+               "filters; 10 ms late");
     compensation.declare(table);
     table.number("hold_back", hold_back, "s", Range::notNegative(),
                  "how late an event may arrive and still be in order");
@@ -63,6 +67,8 @@ struct NodeParameters {
   void validate() const {
     checkBounds(*this);
     if (force_input.empty()) throw Error("force_input: a topic is due");
+    if (!plate_taps.empty() && !(spindle_sensor.empty() && sensor_matrix.empty()))
+      throw Error("plate_taps: without sensor_matrix and spindle_sensor, which are another sensor's");
     compensation.validate();
     taps.validate();
   }

@@ -6,6 +6,7 @@
 #include "smartmill_core/names.h"
 #include "smartmill_kalman/compensation/sorted_compensation.h"
 #include "smartmill_kalman/sensor/spindle_sensor_calibration.h"
+#include "smartmill_kalman/sensor/tap_file.h"
 #include "smartmill_ros/feed.h"
 
 namespace smartmill::kalman {
@@ -22,6 +23,11 @@ void connect(Source& source, SortedCompensation& sorted) {
 /// What the parameters say of the sensor beyond its modes. @throws Error on a bad file.
 inline void useFiles(SortedCompensation& sorted, const NodeParameters& parameters) {
   if (!parameters.sensor_matrix.empty()) sorted.useMatrix(readSensorMatrix(parameters.sensor_matrix));
+  if (!parameters.plate_taps.empty()) {
+    const TapRecords records = readTapFile(parameters.plate_taps);
+    sorted.useTransferMatrix(identifyTransferMatrix(records.taps, records.rate),
+                             parameters.compensation.filter.bandwidth);
+  }
   sorted.setSpindleSensorLength(parameters.spindle_sensor_length);
   if (!parameters.spindle_sensor.empty()) {
     sorted.useSpindleSensor(readSpindleSensor(parameters.spindle_sensor), parameters.spindle_sensor_length);

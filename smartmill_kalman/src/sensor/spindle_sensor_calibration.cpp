@@ -68,7 +68,7 @@ LengthConstants constantsOf(const StaticReadings& readings, double length) {
     const Eigen::Index test = 3 + 2 * tests.at(readings.test[i]);
     for (Eigen::Index j = 0; j < 3; ++j) a(r, j) = readings.load[i][static_cast<std::size_t>(j)];
     a(r, test) = 1.0;
-    a(r, test + 1) = readings.time[i];
+    a(r, test + 1) = readings.time[i] - readings.time[rows.front()];
     const auto means = pairMeans(readings.sensors[i]);
     for (Eigen::Index k = 0; k < 3; ++k) b(r, k) = means[static_cast<std::size_t>(k)];
   }
@@ -359,6 +359,7 @@ StaticReadings readStaticReadings(const std::string& file) {
 
 StaticCalibration calibrateStatic(const StaticReadings& readings, const SpindleSensorCalibration& base) {
   const std::set<double> lengths(readings.length.begin(), readings.length.end());
+  if (lengths.empty()) throw Error(readings.file + ": there are none");
   StaticCalibration result;
   result.calibration = base;
   for (const double length : lengths) result.lengths.push_back(constantsOf(readings, length));
@@ -398,7 +399,7 @@ std::array<double, 3> verifyStatic(const StaticReadings& readings,
     Eigen::MatrixXd a(n, 2), b(n, 3);
     for (Eigen::Index r = 0; r < n; ++r) {
       const std::size_t i = unloaded[static_cast<std::size_t>(r)];
-      a.row(r) << 1.0, readings.time[i];
+      a.row(r) << 1.0, readings.time[i] - readings.time[rows.front()];
       const auto f = staticForce(calibration, readings.length[i], pairMeans(readings.sensors[i]));
       b.row(r) << f[0], f[1], f[2];
     }
@@ -407,7 +408,8 @@ std::array<double, 3> verifyStatic(const StaticReadings& readings,
       const auto f = staticForce(calibration, readings.length[i], pairMeans(readings.sensors[i]));
       for (std::size_t axis = 0; axis < 3; ++axis) {
         const auto k = static_cast<Eigen::Index>(axis);
-        const double told = f[axis] - zero(0, k) - zero(1, k) * readings.time[i];
+        const double told =
+            f[axis] - zero(0, k) - zero(1, k) * (readings.time[i] - readings.time[rows.front()]);
         worst[axis] = std::max(worst[axis], std::abs(told - readings.load[i][axis]));
         largest[axis] = std::max(largest[axis], std::abs(readings.load[i][axis]));
       }

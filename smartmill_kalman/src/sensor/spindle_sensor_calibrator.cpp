@@ -52,14 +52,12 @@ void SpindleSensorCalibrator::cancel() {
 
 bool SpindleSensorCalibrator::handle(const CalibrationGoal& goal) {
   if (goal_) return false;
-  begun_ = true;
   if (goal.step == CalibrationGoal::Step::fit) {
     fit();
   } else if (goal.step == CalibrationGoal::Step::verify) {
     verify();
   } else if (goal.step == CalibrationGoal::Step::forget) {
     reset();
-    begun_ = true;
     finish(Code::ok, "readings and taps are forgotten");
   } else if (!(goal.length > 0.0)) {
     finish(Code::bad_goal, formatted("length %g m: above 0 is due", goal.length));

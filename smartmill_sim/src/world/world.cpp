@@ -254,7 +254,11 @@ class World::Impl {
       refuse(PLUNGED, "TOOL PLUNGED INTO STOCK");
       arcs.clear();
     }
-    if (!arcs.empty() || machine_.cutting()) stock_->pass(state.position);
+    if (!arcs.empty() || machine_.cutting()) {
+      stock_->pass(state.position);
+    } else {
+      stock_->leave();
+    }
     if (!same(arcs, arcs_)) {
       arcs_ = arcs;
       machine_.engage(arcs, between(state, 0.0));
@@ -263,6 +267,34 @@ class World::Impl {
 
   void refuse(int number, const char* text) {
     if (controller_.status().alarm == 0) controller_.raiseAlarm(number, text);
+  }
+
+  /// What acts on the tool besides cut and station [N]: weights and blows by hand.
+  std::array<double, 3> byHand(double at, CuttingMachine::Input& input, double& tap) const {
+    std::array<double, 3> tip = pull_;
+    if (tip_blow_) {
+      const double hit = tip_blow_->force(at);
+      tip[tip_blow_axis_] += hit;
+      if (tip_blow_axis_ < 2) input.tip_force[tip_blow_axis_] += hit;
+      tap += hit;
+    }
+    for (std::size_t axis = 0; axis < 3 && pull_on_table_; ++axis) input.sensor_force[axis] += pull_[axis];
+    return tip;
+  }
+
+  /// The step in the flange's sensors and in the plate.
+  void showFurther(const CuttingMachine::Input& input, const HammerStation::Push& push,
+                   const std::array<double, 3>& tip, const std::array<double, 3>& blow, double height,
+                   const CuttingMachine::Output& out) {
+    if (flange_) {
+      flange_->step({out.force.fx + push.tip_force[0] + tip[0], out.force.fy + push.tip_force[1] + tip[1],
+                     out.force.fz + tip[2]},
+                    input.motion.angle, input.motion.speed);
+    }
+    if (!plate_) return;
+    std::array<double, 3> cut = out.applied;
+    for (std::size_t axis = 0; axis < 3; ++axis) cut[axis] -= blow[axis];
+    plate_->step(cut, {input.motion.centre[0], input.motion.centre[1], height}, blow, tap_point_);
   }
 
   /// Sensors are averaged over the sample's own interval, centred on it, as a converter with an anti-aliasing
@@ -282,26 +314,9 @@ class World::Impl {
       input.tip_force = push.tip_force;
       if (blow_) tap += input.sensor_force[blow_axis_] = blow_->force(at);
       const std::array<double, 3> blow = input.sensor_force;
-      std::array<double, 3> tip = pull_;
-      if (tip_blow_) {
-        const double hit = tip_blow_->force(at);
-        tip[tip_blow_axis_] += hit;
-        if (tip_blow_axis_ < 2) input.tip_force[tip_blow_axis_] += hit;
-        tap += hit;
-      }
-      for (std::size_t axis = 0; axis < 3 && pull_on_table_; ++axis) input.sensor_force[axis] += pull_[axis];
+      const std::array<double, 3> tip = byHand(at, input, tap);
       const CuttingMachine::Output out = machine_.step(input);
-      if (flange_) {
-        flange_->step({out.force.fx + push.tip_force[0] + tip[0], out.force.fy + push.tip_force[1] + tip[1],
-                       out.force.fz + tip[2]},
-                      input.motion.angle, input.motion.speed);
-      }
-      if (plate_) {
-        std::array<double, 3> cut = out.applied;
-        for (std::size_t axis = 0; axis < 3; ++axis) cut[axis] -= blow[axis];
-        plate_->step(cut, {input.motion.centre[0], input.motion.centre[1], now.position[2]}, blow,
-                     tap_point_);
-      }
+      showFurther(input, push, tip, blow, now.position[2], out);
       if (station_) station_->hear(out.displacement);
       for (std::size_t axis = 0; axis < 3; ++axis) sensor[axis] += out.sensor[axis];
       for (std::size_t axis = 0; axis < 2; ++axis)

@@ -12,6 +12,7 @@
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/signal/stream_sorter.h"
 #include "smartmill_kalman/compensation/force_compensation.h"
+#include "smartmill_kalman/compensation/matrix_compensation.h"
 #include "smartmill_kalman/sensor/sensor_measurement.h"
 #include "smartmill_kalman/sensor/spindle_force_sensor.h"
 #include "smartmill_kalman/sensor/spindle_sensor_calibrator.h"
@@ -29,7 +30,7 @@ class SortedCompensation {
     std::function<void(const StrikeCommand&)> strike;
     std::function<void(const TapFeedback&)> feedback;
     std::function<void(const SensorResult&)> result;
-    std::function<void(const CalibrationResult&)> calibration;
+    std::function<void(const CalibrationResult&)> calibration = {};
   };
 
   /// @param sensor the believed sensor: serves the axes not measured @param hold_back [s], see StreamSorter.
@@ -44,6 +45,14 @@ class SortedCompensation {
   void useSpindleSensor(const SpindleSensorCalibration& calibration, double length);
   /// Length [m] of tool and holder for a calibration that is made here.
   void setSpindleSensorLength(double length) { spindle_length_ = length; }
+  /// Six sensors without a calibration are not refused but wait for one.
+  void awaitCalibration() { awaits_calibration_ = true; }
+  bool uncalibrated() const { return awaits_calibration_ && !spindle_; }
+  /// Blocks of a sensor of 3 or 6 channels go through the inverse of its matrix from now on, instead of the
+  /// filters; they come out late. @throws Error.
+  void useTransferMatrix(const TransferMatrix& matrix, double bandwidth);
+  /// @return null without a transfer matrix.
+  const MatrixCompensation* transferMatrix() const { return inverse_ ? &*inverse_ : nullptr; }
   /// The sensor's cross-talk serves from now on, its own axes instead of the believed ones until taps tell
   /// better.
   void useMatrix(const SensorMatrix& matrix) {
@@ -78,6 +87,7 @@ class SortedCompensation {
   void flush() {
     sorter_.flush();
     compensation_.flush();
+    if (inverse_) inverse_->flush();
   }
 
   const CompensationHealth& health() const { return compensation_.health(); }
@@ -106,7 +116,9 @@ class SortedCompensation {
   StreamSorter sorter_;
   std::array<double, 3> identified_{};  // [s] stamp of the modes in use, an axis each
   StreamSorter::Stream conditions_, goals_, hammers_, angles_, blocks_;
+  std::optional<MatrixCompensation> inverse_;
   std::optional<SpindleForceSensor> spindle_;
+  bool awaits_calibration_ = false;
   double spindle_length_ = 0.0;  // [m] 0: not told
   std::optional<CuttingCondition> condition_;
   TapParameters taps_;

@@ -50,15 +50,14 @@ class SpindleSensorCalibrator {
   /// Block of the six sensors. @throws Error when a channel is missing.
   void handle(const SampleBlock& block);
   void handleHammer(const SampleBlock& block);
-  /// Blows from now on are along an axis, for the measurement that tapped() ends. @param length [m] of tool and
-  /// holder; 0: not told
+  /// Blows from now on are along an axis, for the measurement that tapped() ends. @param length [m] of tool
+  /// and holder; 0: not told
   void tapping(const std::string& direction, double length = 0.0);
   void tapped(const SensorResult& result);
   void cancel();
   void reset();
 
   bool active() const { return goal_.has_value(); }
-  bool begun() const { return begun_; }  ///< a step has come
   std::optional<CalibrationResult> takeResult();
   /// What fit reads, as a table of `spindle_sensor calibrate`.
   std::string readingsTable() const;
@@ -81,7 +80,6 @@ class SpindleSensorCalibrator {
   SpindleSensorCalibration base_;
   StaticReadings readings_, reference_;
   std::optional<CalibrationGoal> goal_;  // of the reading that runs
-  bool begun_ = false;
   std::array<double, 6> sum_{};
   double time_sum_ = 0.0;
   std::size_t count_ = 0;

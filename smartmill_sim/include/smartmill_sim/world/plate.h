@@ -15,12 +15,12 @@ namespace smartmill::sim {
 struct PlateTraits {
   bool present = false;
   std::array<double, 3> origin{{0.0, 0.0, -0.2}};
+  std::array<double, 3> frequency{{3000.0, 3000.0, 4000.0}};
+  double damping = 0.02;
   double mass = 2.0;
   std::array<double, 3> centre{{2e-3, -3e-3, 12e-3}};
   std::array<double, 3> size{{0.105, 0.09, 0.035}};
-  std::array<double, 3> frequency{{3000.0, 3000.0, 4000.0}};
   double foot = 0.036;
-  double damping = 0.02;
   double force_noise = 0.05;
   double moment_noise = 0.0015;
 

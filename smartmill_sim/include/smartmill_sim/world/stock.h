@@ -27,6 +27,8 @@ class Stock {
 
   /// The tool, cutting, has come here: what it passed over is gone once it turns off the line.
   void pass(const std::array<double, 3>& position);
+  /// The tool meets nothing: what it cuts next begins where it is then.
+  void leave() { open_ = false; }
 
  private:
   /// What the tool cleared along a straight line.

@@ -1,0 +1,71 @@
+#include "smartmill_loadmeter/identification/force_curve.h"
+
+#include <cmath>
+#include <random>
+
+#include <gtest/gtest.h>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/units.h"
+
+namespace smartmill::loadmeter {
+namespace {
+
+/// Kienzle's power laws: 60 and 25 N/mm at 0.1 mm.
+double tangential(double h) {
+  return 60e3 * std::pow(h / 1e-4, 0.75);
+}
+double radial(double h) {
+  return 25e3 * std::pow(h / 1e-4, 0.6);
+}
+
+/// Straight teeth: forces in closed form, several teeth at once.
+AngleRecord cut(int teeth, const Engagement& e, double noise, unsigned seed) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal(0.0, noise);
+  AngleRecord record;
+  record.engagement = e;
+  for (int i = 0; i < 4000; ++i) {
+    const double angle = units::TWO_PI * i / 173.0;
+    double fx = normal(random), fy = normal(random);
+    for (int t = 0; t < teeth; ++t) {
+      const double phi = std::fmod(angle + units::TWO_PI * t / teeth, units::TWO_PI);
+      if (phi <= e.entry || phi >= e.exit) continue;
+      const double h = e.feed_per_tooth * std::sin(phi);
+      fx += e.axial_depth * (-tangential(h) * std::cos(phi) - radial(h) * std::sin(phi));
+      fy += e.axial_depth * (tangential(h) * std::sin(phi) - radial(h) * std::cos(phi));
+    }
+    record.angle.push_back(angle);
+    record.fx.push_back(fx);
+    record.fy.push_back(fy);
+  }
+  return record;
+}
+
+TEST(ForceCurve, FindsAPowerLawWithFourTeethInASlot) {
+  std::vector<AngleRecord> records;
+  unsigned seed = 1;
+  for (const double feed : {0.1e-3, 0.2e-3, 0.325e-3})
+    records.push_back(cut(4, {0.0, units::PI, 2e-3, feed}, 2.0, seed++));
+  const ForceCurves curves = fitForceCurves(records, {4, 12e-3, 0.0, {}});
+  EXPECT_NEAR(curves.rms, 2.0, 0.3);
+  double before = 0.0;
+  for (double h = 0.02e-3; h <= 0.32e-3; h += 0.01e-3) {
+    EXPECT_NEAR(curves.tangential.at(h), tangential(h), 0.03 * tangential(h) + 300.0) << h;
+    EXPECT_NEAR(curves.radial.at(h), radial(h), 0.03 * radial(h) + 300.0) << h;
+    EXPECT_GE(curves.tangential.at(h), before);
+    EXPECT_GT(curves.tangential.stdAt(h), 0.0);
+    before = curves.tangential.at(h);
+  }
+  // The slope is what chatter knows: power law times exponent over chip.
+  EXPECT_NEAR(curves.tangential.slope(0.2e-3), 0.75 * tangential(0.2e-3) / 0.2e-3,
+              0.06 * 0.75 * tangential(0.2e-3) / 0.2e-3);
+}
+
+TEST(ForceCurve, RefusesARecordWithoutAChip) {
+  EXPECT_THROW(fitForceCurves({}, {4, 12e-3, 0.0, {}}), Error);
+  EXPECT_THROW(fitForceCurves({cut(2, {0.0, 0.0, 2e-3, 0.1e-3}, 1.0, 1)}, {2, 12e-3, 0.0, {}}), Error);
+}
+
+}  // namespace
+}  // namespace smartmill::loadmeter

@@ -1,0 +1,99 @@
+#include "kalman/spindle_rig.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "kalman/expanded_disturbance.h"
+#include "smartmill_core/error.h"
+#include "smartmill_core/testing/reference_case.h"
+#include "smartmill_core/units.h"
+
+namespace smartmill::kalman {
+namespace {
+
+constexpr double LENGTH = 0.139;  // [m]
+
+// Weights, the reference, taps, a cut: the sensor in the spindle of the simulated machine through the
+// product's steps.
+TEST(SpindleRig, ShowsTheForceOfACutAfterItsCalibration) {
+  const MachineModel model = readMachineModel("../launch/models/mill_twin.yaml");
+  sim::WorldOptions world;
+  world.spindle_sensor.present = true;
+  CompensationParameters filter;
+  filter.filter.bandwidth = 2500.0;
+  TapParameters taps;
+  taps.fit_high = 2500.0;
+  SpindleRig rig(model, world, filter, taps, false);
+  rig.sorted().setSpindleSensorLength(LENGTH);
+  rig.tell(CuttingCondition::Kind::none);
+  rig.readStatic({0.110, LENGTH, 0.170}, {0.0, 150.0, 300.0, 0.0}, false);
+  CalibrationGoal fit;
+  fit.step = CalibrationGoal::Step::fit;
+  const auto found = rig.ask(fit).calibration;
+  ASSERT_TRUE(found);
+  // A beam's reciprocal is the line, and the readings prove it.
+  EXPECT_TRUE(found->x.reciprocal);
+  EXPECT_NEAR(found->x.at(LENGTH), 18.0, 0.2);  // Burzoni Table 2
+  // Beyond its lengths it does not serve.
+  EXPECT_THROW(SpindleForceSensor(*found, 0.25), Error);
+  rig.readStatic({0.125}, {0.0, 150.0, 300.0, 0.0}, true);
+  CalibrationGoal verify;
+  verify.step = CalibrationGoal::Step::verify;
+  const CalibrationResult verified = rig.ask(verify);
+  for (const double e : verified.error) EXPECT_LT(e, 0.05);  // Burzoni 3.2.1
+  rig.world().setToolLength(LENGTH);
+  rig.run(0.3);
+  for (const char* direction : {"y", "x", "z"}) EXPECT_EQ(rig.tap(direction, 5).code, FrfCode::ok);
+  ASSERT_TRUE(rig.ask(fit).calibration);
+  const auto cut = cutSlot(rig, model, units::radPerSecFromRpm(6000.0), 0.8e-3, 0.1e-3, 0.6, 0.4);
+  const std::size_t n = cut.compensated[2].size();
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto error = [&](const auto& force) {
+      return bandError(force[axis], cut.truth[axis], sim::World::SAMPLE_RATE, n / 10, n - n / 10, 2500.0);
+    };
+    EXPECT_GT(error(cut.measured), 0.08);
+    EXPECT_LT(error(cut.compensated), 0.04);
+  }
+  // A missing channel is one line.
+  SampleBlock block;
+  block.channels = {"x1", "x2", "y1", "y2", "z1"};
+  block.units.assign(5, "N");
+  EXPECT_THROW(SpindleForceSensor(*found, LENGTH).handle(block), Error);
+}
+
+// Eq. 4-43: a constant and an oscillation at tooth passing are told without error; another harmonic is not.
+TEST(ExpandedDisturbance, TellsWhatItIsMadeFor) {
+  constexpr double RATE = 25600.0;
+  ModalModel sensor;
+  sensor.modes.push_back({930.0, 0.04, 0.8});
+  sensor.direct = 0.2;
+  const auto error = [&](double f) {
+    ModalFilter plant(sensor, RATE, Hold::first_order);
+    std::vector<double> measured, truth;
+    for (int i = 0; i < 25600; ++i) {
+      truth.push_back(50.0 + 100.0 * std::cos(units::TWO_PI * f * i / RATE));
+      measured.push_back(plant.step(truth.back()));
+    }
+    const auto force = expandedDisturbanceForce(measured, sensor, RATE, 400.0, std::pow(2.0, 20), 1.0);
+    double sum = 0.0;
+    for (std::size_t i = 20000; i < truth.size(); ++i) sum += std::pow(force[i] - truth[i], 2);
+    return std::sqrt(sum / 5600.0);
+  };
+  EXPECT_LT(error(400.0), 1.0);
+  EXPECT_GT(error(1600.0), 3.0);
+}
+
+// Kurtosis of a uniform distribution 1.8, of a sine 1.5.
+TEST(ExpandedDisturbance, KurtosisOfKnownDistributions) {
+  std::vector<double> uniform, sine;
+  for (int i = 0; i < 10000; ++i) {
+    uniform.push_back(i);
+    sine.push_back(std::sin(units::TWO_PI * i / 10000.0));
+  }
+  EXPECT_NEAR(kurtosis(uniform), 1.8, 1e-6);
+  EXPECT_NEAR(kurtosis(sine), 1.5, 1e-6);
+}
+
+}  // namespace
+}  // namespace smartmill::kalman
