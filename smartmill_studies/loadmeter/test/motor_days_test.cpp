@@ -10,7 +10,7 @@ namespace {
 TEST(MotorDays, currentsOfTheTwinBecomeForces) {
   MotorDay day;
   day.cuts = 24;
-  day.duration = 1.0;
+  day.diagonal = false;
   const auto standard = runDay(day, std::nullopt);
   ASSERT_EQ(standard.size(), 24u);
   const MotorCalibration calibration = calibrationOf(standard);
@@ -19,6 +19,7 @@ TEST(MotorDays, currentsOfTheTwinBecomeForces) {
   EXPECT_NEAR(calibration.drive[0]->newton_per_ampere.value, 200.0, 4.0);
   EXPECT_NEAR(calibration.drive[1]->newton_per_ampere.value, 200.0, 4.0);
   day.cuts = 16;
+  day.diagonal = true;
   day.temperature = 35.0;
   day.seed = 2;
   const auto warm = runDay(day, calibration);
