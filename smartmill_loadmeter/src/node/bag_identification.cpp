@@ -11,7 +11,8 @@ namespace smartmill::loadmeter {
 std::vector<IdentifyResult> identifyFromBag(const std::string& path, const MachineModel& model,
                                             const NodeParameters& parameters,
                                             const std::function<void(double)>& progress,
-                                            const std::function<void(const MotorForce&)>& force) {
+                                            const std::function<void(const MotorForce&)>& force,
+                                            const std::function<void(const ForceEstimate&)>& estimate) {
   SortedIdentification identification(model, parameters.identification, parameters.hold_back);
   if (!parameters.motor_calibration.empty()) {
     identification.identification().setMotors(readMotorCalibration(parameters.motor_calibration));
@@ -19,6 +20,7 @@ std::vector<IdentifyResult> identifyFromBag(const std::string& path, const Machi
       if (force) force(f);
     });
   }
+  if (estimate) identification.identification().onForce(estimate);
   std::vector<IdentifyResult> results;
   identification.identification().onResult([&](const IdentifyResult& result) {
     if (!result.reset) results.push_back(result);
