@@ -196,7 +196,9 @@ double TorquePowerLaw::torque(double speed_rpm, double rise) const {
   }
   const Side& law = *side(above);
   // Polynomials say nothing beyond the speeds that they were made from.
-  const double low = law.middle - law.span, high = law.middle + law.span, beyond = 0.1 * law.middle;
+  double low = law.middle - law.span, high = law.middle + law.span;
+  (above ? low : high) = above ? std::min(low, base_) : std::max(high, base_);
+  const double beyond = 0.1 * law.middle;
   if (speed_rpm < low - beyond || speed_rpm > high + beyond) {
     throw Error("spindle calibration: cuts from " + std::to_string(std::lround(low)) + " to " +
                 std::to_string(std::lround(high)) + " rpm: torque at " +
