@@ -25,7 +25,7 @@ struct Options {
   NodeParameters parameters;
   std::string tool, material;
   double rake = NAN, depth_percent = 0.0, runout_um = 0.0;
-  bool spindle_uncertainty = false, plain_friction = false;
+  bool spindle_uncertainty = false, plain_friction = false, forces = false;
 };
 
 const char* practice(Means means) {
@@ -182,8 +182,15 @@ void run(const Options& o) {
       if (terminal) std::fprintf(stderr, "\rreading %3.0f %%%s", 100.0 * share, share >= 1.0 ? "\n" : "");
     };
     std::vector<CoefficientRecord> cuts;
-    const auto results = identifyFromBag(o.source_path, readMachineModel(model_file), parameters, progress,
-                                         {}, [&](const CoefficientRecord& cut) { cuts.push_back(cut); });
+    BagListeners listeners;
+    listeners.progress = progress;
+    listeners.cut = [&](const CoefficientRecord& cut) { cuts.push_back(cut); };
+    if (o.forces) {
+      listeners.force = [](const ForceEstimate& f) {
+        std::printf("%s: %s\n", f.name.c_str(), f.text().c_str());
+      };
+    }
+    const auto results = identifyFromBag(o.source_path, readMachineModel(model_file), parameters, listeners);
     keepCuts(o, std::move(cuts));
     for (const IdentifyResult& result : results) {
       if (result.code != IdentifyResult::Code::ok) throw Error(o.source_path + ": " + result.message);
@@ -242,6 +249,8 @@ int main(int argc, char** argv) {
   line.option("--runout-uncertainty", o.runout_um,
               "[um] load_meter of a campaign: standard deviation of the cutter axis' offset")
       .within(0.0, 100.0);
+  line.flag("--forces", o.forces,
+            "of a bag: each cut's force by all that was measured of it (force/estimate)");
   line.flag("--plain-friction", o.plain_friction,
             "load_meter of a campaign: Coulomb and viscous friction only, nothing added by evidence");
   line.option("--database", o.database, "SQLite file of the machine that keeps the result");

@@ -126,7 +126,8 @@ class Shop {
       for (std::size_t a = 0; a < 3; ++a) {
         if (std::abs(s.velocity[a]) < 1e-12) s.velocity[a] = 0.0;
       }
-      s.position = {s.velocity[0] * t, s.velocity[1] * t, pass.air ? 5e-3 : -pass.depth};
+      // The spindle turns before the tool is in.
+      s.position = {s.velocity[0] * t, s.velocity[1] * t, pass.air || b == 0 ? 5e-3 : -pass.depth};
       s.spindle_speed = pass.speed;
       s.spindle_angle = std::fmod(pass.speed * t, TWO_PI);
     }
@@ -230,8 +231,12 @@ std::vector<MotorCut> runDay(const MotorDay& day, const std::optional<MotorCalib
         units::radPerSecFromRpm(uniform(0.0, 1.0) < 0.5 ? uniform(1000.0, 1500.0) : uniform(1700.0, 3500.0));
     pass.feed = uniform(0.06e-3, 0.2e-3);
     pass.depth = uniform(1e-3, 3e-3);
-    pass.heading = units::PI / 4.0 * std::floor(uniform(0.0, 8.0));
+    pass.heading = day.diagonal ? units::PI / 4.0 * std::floor(uniform(0.0, 8.0))
+                                : units::PI / 2.0 * std::floor(uniform(0.0, 4.0));
     const CuttingCoefficients& metal = METALS[random() % METALS.size()];
+    // Two periods of a drive's phase at least in the steady part.
+    pass.feed = std::max(pass.feed, 2.6 / 400.0 / (day.duration - 0.25) * units::TWO_PI / pass.speed *
+                                        std::sqrt(2.0) / model.tool->teeth);
     Pass air = pass;
     air.air = true;
     shop->run(air, metal, static_cast<unsigned>(random()));
@@ -277,6 +282,11 @@ MotorCalibration calibrationOf(const std::vector<MotorCut>& cuts) {
 
 namespace {
 
+/// Whether a drive was read in a cut along its own axis, as the paper's longitudinal and facing cuts.
+bool alone(const MotorCut& cut, std::size_t axis) {
+  return cut.cut.range[axis] && cut.air.range[axis] && std::abs(cut.cut.velocity[1 - axis]) < 1e-9;
+}
+
 /// Inputs and outputs of an ANFIS for an axis (0, 1) or the spindle (2); the array that the paper found best.
 struct Samples {
   std::vector<std::vector<double>> inputs;
@@ -289,7 +299,7 @@ Samples samplesOf(const std::vector<MotorCut>& cuts, std::size_t which) {
       if (!cut.cut.spindle_range || !cut.air.spindle_range) continue;
       s.inputs.push_back({*cut.cut.spindle_range - *cut.air.spindle_range, cut.speed_rpm});
       s.outputs.push_back(cut.torque / cut.radius);
-    } else if (cut.cut.range[which] && cut.air.range[which]) {
+    } else if (alone(cut, which)) {
       s.inputs.push_back({rise(cut, which), std::abs(cut.cut.velocity[which])});
       s.outputs.push_back(cut.cut.velocity[which] > 0.0 ? -cut.force[which] : cut.force[which]);
     }
@@ -334,7 +344,7 @@ DayErrors judgeDay(const std::vector<MotorCut>& learnt, const MotorCalibration& 
         by_law = calibration.spindle->torque(cut.speed_rpm, test.inputs[k][0]) / cut.radius;
         by_old = by_law;
       } else {
-        if (!cut.cut.range[which] || !cut.air.range[which]) continue;
+        if (!alone(cut, which)) continue;
         const double m = calibration.drive[which]->newton_per_ampere.value;
         by_law = m * rise(cut, which);
         by_old = m * (*cut.cut.range[which] - old_air);

@@ -16,7 +16,8 @@ struct MotorDay {
   double temperature = 20.0;  ///< [deg C]
   unsigned seed = 1;
   int cuts = 24;
-  double duration = 1.2;      ///< [s] of each pass
+  double duration = 1.4;      ///< [s] of each pass
+  bool diagonal = true;       ///< slots along both axes too, where the cut may pull one on
   bool force_sensor = false;  ///< the twin's dynamometer takes part as force/compensated
 };
 

@@ -242,6 +242,7 @@ void LoadMeterIdentification::estimate(const LoadTest& cut) const {
   if (cut.force) {
     readings.motor_torque = cut.force->torque;
     readings.motor_force = cut.force->force;
+    readings.motor_other = cut.force->other;
   }
   if (cut.sensor) {
     std::optional<ForceReading> air;

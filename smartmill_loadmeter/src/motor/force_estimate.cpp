@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include <Eigen/Core>
 
@@ -137,7 +138,8 @@ Rows rowsOf(const ForceReadings& r, const ForceEstimateParameters& p) {
 /// The coefficients (Ktc, ratios, Kte, ratios; in units of the prior's sizes) that readings and prior like
 /// best.
 Eigen::VectorXd solve(const Mechanics& mechanics, const std::vector<Row>& rows,
-                      const std::array<double, 6>& prior, const std::array<double, 6>& scatter) {
+                      const std::array<double, 6>& prior, const std::array<double, 6>& scatter,
+                      double* squares) {
   const auto count = static_cast<Eigen::Index>(rows.size());
   const fit::FunctionResiduals residuals(count + 6, [&](const Eigen::VectorXd& at, Eigen::VectorXd& out) {
     const auto due = mechanics.of(at);
@@ -160,6 +162,7 @@ Eigen::VectorXd solve(const Mechanics& mechanics, const std::vector<Row>& rows,
   }
   const fit::Result solved = fit::minimise(residuals, start);
   if (!solved.usable()) throw Error("force of a cut: " + solved.message);
+  *squares = solved.squares;
   return solved.value;
 }
 
@@ -195,7 +198,10 @@ std::string ForceEstimate::text() const {
   return all;
 }
 
-ForceEstimate estimateForce(const ForceReadings& readings, const ForceEstimateParameters& p) {
+namespace {
+
+/// One reading of each drive. @param squares becomes its distance from prior and mechanics
+ForceEstimate estimateOne(const ForceReadings& readings, const ForceEstimateParameters& p, double* squares) {
   const Rows rows = rowsOf(readings, p);
   const Mechanics mechanics(readings);
   const std::array<double, 6> prior{
@@ -203,7 +209,7 @@ ForceEstimate estimateForce(const ForceReadings& readings, const ForceEstimatePa
   const std::array<double, 6> scatter{{KTC_STD / KTC, p.radial_ratio_std, p.axial_ratio_std, KTE_STD / KTE,
                                        p.radial_edge_ratio_std, p.axial_edge_ratio_std}};
   const auto count = static_cast<Eigen::Index>(rows.rows.size());
-  const Eigen::VectorXd at = solve(mechanics, rows.rows, prior, scatter);
+  const Eigen::VectorXd at = solve(mechanics, rows.rows, prior, scatter, squares);
   ForceEstimate found;
   found.stamp = readings.stamp;
   found.name = readings.name;
@@ -236,6 +242,50 @@ ForceEstimate estimateForce(const ForceReadings& readings, const ForceEstimatePa
   for (const Row& row : rows.rows)
     found.surprise +=
         std::pow((best[row.quantity] - row.value) / row.std_dev, 2) / static_cast<double>(count);
+  return found;
+}
+
+/// Several estimates as one: mean and spread of a mixture.
+Estimate mixed(const std::vector<ForceEstimate>& all, const std::vector<double>& weight,
+               const std::function<const Estimate&(const ForceEstimate&)>& of) {
+  Estimate sum;
+  for (std::size_t i = 0; i < all.size(); ++i) sum.value += weight[i] * of(all[i]).value;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const Estimate& e = of(all[i]);
+    sum.std_dev += weight[i] * (e.std_dev * e.std_dev + std::pow(e.value - sum.value, 2));
+  }
+  sum.std_dev = std::sqrt(sum.std_dev);
+  return sum;
+}
+
+}  // namespace
+
+ForceEstimate estimateForce(const ForceReadings& readings, const ForceEstimateParameters& p) {
+  std::vector<ForceReadings> variants{readings};
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (!readings.motor_force[a] || !readings.motor_other[a]) continue;
+    for (std::size_t i = variants.size(); i-- > 0;) {
+      variants.push_back(variants[i]);
+      variants.back().motor_force[a] = readings.motor_other[a];
+    }
+  }
+  std::vector<ForceEstimate> all;
+  std::vector<double> squares(variants.size()), weight;
+  for (std::size_t i = 0; i < variants.size(); ++i) all.push_back(estimateOne(variants[i], p, &squares[i]));
+  const std::size_t best =
+      static_cast<std::size_t>(std::min_element(squares.begin(), squares.end()) - squares.begin());
+  double sum = 0.0;
+  for (const double s : squares) {
+    weight.push_back(std::exp(-0.5 * (s - squares[best])));
+    sum += weight.back();
+  }
+  for (double& w : weight) w /= sum;
+  ForceEstimate found = all[best];
+  for (std::size_t a = 0; a < 3; ++a) {
+    found.mean[a] = mixed(all, weight, [a](const ForceEstimate& e) -> const Estimate& { return e.mean[a]; });
+    found.rms[a] = mixed(all, weight, [a](const ForceEstimate& e) -> const Estimate& { return e.rms[a]; });
+  }
+  found.torque = mixed(all, weight, [](const ForceEstimate& e) -> const Estimate& { return e.torque; });
   return found;
 }
 

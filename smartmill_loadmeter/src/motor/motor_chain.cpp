@@ -141,8 +141,14 @@ MotorForce forceFromMotors(const MotorReading& cut, const std::vector<MotorReadi
       continue;
     }
     Estimate force = calibration.drive[a]->opposing(*cut.range[a], *nearest->range[a]);
-    if (cut.velocity[a] > 0.0) force.value = -force.value;
-    if (std::abs(cut.velocity[a]) >= parameters.smallest_velocity) result.force[a] = force;
+    Estimate other = calibration.drive[a]->opposing(-*cut.range[a], *nearest->range[a]);
+    if (cut.velocity[a] > 0.0) {
+      force.value = -force.value;
+      other.value = -other.value;
+    }
+    if (std::abs(cut.velocity[a]) < parameters.smallest_velocity) continue;
+    result.force[a] = force;
+    result.other[a] = other;
   }
   if (cut.spindle_range) {
     const MotorReading* nearest = nullptr;

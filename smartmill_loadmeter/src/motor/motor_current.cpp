@@ -194,7 +194,17 @@ double TorquePowerLaw::torque(double speed_rpm, double rise) const {
     throw Error("spindle calibration: no cut " + std::string(above ? "above" : "below") +
                 " base speed: torque at " + std::to_string(speed_rpm) + " rpm is not known");
   }
-  return evaluate(*side(above), speed_rpm, rise);
+  const Side& law = *side(above);
+  // Polynomials say nothing beyond the speeds that they were made from.
+  double low = law.middle - law.span, high = law.middle + law.span;
+  (above ? low : high) = above ? std::min(low, base_) : std::max(high, base_);
+  const double beyond = 0.1 * law.middle;
+  if (speed_rpm < low - beyond || speed_rpm > high + beyond) {
+    throw Error("spindle calibration: cuts from " + std::to_string(std::lround(low)) + " to " +
+                std::to_string(std::lround(high)) + " rpm: torque at " +
+                std::to_string(std::lround(speed_rpm)) + " rpm is not known");
+  }
+  return evaluate(law, speed_rpm, rise);
 }
 
 }  // namespace smartmill::loadmeter

@@ -9,18 +9,14 @@
 namespace smartmill::loadmeter {
 
 std::vector<IdentifyResult> identifyFromBag(const std::string& path, const MachineModel& model,
-                                            const NodeParameters& parameters,
-                                            const std::function<void(double)>& progress,
-                                            const std::function<void(const MotorForce&)>& force,
-                                            const std::function<void(const CoefficientRecord&)>& cut) {
+                                            const NodeParameters& parameters, const BagListeners& listeners) {
   SortedIdentification identification(model, parameters.identification, parameters.hold_back);
   if (!parameters.motor_calibration.empty()) {
     identification.identification().setMotors(readMotorCalibration(parameters.motor_calibration));
-    identification.identification().onMotorForce([&](const MotorForce& f) {
-      if (force) force(f);
-    });
+    if (listeners.motors) identification.identification().onMotorForce(listeners.motors);
   }
-  if (cut) identification.identification().onCut(cut);
+  if (listeners.force) identification.identification().onForce(listeners.force);
+  if (listeners.cut) identification.identification().onCut(listeners.cut);
   std::vector<IdentifyResult> results;
   identification.identification().onResult([&](const IdentifyResult& result) {
     if (!result.reset) results.push_back(result);
@@ -34,7 +30,7 @@ std::vector<IdentifyResult> identifyFromBag(const std::string& path, const Machi
         const ros::Time stamp = m.goal.header.stamp.isZero() ? m.goal_id.stamp : m.goal.header.stamp;
         identification.push(IdentifyGoal{toSec(stamp), m.goal.tool, m.goal.material, m.goal.reset != 0, 0});
       });
-  bag.run(progress);
+  bag.run(listeners.progress);
   identification.flush();
   if (results.empty()) {
     identification.push(IdentifyGoal{identification.newest(), "", "", false, 0});

@@ -9,18 +9,21 @@
 
 namespace smartmill::loadmeter {
 
+/// What is called on the way; empty: not.
+struct BagListeners {
+  std::function<void(double)> progress;           ///< now and then, with the share read, 0..1
+  std::function<void(const MotorForce&)> motors;  ///< a cut's force by the motors, where they are calibrated
+  std::function<void(const ForceEstimate&)> force;    ///< a cut's force by all that was measured of it
+  std::function<void(const CoefficientRecord&)> cut;  ///< every cut, as it enters the database
+};
+
 /// Runs a recorded bag through the class that the node runs: cnc/state, cnc/load, daq/motor_current,
 /// cut/condition and the action's goals.
-/// @param progress called now and then with the share read, 0..1.
-/// @param force called with each cut's force by the motors, where parameters name a motor calibration.
-/// @param cut called with every cut, as it enters the database.
 /// @return the answer to each goal in the bag that asked for coefficients; to one at its end when there is
 /// none.
 /// @throws Error on a bad bag.
 std::vector<IdentifyResult> identifyFromBag(const std::string& path, const MachineModel& model,
                                             const NodeParameters& parameters,
-                                            const std::function<void(double)>& progress,
-                                            const std::function<void(const MotorForce&)>& force = {},
-                                            const std::function<void(const CoefficientRecord&)>& cut = {});
+                                            const BagListeners& listeners = {});
 
 }  // namespace smartmill::loadmeter

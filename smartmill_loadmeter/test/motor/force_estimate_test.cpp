@@ -154,6 +154,26 @@ TEST(ForceEstimate, sensorsThatDisagreeAreTold) {
   EXPECT_GT(estimateForce(one.readings, {}).surprise, 5.0);
 }
 
+// A cut that pulls an axis on shows the same range as one that holds it harder: the others tell which it is.
+TEST(ForceEstimate, aRangeHasNoSign) {
+  std::mt19937_64 random(11);
+  int near = 0;
+  for (int i = 0; i < 40; ++i) {
+    Case one = draw(random, {0, 1}, false);
+    for (std::size_t a = 0; a < 2; ++a) {
+      // Friction of 150 N either way.
+      one.readings.motor_other[a] = one.readings.motor_force[a];
+      const bool on = one.mean[a] > 0.0;
+      const double wrong = -one.readings.motor_force[a]->value + (on ? -300.0 : 300.0);
+      (i % 2 ? one.readings.motor_force : one.readings.motor_other)[a]->value = wrong;
+    }
+    const ForceEstimate found = estimateForce(one.readings, {});
+    near += std::abs(found.mean[0].value - one.mean[0]) < 3.0 * found.mean[0].std_dev &&
+            std::abs(found.mean[1].value - one.mean[1]) < 3.0 * found.mean[1].std_dev;
+  }
+  EXPECT_GE(near, 38);
+}
+
 TEST(ForceEstimate, refusesWhatSaysNothing) {
   std::mt19937_64 random(5);
   Case one = draw(random, {0}, false);

@@ -87,6 +87,8 @@ TEST(TorqueLaw, findsThePowersBelowAndAboveBaseSpeed) {
   for (const double n : {900.0, 1400.0, 1700.0, 2300.0})
     EXPECT_NEAR(found.torque(n, 2.5), law(n, 2.5), 0.5) << n;
   const std::vector<SpindleCut> slow(cuts.begin(), cuts.begin() + 4);
+  EXPECT_THAT(errorOf([&] { TorquePowerLaw(slow, 1570.0).torque(100.0, 1.0); }),
+              HasSubstr("rpm: torque at 100 rpm is not known"));
   EXPECT_THAT(errorOf([&] { TorquePowerLaw(slow, 1570.0).torque(2000.0, 1.0); }),
               HasSubstr("no cut above base speed"));
 }

@@ -60,25 +60,32 @@ TEST(Bag, givesTheFiguresOfTheLiveRunToTheLastDigit) {
   const TemporaryFolder folder;
   const std::string file = folder.file("run.bag");
   std::vector<IdentifyResult> live;
+  std::vector<ForceEstimate> forces, played;
   {
     Recorder recorder(file);
+    recorder.direct.onForce([&](const ForceEstimate& f) { forces.push_back(f); });
     recorder.session.air(9000.0, 2.0);
     recorder.goal(true);
     takeThrough(recorder.session);
     recorder.goal(false);
     live = recorder.results;
   }
-  const std::vector<IdentifyResult> found = identifyFromBag(file, model(), {}, [](double) {});
+  BagListeners listeners;
+  listeners.force = [&](const ForceEstimate& f) { played.push_back(f); };
+  const std::vector<IdentifyResult> found = identifyFromBag(file, model(), {}, listeners);
   ASSERT_EQ(live.size(), 1u);
   ASSERT_EQ(found.size(), 1u);
   EXPECT_EQ(found[0].message, live[0].message);
   EXPECT_EQ(found[0].coefficients.value.ktc, live[0].coefficients.value.ktc);
   EXPECT_EQ(found[0].coefficients.std_dev.kte, live[0].coefficients.std_dev.kte);
   EXPECT_EQ(found[0].coefficients.stamp, live[0].coefficients.stamp);
+  ASSERT_EQ(played.size(), 3u);
+  ASSERT_EQ(forces.size(), 3u);
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(played[i].text(), forces[i].text());
 
   // Half a bag is refused in one line.
   std::filesystem::resize_file(file, std::filesystem::file_size(file) / 2);
-  const std::string message = errorOf([&] { identifyFromBag(file, model(), {}, [](double) {}); });
+  const std::string message = errorOf([&] { identifyFromBag(file, model(), {}); });
   EXPECT_THAT(message, HasSubstr("run.bag"));
   EXPECT_EQ(message.find('\n'), std::string::npos);
 }
@@ -89,7 +96,7 @@ TEST(Bag, withoutAGoalIsAskedAtItsEnd) {
     Recorder recorder(folder.file("run.bag"));
     takeThrough(recorder.session);
   }
-  const auto found = identifyFromBag(folder.file("run.bag"), model(), {}, [](double) {});
+  const auto found = identifyFromBag(folder.file("run.bag"), model(), {});
   ASSERT_EQ(found.size(), 1u);
   EXPECT_NEAR(found[0].coefficients.value.ktc, TRUTH.ktc, 0.01 * TRUTH.ktc);
 }
@@ -107,7 +114,7 @@ TEST(Bag, aRunoutIsToldAsOnTheRunningMachine) {
     recorder.goal(false);
     live = recorder.results;
   }
-  const auto found = identifyFromBag(folder.file("run.bag"), model(), {}, [](double) {});
+  const auto found = identifyFromBag(folder.file("run.bag"), model(), {});
   ASSERT_EQ(found.size(), 1u);
   ASSERT_EQ(live.size(), 1u);
   EXPECT_EQ(found[0].message, live[0].message);

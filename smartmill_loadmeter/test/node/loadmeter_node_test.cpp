@@ -8,11 +8,13 @@
 #include <gtest/gtest.h>
 
 #include "../session.h"
+#include "smartmill_core/force_names.h"
 #include "smartmill_core/names.h"
 #include "smartmill_msgs/CncState.h"
 #include "smartmill_msgs/CuttingCoefficients.h"
 #include "smartmill_msgs/CuttingCondition.h"
 #include "smartmill_msgs/FindCoefficients.h"
+#include "smartmill_msgs/ForceEstimate.h"
 #include "smartmill_msgs/IdentifyCoefficientsAction.h"
 #include "smartmill_msgs/LoadSample.h"
 #include "smartmill_msgs/SampleBlock.h"
@@ -137,6 +139,17 @@ TEST(LoadMeterNode, identifiesPublishesAndAnswers) {
   EXPECT_NEAR(last.wrench.force.x, truth, 4.0);  // scatter of the calibration: 1 N
   EXPECT_TRUE(std::isnan(last.wrench.force.y));
   EXPECT_TRUE(std::isnan(last.wrench.force.z));
+
+  // The one estimator tells all three of the same cut, each as well as it is known.
+  smartmill_msgs::ForceEstimate::ConstPtr estimate;
+  for (int i = 0; i < 200 && !(estimate && estimate->header.stamp == last.header.stamp); ++i)
+    estimate = ros::topic::waitForMessage<smartmill_msgs::ForceEstimate>(names::FORCE_ESTIMATE, nh, PATIENCE);
+  ASSERT_TRUE(estimate && estimate->header.stamp == last.header.stamp);
+  EXPECT_EQ(estimate->sources, (std::vector<std::string>{"load_meter", "motor_x"}));
+  EXPECT_NEAR(estimate->mean.x, truth, 3.0 * estimate->mean_std.x);
+  EXPECT_LT(estimate->mean_std.x, 0.1 * std::abs(truth));
+  EXPECT_GT(estimate->mean_std.y, estimate->mean_std.x);
+  EXPECT_GT(estimate->rms.y, 0.0);
 }
 
 }  // namespace

@@ -32,12 +32,12 @@ Structure turned(double angle, double noise = 0.0) {
   one.y.modes = {scaled(a, s * s), scaled(b, c * c)};
   one.cross.unit = "m/N";
   std::mt19937 random(1);
-  std::normal_distribution<double> normal(0.0, noise);
+  std::normal_distribution<double> normal;
   const ModalModel first{{a}, 0.0}, second{{b}, 0.0};
   for (double f = 300.0; f < 2000.0; f += 2.0) {
     one.cross.frequency.push_back(f);
     one.cross.value.push_back(c * s * (first.response(f) - second.response(f)) +
-                              Complex(normal(random), normal(random)));
+                              noise * Complex(normal(random), normal(random)));
   }
   return one;
 }

@@ -21,6 +21,13 @@ std::vector<MotorCut> day(const char* name, const MotorDay& one,
   return cuts;
 }
 
+/// Along X or Y only: there the cut always opposes the feed.
+MotorDay standardDay(unsigned seed, int cuts) {
+  MotorDay one{20.0, seed, cuts};
+  one.diagonal = false;
+  return one;
+}
+
 void row(const char* name, const std::array<double, 3>& e) {
   std::printf("  %-44s %7.1f %7.1f %7.1f\n", name, e[0], e[1], e[2]);
 }
@@ -38,7 +45,7 @@ void tell(const char* name, const DayErrors& e) {
 }
 
 void run(int cuts, unsigned seed, double warmer, const std::string& out) {
-  const auto standard = day("standard cuts", {20.0, seed, cuts}, std::nullopt);
+  const auto standard = day("standard cuts", standardDay(seed, cuts), std::nullopt);
   const MotorCalibration calibration = calibrationOf(standard);
   if (!out.empty()) writeMotorCalibration(calibration, out);
   for (std::size_t a = 0; a < 2; ++a)

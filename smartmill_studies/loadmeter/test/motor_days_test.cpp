@@ -9,16 +9,17 @@ namespace {
 // warmer with the calibration of the first.
 TEST(MotorDays, currentsOfTheTwinBecomeForces) {
   MotorDay day;
-  day.cuts = 24;
-  day.duration = 1.0;
+  day.cuts = 40;
+  day.diagonal = false;
   const auto standard = runDay(day, std::nullopt);
-  ASSERT_EQ(standard.size(), 24u);
+  ASSERT_EQ(standard.size(), 40u);
   const MotorCalibration calibration = calibrationOf(standard);
   ASSERT_TRUE(calibration.drive[0] && calibration.drive[1] && calibration.spindle);
   EXPECT_FALSE(calibration.drive[2]);  // never moved
   EXPECT_NEAR(calibration.drive[0]->newton_per_ampere.value, 200.0, 4.0);
   EXPECT_NEAR(calibration.drive[1]->newton_per_ampere.value, 200.0, 4.0);
-  day.cuts = 16;
+  day.cuts = 12;
+  day.diagonal = true;
   day.temperature = 35.0;
   day.seed = 2;
   const auto warm = runDay(day, calibration);
@@ -27,9 +28,10 @@ TEST(MotorDays, currentsOfTheTwinBecomeForces) {
     std::printf("regression %.1f, ANFIS %.1f, old air %.1f N; estimate %.1f N, inside %.2f, dynamic %.2f\n",
                 errors.regression[a], errors.anfis[a], errors.old_air[a], errors.estimate[a],
                 errors.inside[a], errors.inside_rms[a]);
-  // Table 1 of Cheng & Venuvinod has 29 N for a feed drive.
-  EXPECT_LT(errors.regression[0], 29.0);
-  EXPECT_LT(errors.regression[1], 29.0);
+  // Table 1 of Cheng & Venuvinod has 29 N for a feed drive, 36 N for the tangential force.
+  EXPECT_LT(errors.regression[0], 10.0);
+  EXPECT_LT(errors.regression[1], 10.0);
+  EXPECT_LT(errors.regression[2], 36.0);
   // Friction of the warm day taken for that of the cold one costs its change, 12 % of 150 N.
   EXPECT_GT(errors.old_air[0], errors.regression[0]);
   for (const MotorCut& cut : warm) {

@@ -34,7 +34,9 @@ struct ForceReadings {
   double heading = 0.0;                  ///< [rad] of the feed in the X-Y plane, from +X towards +Y
   std::optional<Estimate> load_torque;   ///< [N m] of the cut, by the load meter
   std::optional<Estimate> motor_torque;  ///< [N m] by the spindle's current
-  std::array<std::optional<Estimate>, 3> motor_force;   ///< [N] mean, of axes that moved
+  std::array<std::optional<Estimate>, 3> motor_force;  ///< [N] mean, of axes that moved
+  /// [N] what that is where the cut pulls the axis on; empty: it cannot be.
+  std::array<std::optional<Estimate>, 3> motor_other;
   std::array<std::optional<Estimate>, 3> sensor_force;  ///< [N] mean, of a force sensor
   std::array<std::optional<Estimate>, 3> sensor_rms;    ///< [N] variation over a tooth, of the sensor
 };

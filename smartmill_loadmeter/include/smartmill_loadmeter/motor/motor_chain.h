@@ -71,8 +71,10 @@ struct MotorForce {
   double stamp = 0.0;                            ///< [s] last reading of the test
   std::string name;                              ///< of the test
   std::array<std::optional<Estimate>, 3> force;  ///< [N] mean force on the tool, machine X, Y, Z
-  std::optional<Estimate> torque;                ///< [N m] of the spindle
-  std::array<std::string, 4> reason;             ///< why X, Y, Z, torque are not known
+  /// [N] what it is where the cut pulls the axis on harder than friction holds it: a range has no sign.
+  std::array<std::optional<Estimate>, 3> other;
+  std::optional<Estimate> torque;     ///< [N m] of the spindle
+  std::array<std::string, 4> reason;  ///< why X, Y, Z, torque are not known
   /// E.g. "Fx -120.1 +- 3.0 N; Fy not observable: the axis stands still".
   std::string text() const;
 };
