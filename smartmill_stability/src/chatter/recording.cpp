@@ -27,6 +27,7 @@ constexpr double STANDS = 0.6;                          // [1] of the cut's wind
 constexpr double CONTRAST = 1.8;                        // [x] power of cutting over not cutting
 constexpr double LEAST_SHARE = 0.02;                    // [1] of the harmonics' power
 constexpr double BELOW_MODE = 0.06, ABOVE_MODE = 0.15;  // [1] chatter lies above its mode, mostly
+constexpr double APART = 0.5, DRIFT = 0.0006;           // [lines], [1] of the frequency: between companions
 constexpr int COMPANIONS = 4;                           // tooth passings to each side
 
 double decibel(double ratio) {
@@ -114,12 +115,9 @@ class Judge {
     air_ = mean(false);
     floor_ = floorOf(in_cut_);
     findSpeed();
-    verdict_.cut = parts_ || inStep();
-    if (!verdict_.cut) {
-      verdict_.reason = "nothing is heard that cuts";
-      return verdict_;
-    }
     findLines();
+    verdict_.cut = parts_ || verdict_.chatter || inStep();
+    if (!verdict_.cut) verdict_.reason = "nothing is heard that cuts";
     return verdict_;
   }
 
@@ -160,10 +158,38 @@ class Judge {
     }
     parts_ = contrast > std::log(CONTRAST);
     for (std::size_t w = 0; w < level.size(); ++w) cut_.push_back(!parts_ || level[w] > threshold);
+    if (parts_ && !teethPart()) {
+      parts_ = false;
+      cut_.assign(level.size(), true);
+    }
     const auto first = std::find(cut_.begin(), cut_.end(), true) - cut_.begin();
     const auto last = cut_.rend() - std::find(cut_.rbegin(), cut_.rend(), true) - 1;
     verdict_.from = verdict_.spectrogram.time[static_cast<std::size_t>(first)];
     verdict_.to = verdict_.spectrogram.time[static_cast<std::size_t>(last)];
+  }
+
+  /// Louder because the teeth are in it, for a while, and not because a vibration grows in the cut.
+  bool teethPart() {
+    constexpr double TEETH = 3.0;   // [x] power
+    constexpr double LEAST = 0.12;  // [1] of the windows
+    const auto loud = static_cast<double>(std::count(cut_.begin(), cut_.end(), true));
+    const double all = static_cast<double>(cut_.size());
+    if (std::min(loud, all - loud) < std::max(2.0, LEAST * all)) return false;
+    const std::vector<double> cut = mean(true), air = mean(false);
+    double in = 0.0, out = 0.0;
+    const double tooth = request_.teeth * request_.speed / units::TWO_PI;
+    for (double f = tooth; f < verdict_.spectrogram.frequency.back(); f += tooth) {
+      const double reach = request_.speed_error * f + MAIN_LOBE * step_;
+      if (f < LOWEST) continue;
+      if (reach > 0.25 * tooth) break;  // higher ones cannot be told apart
+      const auto from = static_cast<std::size_t>((f - reach) / step_);
+      const auto to = std::min(cut.size() - 1, static_cast<std::size_t>((f + reach) / step_));
+      for (std::size_t k = from; k <= to; ++k) {
+        in += cut[k];
+        out += air[k];
+      }
+    }
+    return in > TEETH * out;
   }
 
   /// Mean over the windows of one kind whose neighbours are of that kind too; all of the kind where there is
@@ -200,7 +226,7 @@ class Judge {
 
   void findSpeed() {
     verdict_.speed = request_.speed;
-    double best = 1.05 * comb(request_.speed);  // what is told has the benefit of the doubt
+    double best = 1.15 * comb(request_.speed);  // what is told has the benefit of the doubt
     const double step = 0.3 * step_ / verdict_.spectrogram.frequency.back();
     for (double off = -request_.speed_error; off <= request_.speed_error; off += step) {
       const double speed = request_.speed * (1.0 + off), score = comb(speed);
@@ -227,7 +253,6 @@ class Judge {
     return off < MAIN_LOBE * step_ + SPREAD * frequency;
   }
 
-  /// Mains hum and what its rectifiers make of it is the shop's.
   bool narrowLine(std::size_t k) const {
     constexpr std::size_t BESIDE = 6;
     if (k < BESIDE + 2 || k + BESIDE + 2 >= in_cut_.size()) return false;
@@ -236,7 +261,8 @@ class Judge {
     const auto beside = [&](std::size_t at) {
       return (in_cut_[at - 1] + in_cut_[at] + in_cut_[at + 1]) / 3.0;
     };
-    return beside(k - BESIDE) < NARROW * p && beside(k + BESIDE) < NARROW * p;
+    // On one side a harmonic may stand.
+    return std::min(beside(k - BESIDE), beside(k + BESIDE)) < NARROW * p;
   }
 
   double overAir(std::size_t k) const {
@@ -273,7 +299,7 @@ class Judge {
         const double order = std::round(away / passing());
         if (std::abs(order) > COMPANIONS && sign > 0.0) continue;
         if (std::abs(away - order * passing()) >
-            1.5 * step_ + SPREAD * std::max(other.frequency, line.frequency))
+            APART * step_ + DRIFT * std::max(other.frequency, line.frequency))
           continue;
         ++found;
         *power += other.power;
@@ -309,7 +335,7 @@ class Judge {
         continue;
       }
       // Its main lobe is about four lines of the mean wide.
-      lines.push_back({f, 2.0 * in_cut_[k], k});
+      lines.push_back({vertex(k), 2.0 * in_cut_[k], k});
     }
     decide(lines, harmonics, alone_in_air);
   }
@@ -330,7 +356,7 @@ class Judge {
       }
       const bool due = request_.modes.empty() || near;
       // Without air to compare with, another machine's tone is told by its loneliness alone.
-      const int needed = parts_ && (near || std::isfinite(mode)) ? 0 : 1;
+      const int needed = !parts_ ? 2 : std::isfinite(mode) ? 0 : 1;
       weak = weak || share < LEAST_SHARE;
       lonely = lonely || companions < needed;
       far = far || !due;
@@ -358,7 +384,7 @@ class Judge {
   bool sameFamily(const Line& a, const Line& b) const {
     for (const double sign : {1.0, -1.0}) {
       const double off = std::remainder(b.frequency - sign * a.frequency, passing());
-      if (std::abs(off) < 1.5 * step_ + SPREAD * std::max(a.frequency, b.frequency)) return true;
+      if (std::abs(off) < APART * step_ + DRIFT * std::max(a.frequency, b.frequency)) return true;
     }
     return false;
   }
