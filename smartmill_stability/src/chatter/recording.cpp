@@ -17,14 +17,15 @@ constexpr double LOWEST = 80.0, HIGHEST = 6000.0;            // [Hz] looked at
 constexpr double TURNS = 32.0;                               // revolutions of a window
 constexpr double LEAST_WINDOW = 0.08, LONGEST_WINDOW = 0.8;  // [s]
 constexpr int LEAST_WINDOWS = 5;
-constexpr double MAIN_LOBE = 3.5;                       // [lines] half width of a sine under the window
-constexpr double SPREAD = 0.0015;                       // [1] of the frequency: the spindle's speed varies
-constexpr double LINE = 14.0;                           // [x] of what is beside it, power
-constexpr double NARROW = 0.06;                         // [1] of a line's power, this far beside it at most
-constexpr double AIR = 6.0;                             // [x] over the same line out of the cut, power
-constexpr double PRESENT = 5.0;                         // [x] of what is beside it, in one window
-constexpr double STANDS = 0.6;                          // [1] of the cut's windows
-constexpr double CONTRAST = 1.8;                        // [x] power of cutting over not cutting
+constexpr double MAIN_LOBE = 3.5;  // [lines] half width of a sine under the window
+constexpr double SPREAD = 0.0015;  // [1] of the frequency: the spindle's speed varies
+constexpr double LINE = 14.0;      // [x] of what is beside it, power
+constexpr double NARROW = 0.06;    // [1] of a line's power, this far beside it at most
+constexpr double AIR = 6.0;        // [x] over the same line out of the cut, power
+constexpr double PRESENT = 5.0;    // [x] of what is beside it, in one window
+constexpr double STANDS = 0.6;     // [1] of the cut's windows
+constexpr double CONTRAST = 1.8;   // [x] power of cutting over not cutting
+constexpr double STRONG = 0.3;     // [1] of the harmonics' power: needs no companion where the air is silent
 constexpr double LEAST_SHARE = 0.02;                    // [1] of the harmonics' power
 constexpr double BELOW_MODE = 0.06, ABOVE_MODE = 0.15;  // [1] chatter lies above its mode, mostly
 constexpr double APART = 0.5, DRIFT = 0.0006;           // [lines], [1] of the frequency: between companions
@@ -226,10 +227,13 @@ class Judge {
 
   void findSpeed() {
     verdict_.speed = request_.speed;
-    double best = 1.15 * comb(request_.speed);  // what is told has the benefit of the doubt
+    // A correction beyond what a spindle's load does has to say more.
+    constexpr double LOADED = 0.005, BEYOND = 1.15;
+    double best = comb(request_.speed);
     const double step = 0.3 * step_ / verdict_.spectrogram.frequency.back();
     for (double off = -request_.speed_error; off <= request_.speed_error; off += step) {
-      const double speed = request_.speed * (1.0 + off), score = comb(speed);
+      const double speed = request_.speed * (1.0 + off);
+      const double score = comb(speed) / (std::abs(off) > LOADED ? BEYOND : 1.0);
       if (!(score > best)) continue;
       best = score;
       verdict_.speed = speed;
@@ -247,10 +251,9 @@ class Judge {
     return heard >= 2;
   }
 
-  bool harmonic(double frequency) const {
-    const double turn = verdict_.speed / units::TWO_PI;
-    const double off = std::abs(std::remainder(frequency, turn));
-    return off < MAIN_LOBE * step_ + SPREAD * frequency;
+  /// [Hz] to the nearest order of the turn.
+  double offHarmonic(double frequency) const {
+    return std::abs(std::remainder(frequency, verdict_.speed / units::TWO_PI));
   }
 
   bool narrowLine(std::size_t k) const {
@@ -288,25 +291,25 @@ class Judge {
     return there >= STANDS * cut;
   }
 
-  int companionsOf(const Line& line, const std::vector<Line>& lines, double* power) const {
-    int found = 0;
-    *power = line.power;
+  /// Lines that belong to one.
+  struct Family {
+    int companions = 0;
+    bool adjacent = false;  // one of them is a single tooth passing away
+    double power = 0.0;
+  };
+  Family familyOf(const Line& line, const std::vector<Line>& lines) const {
+    Family family;
+    family.power = line.power;
     for (const Line& other : lines) {
-      if (&other == &line) continue;
-      // Of a real signal the mirrored lines belong to it as well.
-      for (const double sign : {1.0, -1.0}) {
-        const double away = other.frequency - sign * line.frequency;
-        const double order = std::round(away / passing());
-        if (std::abs(order) > COMPANIONS && sign > 0.0) continue;
-        if (std::abs(away - order * passing()) >
-            APART * step_ + DRIFT * std::max(other.frequency, line.frequency))
-          continue;
-        ++found;
-        *power += other.power;
-        break;
-      }
+      if (&other == &line || !sameFamily(line, other)) continue;
+      const double order = (other.frequency - line.frequency) / passing();
+      const bool apart = std::abs(order - std::round(order)) * passing() < tolerance(line, other);
+      if (apart && std::abs(order) > COMPANIONS + 0.5) continue;
+      ++family.companions;
+      family.adjacent = family.adjacent || (apart && std::abs(std::round(order)) == 1.0);
+      family.power += other.power;
     }
-    return found;
+    return family;
   }
 
   bool nearMode(double frequency, double* mode) const {
@@ -325,11 +328,11 @@ class Judge {
     for (std::size_t k = 1; k + 1 < in_cut_.size(); ++k) {
       const double f = verdict_.spectrogram.frequency[k];
       if (f < LOWEST) continue;
-      if (harmonic(f)) {
-        harmonics += std::max(0.0, in_cut_[k] - floor_[k]);
-        continue;
-      }
-      if (!narrowLine(k) || !stands(k)) continue;
+      const bool beside = offHarmonic(f) < MAIN_LOBE * step_ + SPREAD * f;
+      // The flank of a harmonic has no peak of its own.
+      const bool line = narrowLine(k) && offHarmonic(vertex(k)) > step_ + DRIFT * f;
+      if (beside && !line) harmonics += std::max(0.0, in_cut_[k] - floor_[k]);
+      if (!line || !stands(k)) continue;
       if (parts_ && overAir(k) < AIR) {
         ++alone_in_air;
         continue;
@@ -345,25 +348,26 @@ class Judge {
     double best_power = 0.0;
     bool weak = false, lonely = false, far = false;
     for (const Line& line : lines) {
-      double power = 0.0, mode = RecordingVerdict::UNKNOWN;
-      const int companions = companionsOf(line, lines, &power);
-      const double share = power / std::max(1e-30, harmonics);
+      const Family family = familyOf(line, lines);
+      double mode = RecordingVerdict::UNKNOWN;
+      const double share = family.power / std::max(1e-30, harmonics);
       bool near = nearMode(line.frequency, &mode);
       for (const Line& other : lines) {
         double off = RecordingVerdict::UNKNOWN;
-        if (companions > 0 && sameFamily(line, other)) near = near || nearMode(other.frequency, &off);
+        if (family.companions > 0 && sameFamily(line, other)) near = near || nearMode(other.frequency, &off);
         if (std::isnan(mode)) mode = off;
       }
       const bool due = request_.modes.empty() || near;
       // Without air to compare with, another machine's tone is told by its loneliness alone.
-      const int needed = !parts_ ? 2 : std::isfinite(mode) ? 0 : 1;
+      const bool belongs = parts_ ? family.companions > 0 || std::isfinite(mode) || share > STRONG
+                                  : family.companions > 1 || family.adjacent;
       weak = weak || share < LEAST_SHARE;
-      lonely = lonely || companions < needed;
+      lonely = lonely || !belongs;
       far = far || !due;
-      if (share < LEAST_SHARE || companions < needed || !due || line.power <= best_power) continue;
+      if (share < LEAST_SHARE || !belongs || !due || line.power <= best_power) continue;
       best = &line;
       best_power = line.power;
-      verdict_.companions = companions;
+      verdict_.companions = family.companions;
       verdict_.share = share;
       verdict_.mode = mode;
     }
@@ -381,11 +385,15 @@ class Judge {
                                : "no line beside the harmonics";
   }
 
+  double tolerance(const Line& a, const Line& b) const {
+    return APART * step_ + DRIFT * std::max(a.frequency, b.frequency);
+  }
+
+  /// A whole number of tooth passings apart; of a real signal the mirrored lines belong to it as well.
   bool sameFamily(const Line& a, const Line& b) const {
-    for (const double sign : {1.0, -1.0}) {
-      const double off = std::remainder(b.frequency - sign * a.frequency, passing());
-      if (std::abs(off) < APART * step_ + DRIFT * std::max(a.frequency, b.frequency)) return true;
-    }
+    for (const double sign : {1.0, -1.0})
+      if (std::abs(std::remainder(b.frequency - sign * a.frequency, passing())) < tolerance(a, b))
+        return true;
     return false;
   }
 
