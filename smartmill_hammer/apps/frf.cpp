@@ -288,6 +288,14 @@ void runBag(const Options& options) {
     throw Error(options.inputs[0] + ": no measurement came to its end; the last: " + results.back().message);
 }
 
+void addChannels(const CommandOptions& line, ChannelNames& channels) {
+  line.option("--force-channel", channels.force, "column or channel of the hammer, where it is not named so");
+  line.option("--response-channel", channels.response, "column or channel of the response");
+  line.option("--sound-channels", channels.sound,
+              "of WAV, FLAC or AIFF: NUMBER:NAME=SCALE,..., what full scale is in SI units, e.g. "
+              "1:hammer=2000,2:acceleration=500");
+}
+
 void run(const Options& options) {
   std::vector<TapFormat> formats;
   for (const std::string& file : options.inputs) {
@@ -335,12 +343,7 @@ int main(int argc, char** argv) {
   line.flag("--real-modes", o.real_modes, "proportional damping: gains without phase");
   line.option("--average", o.average, "of hits: h1, h2 or hv").oneOf({"h1", "h2", "hv"}).showDefault();
   line.option("--weak-force", o.weak_force, "[N] a lower peak is no hit; 0: told by the noise").notNegative();
-  line.option("--force-channel", o.channels.force,
-              "column or channel of the hammer, where it is not named so");
-  line.option("--response-channel", o.channels.response, "column or channel of the response");
-  line.option("--sound-channels", o.channels.sound,
-              "of WAV, FLAC or AIFF: NUMBER:NAME=SCALE,..., what full scale is in SI units, e.g. "
-              "1:hammer=2000,2:acceleration=500");
+  smartmill::hammer::addChannels(line, o.channels);
   line.option("--stickout-mm", o.tip.stickout,
               "tool out of the holder: the direct FRF at the tip, of one struck above it")
       .notNegative();

@@ -48,8 +48,7 @@ void list(const Options& o) {
   }
 }
 
-void find(const Options& o) {
-  mustExist(o.file);
+CoefficientQuery queryOf(const Options& o) {
   CoefficientQuery query;
   query.tool = o.tool;
   query.material = o.material;
@@ -59,8 +58,13 @@ void find(const Options& o) {
   query.helix = units::radFromDeg(o.helix);
   query.rake = units::radFromDeg(o.rake);
   query.edge_age = 60.0 * o.age;
+  return query;
+}
+
+void find(const Options& o) {
+  mustExist(o.file);
   const CoefficientDatabase database(o.file);
-  const auto found = database.estimate(query);
+  const auto found = database.estimate(queryOf(o));
   if (!found) {
     throw Error(o.file + ": nothing for '" + o.tool + "' in '" + o.material +
                 "'; known: " + database.contents());
@@ -73,16 +77,8 @@ void find(const Options& o) {
 
 void answer(const Options& o) {
   mustExist(o.file);
-  CoefficientQuery query;
-  query.tool = o.tool;
-  query.material = o.material;
-  query.cutting_speed = o.cutting_speed * units::M_PER_MIN;
-  query.feed_per_tooth = o.feed * units::MM;
-  query.diameter = o.diameter * units::MM;
-  query.helix = units::radFromDeg(o.helix);
-  query.rake = units::radFromDeg(o.rake);
   const CoefficientDatabase database(o.file);
-  const auto found = recommendCut(database, query);
+  const auto found = recommendCut(database, queryOf(o));
   if (!found) throw Error(o.file + ": nothing in '" + o.material + "'; known: " + database.contents());
   std::printf("%s\n", found->message.c_str());
   for (const WayAnswer& way : found->ways)
@@ -111,6 +107,15 @@ void predictFor(const Options& o) {
   std::printf("# from %d sets: shear stress %.1f N/mm2, shear angle %.2f deg, friction angle %.2f deg\n%s",
               p.sets, zone.shear_stress / units::N_PER_MM2, units::degFromRad(zone.shear_angle),
               units::degFromRad(zone.friction_angle), cuttingSection(k.value, k.std_dev).c_str());
+}
+
+/// What is known of the cut; of a tool that has cut something its records may know rake and helix.
+void cutOptions(const CommandOptions& command, Options& o) {
+  command.option("--cutting-speed", o.cutting_speed, "[m/min]");
+  command.option("--feed-per-tooth", o.feed, "[mm]");
+  command.option("--diameter", o.diameter, "[mm]");
+  command.option("--helix", o.helix, "[deg]");
+  command.option("--rake", o.rake, "[deg] normal rake");
 }
 
 void progressOf(const char* verb, const FleetTransfer& done) {
@@ -232,11 +237,7 @@ int main(int argc, char** argv) {
   const CommandOptions find_command =
       line.command("find", "best knowledge for a cut, uncertainty growing with distance from what was tried");
   pair(find_command);
-  find_command.option("--cutting-speed", o.cutting_speed, "[m/min]");
-  find_command.option("--feed-per-tooth", o.feed, "[mm]");
-  find_command.option("--diameter", o.diameter, "[mm]");
-  find_command.option("--helix", o.helix, "[deg]");
-  find_command.option("--rake", o.rake, "[deg] normal rake");
+  cutOptions(find_command, o);
   find_command.option("--edge-age", o.age, "[min] cutting time of the edge");
   const CommandOptions predict_command = line.command(
       "predict", "another tool's coefficients by way of shear angle, friction angle and shear stress");
@@ -248,11 +249,7 @@ int main(int argc, char** argv) {
       "what to cut a material with this tool by, though they may never have met, and how sure it is");
   answer_command.option("--tool", o.tool, "name of the tool").required();
   answer_command.option("--material", o.material, "workpiece material").required();
-  answer_command.option("--rake", o.rake, "[deg] normal rake (default: what its records say)");
-  answer_command.option("--helix", o.helix, "[deg] (default: what its records say)");
-  answer_command.option("--diameter", o.diameter, "[mm]");
-  answer_command.option("--cutting-speed", o.cutting_speed, "[m/min]");
-  answer_command.option("--feed-per-tooth", o.feed, "[mm]");
+  cutOptions(answer_command, o);
   const CommandOptions merge_command = line.command("merge", "takes over what another machine's file has");
   merge_command.option("OTHER", o.other, "SQLite file").required();
   const CommandOptions export_command = line.command("export", "writes everything as .csv or .yaml");

@@ -120,6 +120,18 @@ bool drawFrf(const SessionRecording& recording, const std::filesystem::path& fol
   return true;
 }
 
+/// The margin to both flanks of the lobe, at the recommended depth.
+std::string marginOf(const StabilityChart& chart, const std::filesystem::path& folder) {
+  const StabilityPoint& best = chart.recommended.front();
+  const auto [below, above] = lobeFlanks(chart.limit, best.spindle_speed, best.axial_depth);
+  Table margin(folder / "data" / "chart_margin.dat");
+  for (const double speed : {best.spindle_speed - below, best.spindle_speed, best.spindle_speed + above})
+    margin.row({units::rpmFromRadPerSec(speed), best.axial_depth / units::MM});
+  return margin.close() + " using 1:2 with linespoints pt 3 lw 2.5 lc rgb '#008800' title 'recommended: " +
+         formatted("-%.1f %% and +%.1f %% to the flanks'", 100.0 * below / best.spindle_speed,
+                   100.0 * above / best.spindle_speed);
+}
+
 bool drawChart(const SessionRecording& recording, const Report& report,
                const std::optional<StabilityChart>& true_chart, const std::filesystem::path& folder) {
   if (!recording.chart || recording.chart->limit.spindle_speed.empty()) return false;
@@ -155,17 +167,8 @@ bool drawChart(const SessionRecording& recording, const Report& report,
     plot += ", " + file + " using 1:4 with lines dt 3 lw 1.5 lc rgb '#aa00aa' title 'spindle power'";
   }
   if (!chart.recommended.empty()) {
-    // The margin to both flanks of the lobe, at the recommended depth.
-    const StabilityPoint& best = chart.recommended.front();
-    const auto [below, above] = lobeFlanks(chart.limit, best.spindle_speed, best.axial_depth);
-    Table margin(folder / "data" / "chart_margin.dat");
-    for (const double speed : {best.spindle_speed - below, best.spindle_speed, best.spindle_speed + above})
-      margin.row({units::rpmFromRadPerSec(speed), best.axial_depth / units::MM});
-    plot += ", " + margin.close() +
-            " using 1:2 with linespoints pt 3 lw 2.5 lc rgb '#008800' title 'recommended: " +
-            formatted("-%.1f %% and +%.1f %% to the flanks'", 100.0 * below / best.spindle_speed,
-                      100.0 * above / best.spindle_speed);
-    highest = std::max(highest, 1.4 * best.axial_depth);
+    plot += ", " + marginOf(chart, folder);
+    highest = std::max(highest, 1.4 * chart.recommended.front().axial_depth);
   }
   for (const CutCheck& cut : report.cuts) {
     Table point(folder / "data" / (cut.name + ".dat"));

@@ -6,8 +6,8 @@
 
 namespace smartmill::cnc::linuxcnc {
 
-GatewayClient::GatewayClient(const std::string& folder, double timeout)
-    : path_(folder + "/" + GATEWAY_SOCKET), timeout_(timeout) {
+GatewayClient::GatewayClient(const std::string& folder, double timeout, const char* socket)
+    : path_(folder + "/" + socket), timeout_(timeout) {
 }
 
 void GatewayClient::connect() {
@@ -44,6 +44,10 @@ MachineStatus GatewayClient::status() {
 
 Reply GatewayClient::carryOut(const Command& command) {
   return exchange<Reply>(command);
+}
+
+Reply GatewayClient::carryOut(const SetOverrides& overrides) {
+  return exchange<Reply>(overrides);
 }
 
 }  // namespace smartmill::cnc::linuxcnc

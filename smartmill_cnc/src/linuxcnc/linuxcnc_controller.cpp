@@ -71,7 +71,7 @@ Failure::Kind kindOf(Reply::Code code) {
 
 class LinuxCncController : public Controller {
  public:
-  LinuxCncController(const LinuxCncParameters& parameters, std::shared_ptr<ServoStream> stream,
+  LinuxCncController(const LinuxCncParameters& parameters, std::shared_ptr<const ServoStream> stream,
                      double (*now)())
       : folder_(parameters.folder),
         timeout_(parameters.timeout),
@@ -170,7 +170,7 @@ class LinuxCncController : public Controller {
   bool takesOverrides() const override { return true; }
   Result<Overrides> setOverrides(const Overrides& wanted) override {
     const Overrides taken{std::min(1.0, wanted.feed), wanted.spindle};
-    const Reply reply = stream_->setOverrides({taken.feed, taken.spindle}, timeout_);
+    const Reply reply = askStream(SetOverrides{taken.feed, taken.spindle});
     if (reply.code != Reply::Code::done) {
       return Failure{kindOf(reply.code), reply.text};
     }
@@ -183,6 +183,17 @@ class LinuxCncController : public Controller {
     client_.close();
     open_ = false;
     return {Failure::Kind::lost, why};
+  }
+
+  /// By a connection of its own, since that of the servo cycles is read elsewhere.
+  Reply askStream(const SetOverrides& overrides) const {
+    try {
+      GatewayClient stream(folder_, timeout_, STREAM_SOCKET);
+      stream.connect();
+      return stream.carryOut(overrides);
+    } catch (const Error& e) {
+      return {Reply::Code::refused, e.what()};
+    }
   }
 
   Status tell(const Command& command) {
@@ -251,7 +262,7 @@ class LinuxCncController : public Controller {
   const std::string folder_;
   const double timeout_;  // [s]
   GatewayClient client_;
-  std::shared_ptr<ServoStream> stream_;
+  std::shared_ptr<const ServoStream> stream_;
   double (*now_)();
   Stillness silence_;
   std::uint64_t servo_count_ = 0;
@@ -273,7 +284,8 @@ std::string linuxCncText(const std::string& program) {
 }
 
 std::unique_ptr<Controller> makeLinuxCncController(const LinuxCncParameters& parameters,
-                                                   std::shared_ptr<ServoStream> stream, double (*now)()) {
+                                                   std::shared_ptr<const ServoStream> stream,
+                                                   double (*now)()) {
   if (parameters.folder.empty()) {
     throw Error("linuxcnc_folder: the folder of the machine is due");
   }

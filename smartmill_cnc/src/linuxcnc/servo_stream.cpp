@@ -1,7 +1,6 @@
 #include "smartmill_cnc/linuxcnc/servo_stream.h"
 
 #include <algorithm>
-#include <chrono>
 #include <utility>
 
 #include "smartmill_core/error.h"
@@ -57,9 +56,6 @@ std::vector<ServoStretch> ServoStream::step(double wait, double (*now)()) {
     if (load_ && connection_.open()) {
       connection_.send(SetLoad{*std::exchange(load_, std::nullopt)});
     }
-    if (wanted_ && connection_.open()) {
-      connection_.send(*std::exchange(wanted_, std::nullopt), asked_);
-    }
   }
   std::vector<ServoStretch> stretches;
   connection_.wait(wait);
@@ -69,12 +65,6 @@ std::vector<ServoStretch> ServoStream::step(double wait, double (*now)()) {
     if (const auto* block = std::get_if<ServoBlock>(&received->message)) {
       for (ServoStretch& stretch : take(*block, arrival)) {
         stretches.push_back(std::move(stretch));
-      }
-    } else if (const auto* reply = std::get_if<Reply>(&received->message)) {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      if (received->sequence == asked_) {
-        answer_ = *reply;
-        answered_.notify_all();
       }
     }
   }
@@ -145,19 +135,6 @@ std::uint64_t ServoStream::count() const {
 void ServoStream::setLoad(double spindle_load) {
   const std::lock_guard<std::mutex> lock(mutex_);
   load_ = spindle_load;
-}
-
-Reply ServoStream::setOverrides(const SetOverrides& wanted, double timeout) {
-  std::unique_lock<std::mutex> lock(mutex_);
-  ++asked_;
-  answer_.reset();
-  wanted_ = wanted;
-  if (!answered_.wait_for(lock, std::chrono::duration<double>(timeout),
-                          [this] { return answer_.has_value(); })) {
-    wanted_.reset();
-    return {Reply::Code::refused, "the servo stream does not answer"};
-  }
-  return *answer_;
 }
 
 ServoStatistics ServoStream::statistics() const {

@@ -37,8 +37,11 @@ Status MotionMachine::step(const Reading& reading, double now) {
     return watched;
   }
   switch (phase_) {
-    case Phase::opening:
-      return open();
+    case Phase::opening: {
+      // A program that follows another at once begins with 100 % as well.
+      const Status back = putOverridesBack();
+      return back ? open() : back;
+    }
     case Phase::sending:
       return send();
     case Phase::running:

@@ -312,6 +312,34 @@ TEST_F(LinuxCncMachine, FeedHoldStandsAndGoesOnWhereItStood) {
   EXPECT_EQ(outcome().code, MotionCode::cancelled);
 }
 
+TEST_F(LinuxCncMachine, OverridesActAtOnceAndGoBackWithTheProgram) {
+  cut();
+  const OverrideAnswer answer = bridge_->setOverrides({0.5, 0.9}, "chatter");
+  ASSERT_EQ(answer.code, OverrideCode::ok) << answer.message;
+  EXPECT_EQ(answer.taken.feed, 0.5);
+  EXPECT_TRUE(until(
+      [&] {
+        const ServoSample& s = samples_.back();
+        return std::abs(s.velocity - 0.010) < 1e-5 &&
+               std::abs(s.spindle_speed - units::radPerSecFromRpm(2700.0)) < 1e-3;
+      },
+      5.0));
+  // motion.adaptive-feed goes up to 1.
+  EXPECT_EQ(bridge_->setOverrides({1.1, 1.1}, "").taken.feed, 1.0);
+  EXPECT_TRUE(until(
+      [&] {
+        const ServoSample& s = samples_.back();
+        return std::abs(s.velocity - 0.020) < 1e-5 &&
+               std::abs(s.spindle_speed - units::radPerSecFromRpm(3300.0)) < 1e-3;
+      },
+      5.0));
+  EXPECT_EQ(bridge_->setOverrides({0.01, 1.0}, "").code, OverrideCode::limit);
+  bridge_->cancel();
+  EXPECT_EQ(outcome().code, MotionCode::cancelled);
+  ASSERT_EQ(run("S3000 M3\nG4 P700\n").code, MotionCode::ok);
+  EXPECT_NEAR(samples_.back().spindle_speed, units::radPerSecFromRpm(3000.0), 1e-3);
+}
+
 TEST_F(LinuxCncMachine, AnAbortStopsAxesAndSpindleAndTheNextProgramRuns) {
   cut();
   bridge_->cancel();

@@ -46,11 +46,16 @@ CoefficientQuery asked(const std::string& tool, const std::string& material) {
   return query;
 }
 
-TEST(RecommendCut, thePairItselfIsSurest) {
-  CoefficientDatabase database("");
+/// Two tools in steel, one of them in aluminium.
+void fill(CoefficientDatabase& database, const std::string& in_aluminium) {
   database.add(record("a", "steel", 2e9, 0.01));
   database.add(record("b", "steel", 2.2e9, 0.01));
-  database.add(record("b", "aluminium", 0.8e9, 0.01));
+  database.add(record(in_aluminium, "aluminium", 0.8e9, 0.01));
+}
+
+TEST(RecommendCut, thePairItselfIsSurest) {
+  CoefficientDatabase database("");
+  fill(database, "b");
   const auto answer = recommendCut(database, asked("a", "steel"));
   ASSERT_TRUE(answer);
   EXPECT_EQ(answer->way, AnswerWay::pair);
@@ -63,9 +68,7 @@ TEST(RecommendCut, thePairItselfIsSurest) {
 // Two tools, two materials, three pairs cut: in logs the fourth is their sum, K = 0.8 x 1.1.
 TEST(RecommendCut, standardCutsCarryOverToAPairThatNeverMet) {
   CoefficientDatabase database("");
-  database.add(record("a", "steel", 2e9, 0.01));
-  database.add(record("b", "steel", 2.2e9, 0.01));
-  database.add(record("a", "aluminium", 0.8e9, 0.01));
+  fill(database, "a");
   const auto answer = recommendCut(database, asked("b", "aluminium"));
   ASSERT_TRUE(answer);
   EXPECT_EQ(answer->way, AnswerWay::standard_cuts);
@@ -108,9 +111,7 @@ TEST(RecommendCut, theShearZoneKnowsAToolThatHasCutNothing) {
 
 TEST(RecommendCut, waysThatDisagreeMakeItLessSure) {
   CoefficientDatabase database("");
-  database.add(record("a", "steel", 2e9, 0.01));
-  database.add(record("b", "steel", 2.2e9, 0.01));
-  database.add(record("a", "aluminium", 0.8e9, 0.01));
+  fill(database, "a");
   const auto before = recommendCut(database, asked("b", "aluminium"));
   database.add(record("b", "aluminium", 1.6e9, 0.1));
   const auto after = recommendCut(database, asked("b", "aluminium"));

@@ -7,6 +7,7 @@
 #include <memory>
 #include <random>
 
+#include "smartmill_core/cutting/lobe_flanks.h"
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/units.h"
@@ -52,6 +53,28 @@ std::vector<StabilityPoint> pick(
     if (!near) chosen.push_back(point);
   }
   return chosen;
+}
+
+/// Where the spindle's power limits the removal rate it hardly changes over the pocket: of cuts that remove
+/// nearly as much, the one with the widest margin of speed to the nearer flank of its lobe.
+StabilityPoint farthestFromFlanks(const StabilityLimit& limit, const std::vector<StabilityPoint>& cuts,
+                                  const StabilityPoint& best) {
+  constexpr double AS_MUCH = 0.98;
+  const auto margin = [&](const StabilityPoint& cut) {
+    const auto [below, above] = lobeFlanks(limit, cut.spindle_speed, cut.axial_depth);
+    return std::min(below, above) / cut.spindle_speed;
+  };
+  const auto at = std::find_if(cuts.begin(), cuts.end(), [&](const StabilityPoint& cut) {
+    return cut.spindle_speed == best.spindle_speed;
+  });
+  const auto enough = [&](const StabilityPoint& cut) {
+    return cut.material_removal_rate >= AS_MUCH * best.material_removal_rate;
+  };
+  auto from = at, to = at;
+  while (from != cuts.begin() && enough(*(from - 1))) --from;
+  while (to != cuts.end() && enough(*to)) ++to;
+  return *std::max_element(
+      from, to, [&](const StabilityPoint& a, const StabilityPoint& b) { return margin(a) < margin(b); });
 }
 
 }  // namespace
@@ -396,6 +419,7 @@ void ChartMaker::recommend(StabilityChart& chart, const StabilityLimit& wide) co
       pick(peaks, parameters_.recommended, [](const StabilityPoint& a, const StabilityPoint& b) {
         return a.material_removal_rate > b.material_removal_rate;
       });
+  for (StabilityPoint& best : chart.recommended) best = farthestFromFlanks(chart.limit, cuts, best);
 }
 
 void ChartMaker::proposeUnstable(StabilityChart& chart, const StabilityLimit& wide) const {

@@ -156,6 +156,31 @@ void ChatterAdvisor::handle(const ChatterState& state) {
   advise(state);
 }
 
+namespace {
+
+/// Speeds at which the teeth pass in step with the chatter, fastest first, then with a mode (a flip's
+/// frequency is no mode's: the pockets lie there). Limits are not known yet.
+std::vector<ChatterAdvice::Speed> inStep(double frequency, int teeth, const std::vector<SystemMode>& modes,
+                                         double low, double high) {
+  constexpr std::size_t MOST_SPEEDS = 12;
+  constexpr double ALIKE = 0.01, UNKNOWN = std::numeric_limits<double>::quiet_NaN();
+  std::vector<double> proposed = speedsFromChatter(frequency, teeth, low, high);
+  if (proposed.size() > MOST_SPEEDS) proposed.resize(MOST_SPEEDS);
+  for (const SystemMode& mode : modes)
+    for (const double s : speedsFromChatter(mode.frequency, teeth, low, high))
+      if (proposed.size() < 4 * MOST_SPEEDS) proposed.push_back(s);
+  std::vector<ChatterAdvice::Speed> speeds;
+  for (const double s : proposed) {
+    if (std::none_of(speeds.begin(), speeds.end(), [&](const ChatterAdvice::Speed& other) {
+          return std::abs(other.speed / s - 1.0) < ALIKE;
+        }))
+      speeds.push_back({s, UNKNOWN, UNKNOWN});
+  }
+  return speeds;
+}
+
+}  // namespace
+
 void ChatterAdvisor::advise(const ChatterState& state) {
   ChatterAdvice advice;
   advice.stamp = state.stamp;
@@ -189,24 +214,8 @@ void ChatterAdvisor::advise(const ChatterState& state) {
       advice.corrected_limit = limitOf(*system);
     }
   }
-  std::vector<double> proposed = speedsFromChatter(frequency, teeth, low_, high_);
-  constexpr std::size_t MOST_SPEEDS = 12;
-  if (proposed.size() > MOST_SPEEDS) proposed.resize(MOST_SPEEDS);
   const bool known = system && most > 0.0;
-  if (known) {
-    // A flip's frequency is no mode's: the pockets lie where the teeth pass in step with a mode.
-    for (const SystemMode& mode : system->modes)
-      for (const double s : speedsFromChatter(mode.frequency, teeth, low_, high_))
-        if (proposed.size() < 4 * MOST_SPEEDS) proposed.push_back(s);
-  }
-  for (const double s : proposed) {
-    constexpr double ALIKE = 0.01;
-    constexpr double UNKNOWN = std::numeric_limits<double>::quiet_NaN();
-    if (std::none_of(advice.speeds.begin(), advice.speeds.end(), [&](const ChatterAdvice::Speed& other) {
-          return std::abs(other.speed / s - 1.0) < ALIKE;
-        }))
-      advice.speeds.push_back({s, UNKNOWN, UNKNOWN});
-  }
+  advice.speeds = inStep(frequency, teeth, known ? system->modes : std::vector<SystemMode>(), low_, high_);
   if (early_) early_(advice);
   for (ChatterAdvice::Speed& one : advice.speeds) {
     if (!known) break;

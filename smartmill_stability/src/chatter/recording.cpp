@@ -17,16 +17,18 @@ constexpr double LOWEST = 80.0, HIGHEST = 6000.0;            // [Hz] looked at
 constexpr double TURNS = 32.0;                               // revolutions of a window
 constexpr double LEAST_WINDOW = 0.08, LONGEST_WINDOW = 0.8;  // [s]
 constexpr int LEAST_WINDOWS = 5;
-constexpr double MAIN_LOBE = 3.5;                       // [lines] half width of a sine under the window
-constexpr double SPREAD = 0.0015;                       // [1] of the frequency: the spindle's speed varies
-constexpr double LINE = 14.0;                           // [x] of what is beside it, power
-constexpr double NARROW = 0.06;                         // [1] of a line's power, this far beside it at most
-constexpr double AIR = 6.0;                             // [x] over the same line out of the cut, power
-constexpr double PRESENT = 5.0;                         // [x] of what is beside it, in one window
-constexpr double STANDS = 0.6;                          // [1] of the cut's windows
-constexpr double CONTRAST = 1.8;                        // [x] power of cutting over not cutting
+constexpr double MAIN_LOBE = 3.5;  // [lines] half width of a sine under the window
+constexpr double SPREAD = 0.0015;  // [1] of the frequency: the spindle's speed varies
+constexpr double LINE = 14.0;      // [x] of what is beside it, power
+constexpr double NARROW = 0.06;    // [1] of a line's power, this far beside it at most
+constexpr double AIR = 6.0;        // [x] over the same line out of the cut, power
+constexpr double PRESENT = 5.0;    // [x] of what is beside it, in one window
+constexpr double STANDS = 0.6;     // [1] of the cut's windows
+constexpr double CONTRAST = 1.8;   // [x] power of cutting over not cutting
+constexpr double STRONG = 0.3;     // [1] of the harmonics' power: needs no companion where the air is silent
 constexpr double LEAST_SHARE = 0.02;                    // [1] of the harmonics' power
 constexpr double BELOW_MODE = 0.06, ABOVE_MODE = 0.15;  // [1] chatter lies above its mode, mostly
+constexpr double APART = 0.5, DRIFT = 0.0006;           // [lines], [1] of the frequency: between companions
 constexpr int COMPANIONS = 4;                           // tooth passings to each side
 
 double decibel(double ratio) {
@@ -114,12 +116,9 @@ class Judge {
     air_ = mean(false);
     floor_ = floorOf(in_cut_);
     findSpeed();
-    verdict_.cut = parts_ || inStep();
-    if (!verdict_.cut) {
-      verdict_.reason = "nothing is heard that cuts";
-      return verdict_;
-    }
     findLines();
+    verdict_.cut = parts_ || verdict_.chatter || inStep();
+    if (!verdict_.cut) verdict_.reason = "nothing is heard that cuts";
     return verdict_;
   }
 
@@ -160,10 +159,38 @@ class Judge {
     }
     parts_ = contrast > std::log(CONTRAST);
     for (std::size_t w = 0; w < level.size(); ++w) cut_.push_back(!parts_ || level[w] > threshold);
+    if (parts_ && !teethPart()) {
+      parts_ = false;
+      cut_.assign(level.size(), true);
+    }
     const auto first = std::find(cut_.begin(), cut_.end(), true) - cut_.begin();
     const auto last = cut_.rend() - std::find(cut_.rbegin(), cut_.rend(), true) - 1;
     verdict_.from = verdict_.spectrogram.time[static_cast<std::size_t>(first)];
     verdict_.to = verdict_.spectrogram.time[static_cast<std::size_t>(last)];
+  }
+
+  /// Louder because the teeth are in it, for a while, and not because a vibration grows in the cut.
+  bool teethPart() {
+    constexpr double TEETH = 3.0;   // [x] power
+    constexpr double LEAST = 0.12;  // [1] of the windows
+    const auto loud = static_cast<double>(std::count(cut_.begin(), cut_.end(), true));
+    const double all = static_cast<double>(cut_.size());
+    if (std::min(loud, all - loud) < std::max(2.0, LEAST * all)) return false;
+    const std::vector<double> cut = mean(true), air = mean(false);
+    double in = 0.0, out = 0.0;
+    const double tooth = request_.teeth * request_.speed / units::TWO_PI;
+    for (double f = tooth; f < verdict_.spectrogram.frequency.back(); f += tooth) {
+      const double reach = request_.speed_error * f + MAIN_LOBE * step_;
+      if (f < LOWEST) continue;
+      if (reach > 0.25 * tooth) break;  // higher ones cannot be told apart
+      const auto from = static_cast<std::size_t>((f - reach) / step_);
+      const auto to = std::min(cut.size() - 1, static_cast<std::size_t>((f + reach) / step_));
+      for (std::size_t k = from; k <= to; ++k) {
+        in += cut[k];
+        out += air[k];
+      }
+    }
+    return in > TEETH * out;
   }
 
   /// Mean over the windows of one kind whose neighbours are of that kind too; all of the kind where there is
@@ -200,10 +227,13 @@ class Judge {
 
   void findSpeed() {
     verdict_.speed = request_.speed;
-    double best = 1.05 * comb(request_.speed);  // what is told has the benefit of the doubt
+    // A correction beyond what a spindle's load does has to say more.
+    constexpr double LOADED = 0.005, BEYOND = 1.15;
+    double best = comb(request_.speed);
     const double step = 0.3 * step_ / verdict_.spectrogram.frequency.back();
     for (double off = -request_.speed_error; off <= request_.speed_error; off += step) {
-      const double speed = request_.speed * (1.0 + off), score = comb(speed);
+      const double speed = request_.speed * (1.0 + off);
+      const double score = comb(speed) / (std::abs(off) > LOADED ? BEYOND : 1.0);
       if (!(score > best)) continue;
       best = score;
       verdict_.speed = speed;
@@ -221,13 +251,11 @@ class Judge {
     return heard >= 2;
   }
 
-  bool harmonic(double frequency) const {
-    const double turn = verdict_.speed / units::TWO_PI;
-    const double off = std::abs(std::remainder(frequency, turn));
-    return off < MAIN_LOBE * step_ + SPREAD * frequency;
+  /// [Hz] to the nearest order of the turn.
+  double offHarmonic(double frequency) const {
+    return std::abs(std::remainder(frequency, verdict_.speed / units::TWO_PI));
   }
 
-  /// Mains hum and what its rectifiers make of it is the shop's.
   bool narrowLine(std::size_t k) const {
     constexpr std::size_t BESIDE = 6;
     if (k < BESIDE + 2 || k + BESIDE + 2 >= in_cut_.size()) return false;
@@ -236,7 +264,8 @@ class Judge {
     const auto beside = [&](std::size_t at) {
       return (in_cut_[at - 1] + in_cut_[at] + in_cut_[at + 1]) / 3.0;
     };
-    return beside(k - BESIDE) < NARROW * p && beside(k + BESIDE) < NARROW * p;
+    // On one side a harmonic may stand.
+    return std::min(beside(k - BESIDE), beside(k + BESIDE)) < NARROW * p;
   }
 
   double overAir(std::size_t k) const {
@@ -262,25 +291,25 @@ class Judge {
     return there >= STANDS * cut;
   }
 
-  int companionsOf(const Line& line, const std::vector<Line>& lines, double* power) const {
-    int found = 0;
-    *power = line.power;
+  /// Lines that belong to one.
+  struct Family {
+    int companions = 0;
+    bool adjacent = false;  // one of them is a single tooth passing away
+    double power = 0.0;
+  };
+  Family familyOf(const Line& line, const std::vector<Line>& lines) const {
+    Family family;
+    family.power = line.power;
     for (const Line& other : lines) {
-      if (&other == &line) continue;
-      // Of a real signal the mirrored lines belong to it as well.
-      for (const double sign : {1.0, -1.0}) {
-        const double away = other.frequency - sign * line.frequency;
-        const double order = std::round(away / passing());
-        if (std::abs(order) > COMPANIONS && sign > 0.0) continue;
-        if (std::abs(away - order * passing()) >
-            1.5 * step_ + SPREAD * std::max(other.frequency, line.frequency))
-          continue;
-        ++found;
-        *power += other.power;
-        break;
-      }
+      if (&other == &line || !sameFamily(line, other)) continue;
+      const double order = (other.frequency - line.frequency) / passing();
+      const bool apart = std::abs(order - std::round(order)) * passing() < tolerance(line, other);
+      if (apart && std::abs(order) > COMPANIONS + 0.5) continue;
+      ++family.companions;
+      family.adjacent = family.adjacent || (apart && std::abs(std::round(order)) == 1.0);
+      family.power += other.power;
     }
-    return found;
+    return family;
   }
 
   bool nearMode(double frequency, double* mode) const {
@@ -299,17 +328,17 @@ class Judge {
     for (std::size_t k = 1; k + 1 < in_cut_.size(); ++k) {
       const double f = verdict_.spectrogram.frequency[k];
       if (f < LOWEST) continue;
-      if (harmonic(f)) {
-        harmonics += std::max(0.0, in_cut_[k] - floor_[k]);
-        continue;
-      }
-      if (!narrowLine(k) || !stands(k)) continue;
+      const bool beside = offHarmonic(f) < MAIN_LOBE * step_ + SPREAD * f;
+      // The flank of a harmonic has no peak of its own.
+      const bool line = narrowLine(k) && offHarmonic(vertex(k)) > step_ + DRIFT * f;
+      if (beside && !line) harmonics += std::max(0.0, in_cut_[k] - floor_[k]);
+      if (!line || !stands(k)) continue;
       if (parts_ && overAir(k) < AIR) {
         ++alone_in_air;
         continue;
       }
       // Its main lobe is about four lines of the mean wide.
-      lines.push_back({f, 2.0 * in_cut_[k], k});
+      lines.push_back({vertex(k), 2.0 * in_cut_[k], k});
     }
     decide(lines, harmonics, alone_in_air);
   }
@@ -319,25 +348,26 @@ class Judge {
     double best_power = 0.0;
     bool weak = false, lonely = false, far = false;
     for (const Line& line : lines) {
-      double power = 0.0, mode = RecordingVerdict::UNKNOWN;
-      const int companions = companionsOf(line, lines, &power);
-      const double share = power / std::max(1e-30, harmonics);
+      const Family family = familyOf(line, lines);
+      double mode = RecordingVerdict::UNKNOWN;
+      const double share = family.power / std::max(1e-30, harmonics);
       bool near = nearMode(line.frequency, &mode);
       for (const Line& other : lines) {
         double off = RecordingVerdict::UNKNOWN;
-        if (companions > 0 && sameFamily(line, other)) near = near || nearMode(other.frequency, &off);
+        if (family.companions > 0 && sameFamily(line, other)) near = near || nearMode(other.frequency, &off);
         if (std::isnan(mode)) mode = off;
       }
       const bool due = request_.modes.empty() || near;
       // Without air to compare with, another machine's tone is told by its loneliness alone.
-      const int needed = parts_ && (near || std::isfinite(mode)) ? 0 : 1;
+      const bool belongs = parts_ ? family.companions > 0 || std::isfinite(mode) || share > STRONG
+                                  : family.companions > 1 || family.adjacent;
       weak = weak || share < LEAST_SHARE;
-      lonely = lonely || companions < needed;
+      lonely = lonely || !belongs;
       far = far || !due;
-      if (share < LEAST_SHARE || companions < needed || !due || line.power <= best_power) continue;
+      if (share < LEAST_SHARE || !belongs || !due || line.power <= best_power) continue;
       best = &line;
       best_power = line.power;
-      verdict_.companions = companions;
+      verdict_.companions = family.companions;
       verdict_.share = share;
       verdict_.mode = mode;
     }
@@ -355,11 +385,15 @@ class Judge {
                                : "no line beside the harmonics";
   }
 
+  double tolerance(const Line& a, const Line& b) const {
+    return APART * step_ + DRIFT * std::max(a.frequency, b.frequency);
+  }
+
+  /// A whole number of tooth passings apart; of a real signal the mirrored lines belong to it as well.
   bool sameFamily(const Line& a, const Line& b) const {
-    for (const double sign : {1.0, -1.0}) {
-      const double off = std::remainder(b.frequency - sign * a.frequency, passing());
-      if (std::abs(off) < 1.5 * step_ + SPREAD * std::max(a.frequency, b.frequency)) return true;
-    }
+    for (const double sign : {1.0, -1.0})
+      if (std::abs(std::remainder(b.frequency - sign * a.frequency, passing())) < tolerance(a, b))
+        return true;
     return false;
   }
 

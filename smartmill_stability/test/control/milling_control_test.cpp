@@ -244,7 +244,8 @@ TEST(DepthsAtRisk, followTheClosedForm) {
   const DrawnLimits limits = drawnLimits(tangential, speeds, 800, 3);
   const double sigma = std::sqrt(std::log1p(SHARE * SHARE));
   const double expected = 1.0 / std::exp(1.644854 * sigma - 0.5 * sigma * sigma);
-  for (const double share : depthsAtRisk(limits, speeds, 0.05, 0.0)) EXPECT_NEAR(share, expected, 0.045);  // 4 sigma of 800 draws
+  for (const double share : depthsAtRisk(limits, speeds, 0.05, 0.0))
+    EXPECT_NEAR(share, expected, 0.045);  // 4 sigma of 800 draws
   // A margin of speed can only take away.
   const auto wide = depthsAtRisk(limits, speeds, 0.05, 0.03), none = depthsAtRisk(limits, speeds, 0.05, 0.0);
   for (std::size_t k = 0; k < speeds.size(); ++k) EXPECT_LE(wide[k], none[k] + 1e-12);

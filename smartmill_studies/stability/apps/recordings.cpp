@@ -3,7 +3,7 @@
 
 #include <cmath>
 #include <cstdio>
-#include <filesystem>
+#include <fstream>
 #include <map>
 #include <string>
 #include <vector>
@@ -34,6 +34,7 @@ void run(const Request& request) {
     int all = 0, said = 0, right = 0, near = 0;
   };
   std::map<stability::SoundKind, Count> counts;
+  std::string list;  // file, told and true speed [rpm], truth, kind
   for (std::size_t k = 0; k < scenes.size(); ++k) {
     const stability::SoundScene& scene = scenes[k];
     stability::RecordingRequest asked;
@@ -54,8 +55,13 @@ void run(const Request& request) {
     if (request.out.empty()) continue;
     SoundFile sound{scene.recording.sample_rate, scene.recording.channels};
     for (double& v : sound.channels[0]) v *= 0.2;
-    writeWav(sound, request.out + formatted("/scene_%03zu.wav", k));
+    const std::string file = request.out + formatted("/scene_%03zu.wav", k);
+    writeWav(sound, file);
+    list +=
+        formatted("%s %.2f %.2f %d %s\n", file.c_str(), units::rpmFromRadPerSec(scene.told_speed),
+                  units::rpmFromRadPerSec(scene.speed), static_cast<int>(scene.chatters), nameOf(scene.kind));
   }
+  if (!request.out.empty()) std::ofstream(request.out + "/scenes.txt") << list;
   int right = 0;
   std::printf("%-38s %6s %12s %6s\n", "kind", "scenes", "said chatter", "right");
   for (const auto& [kind, count] : counts) {

@@ -10,8 +10,9 @@ namespace smartmill::cnc::linuxcnc {
 /// Speaks to linuxcnc_gateway; every question is answered before the next.
 class GatewayClient {
  public:
-  /// @param folder of the machine @param timeout [s] > 0 of every answer
-  GatewayClient(const std::string& folder, double timeout);
+  /// @param folder of the machine @param timeout [s] > 0 of every answer @param socket that of the gateway,
+  /// or of linuxcnc_stream
+  GatewayClient(const std::string& folder, double timeout, const char* socket = GATEWAY_SOCKET);
 
   /// @throws Error of one line.
   void connect();
@@ -21,6 +22,7 @@ class GatewayClient {
   /// @throws Error of one line when no answer comes in time; the connection is closed then.
   MachineStatus status();
   Reply carryOut(const Command& command);
+  Reply carryOut(const SetOverrides& overrides);  ///< by linuxcnc_stream
 
  private:
   template <class Answer>

@@ -30,6 +30,7 @@ std::string linuxCncText(const std::string& program);
 /// too. After an emergency stop or an error the panel (`linuxcnc_panel FOLDER ready`) has to make it ready.
 /// @param stream of the same machine; others may drive it
 std::unique_ptr<Controller> makeLinuxCncController(const LinuxCncParameters& parameters,
-                                                   std::shared_ptr<ServoStream> stream, double (*now)());
+                                                   std::shared_ptr<const ServoStream> stream,
+                                                   double (*now)());
 
 }  // namespace smartmill::cnc::linuxcnc

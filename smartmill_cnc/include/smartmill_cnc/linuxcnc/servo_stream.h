@@ -1,7 +1,6 @@
 #pragma once
 
 #include <array>
-#include <condition_variable>
 #include <cstdint>
 #include <limits>
 #include <mutex>
@@ -65,8 +64,6 @@ class ServoStream {
   std::optional<ServoSample> latest() const;  ///< none before the first
   std::uint64_t count() const;                ///< samples that have come
   void setLoad(double spindle_load);
-  /// Asks the stream and waits for its answer, which step() takes in another thread. @param timeout [s]
-  Reply setOverrides(const SetOverrides& wanted, double timeout);
   ServoStatistics statistics() const;
 
  private:
@@ -88,10 +85,6 @@ class ServoStream {
   std::array<std::uint64_t, LATE_BINS> late_{};
   std::optional<ServoSample> latest_;
   std::optional<double> load_;
-  std::optional<SetOverrides> wanted_;  // to be sent
-  std::optional<Reply> answer_;
-  std::uint16_t asked_ = 0;  // number of the last question
-  std::condition_variable answered_;
 };
 
 }  // namespace smartmill::cnc::linuxcnc
