@@ -70,11 +70,10 @@ class Cutter {
   std::optional<BagCut> cut_;
 };
 
-/// Transforms of a whole bag: they hold also for blocks that came before them.
-class BagTransforms {
+/// Turns cuts into the machine's frame as soon as the bag has told how the sensor sits; until then they wait.
+class Turner {
  public:
-  explicit BagTransforms(const std::string& path) {
-    BagReader bag(path);
+  Turner(BagReader& bag, std::function<void(BagCut&&)> done) : done_(std::move(done)) {
     for (const bool is_static : {true, false}) {
       bag.on<tf2_msgs::TFMessage>(is_static ? "/tf_static" : "/tf",
                                   [this, is_static](const tf2_msgs::TFMessage& message, double) {
@@ -82,23 +81,39 @@ class BagTransforms {
                                       buffer_.setTransform(transform, "bag", is_static);
                                   });
     }
-    bag.run();
   }
-  /// Rotation of a frame into the machine's, row-major; nothing when the bag does not tell.
-  std::optional<std::array<double, 9>> toMachine(const std::string& frame) const {
-    if (!buffer_.canTransform(frames::MACHINE, frame, ros::Time(0))) return {};
-    return frames::rotationMatrix(
-        buffer_.lookupTransform(frames::MACHINE, frame, ros::Time(0)).transform.rotation);
+  void setFrame(const std::string& frame) { frame_ = frame; }
+  bool known() const { return buffer_.canTransform(frames::MACHINE, frame_, ros::Time(0)); }
+  void take(BagCut&& cut) {
+    waiting_.push_back(std::move(cut));
+    if (known()) release();
+  }
+  /// Those that nothing is known of stay in the sensor's own frame.
+  void release() {
+    std::array<double, 9> rotation{{1, 0, 0, 0, 1, 0, 0, 0, 1}};
+    if (known()) {
+      rotation = frames::rotationMatrix(
+          buffer_.lookupTransform(frames::MACHINE, frame_, ros::Time(0)).transform.rotation);
+    }
+    for (BagCut& cut : waiting_) {
+      for (auto* force : {&cut.measured, &cut.compensated}) rotateInPlace(rotation, *force);
+      done_(std::move(cut));
+    }
+    waiting_.clear();
   }
 
  private:
+  std::function<void(BagCut&&)> done_;
   tf2::BufferCore buffer_;
+  std::string frame_ = frames::DYNAMOMETER;
+  std::vector<BagCut> waiting_;
 };
 
 /// A method that wants the whole cut, in place of what came sample by sample.
 void compensateWhole(BagCut& cut, Method method, const SortedCompensation& sorted,
                      const HarmonicFilterParameters& parameters) {
-  if (method == Method::kalman || method == Method::fixed_lag || !(cut.speed > 0.0)) return;
+  // The others come as the node makes them.
+  if ((method != Method::smoother && method != Method::inverse) || !(cut.speed > 0.0)) return;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     cut.compensated[axis] = compensateRecord(method, cut.measured[axis], sorted.sensor(axis), cut.speed,
                                              cut.sample_rate, parameters);
@@ -111,14 +126,13 @@ BagSummary compensateBag(const std::string& path, const ForceSensor& sensor, con
                          Method method, const std::function<void(BagCut&&)>& done,
                          const std::function<void(double)>& progress) {
   BagSummary summary;
-  const BagTransforms transforms(path);
-  std::array<double, 9> rotation{{1, 0, 0, 0, 1, 0, 0, 0, 1}};
+  BagReader bag(path);
+  Turner turner(bag, done);
   std::optional<SortedCompensation> sorted;
   Cutter cutter([&](BagCut&& cut) {
     ++summary.cuts;
     compensateWhole(cut, method, *sorted, parameters.compensation.filter);
-    for (auto* force : {&cut.measured, &cut.compensated}) rotateInPlace(rotation, *force);
-    done(std::move(cut));
+    turner.take(std::move(cut));
   });
   sorted.emplace(
       parameters.compensation, parameters.taps, sensor, parameters.hold_back,
@@ -129,16 +143,10 @@ BagSummary compensateBag(const std::string& path, const ForceSensor& sensor, con
                                   {},
                                   [&](const SensorResult& result) { summary.identified.push_back(result); }});
   useFiles(*sorted, parameters);
-  BagReader bag(path);
   summary.duration = bag.duration();
   std::size_t blocks = 0;
   bag.on<smartmill_msgs::SampleBlock>(names::DYNAMOMETER, [&](const smartmill_msgs::SampleBlock& m, double) {
-    if (blocks++ == 0) {
-      const auto found =
-          transforms.toMachine(m.header.frame_id.empty() ? frames::DYNAMOMETER : m.header.frame_id);
-      summary.rotation_known = found.has_value();
-      rotation = found.value_or(rotation);
-    }
+    if (blocks++ == 0 && !m.header.frame_id.empty()) turner.setFrame(m.header.frame_id);
     sorted->push(fromMsg(m));
   });
   connect(bag, *sorted);
@@ -158,6 +166,8 @@ BagSummary compensateBag(const std::string& path, const ForceSensor& sensor, con
   if (blocks == 0) throw Error(path + ": holds no " + names::DYNAMOMETER);
   sorted->flush();
   cutter.close();
+  turner.release();
+  summary.rotation_known = turner.known();
   summary.gaps = sorted->health().gaps;
   summary.not_finite = sorted->health().not_finite;
   summary.late = sorted->late();

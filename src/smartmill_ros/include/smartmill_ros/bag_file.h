@@ -50,6 +50,7 @@ class BagFile {
     std::uint64_t at = 0;
     std::uint32_t stored = 0, size = 0;
     enum class Packing { none, bz2, lz4 } packing = Packing::none;
+    bool seen = false;  // unpacked before, its checksum was right
   };
   struct Loaded {
     std::uint32_t chunk = 0;
@@ -72,7 +73,8 @@ class BagFile {
   std::vector<Entry> entries_;
   std::vector<Chunk> chunks_;
   std::map<std::uint32_t, Connection> connections_;
-  std::deque<Loaded> loaded_;  // the newest in front
+  std::deque<Loaded> loaded_;         // the newest in front
+  std::vector<std::uint8_t> stored_;  // of the chunk at hand
 };
 
 /// The bytes of a file. @throws Error when it cannot be opened.
