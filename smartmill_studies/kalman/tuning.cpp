@@ -158,7 +158,7 @@ std::vector<double> bandForce(const std::vector<double>& measured, const ModalMo
     const double passed = std::min(1.0, 2.0 * std::abs(sensor.response(n / revolution)));
     settling.push_back(std::max(passed * memory.at(bandOf(n / revolution, edges)), QUICKEST) * revolution);
   }
-  const HarmonicGain gain = designHarmonicGain(sensor, spindle_speed, sample_rate, noise_rms, settling);
+  const HarmonicGain gain = designHarmonicGain({sensor, spindle_speed, sample_rate, noise_rms, settling});
   HarmonicFilter filter({gain}, sensor, spindle_speed, sample_rate);
   std::vector<double> force;
   force.reserve(measured.size());

@@ -5,13 +5,9 @@
 #include <complex>
 #include <string>
 
-#include <Eigen/Core>
-
 #include "smartmill_core/error.h"
-#include "smartmill_core/modal/state_space.h"
 #include "smartmill_core/require.h"
 #include "smartmill_core/units.h"
-#include "smartmill_kalman/filter/riccati.h"
 
 // Vectors for the processor at hand; clang, which only reads this file, wants to see it where a function is
 // declared.
@@ -46,64 +42,6 @@ double HarmonicFilterParameters::memory(std::size_t level) const {
   const double slow = std::max(settling_revolutions, memory_revolutions);
   if (level == 0) return settling_revolutions;
   return level == 1 ? std::sqrt(settling_revolutions * slow) : slow;
-}
-
-HarmonicGain designHarmonicGain(const ModalModel& sensor, double spindle_speed, double sample_rate,
-                                int harmonics, double noise_rms, double settling, double quickest) {
-  std::vector<double> each;
-  for (int n = 0; n <= harmonics; ++n) {
-    const double passed = std::abs(sensor.response(n * spindle_speed / units::TWO_PI));
-    each.push_back(std::max(std::min(1.0, 2.0 * passed) * settling, quickest));
-  }
-  return designHarmonicGain(sensor, spindle_speed, sample_rate, noise_rms, each);
-}
-
-HarmonicGain designHarmonicGain(const ModalModel& sensor, double spindle_speed, double sample_rate,
-                                double noise_rms, const std::vector<double>& settling) {
-  const auto harmonics = static_cast<Eigen::Index>(settling.size()) - 1;
-  const auto m = static_cast<Eigen::Index>(2 * sensor.modes.size());
-  const Eigen::Index f = 2 * harmonics + 1;
-  const double dt = 1.0 / sample_rate;
-  const double r = noise_rms * noise_rms;
-
-  // Eq. 5.37: z = (sensor states, force states). The harmonics do not drive each other: each is discretised
-  // with the modes alone, which is the same at a fraction of the cost.
-  const StateSpace modes = stateSpace(sensor);
-  Eigen::RowVectorXd force = Eigen::RowVectorXd::Zero(f);
-  Eigen::MatrixXd phi = Eigen::MatrixXd::Zero(m + f, m + f), noise = phi;
-  for (Eigen::Index n = 0; n <= harmonics; ++n) {
-    const Eigen::Index own = n == 0 ? 1 : 2, at = m + (n == 0 ? 0 : 2 * n - 1);
-    const double w = static_cast<double>(n) * spindle_speed;
-    const double tau = settling[static_cast<std::size_t>(n)];
-    Eigen::MatrixXd a = Eigen::MatrixXd::Zero(m + own, m + own), q = a;
-    a.topLeftCorner(m, m) = modes.a;
-    a.block(0, m, m, 1) = modes.b;
-    if (n > 0) {
-      a(m, m + 1) = w;
-      a(m + 1, m) = -w;
-    }
-    q.diagonal().tail(own).setConstant(r * dt / (tau * tau));
-    force(at - m) = 1.0;
-    const auto [phi_n, noise_n] = discretiseNoise(a, q, dt);
-    phi.topLeftCorner(m, m) = phi_n.topLeftCorner(m, m);
-    phi.block(0, at, m, own) = phi_n.topRightCorner(m, own);
-    phi.block(at, at, own, own) = phi_n.bottomRightCorner(own, own);
-    noise.topLeftCorner(m, m) += noise_n.topLeftCorner(m, m);
-    noise.block(0, at, m, own) = noise_n.topRightCorner(m, own);
-    noise.block(at, 0, own, m) = noise_n.bottomLeftCorner(own, m);
-    noise.block(at, at, own, own) = noise_n.bottomRightCorner(own, own);
-  }
-  Eigen::RowVectorXd c(m + f), d(m + f);
-  c << modes.c, sensor.direct * force;
-  d << Eigen::RowVectorXd::Zero(m), force;
-
-  const Eigen::MatrixXd p = stationaryCovariance(phi, noise, c, r);
-  HarmonicGain gain;
-  gain.variance = (c * p * c.transpose())(0) + r;
-  const Eigen::VectorXd filter = p * c.transpose() / gain.variance, smoothing = p * d.transpose();
-  gain.filter.assign(filter.data(), filter.data() + filter.size());
-  gain.smoothing.assign(smoothing.data(), smoothing.data() + smoothing.size());
-  return gain;
 }
 
 std::vector<HarmonicGain> designGains(const ModalModel& sensor, double spindle_speed, double sample_rate,
@@ -268,8 +206,28 @@ void HarmonicFilter::retune(const ModalModel& sensor, double spindle_speed) {
   setGains();
 }
 
+void HarmonicFilter::replaceModes(const ModalModel& sensor, std::vector<HarmonicGain> gains) {
+  HarmonicFilter other(std::move(gains), sensor, spindle_speed_, sample_rate_);
+  const std::vector<Complex> seen = measuredHarmonics();
+  for (std::size_t n = 0; n < seen.size() && n <= static_cast<std::size_t>(other.harmonics_); ++n) {
+    const Complex passed = sensor.response(static_cast<double>(n) * spindle_speed_ / units::TWO_PI);
+    const Complex force = std::abs(passed) < LEAST_PASSED ? forceHarmonic(n) : seen[n] / passed;
+    const std::size_t i = other.modes_ + n;
+    other.blocks_[i / 4].re[i % 4] = force.real();
+    other.blocks_[i / 4].im[i % 4] = n > 0 ? force.imag() : 0.0;
+  }
+  other.expected_ = other.expectation();
+  other.watch_ = watch_;
+  other.watch_.setLevels(other.design_.size());
+  other.innovation_ = innovation_;
+  *this = std::move(other);
+}
+
 void HarmonicFilter::replaceSensor(const ModalModel& sensor, std::vector<HarmonicGain> gains) {
-  if (sensor.modes.size() != modes_) throw Error("Kalman filter: the number of modes cannot change");
+  if (sensor.modes.size() != modes_) {
+    if (gains.empty()) throw Error("Kalman filter: other modes ask for other gains");
+    return replaceModes(sensor, std::move(gains));
+  }
   for (int n = 0; n <= harmonics_; ++n) {
     const double f = n * spindle_speed_ / units::TWO_PI;
     const Complex was = sensor_.response(f), is = sensor.response(f);

@@ -8,6 +8,7 @@
 
 #include "smartmill_core/modal/modal_model.h"
 #include "smartmill_core/parameters/parameter_table.h"
+#include "smartmill_kalman/filter/harmonic_gain.h"
 #include "smartmill_kalman/filter/innovation_watch.h"
 
 namespace smartmill::kalman {
@@ -25,7 +26,7 @@ struct HarmonicFilterParameters {
                  "harmonics of the spindle frequency up to here, and below 0.45 of the sample rate");
     table.number(
         "max_harmonics", max_harmonics, "1", Range::closed(0, 200),
-        "at most so many; low speeds reach this first. Laying out takes the cube of it; 0: a random walk");
+        "at most so many; low speeds reach this first. Laying out takes the square of it; 0: a random walk");
     table.number("noise_rms", noise_rms, "N", Range::positive(), "noise of one sample of the sensor");
     table.number("settling_revolutions", settling_revolutions, "1", Range::positive(),
                  "time constant of each harmonic's amplitude after a change: smaller follows faster");
@@ -38,28 +39,6 @@ struct HarmonicFilterParameters {
   /// @throws Error naming key and value.
   void validate() const;
 };
-
-/// Gains of one filter, in the coordinates of Dunwoody eq. 5.37: mode states (two a mode, StateSpace form),
-/// then the constant, then (F, G) of each harmonic.
-struct HarmonicGain {
-  std::vector<double> filter;  ///< [state/N] P c' / (c P c' + r)
-  std::vector<double>
-      smoothing;          ///< [state N] P d', d the force of a state, P the stationary prediction covariance
-  double variance = 0.0;  ///< [N2] of the innovation
-};
-
-/// Stationary gain from the discrete Riccati equation. Exact discretisation (Van Loan for the noise). Process
-/// noise q = (r dt) / tau^2 for every amplitude puts each harmonic's pole near -|H| / tau, H the sensor's
-/// answer to it. A harmonic that the sensor hardly passes is slow already: tau is min(1, 2 |H|) settling
-/// there, not below quickest, so that a long memory does not make it slower still. The gain does not depend
-/// on r.
-/// @param spindle_speed [rad/s] @param sample_rate [Hz] @param settling, quickest [s]
-HarmonicGain designHarmonicGain(const ModalModel& sensor, double spindle_speed, double sample_rate,
-                                int harmonics, double noise_rms, double settling, double quickest);
-
-/// The same with a time constant [s] for each harmonic, 0 .. N.
-HarmonicGain designHarmonicGain(const ModalModel& sensor, double spindle_speed, double sample_rate,
-                                double noise_rms, const std::vector<double>& settling);
 
 /// Gains from quick to slow: settling_revolutions, memory_revolutions and their geometric mean.
 std::vector<HarmonicGain> designGains(const ModalModel& sensor, double spindle_speed, double sample_rate,
@@ -108,8 +87,8 @@ class HarmonicFilter {
   /// on, the gains stay.
   void retune(const ModalModel& sensor, double spindle_speed);
 
-  /// The sensor is another than was believed, same number of modes: what is expected to be measured goes on,
-  /// the force jumps to what explains it. @param gains of the other sensor; empty: the gains stay
+  /// The sensor is another than was believed: what is expected to be measured goes on, the force jumps to
+  /// what explains it. @param gains of the other sensor; empty, with as many modes: the gains stay
   void replaceSensor(const ModalModel& sensor, std::vector<HarmonicGain> gains);
 
   /// Harmonics of the measured force at the next sample [N]: output = Re sum Y_n, n = 0..N.
@@ -174,6 +153,7 @@ class HarmonicFilter {
   void layOut(const ModalModel& sensor, double spindle_speed);
   std::vector<double> toPairs(const std::vector<double>& state) const;
   void setGains();
+  void replaceModes(const ModalModel& sensor, std::vector<HarmonicGain> gains);
   double expectation() const;
 
   ModalModel sensor_;
