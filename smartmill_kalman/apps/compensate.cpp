@@ -88,6 +88,7 @@ std::array<std::vector<double>, 3> forces(const Record& record) {
 kalman::NodeParameters parametersOf(const Request& request) {
   kalman::NodeParameters parameters = request.parameters;
   if (request.method == "fixed-lag") parameters.compensation.lag = request.lag;
+  if (request.method == "delay") parameters.compensation.delay_form = true;
   parameters.validate();
   return parameters;
 }
@@ -229,9 +230,11 @@ int main(int argc, char** argv) {
       "campaign: sensor with its cross-talk from the campaign's own taps along x, y and z; method kalman");
   line.option("--matrix-out", request.matrix_out,
               "with --coupled: file of the matrix, for the node's parameter sensor_matrix");
-  line.option("--method", request.method,
-              "kalman (causal, as the node), smoother, fixed-lag (as the node with `lag`) or inverse")
-      .oneOf({"kalman", "smoother", "fixed-lag", "inverse"})
+  line.option(
+          "--method", request.method,
+          "kalman (causal, as the node), delay (as the node with `delay_form`), smoother, fixed-lag (as the "
+          "node with `lag`) or inverse")
+      .oneOf({"kalman", "delay", "smoother", "fixed-lag", "inverse"})
       .showDefault();
   line.option("--lag-s", request.lag, "lag of fixed-lag").within(0.0, 10.0).showDefault();
   const ParameterTable table = tableOf(request.parameters);

@@ -35,6 +35,8 @@ void CompensationParameters::validate() const {
   checkBounds(*this);
   // Following needs the angle of the teeth, which the force alone does not tell.
   if (track_speed && follow) throw Error("track_speed: follow needs the spindle's angle, false is due");
+  if (delay_form && (track_speed || follow || lag > 0.0))
+    throw Error("delay_form: track_speed, follow and lag need harmonics, false and 0 are due");
 }
 
 ForceCompensation::ForceCompensation(const CompensationParameters& parameters, bool measures_workpiece,
@@ -53,6 +55,8 @@ void ForceCompensation::setSensor(std::size_t axis, const ModalModel& sensor, do
 void ForceCompensation::setMatrix(const SensorMatrix& matrix) {
   if (parameters_.lag > 0.0)
     throw Error("lag: with a sensor matrix 0 is due, the smoother knows no cross-talk");
+  if (parameters_.delay_form)
+    throw Error("delay_form: with a sensor matrix false is due, it needs harmonics");
   for (std::size_t axis = 0; axis < 3; ++axis) setSensor(axis, matrix.h[axis][axis]);
   matrix_ = matrix;
 }
@@ -92,6 +96,7 @@ void ForceCompensation::handle(const SpindleAngle& angle) {
 void ForceCompensation::stop() {
   flush();
   filters_.clear();
+  delays_.clear();
 }
 
 void ForceCompensation::flush() {
@@ -130,6 +135,7 @@ void ForceCompensation::reset() {
   waiting_.clear();
   smoothers_ = {};
   filters_.clear();
+  delays_.clear();
   next_index_.reset();
   speed_ = steady_speed_ = 0.0;
   tracker_.reset();
@@ -174,10 +180,12 @@ void ForceCompensation::design(double speed, double sample_rate) {
       follower_.emplace(condition_->tool, condition_->engagement, harmonics, parameters_.follower);
     next_look_ = 0.0;
   }
-  if (before.empty()) {
-    settling_left_ =
-        parameters_.settling_periods * parameters_.filter.settling_revolutions * units::TWO_PI / speed;
-  }
+  if (before.empty()) settle();
+}
+
+void ForceCompensation::settle() {
+  settling_left_ =
+      parameters_.settling_periods * parameters_.filter.settling_revolutions * units::TWO_PI / speed_;
 }
 
 void ForceCompensation::follow(double time, double sample_rate) {
@@ -198,6 +206,8 @@ void ForceCompensation::follow(double time, double sample_rate) {
   if (!move) return;
   ++health_.moves;
   ++moves_;
+  // What waits for its lag is told with the modes that it was measured with.
+  if (move->sensor[0].modes.size() != sensor_[0]->modes.size()) flush();
   for (std::size_t axis = 0; axis < 2; ++axis) {
     // The gains bear small moves.
     bool far = designed_for_[axis].size() != move->sensor[axis].modes.size();
@@ -252,8 +262,32 @@ ForceBlock ForceCompensation::measuredIn(const SampleBlock& block) {
   return measured;
 }
 
+/// The same of the delay form. Its gains are those of the speed at which the cut began, or of one as far on
+/// as the harmonics' grid allows.
+void ForceCompensation::prepareDelays(double sample_rate) {
+  const bool fresh = delays_.empty();
+  const auto point = static_cast<int>(std::lround(std::log(speed_) / SPEED_GRID));
+  if (fresh || design_rate_ != sample_rate ||
+      std::abs(std::log(speed_) / SPEED_GRID - grid_point_) > GRID_HYSTERESIS) {
+    std::vector<DelayFilter> before;
+    before.swap(delays_);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      HarmonicFilterParameters parameters = parameters_.filter;
+      parameters.noise_rms = noise_rms_[axis];
+      delays_.emplace_back(*sensor_[axis], speed_, sample_rate, parameters);
+      if (!before.empty() && design_rate_ == sample_rate) delays_[axis].adopt(before[axis]);
+    }
+    grid_point_ = point;
+    design_rate_ = sample_rate;
+    if (fresh) settle();
+  } else if (std::abs(speed_ / delays_.front().spindleSpeed() - 1.0) > RETUNE) {
+    for (DelayFilter& filter : delays_) filter.retune(speed_);
+  }
+}
+
 /// Filters for the speed and rate of now: laid out anew, or turned to a speed that moved a little.
 void ForceCompensation::prepareFilters(double sample_rate) {
+  if (parameters_.delay_form) return prepareDelays(sample_rate);
   const double off_grid = std::abs(std::log(speed_) / SPEED_GRID - grid_point_);
   if (filters_.empty() || design_rate_ != sample_rate || off_grid > GRID_HYSTERESIS) {
     design(speed_, sample_rate);
@@ -285,7 +319,7 @@ void ForceCompensation::handle(const SampleBlock& block) {
     return;
   }
   prepareFilters(block.sample_rate);
-  health_.speed = filters_.front().spindleSpeed();
+  health_.speed = parameters_.delay_form ? delays_.front().spindleSpeed() : filters_.front().spindleSpeed();
   run(compensated.force, block.sample_rate);
   const bool settling = settling_left_ > 0.0 || (tracker_ && tracker_->speedStd() > TRACKED * speed_);
   compensated.status = settling ? ForceBlock::Status::settling : ForceBlock::Status::compensated;
@@ -309,6 +343,11 @@ void ForceCompensation::take(std::size_t axis, double& sample, Innovations& inno
   } else {
     sample = std::isfinite(sample) ? filter.step(sample) : filter.coast();
   }
+  judge(axis, filter, innovations);
+}
+
+template <class Filter>
+void ForceCompensation::judge(std::size_t axis, const Filter& filter, Innovations& innovations) {
   const double innovation = filter.innovation() / filter.innovationStd();
   innovations.own[axis] += innovation * innovation;
   innovations.neighbours[axis] += innovation * innovations.last[axis];
@@ -361,6 +400,13 @@ void ForceCompensation::run(std::array<std::vector<double>, 3>& force, double sa
     for (std::size_t i = 0; i < count; ++i) {
       for (std::size_t axis = 0; axis < 3; ++axis) take(axis, force[axis][i], innovations);
       couple(force, i);
+    }
+  } else if (parameters_.delay_form) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      for (double& sample : force[axis]) {
+        sample = std::isfinite(sample) ? delays_[axis].step(sample) : delays_[axis].coast();
+        judge(axis, delays_[axis], innovations);
+      }
     }
   } else {
     for (std::size_t axis = 0; axis < 3; ++axis) {

@@ -5,6 +5,7 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/units.h"
+#include "smartmill_kalman/filter/delay_filter.h"
 #include "smartmill_kalman/filter/inverse_filter.h"
 #include "smartmill_kalman/filter/lag_smoother.h"
 
@@ -44,10 +45,11 @@ std::vector<double> stateAtStart(HarmonicFilter quick, const std::vector<double>
 
 Method methodOf(const std::string& name) {
   if (name == "kalman") return Method::kalman;
+  if (name == "delay") return Method::delay;
   if (name == "smoother") return Method::smoother;
   if (name == "fixed-lag") return Method::fixed_lag;
   if (name == "inverse") return Method::inverse;
-  throw Error("method '" + name + "': kalman, smoother, fixed-lag or inverse is due");
+  throw Error("method '" + name + "': kalman, delay, smoother, fixed-lag or inverse is due");
 }
 
 std::vector<double> smoothRecord(const std::vector<double>& measured, const ModalModel& sensor,
@@ -97,8 +99,13 @@ std::vector<double> compensateRecord(Method method, const std::vector<double>& m
     force.erase(force.begin(), force.begin() + static_cast<std::ptrdiff_t>(filter.latency()));
     return force;
   }
-  HarmonicFilter filter(sensor, spindle_speed, sample_rate, parameters);
   force.reserve(measured.size());
+  if (method == Method::delay) {
+    DelayFilter filter(sensor, spindle_speed, sample_rate, parameters);
+    for (const double sample : measured) force.push_back(filter.step(sample));
+    return force;
+  }
+  HarmonicFilter filter(sensor, spindle_speed, sample_rate, parameters);
   if (method == Method::fixed_lag) {
     // In blocks, as the node: a block's samples know what comes up to the lag after the block's end.
     constexpr std::size_t BLOCK = 256;

@@ -8,13 +8,13 @@
 #include <string>
 #include <vector>
 
-#include "kalman/delay_filter.h"
 #include "kalman/tuning.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/program.h"
 #include "smartmill_core/units.h"
 #include "smartmill_kalman/compensation/campaign_compensation.h"
 #include "smartmill_kalman/compensation/record_compensation.h"
+#include "smartmill_kalman/filter/delay_filter.h"
 #include "smartmill_kalman_testing/reference_case.h"
 
 namespace {

@@ -15,6 +15,7 @@
 #include "smartmill_core/modal/modal_model.h"
 #include "smartmill_core/signal/streams.h"
 #include "smartmill_kalman/filter/coupled_filter.h"
+#include "smartmill_kalman/filter/delay_filter.h"
 #include "smartmill_kalman/filter/harmonic_filter.h"
 #include "smartmill_kalman/filter/lag_smoother.h"
 #include "smartmill_kalman/following/mode_follower.h"
@@ -27,6 +28,7 @@ struct CompensationParameters {
   double least_speed = 20.0;
   double speed_tolerance = 0.002;
   double lag = 0.0;
+  bool delay_form = false;
   bool track_speed = false;
   SpeedTrackerParameters tracker;
   double settling_periods = 5.0;
@@ -44,6 +46,9 @@ struct CompensationParameters {
     table.number(
         "lag", lag, "s", Range::closed(0.0, 10.0),
         "blocks come so much later, each force told from the samples up to so much after it; 0: causal");
+    table.flag("delay_form", delay_form,
+               "true: the force repeats with the revolution, F(t) = F(t - T), in place of harmonics; no band "
+               "limit, three times the cost; with lag 0, without track_speed, follow and sensor_matrix");
     table.flag("track_speed", track_speed,
                "true: no tachometer; the speed is told from the force, from the cutting condition's on; a "
                "memory of 2 "
@@ -119,14 +124,18 @@ class ForceCompensation {
 
  private:
   void design(double speed, double sample_rate);
+  void settle();
   ForceBlock measuredIn(const SampleBlock& block);
   void prepareFilters(double sample_rate);
+  void prepareDelays(double sample_rate);
   void retune(double sample_rate);
   /// Sums over a block, each innovation over its design.
   struct Innovations {
     std::array<double, 3> last{}, own{}, neighbours{};
   };
   void take(std::size_t axis, double& sample, Innovations& innovations);
+  template <class Filter>
+  void judge(std::size_t axis, const Filter& filter, Innovations& innovations);
   void couple(std::array<std::vector<double>, 3>& force, std::size_t i);
   void track(std::array<std::vector<double>, 3>& force, std::size_t i, double sample_rate,
              Innovations& innovations);
@@ -147,6 +156,7 @@ class ForceCompensation {
   std::optional<SensorMatrix> matrix_;
   std::optional<CrossTalkInverse> cross_talk_;  // of matrix_ at the filters' speed
   std::vector<HarmonicFilter> filters_;         // of the axes with a model, in order; empty: to be laid out
+  std::vector<DelayFilter> delays_;             // in their place with delay_form
   std::array<LagSmoother, 3> smoothers_;
   std::deque<std::pair<ForceBlock, ForceBlock>> waiting_;  // measured and causal, for their lag to pass
   std::map<std::pair<std::size_t, int>, std::vector<HarmonicGain>>

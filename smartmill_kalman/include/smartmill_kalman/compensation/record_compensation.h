@@ -11,6 +11,7 @@ namespace smartmill::kalman {
 /// How a whole record is compensated.
 enum class Method {
   kalman,     ///< causal, as the node does it; no latency
+  delay,      ///< the same with F(t) = F(t - T) in place of harmonics
   smoother,   ///< fixed interval: every sample knows the whole record; no latency
   fixed_lag,  ///< every sample knows what comes up to a lag after it; no latency in a record
   inverse     ///< frequency-domain inversion; its latency is taken out

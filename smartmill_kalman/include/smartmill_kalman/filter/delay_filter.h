@@ -12,7 +12,10 @@ namespace smartmill::kalman {
 /// Discrete model of a sensor whose force repeats with a period T that is no whole number of samples.
 /// State: sensor modes (two a mode, StateSpace form), then a line of forces F(k - 3) .. F(k - 3 + line - 1).
 struct DelayModel {
+  /// @param period [s] @throws Error where it is no 18 .. 1e6 samples.
   DelayModel(const ModalModel& sensor, double period, double sample_rate);
+  /// Another period [samples]; line, interpolate and at change with it. @throws Error as above.
+  void setPeriod(double samples);
 
   std::size_t modes, line;          ///< [1] modes of the sensor; forces kept, ceil(T) + TAPS / 2
   std::vector<double> transition;   ///< 2 x 2 of each mode, row-major
@@ -21,6 +24,7 @@ struct DelayModel {
   double direct;                    ///< [1]
   std::vector<double> interpolate;  ///< TAPS shares of line[at] .. in F one period before the line's next
   std::size_t at;
+  double period;  ///< [samples]
 
   static constexpr std::size_t HOLD = 8;   ///< forces that tell the one between two samples
   static constexpr std::size_t TAPS = 16;  ///< forces that tell the one a period before
@@ -58,7 +62,14 @@ class DelayFilter {
 
   /// Takes one measured sample [N]. @return applied force [N] at this sample, from all samples up to it.
   double step(double measured);
+  /// Keeps the state going without a measurement. @return predicted force [N].
+  double coast() { return advance(0.0); }
   void reset();
+
+  /// Another spindle speed: the force goes on over the angle, the gains stay.
+  void retune(double spindle_speed);
+  /// Takes the force of another filter of the same sensor over, so that new gains start without a jump.
+  void adopt(const DelayFilter& other);
 
   double innovation() const { return innovation_; }  ///< [N] of the last step
   double innovationStd() const { return innovation_std_[watch_.level()]; }
@@ -66,7 +77,15 @@ class DelayFilter {
   std::size_t level() const { return watch_.level(); }
   void setLevel(std::size_t level) { watch_.setLevel(level); }
 
+  double spindleSpeed() const;  ///< [rad/s]
+
  private:
+  double advance(double innovation);
+  double expected() const;
+  /// Line of a filter as it stands in this one's samples.
+  void takeLine(const DelayFilter& other);
+
+  double sample_rate_;
   DelayModel model_;
   std::vector<std::vector<double>> gain_;  // a level each
   std::vector<double> innovation_std_;

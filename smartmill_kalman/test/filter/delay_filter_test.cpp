@@ -1,4 +1,4 @@
-#include "kalman/delay_filter.h"
+#include "smartmill_kalman/filter/delay_filter.h"
 
 #include <algorithm>
 #include <cmath>
@@ -134,6 +134,24 @@ TEST(DelayFilter, MeetsTheTargetsOfTheReferenceCut) {
       EXPECT_LT(bandError(force, record.truth[axis], RATE, third, eighth, 5000.0), 0.01) << rpm;
     }
   }
+}
+
+// As the node's method it serves where the speed falls by 1 % under the load: the line follows the angle.
+TEST(DelayFilter, FollowsASpeedThatMoves) {
+  ReferenceCase c;
+  c.spindle_speed = units::radPerSecFromRpm(9000.0);
+  c.duration = 0.5;
+  c.speed_drop = 0.01;
+  const ReferenceRecord record = simulate(c);
+  CompensationParameters parameters;
+  parameters.delay_form = true;
+  const auto force = runCompensation(c, record, c.sensor, parameters);
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    EXPECT_LT(bandError(force[axis], record.truth[axis], RATE, 5120, force[axis].size(), 3000.0), 0.006);
+    EXPECT_LT(bandError(force[axis], record.truth[axis], RATE, 5120, force[axis].size(), 5000.0), 0.012);
+  }
+  parameters.track_speed = true;
+  EXPECT_THROW(parameters.validate(), Error);
 }
 
 TEST(DelayFilter, RefusesAPeriodOfTooFewSamples) {

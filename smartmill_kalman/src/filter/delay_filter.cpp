@@ -1,4 +1,4 @@
-#include "kalman/delay_filter.h"
+#include "smartmill_kalman/filter/delay_filter.h"
 
 #include <algorithm>
 #include <cmath>
@@ -37,14 +37,27 @@ std::vector<double> lagrangePolynomial(const std::vector<double>& nodes, std::si
   return p;
 }
 
+/// Shares of the TAPS points around a position in its value (Lagrange). @return the first of them
+std::size_t sharesAt(double position, std::vector<double>& shares) {
+  constexpr std::size_t TAPS = DelayModel::TAPS;
+  const auto first = static_cast<std::size_t>(std::floor(position)) - (TAPS / 2 - 1);
+  for (std::size_t j = 0; j < TAPS; ++j) {
+    double share = 1.0;
+    const auto point = static_cast<double>(j);
+    for (std::size_t k = 0; k < TAPS; ++k) {
+      const auto other = static_cast<double>(k);
+      if (k != j) share *= (position - static_cast<double>(first) - other) / (point - other);
+    }
+    shares[j] = share;
+  }
+  return first;
+}
+
 }  // namespace
 
-DelayModel::DelayModel(const ModalModel& sensor, double period, double sample_rate)
+DelayModel::DelayModel(const ModalModel& sensor, double turn, double sample_rate)
     : modes(sensor.modes.size()), direct(sensor.direct) {
-  const double samples = period * sample_rate;
-  if (!(samples >= 18.0) || samples > 1e6) {
-    throw Error("delay form: a period of " + std::to_string(samples) + " samples, 18 .. 1e6 is due");
-  }
+  setPeriod(turn * sample_rate);
   const StateSpace continuous = stateSpace(sensor);
   const auto m = static_cast<Eigen::Index>(2 * modes);
   // x' = A x + B p(u), p a polynomial in u = t / dt: the chain z_i' = z_(i+1) makes the powers of u.
@@ -76,19 +89,18 @@ DelayModel::DelayModel(const ModalModel& sensor, double period, double sample_ra
       }
     }
   }
+}
+
+void DelayModel::setPeriod(double samples) {
+  if (!(samples >= 18.0) || samples > 1e6) {
+    throw Error("delay form: a period of " + std::to_string(samples) + " samples, 18 .. 1e6 is due");
+  }
+  period = samples;
   // The line's next element is line[line]; one period before it is line[line - T].
   line = static_cast<std::size_t>(std::ceil(samples)) + TAPS / 2;
   const double position = static_cast<double>(line) - samples;
-  at = static_cast<std::size_t>(std::floor(position)) - (TAPS / 2 - 1);
-  std::vector<double> points;
-  for (std::size_t j = 0; j < TAPS; ++j) points.push_back(static_cast<double>(at + j));
-  for (std::size_t j = 0; j < TAPS; ++j) {
-    double share = 1.0;
-    for (std::size_t k = 0; k < TAPS; ++k) {
-      if (k != j) share *= (position - points[k]) / (points[j] - points[k]);
-    }
-    interpolate.push_back(share);
-  }
+  interpolate.resize(TAPS);
+  at = sharesAt(position, interpolate);
 }
 
 void DelayModel::step(std::vector<double>& x) const {
@@ -150,7 +162,8 @@ std::vector<double> delayGain(const DelayModel& model, double q, double r) {
 
 DelayFilter::DelayFilter(const ModalModel& sensor, double spindle_speed, double sample_rate,
                          const HarmonicFilterParameters& parameters)
-    : model_(sensor, units::TWO_PI / spindle_speed, sample_rate),
+    : sample_rate_(sample_rate),
+      model_(sensor, units::TWO_PI / spindle_speed, sample_rate),
       watch_(1, units::TWO_PI / spindle_speed * sample_rate) {
   parameters.validate();
   const double r = parameters.noise_rms * parameters.noise_rms;
@@ -176,21 +189,85 @@ void DelayFilter::reset() {
   watch_.reset();
 }
 
+double DelayFilter::spindleSpeed() const {
+  return units::TWO_PI * sample_rate_ / model_.period;
+}
+
+void DelayFilter::retune(double spindle_speed) {
+  const DelayFilter before = *this;
+  model_.setPeriod(units::TWO_PI * sample_rate_ / spindle_speed);
+  for (std::vector<double>& gain : gain_) {
+    // The far end of the line is made of the forces one period before it, and so is its gain.
+    const std::size_t first = 2 * model_.modes;
+    gain.resize(std::min(gain.size(), model_.states()));
+    while (gain.size() < model_.states()) {
+      const std::size_t from = first + model_.at + (gain.size() - first) - model_.line;
+      double next = 0.0;
+      for (std::size_t j = 0; j < DelayModel::TAPS; ++j) next += model_.interpolate[j] * gain[from + j];
+      gain.push_back(next);
+    }
+  }
+  takeLine(before);
+  watch_.setRevolution(model_.period);
+}
+
+void DelayFilter::adopt(const DelayFilter& other) {
+  modes_ = other.modes_;
+  takeLine(other);
+  watch_.setLevel(other.level());
+}
+
+// The same force at the same angle: the other's samples lie closer or wider.
+void DelayFilter::takeLine(const DelayFilter& other) {
+  constexpr std::size_t TAPS = DelayModel::TAPS;
+  const DelayModel& was = other.model_;
+  const auto first = other.line_.begin() + static_cast<std::ptrdiff_t>(other.head_);
+  std::vector<double> known(first, first + static_cast<std::ptrdiff_t>(was.line));
+  // What comes after the line, as the model tells it, so that every place has its points around it.
+  while (known.size() < was.line + 2 * TAPS) {
+    const std::size_t from = was.at + known.size() - was.line;
+    double next = 0.0;
+    for (std::size_t j = 0; j < TAPS; ++j) next += was.interpolate[j] * known[from + j];
+    known.push_back(next);
+  }
+  line_.assign(ROOM * model_.line, 0.0);
+  head_ = 0;
+  std::vector<double> share(TAPS);
+  constexpr auto NOW = static_cast<double>(DelayModel::NOW);
+  for (std::size_t i = 0; i < model_.line; ++i) {
+    double position = NOW + (static_cast<double>(i) - NOW) * was.period / model_.period;
+    if (position < static_cast<double>(TAPS / 2)) position += was.period;
+    if (position > static_cast<double>(was.line + TAPS)) position -= was.period;
+    const std::size_t from = sharesAt(position, share);
+    for (std::size_t j = 0; j < TAPS; ++j) line_[i] += share[j] * known[from + j];
+  }
+}
+
+double DelayFilter::expected() const {
+  double sum = model_.direct * line_[head_ + DelayModel::NOW];
+  for (std::size_t i = 0; i < modes_.size(); ++i) sum += model_.output[i] * modes_[i];
+  return sum;
+}
+
 double DelayFilter::step(double measured) {
+  const double innovation = measured - expected();
+  const double force = advance(innovation);
+  watch_.add(innovation);
+  return force;
+}
+
+double DelayFilter::advance(double innovation) {
   constexpr std::size_t HOLD = DelayModel::HOLD, TAPS = DelayModel::TAPS, NOW = DelayModel::NOW;
   if (head_ + model_.line >= line_.size()) {
     std::copy(line_.end() - static_cast<std::ptrdiff_t>(model_.line), line_.end(), line_.begin());
     head_ = 0;
   }
   double* forces = line_.data() + head_;
-  double expected = model_.direct * forces[NOW];
-  for (std::size_t i = 0; i < modes_.size(); ++i) expected += model_.output[i] * modes_[i];
-  innovation_ = measured - expected;
-  const double nu = innovation_;
+  innovation_ = innovation;
   const double* gain = gain_[watch_.level()].data();
-  for (std::size_t i = 0; i < modes_.size(); ++i) modes_[i] += gain[i] * nu;
+  for (std::size_t i = 0; i < modes_.size(); ++i) modes_[i] += gain[i] * innovation;
   gain += modes_.size();
-  for (std::size_t i = 0; i < model_.line; ++i) forces[i] += gain[i] * nu;
+  for (std::size_t i = 0; i < model_.line; ++i) forces[i] += gain[i] * innovation;
   const double force = forces[NOW];
   for (std::size_t k = 0; k < model_.modes; ++k) {
     const double* phi = model_.transition.data() + 4 * k;
@@ -209,7 +286,6 @@ double DelayFilter::step(double measured) {
   for (std::size_t j = 0; j < TAPS; ++j) next += model_.interpolate[j] * forces[model_.at + j];
   forces[model_.line] = next;
   ++head_;
-  watch_.add(nu);
   return force;
 }
 
