@@ -26,14 +26,31 @@ constexpr std::size_t TERMS = 4;           // tangential and radial, chip and ed
 using Sensor = std::array<ModalModel, 2>;  // x, y
 using Basis = std::array<ModeFollower::Harmonics, TERMS>;
 
-/// Modes moved by p: log frequency, log damping of each in turn, x then y.
-std::array<ModalModel, 2> moved(const std::array<ModalModel, 2>& from, const Eigen::VectorXd& p) {
+/// A mode that no tap has shown: where it is looked for, what it is to begin with and how far it may be off.
+constexpr double HIDDEN_LOW = 300.0, HIDDEN_STEP = 1.02;  // [Hz], [1]
+constexpr double HIDDEN_DAMPING = 0.03, GAIN_STD = 0.05;  // [1]
+/// What speaks for it over what speaks for a move, and the rows beyond the unknowns that can speak.
+constexpr double HIDDEN_EVIDENCE = 2.0;
+/// Mean square of the innovations over their variance from which something is missing; share of the cost that
+/// the mode may leave. A force model that is wrong (another helix, depth or exit) leaves a third and more.
+constexpr double UNEXPLAINED = 2.0, REMAINS = 0.25;
+constexpr Eigen::Index LEAST_LEFT = 12;
+
+/// Modes moved by p: log frequency, log damping of each in turn, x then y; then, where p goes on, what each
+/// gain grows by, the static gain staying.
+std::array<ModalModel, 2> moved(const std::array<ModalModel, 2>& from, const Eigen::VectorXd& p, bool gains) {
   std::array<ModalModel, 2> sensor = from;
   Eigen::Index at = 0;
   for (ModalModel& axis : sensor) {
     for (Mode& mode : axis.modes) {
       mode.frequency *= std::exp(p(at++));
       mode.damping_ratio = std::min(0.9, mode.damping_ratio * std::exp(p(at++)));
+    }
+  }
+  for (ModalModel& axis : sensor) {
+    for (std::size_t k = 0; gains && k < axis.modes.size(); ++k) {
+      axis.direct -= p(at);
+      axis.modes[k].gain += p(at++);
     }
   }
   return sensor;
@@ -129,6 +146,16 @@ class WeightedHarmonics {
     return columns;
   }
 
+  /// A mode at f [Hz] of gain 1 in an axis, the static gain staying, as it shows in the force of the cut.
+  Eigen::VectorXd hidden(std::size_t axis, double f, const Sensor& sensor, const Basis& basis) const {
+    const Eigen::VectorXd x = leastSquares(seen(sensor, basis), target_, 1e-10);
+    Sensor only;
+    only[axis].modes = {{f, HIDDEN_DAMPING, 1.0}};
+    only[axis].direct = -1.0;
+    return seen(only, basis) * x;
+  }
+  double highest() const { return static_cast<double>(count_ - 1) * spindle_frequency_; }  ///< [Hz]
+
   /// Residual with the force model's numbers at their best for this sensor.
   Eigen::VectorXd innovations(const Sensor& sensor, const Basis& basis) const {
     const Eigen::MatrixXd columns = seen(sensor, basis);
@@ -180,21 +207,30 @@ class CutResiduals : public fit::Residuals {
  public:
   CutResiduals(const WeightedHarmonics& measured, const Sensor& now, const ToolGeometry& tool,
                const Engagement& engagement, const std::vector<double>& radius,
-               const FollowParameters& parameters)
+               const FollowParameters& parameters, const std::array<std::size_t, 2>& tapped)
       : measured_(measured), now_(now), tool_(tool), engagement_(engagement), radius_(radius) {
-    modal_ = static_cast<Eigen::Index>(2 * (now[0].modes.size() + now[1].modes.size()));
+    const std::size_t modes = now[0].modes.size() + now[1].modes.size();
+    gains_ = modes > tapped[0] + tapped[1];
+    modal_ = static_cast<Eigen::Index>((gains_ ? 3 : 2) * modes);
     prior_.resize(modal_ + tool.teeth - 1);
-    for (Eigen::Index i = 0; i < prior_.size(); ++i) {
-      const double modes = i % 2 == 0 ? parameters.frequency_std : parameters.damping_std;
-      prior_(i) = 1.0 / (i >= modal_ ? RADIUS_STD : modes);
+    Eigen::Index at = 0;
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      for (std::size_t k = 0; k < now[axis].modes.size(); ++k) {
+        // Of one that no tap has shown little is known.
+        const double wider = k < tapped[axis] ? 1.0 : 5.0;
+        prior_(at++) = 1.0 / (wider * parameters.frequency_std);
+        prior_(at++) = 1.0 / (wider * parameters.damping_std);
+      }
     }
+    prior_.segment(at, modal_ - at).setConstant(1.0 / GAIN_STD);
+    prior_.tail(tool.teeth - 1).setConstant(1.0 / RADIUS_STD);
   }
 
   Eigen::Index modal() const { return modal_; }  ///< so many unknowns are of the modes
   Eigen::Index freedom() const { return prior_.size(); }
   Eigen::Index count() const override { return measured_.rows() + freedom(); }
 
-  Sensor sensor(const Eigen::VectorXd& at) const { return moved(now_, at); }
+  Sensor sensor(const Eigen::VectorXd& at) const { return moved(now_, at, gains_); }
   Basis force(const Eigen::VectorXd& at) const { return harmonicsOf(tool_, engagement_, radii(at)); }
   std::vector<double> radii(const Eigen::VectorXd& at) const {
     std::vector<double> radius = radius_;
@@ -228,6 +264,7 @@ class CutResiduals : public fit::Residuals {
   const ToolGeometry& tool_;
   const Engagement& engagement_;
   std::vector<double> radius_;  // [m] to begin with
+  bool gains_ = false;          // are unknown too
   Eigen::Index modal_ = 0;
   Eigen::VectorXd prior_;
 };
@@ -276,6 +313,44 @@ class CutFit {
   double cost_ = 0.0, squares_ = 0.0;
 };
 
+/// Mean square of what a fit leaves, at least 1: the force model's own shortcomings raise what counts as
+/// evidence.
+double scaleOf(const WeightedHarmonics& seen, const CutResiduals& residuals, double squares) {
+  const Eigen::Index left = seen.rows() - static_cast<Eigen::Index>(TERMS) - residuals.freedom();
+  return std::max(1.0, squares / static_cast<double>(std::max<Eigen::Index>(left, 1)));
+}
+
+/// A sensor with one more mode in each axis that has none such yet, where the innovations fall most.
+/// @return nothing where there are too few to tell
+std::optional<Sensor> withHidden(const WeightedHarmonics& measured, const Sensor& sensor, const Basis& force,
+                                 const std::array<std::size_t, 2>& tapped) {
+  const std::size_t modes = tapped[0] + tapped[1];
+  const auto unknowns = static_cast<Eigen::Index>(TERMS + 3 * (modes + 2));
+  if (sensor[0].modes.size() + sensor[1].modes.size() > modes || measured.rows() < unknowns + LEAST_LEFT)
+    return std::nullopt;
+  const Eigen::MatrixXd even = measured.seen(sensor, force);
+  const Eigen::VectorXd left = measured.innovations(sensor, force);
+  Sensor best = sensor;
+  double most = 0.0;
+  for (double f = HIDDEN_LOW; f < measured.highest(); f *= HIDDEN_STEP) {
+    Eigen::MatrixXd columns(measured.rows(), even.cols() + 2);
+    columns.leftCols(even.cols()) = even;
+    for (std::size_t axis = 0; axis < 2; ++axis)
+      columns.col(even.cols() + static_cast<Eigen::Index>(axis)) = measured.hidden(axis, f, sensor, force);
+    const Eigen::VectorXd x = leastSquares(columns, left, 1e-9);
+    const double fall = left.squaredNorm() - (left - columns * x).squaredNorm();
+    if (fall <= most) continue;
+    most = fall;
+    best = sensor;
+    for (std::size_t axis = 0; axis < 2; ++axis) {
+      const double gain = std::clamp(x(even.cols() + static_cast<Eigen::Index>(axis)), -0.2, 0.2);
+      best[axis].modes.push_back({f, HIDDEN_DAMPING, gain});
+      best[axis].direct -= gain;
+    }
+  }
+  return best;
+}
+
 }  // namespace
 
 void FollowParameters::validate() const {
@@ -298,16 +373,17 @@ std::optional<ModeFollower::Move> ModeFollower::look(const Harmonics& measured, 
   const auto count = static_cast<std::size_t>(harmonics_) + 1;
   if (measured[0].size() < count || measured[1].size() < count)
     throw Error("mode follower: too few harmonics");
-  if (!first_ || (*first_)[0].modes.size() != now[0].modes.size() ||
-      (*first_)[1].modes.size() != now[1].modes.size()) {
-    first_ = now;
-  }
+  if (!first_) first_ = now;
   const WeightedHarmonics seen(measured, count, noise_std, parameters_.misfit, now, spindle_speed);
   if (std::all_of(radius_.begin(), radius_.end(), [](double r) { return r == 0.0; }))
     radius_ = firstRadii(seen, now, tool_, engagement_);
 
+  const std::array<std::size_t, 2> tapped{{(*first_)[0].modes.size(), (*first_)[1].modes.size()}};
+  const auto residualsOf = [&](const Sensor& sensor) {
+    return CutResiduals(seen, sensor, tool_, engagement_, radius_, parameters_, tapped);
+  };
   // The tool's runout first, with the sensor as believed: that is what the cut may be without any move.
-  const CutResiduals residuals(seen, now, tool_, engagement_, radius_, parameters_);
+  const CutResiduals residuals = residualsOf(now);
   CutFit cut(residuals);
   cut.fitRadii();
   const double unmoved = cut.cost();
@@ -315,12 +391,26 @@ std::optional<ModeFollower::Move> ModeFollower::look(const Harmonics& measured, 
   Move move;
   move.before = cut.squares();
   const double first = seen.innovations(*first_, cut.force()).squaredNorm();
+  const std::optional<Sensor> suspected = withHidden(seen, now, cut.force(), tapped);
   cut.fitAll();
   move.after = cut.squares();
   move.sensor = cut.sensor();
-  // The force model's own shortcomings raise what counts as evidence.
-  const auto left = seen.rows() - static_cast<Eigen::Index>(TERMS) - residuals.freedom();
-  const double scale = std::max(1.0, move.after / static_cast<double>(left));
+  const double scale = scaleOf(seen, residuals, move.after);
+  // What no move explains may be a mode that the taps have not shown. It must leave nothing unexplained.
+  if (suspected && scale > UNEXPLAINED) {
+    const CutResiduals more = residualsOf(*suspected);
+    CutFit hidden(more);
+    hidden.fitAll();
+    const double fall = std::min(cut.cost(), unmoved) - hidden.cost();
+    const bool all_told =
+        scaleOf(seen, more, hidden.squares()) <= 1.0 && hidden.cost() < REMAINS * cut.cost();
+    if (all_told && fall > HIDDEN_EVIDENCE * parameters_.evidence) {
+      radius_ = hidden.radii();
+      move.after = hidden.squares();
+      move.sensor = hidden.sensor();
+      return move;
+    }
+  }
   if ((unmoved - cut.cost()) / scale > parameters_.evidence) {
     radius_ = cut.radii();
     return move;
