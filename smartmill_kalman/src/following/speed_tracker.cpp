@@ -16,6 +16,9 @@ constexpr double USUAL = 2.0;
 constexpr double CLEAR = 10.0;
 /// Revolutions after a change of the force in which the amplitudes rise.
 constexpr double RISE = 1.5;
+/// Load takes speed when it comes or goes; then the speed settles within QUIETENS and what is left is QUIET
+/// of the acceleration.
+constexpr double QUIETENS = 0.2, QUIET = 0.1;  // [s], [1]
 /// Standard deviations that the speed may be off, and revolutions that it may stay there.
 constexpr double MOST = 3.0, LOST = 3.0;
 
@@ -69,7 +72,8 @@ void SpeedTracker::predict(double speed_used, double memory) {
     p_[i][1] = fp[i][1] + dt_ * fp[i][2];
     p_[i][2] = decay_ * fp[i][2];
   }
-  p_[2][2] += drive_;
+  const double share = std::max(QUIET, std::exp(std::min(0.0, wait_) / QUIETENS));
+  p_[2][2] += share * share * drive_;
   // While nothing cuts nothing is learnt: the speed does not become less known than it was.
   if (p_[1][1] > most_variance_) {
     const double scale = std::sqrt(most_variance_ / p_[1][1]);
