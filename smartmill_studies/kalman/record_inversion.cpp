@@ -44,6 +44,9 @@ double passed(double frequency, double bandwidth) {
   return 0.5 * (1.0 + std::cos(units::PI * beyond));
 }
 
+/// Misfit of a sensor that is a rigid body.
+constexpr double RIGID = 1.5;
+
 /// Forward matrix, scaled, on the lines of a transform of a longer record.
 struct LongMatrix {
   Index channels;
@@ -72,6 +75,72 @@ struct LongMatrix {
     }
     return here;
   }
+};
+
+/// Inverse of a rigid body on feet that measure: (K + i w C - w^2 M) (K + i w C)^-1 = I - w^2 M Z^-1, Z = K +
+/// i w C nearly real. So each element is 1 or 0 at rest, the real part of the rest a polynomial in w^2 and
+/// w^4, the imaginary in w^3 and w^5: four numbers told by all lines together, where a line alone tells two.
+class RigidInverse {
+ public:
+  /// @param bandwidth [Hz] up to which the lines count
+  RigidInverse(const TransferMatrix& matrix, const Eigen::VectorXd& scale, double bandwidth)
+      : size_(scale.size()), unit_(bandwidth) {
+    for (Index i = 0; i < size_; ++i) {
+      for (Index j = 0; j < size_; ++j) {
+        std::vector<Line> lines;
+        const double scaled = scale(j) / scale(i);
+        for (std::size_t l = 1; l < matrix.frequency.size() && matrix.frequency[l] <= bandwidth; ++l) {
+          const double std_dev = matrix.inverse_std[l](i, j) * scaled;
+          const Complex value = matrix.inverse[l](i, j) * scaled - (i == j ? 1.0 : 0.0);
+          if (std_dev > 0.0) lines.push_back({matrix.frequency[l] / unit_, 1.0 / std_dev, value});
+        }
+        elements_.push_back({fit(lines, 0), fit(lines, 1)});
+        for (const Line& line : lines)
+          squares_ += std::norm((line.value - value(elements_.back(), line.u)) * line.weight);
+        count_ += static_cast<double>(lines.size());
+      }
+    }
+  }
+
+  /// Mean square of what it leaves over, over the variance of the lines: 1 for a rigid body.
+  double misfit() const { return count_ > 0.0 ? squares_ / count_ : HUGE_VAL; }
+  MatrixXcd at(double frequency) const {
+    MatrixXcd here = MatrixXcd::Identity(size_, size_);
+    for (Index i = 0; i < size_; ++i) {
+      for (Index j = 0; j < size_; ++j)
+        here(i, j) += value(elements_[static_cast<std::size_t>(i * size_ + j)], frequency / unit_);
+    }
+    return here;
+  }
+
+ private:
+  struct Line {
+    double u, weight;  // [1] frequency over the bandwidth
+    Complex value;
+  };
+  using Element = std::array<Eigen::VectorXd, 2>;  // of the real part, of the imaginary
+
+  static Eigen::Vector2d powers(double u, std::size_t part) {
+    return (part == 0 ? 1.0 : u) * Eigen::Vector2d(u * u, u * u * u * u);
+  }
+  static Complex value(const Element& element, double u) {
+    return {powers(u, 0).dot(element[0]), powers(u, 1).dot(element[1])};
+  }
+  static Eigen::VectorXd fit(const std::vector<Line>& lines, std::size_t part) {
+    Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(2, 2);
+    Eigen::VectorXd right = Eigen::VectorXd::Zero(2);
+    for (const Line& line : lines) {
+      const Eigen::Vector2d row = line.weight * powers(line.u, part);
+      normal += row * row.transpose();
+      right += row * line.weight * (part == 0 ? line.value.real() : line.value.imag());
+    }
+    return linear::solveSymmetric(normal, right);
+  }
+
+  Index size_;
+  double unit_;                    // [Hz]
+  std::vector<Element> elements_;  // row by row
+  double squares_ = 0.0, count_ = 0.0;
 };
 
 /// @throws Error on another number of channels or rate, or when the matrix is only a band.
@@ -109,16 +178,21 @@ std::vector<std::vector<double>> invertRecord(const TransferMatrix& matrix,
   }
   const Eigen::VectorXd scale = matrix.scale();
   const LongMatrix forward(matrix, scale, bandwidth, length);
+  const RigidInverse rigid(matrix, scale, bandwidth);
+  const auto inverted = [&](std::size_t line, double f, const Eigen::VectorXcd& m) -> Eigen::VectorXcd {
+    if (rigid.misfit() < RIGID) return rigid.at(f) * m;
+    const MatrixXcd here = forward.at(line);
+    const double unknown = forward.floor[std::min(lines - 1, static_cast<std::size_t>(f / spacing + 0.5))];
+    const MatrixXcd square = here.adjoint() * here + unknown * MatrixXcd::Identity(size, size);
+    return linear::solveSymmetric(square, Eigen::VectorXcd(here.adjoint() * m));
+  };
   for (std::size_t i = 0; i < spectra.front().size(); ++i) {
     const double f = sample_rate * static_cast<double>(i) / static_cast<double>(length);
     const double weight = passed(f, bandwidth);
     Eigen::VectorXcd m = Eigen::VectorXcd::Zero(size);
     if (weight > 0.0) {
       for (Index c = 0; c < size; ++c) m(c) = spectra[static_cast<std::size_t>(c)][i] / scale(c);
-      const MatrixXcd here = forward.at(i);
-      const double unknown = forward.floor[std::min(lines - 1, static_cast<std::size_t>(f / spacing + 0.5))];
-      const MatrixXcd square = here.adjoint() * here + unknown * MatrixXcd::Identity(size, size);
-      m = weight * linear::solveSymmetric(square, Eigen::VectorXcd(here.adjoint() * m));
+      m = weight * inverted(i, f, m);
     }
     for (Index c = 0; c < size; ++c) spectra[static_cast<std::size_t>(c)][i] = m(c) * scale(c);
   }

@@ -7,8 +7,10 @@
 
 namespace smartmill::kalman {
 
-/// What the sensor would have shown without its dynamics: (G' G + floor)^-1 G' at every line, floor what the
-/// matrix is not known to. A record of any length, no latency.
+/// What the sensor would have shown without its dynamics. Where a rigid body on its feet explains the taps
+/// (six channels; the lines' standard deviations say so), its inverse, told by all lines together; otherwise
+/// (G' G + floor)^-1 G' at every line, floor what the matrix is not known to. A record of any length, no
+/// latency.
 /// @param measured one record a channel [N, N m] @param bandwidth [Hz] full to there, nothing beyond 1.15
 /// times
 /// @return applied force (and moment) of every channel. @throws Error on another number of channels or rate,
