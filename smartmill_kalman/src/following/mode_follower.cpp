@@ -313,6 +313,13 @@ class CutFit {
   double cost_ = 0.0, squares_ = 0.0;
 };
 
+/// Mean square of what a fit leaves, at least 1: the force model's own shortcomings raise what counts as
+/// evidence.
+double scaleOf(const WeightedHarmonics& seen, const CutResiduals& residuals, double squares) {
+  const Eigen::Index left = seen.rows() - static_cast<Eigen::Index>(TERMS) - residuals.freedom();
+  return std::max(1.0, squares / static_cast<double>(std::max<Eigen::Index>(left, 1)));
+}
+
 /// A sensor with one more mode in each axis that has none such yet, where the innovations fall most.
 /// @return nothing where there are too few to tell
 std::optional<Sensor> withHidden(const WeightedHarmonics& measured, const Sensor& sensor, const Basis& force,
@@ -388,19 +395,15 @@ std::optional<ModeFollower::Move> ModeFollower::look(const Harmonics& measured, 
   cut.fitAll();
   move.after = cut.squares();
   move.sensor = cut.sensor();
-  // The force model's own shortcomings raise what counts as evidence.
-  const auto scaleOf = [&](const CutResiduals& of, double squares) {
-    const Eigen::Index left = seen.rows() - static_cast<Eigen::Index>(TERMS) - of.freedom();
-    return std::max(1.0, squares / static_cast<double>(std::max<Eigen::Index>(left, 1)));
-  };
-  const double scale = scaleOf(residuals, move.after);
+  const double scale = scaleOf(seen, residuals, move.after);
   // What no move explains may be a mode that the taps have not shown. It must leave nothing unexplained.
   if (suspected && scale > UNEXPLAINED) {
     const CutResiduals more = residualsOf(*suspected);
     CutFit hidden(more);
     hidden.fitAll();
     const double fall = std::min(cut.cost(), unmoved) - hidden.cost();
-    const bool all_told = scaleOf(more, hidden.squares()) <= 1.0 && hidden.cost() < REMAINS * cut.cost();
+    const bool all_told =
+        scaleOf(seen, more, hidden.squares()) <= 1.0 && hidden.cost() < REMAINS * cut.cost();
     if (all_told && fall > HIDDEN_EVIDENCE * parameters_.evidence) {
       radius_ = hidden.radii();
       move.after = hidden.squares();
