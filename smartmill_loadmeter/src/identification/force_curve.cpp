@@ -113,6 +113,45 @@ void eachSample(const std::vector<AngleRecord>& records, const ToolGeometry& too
   }
 }
 
+/// [m] thickest chip of all. @throws Error when a record's lists differ in length.
+double thickest(const std::vector<AngleRecord>& records) {
+  double top = 0.0;
+  for (const AngleRecord& record : records) {
+    if (record.fx.size() != record.angle.size() || record.fy.size() != record.angle.size())
+      throw Error("force curve: angle, fx and fy differ in length");
+    const Engagement& e = record.engagement;
+    const bool across = e.entry < 0.5 * units::PI && e.exit > 0.5 * units::PI;
+    top = std::max(top, e.feed_per_tooth * (across ? 1.0 : std::max(std::sin(e.entry), std::sin(e.exit))));
+  }
+  return top;
+}
+
+/// @param pulls of each record: gradient that it leaves at the solution @param effective [N2] variance a
+/// sample
+Eigen::MatrixXd covarianceOf(const System& system, const Eigen::VectorXd& rises,
+                             std::vector<Eigen::VectorXd>& pulls, double effective) {
+  // Rises at their bound are known to be 0; the others vary together.
+  const double floor = 1e-9 * system.normal.diagonal().maxCoeff();
+  Eigen::MatrixXd held = system.normal + floor * Eigen::MatrixXd::Identity(rises.size(), rises.size());
+  for (Eigen::Index i = 0; i < rises.size(); ++i) {
+    if (rises(i) > 0.0) continue;
+    held.row(i).setZero();
+    held.col(i).setZero();
+    held(i, i) = 1e6 * system.normal.diagonal().maxCoeff();
+  }
+  const Eigen::MatrixXd inverse = linear::inverseSymmetric(held);
+  Eigen::MatrixXd covariance = effective * inverse;
+  const double witnesses = static_cast<double>(pulls.size());
+  for (Eigen::VectorXd& pull : pulls) {
+    for (Eigen::Index i = 0; i < rises.size(); ++i) {
+      if (!(rises(i) > 0.0)) pull(i) = 0.0;
+    }
+    const Eigen::VectorXd moved = inverse * pull;
+    if (pulls.size() > 1) covariance += witnesses / (witnesses - 1.0) * moved * moved.transpose();
+  }
+  return covariance;
+}
+
 }  // namespace
 
 double ForceCurve::at(double chip) const {
@@ -140,14 +179,7 @@ double ForceCurve::stdAt(double chip) const {
 
 ForceCurves fitForceCurves(const std::vector<AngleRecord>& records, const ToolGeometry& tool, int pieces) {
   if (pieces < 2 || pieces > 30) throw Error("force curve: 2..30 pieces are due");
-  double top = 0.0;
-  for (const AngleRecord& record : records) {
-    if (record.fx.size() != record.angle.size() || record.fy.size() != record.angle.size())
-      throw Error("force curve: angle, fx and fy differ in length");
-    const Engagement& e = record.engagement;
-    const bool across = e.entry < 0.5 * units::PI && e.exit > 0.5 * units::PI;
-    top = std::max(top, e.feed_per_tooth * (across ? 1.0 : std::max(std::sin(e.entry), std::sin(e.exit))));
-  }
+  const double top = thickest(records);
   if (!(top > 0.0)) throw Error("force curve: no chip is cut");
   const int n = pieces + 3;
   System system{Eigen::MatrixXd::Zero(2 * n, 2 * n), Eigen::VectorXd::Zero(2 * n)};
@@ -175,25 +207,7 @@ ForceCurves fitForceCurves(const std::vector<AngleRecord>& records, const ToolGe
   const double variance = system.squares / static_cast<double>(system.rows);
   const double alike = std::clamp(system.neighbours / system.squares, 0.0, 0.99);
   const double effective = variance * (1.0 + alike) / (1.0 - alike);
-  // Rises at their bound are known to be 0; the others vary together.
-  const double floor = 1e-9 * system.normal.diagonal().maxCoeff();
-  Eigen::MatrixXd held = system.normal + floor * Eigen::MatrixXd::Identity(2 * n, 2 * n);
-  for (Eigen::Index i = 0; i < rises.size(); ++i) {
-    if (rises(i) > 0.0) continue;
-    held.row(i).setZero();
-    held.col(i).setZero();
-    held(i, i) = 1e6 * system.normal.diagonal().maxCoeff();
-  }
-  const Eigen::MatrixXd inverse = linear::inverseSymmetric(held);
-  Eigen::MatrixXd covariance = effective * inverse;
-  const double witnesses = static_cast<double>(records.size());
-  for (Eigen::VectorXd& pull : pulls) {
-    for (Eigen::Index i = 0; i < rises.size(); ++i) {
-      if (!(rises(i) > 0.0)) pull(i) = 0.0;
-    }
-    const Eigen::VectorXd moved = inverse * pull;
-    if (records.size() > 1) covariance += witnesses / (witnesses - 1.0) * moved * moved.transpose();
-  }
+  const Eigen::MatrixXd covariance = covarianceOf(system, rises, pulls, effective);
   ForceCurves curves;
   curves.rms = std::sqrt(variance);
   for (int part = 0; part < 2; ++part) {
