@@ -11,6 +11,7 @@
 #include "kalman/spindle_rig.h"
 #include "smartmill_core/program.h"
 #include "smartmill_core/signal/statistics.h"
+#include "smartmill_core/testing/reference_case.h"
 #include "smartmill_core/units.h"
 #include "smartmill_kalman/sensor/state_space_checks.h"
 
@@ -197,8 +198,9 @@ void hypotheses(const Data& data, double band) {
         kalman::expandedTapMap(data.taps[axis], data.sensor[axis], RATE, r_tap, speeds, data.flutes, band);
     std::printf("%s, %c: R of taps %.2f, of cuts %.2f (printed %.2f, %.2f)\n", table.name, "xy"[axis], r_tap,
                 r_cut, table.r_tap, table.r_cut);
-    std::printf("%6s %14s %10s | %10s %10s | %14s %10s | %10s %10s\n", "rpm", "Q printed", "ours", "RMSE pr.",
-                "ours", "Q of the cut", "RMSE", "walk, same", "harmonics");
+    std::printf("%6s %14s %10s | %10s %10s | %14s %10s | %10s %10s | %s\n", "rpm", "Q printed", "ours",
+                "RMSE pr.", "ours", "Q of the cut", "RMSE", "walk, same", "harmonics",
+                "wave, %: cut's Q, harmonics");
     for (std::size_t k = 0; k < RPM.size(); ++k) {
       const SpindleRig::Record& cut = data.cuts[k];
       const auto best = kalman::bestOfCut(cut.measured[axis], cut.truth[axis], data.sensor[axis], RATE,
@@ -211,10 +213,18 @@ void hypotheses(const Data& data, double band) {
       };
       const double walk = score(
           kalman::randomWalkForce(cut.measured[axis], data.sensor[axis], RATE, std::pow(2.0, n), r_cut));
-      std::printf("%6.0f %14.0f %7s2^%-2d | %10.3f %10.3f | %11s2^%-2d %10.3f | %10.3f %10.3f\n", RPM[k],
-                  table.q[k], "", n, table.rmse[k],
-                  best.all[static_cast<std::size_t>(n - kalman::LEAST_EXPONENT)], "", best.exponent,
-                  best.rmse, walk, score(cut.compensated[axis]));
+      const auto wave = [&](const std::vector<double>& force) {
+        const std::size_t end = force.size();
+        return 100.0 * bandError(force, cut.truth[axis], RATE, end / 4, end - end / 10, band);
+      };
+      const double best_wave = wave(kalman::expandedDisturbanceForce(cut.measured[axis], data.sensor[axis],
+                                                                     RATE, data.flutes * RPM[k] / 60.0,
+                                                                     std::pow(2.0, best.exponent), r_cut));
+      std::printf(
+          "%6.0f %14.0f %7s2^%-2d | %10.3f %10.3f | %11s2^%-2d %10.3f | %10.3f %10.3f | %8.1f %8.1f\n",
+          RPM[k], table.q[k], "", n, table.rmse[k],
+          best.all[static_cast<std::size_t>(n - kalman::LEAST_EXPONENT)], "", best.exponent, best.rmse, walk,
+          score(cut.compensated[axis]), best_wave, wave(cut.compensated[axis]));
     }
     std::printf("\n");
   }

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "kalman/bistable.h"
 #include "kalman/spindle_rig.h"
 #include "smartmill_core/program.h"
 #include "smartmill_core/testing/reference_case.h"
@@ -105,7 +106,29 @@ void errors(const SpindleRig::Record& r, const kalman::TransferMatrix& three, do
   }
 }
 
-void chips(const std::vector<SpindleRig::Record>& passes, const MachineModel& model, double rpm) {
+/// Depths between which a tool that cuts with this law may stand still or chatter.
+void bistable(const loadmeter::ForceCurve& law, int teeth, const std::string& picture) {
+  Mode mode;
+  mode.frequency = 800.0;
+  mode.damping_ratio = 0.02;
+  mode.gain = 1.0 / 10e6;
+  std::vector<double> speeds;
+  for (double rpm = 8000.0; rpm <= 24000.0; rpm += 500.0) speeds.push_back(units::radPerSecFromRpm(rpm));
+  const auto points = kalman::bistableRange(law, mode, teeth, 0.1e-3, speeds, 3.0, 20e-3);
+  double widest = 0.0, sum = 0.0;
+  for (const auto& p : points) {
+    widest = std::max(widest, 1.0 - p.large / p.small);
+    sum += (1.0 - p.large / p.small) / static_cast<double>(points.size());
+  }
+  std::printf(
+      "radial law of 5000 rpm on a tool of 800 Hz, 2 %%, 10 N/um, 0.1 mm a tooth, one tooth always in cut: "
+      "below the limit of small vibrations large ones stay over %.0f %% of the depth, at most %.0f %%\n",
+      100.0 * sum, 100.0 * widest);
+  if (!picture.empty()) kalman::drawBistable(points, picture);
+}
+
+loadmeter::ForceCurves chips(const std::vector<SpindleRig::Record>& passes, const MachineModel& model,
+                             double rpm) {
   std::printf(
       "\nforce against chip thickness at %.0f rpm, six feeds, N/mm: truth, from compensated +- band, from "
       "measured\n",
@@ -146,15 +169,17 @@ void chips(const std::vector<SpindleRig::Record>& passes, const MachineModel& mo
   }
   std::printf("left %.2f N compensated, %.2f N measured; largest error from 0.05 mm on: %.1f %%, %.1f %%\n\n",
               good.rms, raw.rms, 100.0 * worst, 100.0 * worst_raw);
+  return good;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  std::string file;
+  std::string file, picture;
   std::uint64_t seed = 17;
   CommandLine line{"Six-channel plate on the simulated machine (Bachrathy and Stepan)."};
   line.option("MODEL", file, "smartmill-model/1 of the simulated machine").required();
+  line.option("--picture", picture, "of the bistable range, PNG; empty: none");
   line.option("--seed", seed, "of noise and scatter").showDefault();
   return runProgram(line, argc, argv, [&] {
     const MachineModel model = readMachineModel(file);
@@ -175,7 +200,8 @@ int main(int argc, char** argv) {
         passes.push_back(pass(machine, model, rpm, feed, 0.3));
       }
       errors(passes[2], three, rpm);
-      chips(passes, model, rpm);
+      const auto curves = chips(passes, model, rpm);
+      if (rpm == 5000.0) bistable(curves.radial, model.needTool("cut").teeth, picture);
     }
   });
 }

@@ -1,9 +1,11 @@
 #include "kalman/spindle_rig.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
 
+#include "kalman/bistable.h"
 #include "kalman/expanded_disturbance.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/testing/reference_case.h"
@@ -82,6 +84,40 @@ TEST(ExpandedDisturbance, TellsWhatItIsMadeFor) {
   };
   EXPECT_LT(error(400.0), 1.0);
   EXPECT_GT(error(1600.0), 3.0);
+}
+
+/// A law of given coefficients over 0 .. 1 mm.
+loadmeter::ForceCurve law(double power) {
+  loadmeter::ForceCurve curve;
+  for (int k = 0; k <= 8; ++k) curve.knots.push_back(1e-3 * k / 8);
+  curve.std_dev.assign(9, 0.0);
+  // Greville's abscissae: a straight law is told without error.
+  for (int k = 0; k < 11; ++k) {
+    const double x = (std::clamp(k - 2, 0, 8) + std::clamp(k - 1, 0, 8) + std::clamp(k, 0, 8)) / 24.0 * 1e-3;
+    curve.value.push_back(100e3 * std::pow(x / 1e-4, power));
+  }
+  return curve;
+}
+
+// Linear: the limit is the textbook's 1 / (2 K zeta (1 + zeta) gain) at its worst speed (Tlusty), and there
+// is hardly a range; a digressive law has one.
+TEST(Bistable, LinearLawHasTheTextbookLimitAndADigressiveOneARange) {
+  Mode mode;
+  mode.frequency = 800.0;
+  mode.damping_ratio = 0.02;
+  mode.gain = 1e-7;
+  std::vector<double> speeds;
+  for (double rpm = 14000.0; rpm <= 20000.0; rpm += 1000.0) speeds.push_back(units::radPerSecFromRpm(rpm));
+  const auto least = [&](double power) {
+    const auto points = bistableRange(law(power), mode, 2, 0.1e-3, speeds, 3.0, 30e-3);
+    return *std::min_element(points.begin(), points.end(),
+                             [](const auto& a, const auto& b) { return a.small < b.small; });
+  };
+  const BistablePoint linear = least(1.0), digressive = least(0.5);
+  const double due = 2.0 * 0.02 * 1.02 / (1e-7 * 1e9);
+  EXPECT_NEAR(linear.small, due, 0.1 * due);
+  EXPECT_GT(linear.large, 0.9 * linear.small);
+  EXPECT_LT(digressive.large, 0.9 * digressive.small);
 }
 
 // Kurtosis of a uniform distribution 1.8, of a sine 1.5.

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "smartmill_core/modal/modal_model.h"
+#include "smartmill_loadmeter/identification/force_curve.h"
+
+namespace smartmill::kalman {
+
+/// A tool with one mode that cuts all the time (Bachrathy and Stepan's reference 9): x'' + 2 zeta w x' + w^2
+/// x = (w^2 / k) b F(h), chip h of the tool's place over the lowest surface that any cut before has left, 0
+/// in the air.
+struct BistablePoint {
+  double speed = 0.0;  ///< [rad/s]
+  double small = 0.0;  ///< [m] depth from which the smallest vibration grows
+  double large =
+      0.0;  ///< [m] depth from which a large one stays; below `small` where both states live side by side
+};
+
+/// @param mode of the tool tip, gain [m/N] @param feed [m] a tooth @param kick [1] of a large vibration, over
+/// feed
+/// @param deepest [m] looked at @return a point a speed
+std::vector<BistablePoint> bistableRange(const loadmeter::ForceCurve& law, const Mode& mode, int teeth,
+                                         double feed, const std::vector<double>& speeds, double kick,
+                                         double deepest);
+
+/// Draws the range with gnuplot. @throws Error.
+void drawBistable(const std::vector<BistablePoint>& points, const std::string& png);
+
+}  // namespace smartmill::kalman
