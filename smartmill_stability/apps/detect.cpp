@@ -200,13 +200,12 @@ void draw(const RecordingVerdict& verdict, const Options& o) {
                       verdict.frequency, end, verdict.frequency)
          << formatted("set label 'chatter %.0f Hz' at %g,%g front tc rgb '#ff2020' offset 0,0.6\n",
                       verdict.frequency, s.time[0], verdict.frequency);
-  plot << "set title "
-       << Gnuplot::quoted(std::filesystem::path(o.file).filename().string() + ": " + verdict.text())
-       << "\nset xlabel 'Time [s]'\nset ylabel 'Frequency [Hz] (dotted: tooth passings)'\nset cblabel 'Power "
-          "[dB]'\n"
+  plot << "set title " << Gnuplot::quoted(verdict.text()) << " font ',10'\nset xlabel "
+       << Gnuplot::quoted("Time [s] of " + std::filesystem::path(o.file).filename().string())
+       << "\nset ylabel 'Frequency [Hz] (dotted: tooth passings)'\nset cblabel 'Power [dB]'\n"
        << formatted("set xrange [%g:%g]\nset yrange [0:%g]\n", s.time[0], end, s.frequency.back())
        << "set palette defined (0 '#000020', 1 '#203080', 2 '#3090a0', 3 '#e0d060', 4 '#ffffff')\n"
-       << "plot $levels using 1:2:3 with points pt 5 ps 0.4 lc palette notitle\n";
+       << "plot $levels using 1:2:3 with image notitle\n";
   plot.draw();
 }
 

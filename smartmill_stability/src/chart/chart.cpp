@@ -415,11 +415,12 @@ void ChartMaker::recommend(StabilityChart& chart, const StabilityLimit& wide) co
     const bool over_right = k + 1 == cuts.size() || rate >= cuts[k + 1].material_removal_rate;
     if (rate > 0.0 && over_left && over_right) peaks.push_back(cuts[k]);
   }
-  chart.recommended =
-      pick(peaks, parameters_.recommended, [](const StabilityPoint& a, const StabilityPoint& b) {
-        return a.material_removal_rate > b.material_removal_rate;
-      });
+  const auto removes_more = [](const StabilityPoint& a, const StabilityPoint& b) {
+    return a.material_removal_rate > b.material_removal_rate;
+  };
+  chart.recommended = pick(peaks, parameters_.recommended, removes_more);
   for (StabilityPoint& best : chart.recommended) best = farthestFromFlanks(chart.limit, cuts, best);
+  std::stable_sort(chart.recommended.begin(), chart.recommended.end(), removes_more);
 }
 
 void ChartMaker::proposeUnstable(StabilityChart& chart, const StabilityLimit& wide) const {

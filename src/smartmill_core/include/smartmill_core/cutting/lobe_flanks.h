@@ -14,26 +14,30 @@ namespace smartmill {
 /// between the chart's speeds; to the chart's end where it never does; 0 of a cut above the limit.
 inline std::array<double, 2> lobeFlanks(const StabilityLimit& limit, double speed, double depth) {
   const std::vector<double>&s = limit.spindle_speed, &d = limit.depth;
+  if (s.empty() || speed < s.front() || speed > s.back()) return {{0.0, 0.0}};
   std::size_t above = 0;
-  while (above < s.size() && s[above] <= speed) ++above;
-  const auto crossing = [&](std::size_t from, std::size_t to) {
-    if (!std::isfinite(d[from]) || !std::isfinite(d[to])) return s[to];
-    return s[from] + (s[to] - s[from]) * (d[from] - depth) / (d[from] - d[to]);
+  while (above + 1 < s.size() && s[above] < speed) ++above;
+  const std::size_t below = s[above] == speed || above == 0 ? above : above - 1;
+  const auto between = [](double a, double b, double share) {
+    return std::isfinite(a) && std::isfinite(b) ? a + share * (b - a) : std::max(a, b);
   };
-  std::array<double, 2> room{{0.0, 0.0}};
-  if (s.empty()) return room;
-  std::size_t k = above > 0 ? above - 1 : 0;
-  if (!(d[k] > depth)) return room;
-  while (k > 0 && d[k - 1] > depth) --k;
-  room[0] = speed - (k > 0 ? crossing(k, k - 1) : s.front());
-  k = std::min(above, s.size() - 1);
-  if (!(d[k] > depth)) {
-    room[1] = above > 0 ? crossing(above - 1, k) - speed : 0.0;
-    return room;
-  }
-  while (k + 1 < s.size() && d[k + 1] > depth) ++k;
-  room[1] = (k + 1 < s.size() ? crossing(k, k + 1) : s.back()) - speed;
-  return room;
+  const double here =
+      above == below ? d[above] : between(d[below], d[above], (speed - s[below]) / (s[above] - s[below]));
+  if (!(here > depth)) return {{0.0, 0.0}};
+  // From a speed whose limit is deeper to the next one.
+  const auto room = [&](std::size_t next, int step) {
+    double at = speed, deep = here;
+    for (;; next = static_cast<std::size_t>(static_cast<long>(next) + step)) {
+      if (!(d[next] > depth)) {
+        const double share = std::isfinite(deep) ? (deep - depth) / (deep - d[next]) : 1.0;
+        return std::abs(at + share * (s[next] - at) - speed);
+      }
+      at = s[next];
+      deep = d[next];
+      if (next == (step < 0 ? 0 : s.size() - 1)) return std::abs(at - speed);
+    }
+  };
+  return {{room(below, -1), room(above, 1)}};
 }
 
 }  // namespace smartmill
