@@ -18,8 +18,10 @@ namespace {
 constexpr double QUICK = 1.5;
 /// Length of the array in which the line moves, in lines.
 constexpr std::size_t ROOM = 8;
-/// Steps of the gain's recursion, in revolutions, and the rise of P over a revolution at which it ends.
-constexpr double MOST_REVOLUTIONS = 3000.0, CONVERGED = 1e-7;
+/// Steps of the gain's recursion, in revolutions, and the rise of P over a revolution at which it ends. What
+/// the sensor hardly passes goes on rising long after: it stays as slow as it is then, when the innovation's
+/// variance rises by less than SETTLED.
+constexpr double MOST_REVOLUTIONS = 1000.0, CONVERGED = 1e-7, SETTLED = 1e-4;
 
 /// Coefficients of u^i, lowest first, of the polynomial that is 1 at node j and 0 at the others.
 std::vector<double> lagrangePolynomial(const std::vector<double>& nodes, std::size_t j) {
@@ -149,7 +151,9 @@ std::vector<double> delayGain(const DelayModel& model, double q, double r) {
     if (step % model.line == 0) {
       double left = 0.0;
       for (const double x : l) left += x * x;
-      if (rise < CONVERGED * variance && m * left < CONVERGED * q * static_cast<double>(model.line)) {
+      const bool last = step + model.line > most && rise < SETTLED * variance;
+      if (last ||
+          (rise < CONVERGED * variance && m * left < CONVERGED * q * static_cast<double>(model.line))) {
         for (double& gain : n) gain /= variance;
         n.push_back(variance);
         return n;

@@ -104,6 +104,31 @@ TEST(DelayFilter, RecoversHarmonicsThroughTheSensor) {
   EXPECT_LT(worst, 0.02);
 }
 
+// A zero of the sensor passes next to nothing at one harmonic: there is a gain all the same, and what is
+// passed comes back.
+TEST(DelayFilter, BearsAZeroOfTheSensor) {
+  ModalModel sensor;
+  sensor.modes = {{1130.0, 0.035, 0.9}};
+  sensor.direct = 0.1;
+  const double speed = units::radPerSecFromRpm(4500.0);
+  DelayFilter filter(sensor, speed, RATE, {});
+  double error = 0.0, norm = 0.0;
+  for (int i = 0; i < 51200; ++i) {
+    const double t = i / RATE;
+    double applied = 50.0, measured = 50.0;
+    for (const auto& [n, amplitude] : {std::pair(4, 100.0), std::pair(16, 20.0)}) {
+      const auto wave = std::polar(amplitude, n * speed * t);
+      applied += wave.real();
+      measured += (sensor.response(n * speed / units::TWO_PI) * wave).real();
+    }
+    const double estimate = filter.step(measured);
+    if (t < 1.0) continue;
+    error += std::pow(estimate - applied, 2);
+    norm += applied * applied;
+  }
+  EXPECT_LT(std::sqrt(error / norm), 0.015);
+}
+
 TEST(DelayFilter, InnovationHasTheExpectedSize) {
   DelayFilter filter(ReferenceCase::exactSensor(), units::radPerSecFromRpm(9000.0), RATE, {});
   const double rms = innovationUnderNoise(filter, 51200, 25600);
