@@ -1,0 +1,80 @@
+#include "stability/kim_figures.h"
+
+#include <cmath>
+#include <filesystem>
+
+#include "smartmill_core/io/gnuplot.h"
+
+namespace smartmill::stability {
+namespace {
+
+std::vector<std::vector<double>> history(const TurningTrace& trace) {
+  std::vector<std::vector<double>> rows;
+  for (std::size_t i = 0; i < trace.time.size(); i += 10)
+    rows.push_back({trace.time[i], 1e6 * trace.motion[i]});
+  return rows;
+}
+
+/// Figures 4 and 5: motion of the tool against the work.
+void drawHistory(const std::string& png, const std::string& title, const TurningTrace& ours,
+                 const TurningTrace* kim) {
+  Gnuplot plot(png, 1100, 500, 12);
+  plot.block("ours", history(ours));
+  if (kim) plot.block("kim", history(*kim));
+  plot << "set grid\nset title " << Gnuplot::quoted(title)
+       << "\nset xlabel 'Time [s]'\nset ylabel 'Tool against work [um]'\nset xrange [0:6.144]\nplot ";
+  if (kim) plot << "$kim using 1:2 with lines lc 'gray' title 'his own update, line by line', ";
+  plot << "$ours using 1:2 with lines lc rgb '#0060ad' title '" << (kim ? "this package" : "no control")
+       << "'\n";
+  plot.draw();
+}
+
+/// Figures 6 and 7: what was learnt by the end of a segment.
+void drawTransfer(const std::string& png, const std::string& title, const KimRun& kim, std::size_t segment,
+                  const SecondOrder& learnt, const SecondOrder& truth, const SecondOrder& printed) {
+  std::vector<std::vector<double>> lines, curves;
+  const auto& s = kim.segments.at(segment);
+  for (std::size_t i = 0; i < s.frequency.size(); ++i)
+    lines.push_back({s.frequency[i], std::abs(s.ratio[i]), std::abs(s.used[i])});
+  for (double w = 200.0; w <= 500.0; w += 0.5)
+    curves.push_back(
+        {w, std::abs(learnt.response(w)), std::abs(truth.response(w)), std::abs(printed.response(w))});
+  Gnuplot plot(png, 1100, 600, 12);
+  plot.block("lines", lines);
+  plot.block("curves", curves);
+  plot << "set grid\nset logscale y\nset title " << Gnuplot::quoted(title)
+       << "\nset xlabel 'Frequency [rad/s]'\nset ylabel 'Deflection over chip [1]'\nset xrange [200:500]\n"
+          "plot $lines using 1:2 with linespoints pt 6 lc 'gray' title 'ratio of spectra', "
+          "$lines using 1:3 with linespoints pt 7 lc rgb '#dd8800' title 'eq. 16, line by line', "
+          "$curves using 1:4 with lines dt 3 lw 2 lc rgb '#aa0000' title 'as Kim prints it', "
+          "$curves using 1:3 with lines lw 3 lc 'black' title 'true', "
+          "$curves using 1:2 with lines dt 2 lw 2 lc rgb '#0060ad' title 'this package'\n";
+  plot.draw();
+}
+
+}  // namespace
+
+KimFigures kimFigures(double growth, const std::string& folder) {
+  std::filesystem::create_directories(folder);
+  TurningLoop loop = kimLoop(growth);
+  TurningLoop free = loop;
+  free.controlled = false;
+  TurningLoop ideal = loop;
+  ideal.lathe.servo_frequency = 0.45 * loop.lathe.rate;  // his servo has no dynamics
+  KimFigures f;
+  f.free = runTurning(free);
+  f.ours = runTurning(loop);
+  f.kim = runKim(ideal);
+  for (const char* number : {"4", "5", "6", "7"}) f.pictures.push_back(folder + "/kim_figure_" + number + ".png");
+  drawHistory(f.pictures[0], "Kim figure 4: uncontrolled", f.free, nullptr);
+  drawHistory(f.pictures[1], "Kim figure 5: controlled", f.ours, &f.kim.trace);
+  drawTransfer(f.pictures[2], "Kim figure 6: second period, 2.049 to 4.096 s", f.kim, 1, f.ours.learnt.at(1).machine,
+               f.truth, {0.15, 335.0, 0.06});
+  drawTransfer(f.pictures[3], "Kim figure 7: third period, 4.097 to 6.144 s", f.kim, 2, f.ours.learnt.at(2).machine,
+               f.truth, {0.15, 346.0, 0.07});
+  return f;
+}
+
+double lastVibration(const TurningTrace& trace) { return trace.vibration(5.644, 6.144); }
+
+}  // namespace smartmill::stability

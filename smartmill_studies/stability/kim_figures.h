@@ -1,0 +1,25 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "stability/turning_loop.h"
+
+namespace smartmill::stability {
+
+/// Kim's machine free, under this package's control, and under his own update, and his figures 4 to 7 of
+/// them.
+struct KimFigures {
+  SecondOrder truth{0.1, 350.0, 0.02};
+  TurningTrace free, ours;
+  KimRun kim;
+  std::vector<std::string> pictures;
+};
+/// @param growth logarithm of the free vibration's growth over a segment of 2.048 s @param folder of the
+/// pictures @throws Error
+KimFigures kimFigures(double growth, const std::string& folder);
+
+/// [m] rms of the last half second.
+double lastVibration(const TurningTrace& trace);
+
+}  // namespace smartmill::stability
