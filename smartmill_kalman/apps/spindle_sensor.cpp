@@ -42,7 +42,8 @@ void calibrate(const Request& request) {
   const kalman::StaticCalibration found = kalman::calibrateStatic(readings, base);
   const SpindleSensorCalibration& c = found.calibration;
   const double length = found.lengths.front().length;
-  const LengthLine none{false, 0.0, std::nan("")};
+  LengthLine none;
+  none.offset = std::nan("");
   std::printf(
       "constants over the length L [mm] of tool and holder (applied over shown force), known for %.0f .. "
       "%.0f mm\n",

@@ -114,6 +114,19 @@ TEST(Stock, ASlotMadeIsAir) {
   EXPECT_TRUE(stock.above({0.0, 12e-3, -2e-3}));
 }
 
+// Out of the stock at one end and in again at the other, at the same depth: nothing between is gone.
+TEST(Stock, ASlotEndsWhereTheToolLeaves) {
+  Stock stock(box(), RADIUS);
+  stock.pass({-40e-3, 40e-3, -2e-3});
+  stock.pass({60e-3, 40e-3, -2e-3});
+  stock.leave();
+  stock.pass({-60e-3, 20e-3, -2e-3});
+  const std::vector<ContactArc> arcs = stock.contact({0.0, 24e-3, -2e-3}, {0.0, -0.01, 0.0});
+  ASSERT_EQ(arcs.size(), 1u);
+  EXPECT_NEAR(arcs[0].entry, 0.5 * PI, 1e-9);
+  EXPECT_NEAR(arcs[0].exit, 1.5 * PI, 1e-9);
+}
+
 TEST(Stock, NothingWithoutFeedOrAbove) {
   const Stock stock(box(), RADIUS);
   EXPECT_TRUE(stock.contact({0.0, 0.0, -2e-3}, {0.0, 0.0, 0.0}).empty());
