@@ -21,7 +21,7 @@ const char* nameOf(Verdict verdict) {
 std::vector<Figure> allFigures() {
   std::vector<Figure> all;
   for (const auto& some : {loadMeterFigures(), hammerFigures(), dynamometerFigures(), chartFigures(),
-                           plateFigures(), motorFigures()})
+                           turningFigures(), spindleSensorFigures(), plateFigures(), motorFigures()})
     all.insert(all.end(), some.begin(), some.end());
   return all;
 }

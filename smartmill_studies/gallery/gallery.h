@@ -35,12 +35,14 @@ struct Figure {
 /// In the order of the documents.
 std::vector<Figure> allFigures();
 
-std::vector<Figure> loadMeterFigures();    ///< Dunwoody chapter 3
-std::vector<Figure> hammerFigures();       ///< Dunwoody chapter 4
-std::vector<Figure> dynamometerFigures();  ///< Dunwoody chapter 5
-std::vector<Figure> chartFigures();        ///< Dunwoody chapter 6
-std::vector<Figure> plateFigures();        ///< Bachrathy and Stepan
-std::vector<Figure> motorFigures();        ///< Cheng and Venuvinod
+std::vector<Figure> loadMeterFigures();      ///< Dunwoody chapter 3
+std::vector<Figure> hammerFigures();         ///< Dunwoody chapter 4
+std::vector<Figure> dynamometerFigures();    ///< Dunwoody chapter 5
+std::vector<Figure> chartFigures();          ///< Dunwoody chapter 6
+std::vector<Figure> turningFigures();        ///< Kim
+std::vector<Figure> spindleSensorFigures();  ///< Burzoni
+std::vector<Figure> plateFigures();          ///< Bachrathy and Stepan
+std::vector<Figure> motorFigures();          ///< Cheng and Venuvinod
 
 /// Agrees within a share of the document's number, or within 1.96 standard deviations of ours.
 Compared compareNumber(const std::string& what, double seed, double ours, double ours_std, double share,

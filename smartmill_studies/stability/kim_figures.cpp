@@ -65,16 +65,19 @@ KimFigures kimFigures(double growth, const std::string& folder) {
   f.free = runTurning(free);
   f.ours = runTurning(loop);
   f.kim = runKim(ideal);
-  for (const char* number : {"4", "5", "6", "7"}) f.pictures.push_back(folder + "/kim_figure_" + number + ".png");
+  for (const char* number : {"4", "5", "6", "7"})
+    f.pictures.push_back(folder + "/kim_figure_" + number + ".png");
   drawHistory(f.pictures[0], "Kim figure 4: uncontrolled", f.free, nullptr);
   drawHistory(f.pictures[1], "Kim figure 5: controlled", f.ours, &f.kim.trace);
-  drawTransfer(f.pictures[2], "Kim figure 6: second period, 2.049 to 4.096 s", f.kim, 1, f.ours.learnt.at(1).machine,
-               f.truth, {0.15, 335.0, 0.06});
-  drawTransfer(f.pictures[3], "Kim figure 7: third period, 4.097 to 6.144 s", f.kim, 2, f.ours.learnt.at(2).machine,
-               f.truth, {0.15, 346.0, 0.07});
+  drawTransfer(f.pictures[2], "Kim figure 6: second period, 2.049 to 4.096 s", f.kim, 1,
+               f.ours.learnt.at(1).machine, f.truth, {0.15, 335.0, 0.06});
+  drawTransfer(f.pictures[3], "Kim figure 7: third period, 4.097 to 6.144 s", f.kim, 2,
+               f.ours.learnt.at(2).machine, f.truth, {0.15, 346.0, 0.07});
   return f;
 }
 
-double lastVibration(const TurningTrace& trace) { return trace.vibration(5.644, 6.144); }
+double lastVibration(const TurningTrace& trace) {
+  return trace.vibration(5.644, 6.144);
+}
 
 }  // namespace smartmill::stability

@@ -1,0 +1,218 @@
+#include "kalman/burzoni_tables.h"
+
+#include <cmath>
+#include <cstdio>
+
+#include "kalman/expanded_disturbance.h"
+#include "smartmill_core/signal/statistics.h"
+#include "smartmill_core/units.h"
+
+namespace smartmill::kalman {
+namespace {
+
+constexpr double LENGTH = 0.139, RATE = sim::World::SAMPLE_RATE;
+constexpr const auto& RPM = BURZONI_RPM;
+using Row = std::array<double, 7>;
+
+/// A table of his: R of taps and of cuts [N2], Q of the taps, RMSE of the cuts with that Q.
+struct Printed {
+  const char* name;
+  std::size_t axis;
+  double r_tap, r_cut;
+  Row q, rmse;
+};
+const std::array<Printed, 8> PRINTED{{{"Table 8",
+                                       0,
+                                       0.15,
+                                       10,
+                                       {512, 512, 512, 1024, 512, 1024, 512},
+                                       {0.829, 1.637, 2.499, 4.033, 2.679, 4.010, 3.252}},
+                                      {"Table 9",
+                                       0,
+                                       0.15,
+                                       0.15,
+                                       {512, 512, 512, 1024, 512, 1024, 512},
+                                       {0.751, 1.756, 4.905, 2.711, 7.321, 4.965, 3.155}},
+                                      {"Table 10",
+                                       0,
+                                       10,
+                                       10,
+                                       {32770, 32770, 32770, 65540, 32770, 65540, 32770},
+                                       {0.706, 1.901, 4.803, 3.029, 7.232, 4.648, 3.036}},
+                                      {"Table 11",
+                                       0,
+                                       2,
+                                       10,
+                                       {8192, 4096, 8192, 16380, 8192, 8192, 8192},
+                                       {0.714, 1.879, 4.587, 3.029, 1.273, 4.058, 1.301}},
+                                      {"Table 12",
+                                       1,
+                                       0.15,
+                                       10,
+                                       {1024, 1024, 1024, 1024, 1024, 1024, 1024},
+                                       {0.763, 1.183, 1.818, 2.194, 2.025, 4.486, 1.296}},
+                                      {"Table 13",
+                                       1,
+                                       0.15,
+                                       0.15,
+                                       {1024, 1024, 1024, 1024, 512, 1024, 1024},
+                                       {0.717, 1.428, 1.687, 4.122, 2.701, 3.174, 5.021}},
+                                      {"Table 14",
+                                       1,
+                                       10,
+                                       10,
+                                       {65550, 65550, 65550, 65550, 32770, 65550, 65550},
+                                       {0.708, 1.541, 1.712, 4.047, 3.365, 3.739, 4.475}},
+                                      {"Table 15",
+                                       1,
+                                       2,
+                                       10,
+                                       {16380, 16380, 16380, 16380, 4096, 16380, 16380},
+                                       {0.705, 1.493, 1.703, 1.557, 1.363, 3.628, 1.599}}}};
+
+/// Blows of a stretch in which the spindle stood: 10 ms before to 190 ms after.
+ReferenceTaps blowsOf(const SpindleRig::Record& record, std::size_t axis) {
+  ReferenceTaps taps;
+  const auto before = static_cast<std::size_t>(0.01 * RATE), length = static_cast<std::size_t>(0.2 * RATE);
+  const std::vector<double>& shown = record.measured[axis];
+  for (std::size_t i = before; i + length < std::min(shown.size(), record.hammer.size()); ++i) {
+    if (record.hammer[i] < 20.0) continue;
+    const auto cut = [&](const std::vector<double>& from) {
+      const auto begin = from.begin() + static_cast<std::ptrdiff_t>(i - before);
+      std::vector<double> piece(begin, begin + static_cast<std::ptrdiff_t>(length));
+      const double zero = mean({piece.begin(), piece.begin() + static_cast<std::ptrdiff_t>(before / 2)});
+      for (double& v : piece) v -= zero;
+      return piece;
+    };
+    taps.hammer.push_back(cut(record.hammer));
+    taps.response.push_back(cut(shown));
+    i += length;
+  }
+  return taps;
+}
+
+double meanSquare(const std::vector<double>& v) {
+  return std::pow(standardDeviation(v), 2);
+}
+
+void cutAll(SpindleRig& rig, const MachineModel& model, BurzoniData& data) {
+  for (const double rpm : RPM) {
+    std::fprintf(stderr, "cut at %.0f rpm\n", rpm);
+    data.cuts.push_back(cutSlot(rig, model, units::radPerSecFromRpm(rpm), 0.8e-3, 0.1e-3, 1.0, 0.6));
+    for (auto* force : {&data.cuts.back().truth, &data.cuts.back().measured, &data.cuts.back().compensated}) {
+      for (auto& axis : *force) axis.resize(data.cuts.back().compensated[2].size());
+    }
+  }
+}
+
+/// R as printed is that of the taps, of air, or a fifth of air's.
+double noiseOf(const BurzoniData& data, std::size_t axis, double printed) {
+  if (printed < 1.0) return data.r_tap[axis];
+  return printed > 5.0 ? data.r_air[axis] : 0.2 * data.r_air[axis];
+}
+
+}  // namespace
+
+BurzoniData gatherBurzoni(const MachineModel& model, std::uint64_t seed, double band) {
+  sim::WorldOptions world;
+  world.seed = seed;
+  world.spindle_sensor.present = true;
+  CompensationParameters filter;
+  filter.filter.bandwidth = band;
+  filter.filter.max_harmonics = 150;
+  TapParameters taps;
+  taps.fit_high = band;
+  SpindleRig rig(model, world, filter, taps, false);
+  rig.sorted().setSpindleSensorLength(LENGTH);
+  rig.tell(CuttingCondition::Kind::none);
+  rig.readStatic({0.100, 0.139, 0.180}, {0.0, 100.0, 200.0, 300.0, 0.0}, false);
+  CalibrationGoal fit;
+  fit.step = CalibrationGoal::Step::fit;
+  rig.ask(fit);
+  rig.world().setToolLength(LENGTH);
+  rig.run(0.5);
+  BurzoniData data;
+  data.flutes = model.needTool("cut").teeth;
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    std::fprintf(stderr, "taps\n");
+    rig.start();
+    rig.tap(std::string(1, "xy"[axis]), 9);
+    rig.run(0.3);
+    data.taps[axis] = blowsOf(rig.take(), axis);
+    data.r_tap[axis] = noiseBefore(data.taps[axis], RATE, 0.005);
+  }
+  rig.ask(fit);
+  for (std::size_t axis = 0; axis < 2; ++axis) data.sensor[axis] = rig.sorted().sensor(axis);
+  rig.run(0.5);
+  rig.start();
+  rig.run(1.0);
+  auto quiet = rig.take();
+  rig.spin(units::radPerSecFromRpm(9000.0));
+  rig.tell(CuttingCondition::Kind::air);
+  rig.run(0.3);
+  rig.start();
+  rig.run(1.0);
+  auto raw = rig.take();  // nothing has told the unbalance yet
+  rig.run(1.0);
+  rig.tell(CuttingCondition::Kind::air);
+  rig.run(0.3);
+  rig.start();
+  rig.run(1.0);
+  auto turning = rig.take();
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    data.still[axis] = quiet.measured[axis];
+    data.air_raw[axis] = raw.measured[axis];
+    data.air[axis] = turning.measured[axis];
+    data.r_air[axis] = meanSquare(turning.measured[axis]);
+  }
+  cutAll(rig, model, data);
+  return data;
+}
+
+BurzoniTable burzoniTable(const BurzoniData& data, std::size_t number, double band) {
+  const Printed& printed = PRINTED.at(number);
+  const std::size_t axis = printed.axis;
+  BurzoniTable table{printed.name,
+                     axis,
+                     printed.r_tap,
+                     printed.r_cut,
+                     noiseOf(data, axis, printed.r_tap),
+                     noiseOf(data, axis, printed.r_cut),
+                     {}};
+  std::vector<double> speeds;
+  for (const double rpm : RPM) speeds.push_back(units::radPerSecFromRpm(rpm));
+  const TuningMap map =
+      expandedTapMap(data.taps[axis], data.sensor[axis], RATE, table.r_tap, speeds, data.flutes, band);
+  for (std::size_t k = 0; k < RPM.size(); ++k) {
+    const SpindleRig::Record& cut = data.cuts[k];
+    const std::vector<double>&measured = cut.measured[axis], &truth = cut.truth[axis];
+    const CutOptimum best =
+        bestOfCut(measured, truth, data.sensor[axis], RATE, speeds[k], data.flutes, table.r_cut, band);
+    const auto score = [&](const std::vector<double>& force) {
+      return scoreCut(force, truth, RATE, speeds[k], data.flutes, force.size() / 4, band, band).rmse;
+    };
+    const auto wave = [&](const std::vector<double>& force) {
+      const std::size_t end = force.size();
+      return 100.0 * bandError(force, truth, RATE, end / 4, end - end / 10, band);
+    };
+    BurzoniRow row;
+    row.rpm = RPM[k];
+    row.q_printed = printed.q[k];
+    row.rmse_printed = printed.rmse[k];
+    row.exponent = map.best(speeds[k]);
+    row.rmse = best.all[static_cast<std::size_t>(row.exponent - LEAST_EXPONENT)];
+    row.cut_exponent = best.exponent;
+    row.cut_rmse = best.rmse;
+    row.cut_wave =
+        wave(expandedDisturbanceForce(measured, data.sensor[axis], RATE, data.flutes * RPM[k] / 60.0,
+                                      std::pow(2.0, best.exponent), table.r_cut));
+    row.walk =
+        score(randomWalkForce(measured, data.sensor[axis], RATE, std::pow(2.0, row.exponent), table.r_cut));
+    row.harmonics = score(cut.compensated[axis]);
+    row.harmonics_wave = wave(cut.compensated[axis]);
+    table.rows.push_back(row);
+  }
+  return table;
+}
+
+}  // namespace smartmill::kalman

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "kalman/spindle_rig.h"
+#include "smartmill_core/testing/reference_case.h"
+
+namespace smartmill::kalman {
+
+/// Spindle speeds of his tables [rpm].
+constexpr std::array<double, 7> BURZONI_RPM{{1000, 4500, 6000, 8400, 9000, 11600, 17600}};
+
+/// The sensor in the simulated spindle, calibrated and tapped by the product's own steps, in air and in seven
+/// slots.
+struct BurzoniData {
+  std::array<ModalModel, 2> sensor;
+  std::array<ReferenceTaps, 2> taps;
+  std::array<double, 2> r_tap{}, r_air{};      ///< [N2] before the blows; cutting air at 9000 rpm
+  std::array<std::vector<double>, 2> air;      ///< [N] at 9000 rpm, unbalance off
+  std::array<std::vector<double>, 2> air_raw;  ///< [N] with it
+  std::array<std::vector<double>, 2> still;    ///< [N] at rest
+  std::vector<SpindleRig::Record> cuts;        ///< one a speed
+  int flutes = 0;
+};
+/// @param band [Hz] up to which harmonics count @throws Error
+BurzoniData gatherBurzoni(const MachineModel& model, std::uint64_t seed, double band);
+
+/// A speed of one of tables 8 to 15.
+struct BurzoniRow {
+  double rpm = 0.0;
+  double q_printed = 0.0, rmse_printed = 0.0;    ///< [N2/s], [N]
+  int exponent = 0;                              ///< of the Q that the taps tell, 2^n
+  double rmse = 0.0;                             ///< [N] of the cut with that Q
+  int cut_exponent = 0;                          ///< of the cut's own best Q
+  double cut_rmse = 0.0, cut_wave = 0.0;         ///< [N], [%] with it
+  double walk = 0.0;                             ///< [N] force as a random walk, same Q
+  double harmonics = 0.0, harmonics_wave = 0.0;  ///< [N], [%] of this package's filter
+};
+struct BurzoniTable {
+  std::string name;
+  std::size_t axis = 0;
+  double r_tap_printed = 0.0, r_cut_printed = 0.0, r_tap = 0.0, r_cut = 0.0;  ///< [N2]
+  std::vector<BurzoniRow> rows;
+};
+/// Table 8 + number, number 0..7. @throws Error
+BurzoniTable burzoniTable(const BurzoniData& data, std::size_t number, double band);
+constexpr std::size_t BURZONI_TABLES = 8;
+
+}  // namespace smartmill::kalman
