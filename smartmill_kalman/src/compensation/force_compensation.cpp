@@ -50,6 +50,7 @@ void ForceCompensation::setSensor(std::size_t axis, const ModalModel& sensor, do
   noise_rms_.at(axis) = noise_rms;
   stop();
   schedule_.clear();
+  delay_schedule_.clear();
 }
 
 void ForceCompensation::setMatrix(const SensorMatrix& matrix) {
@@ -266,15 +267,23 @@ ForceBlock ForceCompensation::measuredIn(const SampleBlock& block) {
 /// as the harmonics' grid allows.
 void ForceCompensation::prepareDelays(double sample_rate) {
   const bool fresh = delays_.empty();
-  const auto point = static_cast<int>(std::lround(std::log(speed_) / SPEED_GRID));
-  if (fresh || design_rate_ != sample_rate ||
-      std::abs(std::log(speed_) / SPEED_GRID - grid_point_) > GRID_HYSTERESIS) {
+  const double halves = 2.0 * units::TWO_PI / speed_ * sample_rate;
+  const auto point = static_cast<int>(std::lround(halves));
+  if (fresh || design_rate_ != sample_rate || std::abs(halves - grid_point_) > GRID_HYSTERESIS) {
+    if (design_rate_ != sample_rate) delay_schedule_.clear();
     std::vector<DelayFilter> before;
     before.swap(delays_);
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      HarmonicFilterParameters parameters = parameters_.filter;
-      parameters.noise_rms = noise_rms_[axis];
-      delays_.emplace_back(*sensor_[axis], speed_, sample_rate, parameters);
+      auto scheduled = delay_schedule_.find({axis, point});
+      if (scheduled == delay_schedule_.end()) {
+        HarmonicFilterParameters parameters = parameters_.filter;
+        parameters.noise_rms = noise_rms_[axis];
+        const DelayFilter made(*sensor_[axis], 2.0 * units::TWO_PI * sample_rate / point, sample_rate,
+                               parameters);
+        scheduled = delay_schedule_.emplace(std::pair(axis, point), made).first;
+      }
+      delays_.push_back(scheduled->second);
+      delays_[axis].retune(speed_);
       if (!before.empty() && design_rate_ == sample_rate) delays_[axis].adopt(before[axis]);
     }
     grid_point_ = point;

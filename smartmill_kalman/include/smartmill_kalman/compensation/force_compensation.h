@@ -157,6 +157,7 @@ class ForceCompensation {
   std::optional<CrossTalkInverse> cross_talk_;  // of matrix_ at the filters' speed
   std::vector<HarmonicFilter> filters_;         // of the axes with a model, in order; empty: to be laid out
   std::vector<DelayFilter> delays_;             // in their place with delay_form
+  std::map<std::pair<std::size_t, int>, DelayFilter> delay_schedule_;  // laid out, by axis and point
   std::array<LagSmoother, 3> smoothers_;
   std::deque<std::pair<ForceBlock, ForceBlock>> waiting_;  // measured and causal, for their lag to pass
   std::map<std::pair<std::size_t, int>, std::vector<HarmonicGain>>
