@@ -58,7 +58,6 @@ void MotorTraits::declare(ParameterTable& table) {
                "[1/K] less force and torque an ampere above 20 deg C");
   table.number("harmonic", harmonic, "1", Range::closed(0.0, 0.5), "share of the fifth harmonic in a phase");
   table.number("noise", noise, "A", Range::closed(0.0, 100.0), "root mean square of a Hall sensor");
-  table.section();
 }
 
 std::array<AxisDrive, 3> MotorTraits::drives() const {
