@@ -19,7 +19,7 @@ constexpr double LENGTH = 0.139;  // [m]
 // Weights, the reference, taps, a cut: the sensor in the spindle of the simulated machine through the
 // product's steps.
 TEST(SpindleRig, ShowsTheForceOfACutAfterItsCalibration) {
-  const MachineModel model = readMachineModel("../launch/models/mill_twin.yaml");
+  const MachineModel model = readMachineModel("../../launch/models/mill_twin.yaml");
   sim::WorldOptions world;
   world.spindle_sensor.present = true;
   CompensationParameters filter;
