@@ -240,7 +240,7 @@ void DelayFilter::takeLine(const DelayFilter& other) {
   constexpr auto NOW = static_cast<double>(DelayModel::NOW);
   for (std::size_t i = 0; i < model_.line; ++i) {
     double position = NOW + (static_cast<double>(i) - NOW) * was.period / model_.period;
-    if (position < static_cast<double>(TAPS / 2)) position += was.period;
+    if (position < 0.5 * static_cast<double>(TAPS)) position += was.period;
     if (position > static_cast<double>(was.line + TAPS)) position -= was.period;
     const std::size_t from = sharesAt(position, share);
     for (std::size_t j = 0; j < TAPS; ++j) line_[i] += share[j] * known[from + j];

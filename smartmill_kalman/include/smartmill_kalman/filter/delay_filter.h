@@ -17,14 +17,14 @@ struct DelayModel {
   /// Another period [samples]; line, interpolate and at change with it. @throws Error as above.
   void setPeriod(double samples);
 
-  std::size_t modes, line;          ///< [1] modes of the sensor; forces kept, ceil(T) + TAPS / 2
+  std::size_t modes = 0, line = 0;  ///< [1] modes of the sensor; forces kept, ceil(T) + TAPS / 2
   std::vector<double> transition;   ///< 2 x 2 of each mode, row-major
   std::vector<double> drive;        ///< [mode state][HOLD]: share of F(k - 3) .. F(k + 4) in the next state
   std::vector<double> output;       ///< of the modes' states
-  double direct;                    ///< [1]
+  double direct = 0.0;              ///< [1]
   std::vector<double> interpolate;  ///< TAPS shares of line[at] .. in F one period before the line's next
-  std::size_t at;
-  double period;  ///< [samples]
+  std::size_t at = 0;
+  double period = 0.0;  ///< [samples]
 
   static constexpr std::size_t HOLD = 8;   ///< forces that tell the one between two samples
   static constexpr std::size_t TAPS = 16;  ///< forces that tell the one a period before
