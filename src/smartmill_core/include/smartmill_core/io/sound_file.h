@@ -20,9 +20,9 @@ SoundFile readSoundFile(const std::string& file);
 
 /// A channel of a sound file as a quantity.
 struct SoundChannel {
-  std::string name;    ///< e.g. fx, hammer, acceleration
-  std::size_t number;  ///< from 1
-  double scale = 1.0;  ///< [unit] at full scale, with its sign
+  std::string name;        ///< e.g. fx, hammer, acceleration
+  std::size_t number = 0;  ///< from 1
+  double scale = 1.0;      ///< [unit] at full scale, with its sign
 };
 
 /// "1:hammer=2000,2:acceleration=-500": number, name and what full scale is in SI units; "=" and the scale
