@@ -117,7 +117,7 @@ void SensorCalibration::give(double volt, double volt_std) {
   if (state_ != State::jogging) return;
   ++jogs_;
   travelled_ += next_;
-  const double change = volt - volt_;
+  const double before = volt_, change = volt - volt_;
   const double noise = std::hypot(volt_std, volt_std_);
   const double moved = next_;
   const bool usable = !clipped(volt) && !clipped(volt_);
@@ -146,6 +146,15 @@ void SensorCalibration::give(double volt, double volt_std) {
       break;
   }
   if (usable) return approached(change, moved, noise);
+  // The curve leaves room, and yet the range ends: something of the tool touches, or is about to. Never
+  // again.
+  if (clipped(volt) && volt > 0.0 && moved > 0.0 && !clipped(before) &&
+      nominalGap(before) - moved > options_.min_gap) {
+    return fail(formatted(
+        "a jog of %.0f um took the sensor from %.2f V to the end of its range: something of the tool "
+        "stands nearer to it than the sensor sees",
+        1e6 * moved, before));
+  }
   // No sensitivity yet: on by the longest jog (the thesis's program does so too).
   if (!clipped(volt)) return ask(volt < 0.0 ? options_.first_jog : -options_.first_jog);
   ask(volt < 0.0 ? options_.max_jog : -options_.max_jog);

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <random>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "smartmill_core/testing/coverage.h"
@@ -68,6 +69,20 @@ TEST(SensorCalibration, JogsAsTheThesisDoes) {
   near.give(sensor.volt(300e-6), 1e-4);
   const double slope = (sensor.volt(300e-6) - sensor.volt(350e-6)) / 50e-6;
   EXPECT_NEAR(near.next(), 0.5 * -sensor.volt(300e-6) / slope, 0.5e-6);
+}
+
+// An edge that stands out touches the sensor's face while the electrode sees the flank behind it: once is too
+// often, a second time never comes.
+TEST(SensorCalibration, StopsWhereTheRangeEndsThoughTheCurveLeavesRoom) {
+  SensorCalibration c{SensorCalibrationOptions()};
+  const Sensor sensor;
+  c.start(sensor.volt(500e-6), 1e-4);
+  c.give(sensor.volt(450e-6), 1e-4);
+  ASSERT_GT(c.next(), 0.0);
+  c.give(9.99, 1e-4);
+  ASSERT_EQ(c.state(), SensorCalibration::State::failed);
+  EXPECT_THAT(c.reason(),
+              ::testing::HasSubstr("to the end of its range: something of the tool stands nearer"));
 }
 
 TEST(SensorCalibration, StandardDeviationIsHonest) {
