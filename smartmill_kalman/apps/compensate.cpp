@@ -8,12 +8,16 @@
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
+#include <future>
 #include <optional>
 #include <set>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "node/bag_compensation.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/program.h"
 #include "smartmill_core/signal/statistics.h"
@@ -44,18 +48,25 @@ void print(const char* axis, const ModalModel& sensor) {
   std::printf("\n");
 }
 
-void printRange(const std::string& name, const std::array<std::vector<double>, 3>& measured,
-                const std::array<std::vector<double>, 3>& compensated) {
-  const auto range = [](const std::vector<double>& v) { return percentile(v, 0.9) - percentile(v, 0.1); };
-  std::printf("%s: range 10..90 %% measured x %.1f y %.1f N, compensated x %.1f y %.1f N\n", name.c_str(),
-              range(measured[0]), range(measured[1]), range(compensated[0]), range(compensated[1]));
+/// [N] from the tenth to the ninetieth percentile
+double range(std::vector<double> values) {
+  const double low = percentile(values, 0.1);
+  return percentile(std::move(values), 0.9) - low;
 }
 
-void write(const std::string& folder, const std::string& name, const std::vector<double>& time,
-           const std::array<std::vector<double>, 3>& force) {
+std::string rangeLine(const std::string& name, const std::array<std::vector<double>, 3>& measured,
+                      const std::array<std::vector<double>, 3>& compensated) {
+  return formatted("%s: range 10..90 %% measured x %.1f y %.1f N, compensated x %.1f y %.1f N\n",
+                   name.c_str(), range(measured[0]), range(measured[1]), range(compensated[0]),
+                   range(compensated[1]));
+}
+
+void write(const std::string& folder, const std::string& name, std::vector<double> time,
+           std::array<std::vector<double>, 3> force) {
   Record record;
-  record.time = time;
-  for (std::size_t axis = 0; axis < 3; ++axis) record.add(std::string("f") + AXES[axis]) = force[axis];
+  record.time = std::move(time);
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    record.add(std::string("f") + AXES[axis]) = std::move(force[axis]);
   writeCsv(record, (std::filesystem::path(folder) / (name + ".csv")).string());
 }
 
@@ -136,7 +147,7 @@ void fromCampaign(const Request& request) {
                                                    test.sample_rate, parameters.compensation.filter,
                                                    kalman::methodOf(request.method), request.lag);
     write(request.out, test.name, record.time, force);
-    printRange(test.name, forces(record), force);
+    std::fputs(rangeLine(test.name, forces(record), force).c_str(), stdout);
     ++cuts;
   }
   if (cuts == 0) throw Error(campaign.folder + ": the campaign has no cuts");
@@ -160,6 +171,14 @@ std::string fileName(std::string name, std::set<std::string>& used) {
   return unique;
 }
 
+/// Writes a cut of a bag. @return what is said of it
+std::string writeCut(const std::string& folder, const std::string& name, kalman::BagCut cut) {
+  const std::string range = rangeLine(name, cut.measured, cut.compensated);
+  write(folder, name, std::move(cut.offset), std::move(cut.compensated));
+  return range +
+         formatted("%s: time 0 is %.9f s, the first %.3f s settle\n", name.c_str(), cut.stamp, cut.settling);
+}
+
 void fromBag(const Request& request) {
   if (request.identify || request.coupled || request.blind) {
     throw Error(
@@ -173,18 +192,18 @@ void fromBag(const Request& request) {
   const MachineModel model = readMachineModel(model_file);
   const bool terminal = isatty(STDERR_FILENO);
   std::set<std::string> used;
+  std::vector<std::future<std::string>> written;  // while the bag is read on
   const auto began = std::chrono::steady_clock::now();
   const kalman::BagSummary summary = kalman::compensateBag(
       request.source, model.force_sensor, parameters, kalman::methodOf(request.method),
       [&](kalman::BagCut&& cut) {
         const std::string name = fileName(cut.name, used);
-        write(request.out, name, cut.offset, cut.compensated);
-        printRange(name, cut.measured, cut.compensated);
-        std::printf("%s: time 0 is %.9f s, the first %.3f s settle\n", name.c_str(), cut.stamp, cut.settling);
+        written.push_back(std::async(std::launch::async, writeCut, request.out, name, std::move(cut)));
       },
       [&](double share) {
         if (terminal) std::fprintf(stderr, "\rreading %3.0f %%%s", 100.0 * share, share >= 1.0 ? "\n" : "");
       });
+  for (std::future<std::string>& cut : written) std::fputs(cut.get().c_str(), stdout);
   for (const kalman::SensorResult& result : summary.identified) {
     std::printf("taps in %s: %s\n", result.modes.direction.c_str(), result.message.c_str());
     if (result.code == FrfCode::ok) print(result.modes.direction.c_str(), result.modes.model);

@@ -82,8 +82,9 @@ void SortedCompensation::useModelFile() {
   }
 }
 
-void SortedCompensation::push(const SampleBlock& block) {
-  sorter_.push(blocks_, block.stamp, [this, block] {
+void SortedCompensation::push(SampleBlock block) {
+  const double stamp = block.stamp;
+  sorter_.push(blocks_, stamp, [this, block = std::move(block)] {
     if (SpindleForceSensor::isSixChannels(block)) {
       calibrator_.handle(block);
       drainCalibration();
@@ -140,8 +141,9 @@ void SortedCompensation::forward(const ForceBlock& measured, const ForceBlock& c
   outputs_.force(shown, marked);
 }
 
-void SortedCompensation::pushHammer(const SampleBlock& block) {
-  sorter_.push(hammers_, block.stamp, [this, block] {
+void SortedCompensation::pushHammer(SampleBlock block) {
+  const double stamp = block.stamp;
+  sorter_.push(hammers_, stamp, [this, block = std::move(block)] {
     calibrator_.handleHammer(block);
     measurement_.handleHammer(block);
     drain();

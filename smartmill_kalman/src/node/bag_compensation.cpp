@@ -143,7 +143,6 @@ BagSummary compensateBag(const std::string& path, const ForceSensor& sensor, con
                                   {},
                                   [&](const SensorResult& result) { summary.identified.push_back(result); }});
   useFiles(*sorted, parameters);
-  summary.duration = bag.duration();
   std::size_t blocks = 0;
   bag.on<smartmill_msgs::SampleBlock>(parameters.force_input,
                                       [&](const smartmill_msgs::SampleBlock& m, double) {
@@ -165,6 +164,7 @@ BagSummary compensateBag(const std::string& path, const ForceSensor& sensor, con
         sorted->push(goalFromMsg(m.goal, received));
       });
   bag.run(progress);
+  summary.duration = bag.duration();
   if (blocks == 0) throw Error(path + ": holds no " + parameters.force_input);
   sorted->flush();
   cutter.close();

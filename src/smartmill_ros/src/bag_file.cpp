@@ -1,10 +1,13 @@
 #include "smartmill_ros/bag_file.h"
 
+#include <fcntl.h>
 #include <lz4frame.h>
 #include <rosbag/stream.h>
+#include <unistd.h>
 
 #include <algorithm>
-#include <fstream>
+#include <cerrno>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -20,7 +23,9 @@ constexpr const char* VERSION_LINE = "#ROSBAG V2.0\n";
 constexpr std::size_t VERSION_SIZE = 13;  // [byte]
 constexpr std::size_t LENGTH = 4;         // [byte] of a record's lengths
 constexpr std::uint32_t NANO = 1000000000;
-constexpr std::size_t KEPT = 4;  // chunks, since neighbours overlap in time
+constexpr std::uint32_t NEVER = std::numeric_limits<std::uint32_t>::max();
+constexpr std::size_t WINDOW = 4096;  // [byte]
+constexpr std::size_t KEPT = 4;       // chunks, since neighbours overlap in time
 
 enum class Op : std::uint8_t { message = 2, bag = 3, index = 4, chunk = 5, chunk_info = 6, connection = 7 };
 
@@ -100,7 +105,7 @@ struct BagFile::Header {
 /// Header and data in the file.
 struct BagFile::Record {
   std::vector<std::uint8_t> header;
-  std::uint64_t data_at = 0, end = 0;
+  std::uint64_t begin = 0, data_at = 0, end = 0;
   std::uint32_t data_size = 0;
 };
 
@@ -111,6 +116,7 @@ void BagFile::fail(const std::string& what) const {
 BagFile::BagFile(BagBytes bytes, std::string name) : bytes_(std::move(bytes)), name_(std::move(name)) {
   std::uint64_t at = 0;
   begin(&at);
+  std::map<std::uint64_t, Time> told;
   while (at < bytes_.size) {
     const Record found = record(at);
     const Header header = headerOf(found.header.data(), found.header.size());
@@ -120,17 +126,52 @@ BagFile::BagFile(BagBytes bytes, std::string name) : bytes_(std::move(bytes)), n
       std::vector<std::uint8_t> data(found.data_size);
       bytes_.read(found.data_at, reinterpret_cast<char*>(data.data()), data.size());
       addConnection(header, data.data(), data.size());
+    } else if (header.op() == Op::chunk_info) {
+      const auto low = header.number("chunk_pos"), high = header.number("chunk_pos", 1),
+                 seconds = header.number("start_time"), nanoseconds = header.number("start_time", 1);
+      if (low && high && seconds && nanoseconds) {
+        told[*low | static_cast<std::uint64_t>(*high) << 32U] = {*seconds, *nanoseconds};
+      }
     }
     at = found.end;
   }
-  for (const Entry& entry : entries_) {
-    if (connections_.count(entry.connection) == 0) {
-      fail("is damaged: a message of an unknown connection");
-    }
+  setFirstTimes(told);
+  window_.clear();
+}
+
+/// A chunk that the index tells nothing of may hold the oldest message of all. @param told by its place
+void BagFile::setFirstTimes(const std::map<std::uint64_t, Time>& told) {
+  for (Chunk& chunk : chunks_) {
+    const auto found = told.find(chunk.begin);
+    chunk.first = found == told.end() ? Time() : found->second;
   }
-  std::stable_sort(entries_.begin(), entries_.end(), [](const Entry& a, const Entry& b) {
-    return std::pair(a.seconds, a.nanoseconds) < std::pair(b.seconds, b.nanoseconds);
-  });
+  Time least = {NEVER, NEVER};
+  for (auto chunk = chunks_.rbegin(); chunk != chunks_.rend(); ++chunk) {
+    chunk->first_behind = least;
+    least = std::min(least, chunk->first);
+  }
+}
+
+bool BagFile::next(Entry* entry) {
+  const auto waits = [this] {
+    return waiting_.empty() || waiting_.top().time > chunks_[indexed_ - 1].first_behind;
+  };
+  while (indexed_ < chunks_.size() && waits()) {
+    index(indexed_++);
+  }
+  if (waiting_.empty()) {
+    return false;
+  }
+  *entry = waiting_.top().entry;
+  waiting_.pop();
+  if (connections_.count(entry->connection) == 0) {
+    fail("is damaged: a message of an unknown connection");
+  }
+  return true;
+}
+
+double BagFile::share() const {
+  return chunks_.empty() ? 1.0 : static_cast<double>(indexed_) / static_cast<double>(chunks_.size());
 }
 
 /// The line that every bag begins with, and its first record. @param at becomes the place behind them.
@@ -157,13 +198,27 @@ void BagFile::begin(std::uint64_t* at) const {
   *at = first.end;
 }
 
+/// Copies bytes that lie within the file; records of the index are small and stand side by side.
+void BagFile::look(std::uint64_t at, std::uint8_t* to, std::size_t count) const {
+  if (count > WINDOW) {
+    bytes_.read(at, reinterpret_cast<char*>(to), count);
+    return;
+  }
+  if (at < window_at_ || at + count > window_at_ + window_.size()) {
+    window_.resize(static_cast<std::size_t>(std::min<std::uint64_t>(WINDOW, bytes_.size - at)));
+    bytes_.read(at, reinterpret_cast<char*>(window_.data()), window_.size());
+    window_at_ = at;
+  }
+  std::copy_n(window_.begin() + static_cast<std::ptrdiff_t>(at - window_at_), count, to);
+}
+
 BagFile::Record BagFile::record(std::uint64_t at) const {
   const auto length = [&](std::uint64_t place) {
     std::uint8_t bytes[LENGTH];
     if (bytes_.size - place < LENGTH) {
       fail("cannot be read as a bag: missing, or cut off");
     }
-    bytes_.read(place, reinterpret_cast<char*>(bytes), LENGTH);
+    look(place, bytes, LENGTH);
     const std::uint32_t size = numberAt(bytes);
     if (size > bytes_.size) {
       fail("is no bag, or damaged: a record tells of " + std::to_string(size) + " bytes");
@@ -174,8 +229,9 @@ BagFile::Record BagFile::record(std::uint64_t at) const {
     return size;
   };
   Record found;
+  found.begin = at;
   found.header.resize(length(at));
-  bytes_.read(at + LENGTH, reinterpret_cast<char*>(found.header.data()), found.header.size());
+  look(at + LENGTH, found.header.data(), found.header.size());
   const std::uint64_t middle = at + LENGTH + found.header.size();
   found.data_size = length(middle);
   found.data_at = middle + LENGTH;
@@ -204,6 +260,7 @@ void BagFile::addConnection(const Header& header, const std::uint8_t* data, std:
 
 void BagFile::addChunk(const Header& header, const Record& record) {
   Chunk chunk;
+  chunk.begin = record.begin;
   chunk.at = record.data_at;
   chunk.stored = record.data_size;
   const std::string packing = header.word("compression");
@@ -224,7 +281,6 @@ void BagFile::addChunk(const Header& header, const Record& record) {
   }
   chunk.size = *size;
   chunks_.push_back(chunk);
-  index(static_cast<std::uint32_t>(chunks_.size() - 1));
 }
 
 /// Finds the messages and connections in a chunk.
@@ -245,15 +301,72 @@ void BagFile::index(std::uint32_t number) {
     if (header.op() == Op::connection) {
       addConnection(header, bytes.data() + begins[1], sizes[1]);
     } else if (header.op() == Op::message) {
-      const auto connection = header.number("conn"), seconds = header.number("time"),
-                 nanoseconds = header.number("time", 1);
-      if (!connection || !seconds || !nanoseconds || *nanoseconds >= NANO) {
-        fail("is damaged: a message without connection or time");
-      }
-      entries_.push_back({*seconds, *nanoseconds, number, static_cast<std::uint32_t>(begins[1]),
-                          static_cast<std::uint32_t>(sizes[1]), *connection});
+      Entry place;
+      place.chunk = number;
+      place.offset = static_cast<std::uint32_t>(begins[1]);
+      place.size = static_cast<std::uint32_t>(sizes[1]);
+      addMessage(header, place);
     }
   }
+}
+
+/// @param place where its bytes are
+void BagFile::addMessage(const Header& header, const Entry& place) {
+  Entry entry = place;
+  const auto connection = header.number("conn"), seconds = header.number("time"),
+             nanoseconds = header.number("time", 1);
+  if (!connection || !seconds || !nanoseconds || *nanoseconds >= NANO) {
+    fail("is damaged: a message without connection or time");
+  }
+  entry.connection = *connection;
+  entry.seconds = *seconds;
+  entry.nanoseconds = *nanoseconds;
+  const Time time{*seconds, *nanoseconds};
+  if (time < chunks_[entry.chunk].first) {
+    fail("is damaged: a message that is older than the index tells");
+  }
+  waiting_.push({time, arrivals_++, entry});
+}
+
+/// Memory that was used before is at hand already.
+BagFile::Loaded BagFile::spare() {
+  Loaded loaded;
+  if (loaded_.size() >= KEPT) {
+    loaded = std::move(loaded_.back());
+    loaded_.pop_back();
+  }
+  return loaded;
+}
+
+/// @throws std::exception
+void BagFile::unpack(const Chunk& chunk, Loaded* loaded) const {
+  std::vector<std::uint8_t>&bytes = loaded->bytes, &stored = loaded->stored;
+  bytes.resize(chunk.size);
+  if (chunk.packing == Chunk::Packing::none) {
+    bytes_.read(chunk.at, reinterpret_cast<char*>(bytes.data()), bytes.size());
+    return;
+  }
+  stored.resize(chunk.stored);
+  bytes_.read(chunk.at, reinterpret_cast<char*>(stored.data()), stored.size());
+  if (chunk.packing == Chunk::Packing::bz2) {
+    rosbag::BZ2Stream(nullptr).decompress(bytes.data(), chunk.size, stored.data(), chunk.stored);
+  } else {
+    unpackLz4(stored, bytes, chunk.seen);
+  }
+}
+
+/// Begins to unpack a chunk that will be asked for.
+void BagFile::ahead(std::uint32_t number) {
+  if (number >= chunks_.size()) {
+    return;
+  }
+  Loaded loaded = spare();
+  loaded.chunk = number;
+  coming_ =
+      std::async(std::launch::async, [this, chunk = chunks_[number], loaded = std::move(loaded)]() mutable {
+        unpack(chunk, &loaded);
+        return std::move(loaded);
+      });
 }
 
 const std::vector<std::uint8_t>& BagFile::load(std::uint32_t number) {
@@ -262,30 +375,25 @@ const std::vector<std::uint8_t>& BagFile::load(std::uint32_t number) {
   if (kept != loaded_.end()) {
     return kept->bytes;
   }
-  Chunk& chunk = chunks_[number];
-  // Memory that was used before is at hand already.
-  std::vector<std::uint8_t> bytes;
-  if (loaded_.size() >= KEPT) {
-    bytes = std::move(loaded_.back().bytes);
-    loaded_.pop_back();
-  }
-  bytes.resize(chunk.size);
-  stored_.resize(chunk.stored);
-  bytes_.read(chunk.at, reinterpret_cast<char*>(stored_.data()), stored_.size());
   try {
-    if (chunk.packing == Chunk::Packing::none) {
-      bytes.assign(stored_.begin(), stored_.begin() + std::min(chunk.size, chunk.stored));
-      bytes.resize(chunk.size);
-    } else if (chunk.packing == Chunk::Packing::bz2) {
-      rosbag::BZ2Stream(nullptr).decompress(bytes.data(), chunk.size, stored_.data(), chunk.stored);
+    // Only next() goes on to a chunk that was never seen.
+    if (!chunks_[number].seen && coming_.valid()) {
+      loaded_.push_front(coming_.get());
     } else {
-      unpackLz4(stored_, bytes, chunk.seen);
+      Loaded loaded = spare();
+      loaded.chunk = number;
+      unpack(chunks_[number], &loaded);
+      loaded_.push_front(std::move(loaded));
     }
+  } catch (const Error&) {
+    throw;
   } catch (const std::exception& e) {
     fail(std::string("is damaged: a chunk cannot be unpacked: ") + e.what());
   }
-  chunk.seen = true;
-  loaded_.push_front({number, std::move(bytes)});
+  if (!chunks_[number].seen) {
+    chunks_[number].seen = true;
+    ahead(number + 1);
+  }
   return loaded_.front().bytes;
 }
 
@@ -294,16 +402,28 @@ const std::uint8_t* BagFile::data(const Entry& entry) {
 }
 
 BagBytes bagBytesOf(const std::string& path) {
-  const auto file = std::make_shared<std::ifstream>(path, std::ios::binary | std::ios::ate);
-  if (!*file || file->tellg() < 0) {
-    throw Error(path + ": cannot be read as a bag: missing, or cut off");
+  const auto unread = [path] { return Error(path + ": cannot be read as a bag: missing, or cut off"); };
+  const int opened = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  const std::shared_ptr<const int> file(new int(opened), [](const int* number) {
+    if (*number >= 0) ::close(*number);
+    delete number;
+  });
+  const off_t size = opened < 0 ? -1 : ::lseek(opened, 0, SEEK_END);
+  if (size < 0) {
+    throw unread();
   }
   BagBytes bytes;
-  bytes.size = static_cast<std::uint64_t>(file->tellg());
-  bytes.read = [file, path](std::uint64_t at, char* to, std::size_t count) {
-    file->seekg(static_cast<std::streamoff>(at));
-    if (!file->read(to, static_cast<std::streamsize>(count))) {
-      throw Error(path + ": cannot be read as a bag: missing, or cut off");
+  bytes.size = static_cast<std::uint64_t>(size);
+  bytes.read = [file, unread](std::uint64_t at, char* to, std::size_t count) {
+    while (count > 0) {
+      const ssize_t got = ::pread(*file, to, count, static_cast<off_t>(at));
+      if (got < 0 && errno == EINTR) continue;
+      if (got <= 0) {
+        throw unread();
+      }
+      at += static_cast<std::uint64_t>(got);
+      to += got;
+      count -= static_cast<std::size_t>(got);
     }
   };
   return bytes;

@@ -1,5 +1,6 @@
 #include "smartmill_ros/bag_reader.h"
 
+#include <algorithm>
 #include <utility>
 
 namespace smartmill {
@@ -13,37 +14,38 @@ BagReader::BagReader(BagBytes bytes, const std::string& name)
 
 bool BagReader::has(const std::string& topic) const {
   const std::string name = names::absolute(topic);
-  for (const BagFile::Entry& entry : file_->entries()) {
-    if (file_->connection(entry).topic == name) {
-      return true;
-    }
-  }
-  return false;
+  const auto& connections = file_->connections();
+  return std::any_of(connections.begin(), connections.end(),
+                     [&name](const auto& connection) { return connection.second.topic == name; });
 }
 
 double BagReader::duration() const {
-  const std::vector<BagFile::Entry>& entries = file_->entries();
-  if (entries.empty()) {
+  if (!first_) {
     return 0.0;
   }
   // Whole seconds apart: a difference of two dates loses digits.
-  const BagFile::Entry &first = entries.front(), &last = entries.back();
-  return static_cast<double>(last.seconds - first.seconds) +
-         1e-9 * (static_cast<double>(last.nanoseconds) - static_cast<double>(first.nanoseconds));
+  return static_cast<double>(last_.seconds - first_->seconds) +
+         1e-9 * (static_cast<double>(last_.nanoseconds) - static_cast<double>(first_->nanoseconds));
 }
 
 void BagReader::run(const std::function<void(double)>& progress) {
-  const std::vector<BagFile::Entry>& entries = file_->entries();
   std::size_t done = 0;
+  // One look at a topic's name a connection, not a message.
+  std::map<std::uint32_t, const std::function<void(const Instance&)>*> handler_of;
   try {
-    for (const BagFile::Entry& entry : entries) {
-      const BagFile::Connection& connection = file_->connection(entry);
-      const auto handler = handlers_.find(connection.topic);
-      if (handler != handlers_.end()) {
-        handler->second({connection, file_->data(entry), entry.size, entry.time()});
+    while (file_->next(&last_)) {
+      if (!first_) first_ = last_;
+      const BagFile::Connection& connection = file_->connection(last_);
+      const auto [known, is_new] = handler_of.try_emplace(last_.connection, nullptr);
+      if (is_new) {
+        const auto handler = handlers_.find(connection.topic);
+        known->second = handler == handlers_.end() ? nullptr : &handler->second;
+      }
+      if (known->second != nullptr) {
+        (*known->second)({connection, file_->data(last_), last_.size, last_.time()});
       }
       if (progress && ++done % 1000 == 0) {
-        progress(static_cast<double>(done) / static_cast<double>(entries.size()));
+        progress(file_->share());
       }
     }
     if (progress) {

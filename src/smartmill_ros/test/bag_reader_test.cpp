@@ -94,6 +94,18 @@ TEST_F(DamagedBag, PackedBagsAreReadTheSame) {
   }
 }
 
+// Where a chunk begins is believed of the index, but looked at.
+TEST_F(DamagedBag, AnIndexThatTellsLaterTimesIsRefused) {
+  const std::string key = "start_time=";
+  std::vector<char> bytes = bytes_;
+  const auto at = std::search(bytes.begin(), bytes.end(), key.begin(), key.end());
+  ASSERT_NE(at, bytes.end());
+  at[static_cast<std::ptrdiff_t>(key.size())] = 2;
+  EXPECT_EQ(fault(bytes), file_ + ": is damaged: a message that is older than the index tells");
+  at[static_cast<std::ptrdiff_t>(key.size())] = 0;
+  EXPECT_EQ(fault(bytes), "");
+}
+
 TEST_F(DamagedBag, AVectorLongerThanItsMessageTakesNoMemory) {
   // The samples' count is the last of its kind in the message: four doubles follow.
   std::vector<char> bytes = bytes_;

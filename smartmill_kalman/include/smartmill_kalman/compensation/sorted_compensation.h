@@ -63,9 +63,9 @@ class SortedCompensation {
   const SpindleSensorHealth* spindleHealth() const { return spindle_ ? &spindle_->health() : nullptr; }
 
   /// Block of the force sensor.
-  void push(const SampleBlock& block);
+  void push(SampleBlock block);
   /// Block of the hammer; a machine without one never sends any.
-  void pushHammer(const SampleBlock& block);
+  void pushHammer(SampleBlock block);
   void push(const SpindleAngle& angle);
   void push(const CuttingCondition& condition);
   /// @param begin told, when its time has come, whether the goal can be taken (false while another

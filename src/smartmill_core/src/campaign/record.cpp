@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <string_view>
 
@@ -34,6 +35,38 @@ constexpr ColumnKind COLUMNS[] = {{"time", "s", 1.0},
                                   {"tool_y", "um", units::UM},
                                   {"displacement", "m", 1.0},
                                   {"acceleration", "m/s2", 1.0}};
+
+constexpr double POWERS[] = {1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12};
+
+/// The digits of printf's %.*g, of at most 9 digits. The usual sizes are rounded as whole numbers, where the
+/// product's own rounding cannot change the digit; std::to_chars does the others.
+void appendGeneral(std::string& text, double value, int digits) {
+  constexpr double CERTAIN = 1e-4;  // from a half, where 1e9 is known to 1e-7
+  char written[40];
+  char* const end = written + sizeof written;
+  const double size = std::abs(value);
+  if (size >= 1e-4 && size < 1e6) {
+    int decimals = digits + 3;  // of numbers from 1e-4 to 1e-3
+    for (double above = 1e-3; size >= above && decimals > digits; above *= 10.0) --decimals;
+    for (double above = 1.0; size >= above; above *= 10.0) --decimals;
+    const double scaled = size * POWERS[decimals], whole = std::floor(scaled), part = scaled - whole;
+    auto number = static_cast<std::uint64_t>(whole) + (part > 0.5 ? 1 : 0);
+    if (std::abs(part - 0.5) > CERTAIN && static_cast<double>(number) < POWERS[digits]) {
+      for (; decimals > 0 && number % 10 == 0; --decimals) number /= 10;
+      char* at = end;
+      for (int left = decimals; left > 0; --left, number /= 10) *--at = static_cast<char>('0' + number % 10);
+      if (decimals > 0) *--at = '.';
+      do {
+        *--at = static_cast<char>('0' + number % 10);
+        number /= 10;
+      } while (number > 0);
+      if (value < 0.0) *--at = '-';
+      text.append(at, end);
+      return;
+    }
+  }
+  text.append(written, std::to_chars(written, end, value, std::chars_format::general, digits).ptr);
+}
 
 const ColumnKind* kindOf(std::string_view name) {
   for (const ColumnKind& kind : COLUMNS) {
@@ -287,17 +320,12 @@ void writeCsv(const Record& record, const std::string& file) {
     si.push_back(kind->si);
   }
   text += "\n";
-  // The digits of %.9g and %.6g at a quarter of their cost.
-  char number[40];
-  const auto add = [&](double value, int digits) {
-    text.append(number,
-                std::to_chars(number, number + sizeof number, value, std::chars_format::general, digits).ptr);
-  };
+  text.reserve(text.size() + record.size() * (12 + 9 * si.size()));
   for (std::size_t i = 0; i < record.size(); ++i) {
-    add(record.time[i], 9);
+    appendGeneral(text, record.time[i], 9);
     for (std::size_t c = 0; c < si.size(); ++c) {
       text += ',';
-      add(record.columns[c][i] / si[c], 6);
+      appendGeneral(text, record.columns[c][i] / si[c], 6);
     }
     text += '\n';
   }

@@ -2,6 +2,9 @@
 
 #include <cmath>
 #include <filesystem>
+#include <fstream>
+#include <random>
+#include <string>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,6 +13,7 @@
 #include "smartmill_core/campaign/slow_channels.h"
 #include "smartmill_core/cutting/regression.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/testing/refusals.h"
 #include "smartmill_core/testing/shared_data.h"
@@ -165,6 +169,26 @@ TEST(Record, writesWhatItReads) {
   for (std::size_t i = 0; i < 100; ++i) {
     EXPECT_NEAR(back.time[i], r.time[i], 1e-9 * r.time[i]);                     // nine digits
     EXPECT_NEAR(back.column("tool_y")[i], r.column("tool_y")[i], 1e-6 * 1e-6);  // six digits
+  }
+}
+
+TEST(Record, writesTheDigitsOfPrintf) {
+  const TemporaryFolder folder;
+  Record r;
+  std::mt19937_64 random(3);
+  std::vector<double>& column = r.add("fx");
+  for (int i = 0; i < 5000; ++i) {
+    const double size = std::exp(std::uniform_real_distribution<double>(-12.0, 16.0)(random));
+    r.time.push_back(i % 3 == 0 ? size : static_cast<double>(random() % 100000) / 1e5);
+    column.push_back(i % 7 == 0 ? static_cast<double>(random() % 2000001) / 1024.0 : -size);
+  }
+  writeCsv(r, folder.file("r.csv"));
+  std::ifstream file(folder.file("r.csv"));
+  std::string line;
+  std::getline(file, line);
+  for (std::size_t i = 0; i < r.size(); ++i) {
+    std::getline(file, line);
+    ASSERT_EQ(line, formatted("%.9g,%.6g", r.time[i], r.columns[0][i]));
   }
 }
 

@@ -3,6 +3,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include <ros/message_traits.h>
@@ -29,13 +30,14 @@ class BagReader {
   template <class Message>
   void on(const std::string& topic, std::function<void(const Message&, double)> handler) {
     const std::string name = names::absolute(topic);
-    handlers_[name] = [this, name, handler](const Instance& instance) {
-      const std::string md5sum = ros::message_traits::MD5Sum<Message>::value();
+    // One message for all, so that its vectors' memory is taken once.
+    handlers_[name] = [this, name, handler, kept = std::make_shared<Message>()](const Instance& instance) {
+      static const std::string md5sum = ros::message_traits::MD5Sum<Message>::value();
       if (md5sum != "*" && md5sum != instance.connection.md5sum) {
         throw Error(path_ + ": topic " + name + " holds " + instance.connection.type +
                     " where another type is due");
       }
-      Message message;
+      Message& message = *kept;
       CheckedStream stream(instance.data, instance.size);
       ros::serialization::deserialize(stream, message);
       handler(message, instance.time);
@@ -44,11 +46,12 @@ class BagReader {
 
   bool has(const std::string& topic) const;
 
+  /// Once: behind it everything has been read.
   /// @param progress called now and then with the share done, 0..1. @throws Error when the bag ends too
   /// early.
   void run(const std::function<void(double)>& progress = {});
 
-  double duration() const;  ///< [s] first to last message
+  double duration() const;  ///< [s] first to last message that run() has read
 
  private:
   struct Instance {
@@ -60,6 +63,8 @@ class BagReader {
 
   std::string path_;
   std::unique_ptr<BagFile> file_;
+  std::optional<BagFile::Entry> first_;
+  BagFile::Entry last_;
   std::map<std::string, std::function<void(const Instance&)>> handlers_;
 };
 
