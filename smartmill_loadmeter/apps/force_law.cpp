@@ -1,9 +1,14 @@
 #include <cstdio>
+#include <filesystem>
 #include <string>
+#include <vector>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
+#include "smartmill_core/io/gnuplot.h"
 #include "smartmill_core/program.h"
 #include "smartmill_core/units.h"
+#include "smartmill_loadmeter/identification/force_curve.h"
 #include "smartmill_loadmeter/identification/force_law.h"
 
 namespace {
@@ -30,8 +35,81 @@ void laws(const char* name, const std::vector<double>& chip, const std::vector<d
   }
 }
 
-void run(const std::string& path) {
-  const Campaign campaign = readCampaign(path);
+struct Options {
+  std::string campaign, curve, compensated;
+  int pieces = 8;
+};
+
+/// Steady samples of a campaign's cuts, the forces as `compensate` has left them where a folder is named.
+std::vector<AngleRecord> angleRecords(const Options& o, const Campaign& campaign, const MachineModel& model,
+                                      const SlotFit& fit) {
+  std::vector<AngleRecord> records;
+  std::size_t cut = 0;
+  for (const CampaignTest& test : campaign.tests) {
+    if (test.kind != TestKind::cut) continue;
+    const std::size_t number = cut++;
+    Record record = readRecord(campaign, test, model);
+    const bool angle = record.has("spindle_angle");
+    AngleRecord one;
+    one.engagement = *test.engagement;
+    const auto first = static_cast<std::size_t>(test.engage_time.value_or(0.0) * test.sample_rate);
+    Record force = o.compensated.empty()
+                       ? record
+                       : readCsv((std::filesystem::path(o.compensated) / (test.name + ".csv")).string());
+    if (force.size() != record.size())
+      throw Error(
+          formatted("%s: %zu samples, the record has %zu", force.file.c_str(), force.size(), record.size()));
+    for (std::size_t i = first; i < record.size(); ++i) {
+      one.angle.push_back(angle ? record.column("spindle_angle")[i]
+                                : test.spindle_speed * static_cast<double>(i - first) / test.sample_rate +
+                                      fit.phase[number]);
+      one.fx.push_back(force.column("fx")[i]);
+      one.fy.push_back(force.column("fy")[i]);
+    }
+    records.push_back(std::move(one));
+  }
+  return records;
+}
+
+void draw(const ForceCurves& curves, const std::string& file) {
+  Gnuplot plot(std::filesystem::path(file).replace_extension(".png").string(), 900, 500, 11);
+  plot << "$d << EOD\n";
+  const double top = curves.tangential.knots.back();
+  for (int k = 1; k <= 200; ++k) {
+    const double h = top * k / 200.0;
+    plot << h / units::MM;
+    for (const ForceCurve* curve : {&curves.tangential, &curves.radial}) {
+      const double at = curve->at(h), two = 2.0 * curve->stdAt(h);
+      plot << " " << at / units::N_PER_MM << " " << (at - two) / units::N_PER_MM << " "
+           << (at + two) / units::N_PER_MM;
+    }
+    plot << "\n";
+  }
+  plot << "EOD\nset grid\nset key top left\nset xlabel 'chip thickness [mm]'\nset ylabel 'force per depth "
+          "[N/mm]'\nplot $d using 1:3:4 with filledcurves lc 'light-blue' t 'two deviations', $d using 1:2 "
+          "with lines lw 2 lc 'blue' t 'tangential', $d using 1:6:7 with filledcurves lc 'light-salmon' t "
+          "'', $d using 1:5 with lines lw 2 lc 'red' t 'radial'\n";
+  plot.draw();
+}
+
+void writeCurve(const Options& o, const Campaign& campaign, const MachineModel& model, const SlotFit& fit) {
+  const ForceCurves curves =
+      fitForceCurves(angleRecords(o, campaign, model, fit), model.needTool("fit a force curve"), o.pieces);
+  writeForceCurves(curves, o.curve);
+  draw(curves, o.curve);
+  std::printf("%s: monotone splines of %d pieces, any number of teeth in cut, %.2f N left (RMS)\n",
+              o.curve.c_str(), o.pieces, curves.rms);
+  for (const double share : {0.1, 0.25, 0.5, 0.75, 1.0}) {
+    const double h = share * curves.tangential.knots.back();
+    std::printf("  h %.4f mm: tangential %8.2f +- %6.2f, radial %8.2f +- %6.2f N/mm\n", h / units::MM,
+                curves.tangential.at(h) / units::N_PER_MM, curves.tangential.stdAt(h) / units::N_PER_MM,
+                curves.radial.at(h) / units::N_PER_MM, curves.radial.stdAt(h) / units::N_PER_MM);
+  }
+}
+
+void run(const Options& o) {
+  if (o.curve.empty() && !o.compensated.empty()) throw Error("--compensated: goes with --curve");
+  const Campaign campaign = readCampaign(o.campaign);
   const MachineModel model = readMachineModel(campaign.modelPath());
   const std::vector<SlotFit> fits = fitSlots(campaign, model);
   std::printf("fits of the mean and the first orders of a revolution, best first:\n");
@@ -51,6 +129,11 @@ void run(const std::string& path) {
     if (f.unbalance > 0.0) std::printf("    turning force %.1f N", f.unbalance);
     std::printf("\n");
   }
+  // For any number of teeth; what follows needs one tooth alone.
+  if (!o.curve.empty()) {
+    writeCurve(o, campaign, model, fits.front());
+    return;
+  }
   const std::vector<ForcePoint> points = revolutionPoints(campaign, model, fits.front());
   std::vector<double> chip, tangential, radial;
   for (const ForcePoint& p : points) {
@@ -69,7 +152,14 @@ int main(int argc, char** argv) {
       "Which force law a campaign's force records prefer: linear, shifted linear or power against chip "
       "thickness, "
       "size effect, runout.");
-  std::string path;
-  line.option("CAMPAIGN", path, "campaign folder").required();
-  return runProgram(line, argc, argv, [&] { run(path); });
+  Options o;
+  line.option("CAMPAIGN", o.campaign, "campaign folder").required();
+  line.option("--curve", o.curve,
+              "YAML of force over chip thickness as monotone splines with deviations, for any number of "
+              "teeth in cut (lobes --force-curve takes it); a picture of the same name with .png beside it");
+  line.option("--compensated", o.compensated,
+              "folder that `compensate CAMPAIGN -o` wrote: fx, fy come from there (a sensor's own modes are "
+              "no law of cutting)");
+  line.option("--pieces", o.pieces, "of a spline").within(2, 30).showDefault();
+  return runProgram(line, argc, argv, [&] { run(o); });
 }

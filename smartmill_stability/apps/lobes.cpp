@@ -8,11 +8,14 @@
 #include <string>
 #include <vector>
 
+#include "smartmill_core/cutting/force_curve.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/io/csv.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/program.h"
 #include "smartmill_core/units.h"
+#include "smartmill_stability/chart/bistable.h"
 #include "smartmill_stability/chart/cut_request.h"
 #include "smartmill_stability/chart/picture.h"
 #include "smartmill_stability/solvers/boundary.h"
@@ -24,7 +27,7 @@ namespace {
 using namespace smartmill;
 
 struct Request : stability::CutRequest {
-  std::string method = "collocation", boundary, serration;
+  std::string method = "collocation", boundary, serration, force_curve;
   double max_depth_mm = 0.0, feed_mm = 0.0;
   bool errors = false;
 };
@@ -105,9 +108,55 @@ void addChips(const Request& request, stability::RegenerativeSystem& system) {
   system.chip = chip;
 }
 
+/// Both limits of a force law that is no straight line, and the range between them.
+void bistable(const Request& request, stability::Method method) {
+  if (!(request.feed_mm > 0.0)) throw Error("--force-curve: needs --feed-mm, above 0");
+  if (!request.serration.empty() || !request.boundary.empty() || request.errors)
+    throw Error("--force-curve: goes with neither --serration-mm nor --boundary nor --errors");
+  const ForceCurves law = readForceCurves(request.force_curve);
+  const stability::RegenerativeSystem system = request.system(readMachineModel(request.model));
+  const auto found = stability::bistableLimits(system, law, request.feed_mm * units::MM, method, {},
+                                               request.speedRange(), request.max_depth_mm * units::MM);
+  CsvWriter csv("rpm,limit_mm,chatter_hz,kind,large_limit_mm,secant_limit_mm", 8);
+  double range = 0.0, widest = 0.0;
+  const auto cell = [](double depth) {
+    return std::isfinite(depth) ? formatted("%.8g", depth / units::MM) : std::string();
+  };
+  for (const stability::BistableLimit& b : found) {
+    const bool limited = std::isfinite(b.small.depth);
+    csv.row(units::rpmFromRadPerSec(b.speed), cell(b.small.depth),
+            limited ? formatted("%.8g", b.small.frequency) : "", limited ? nameOf(b.small.kind) : "",
+            cell(b.large.depth), cell(b.secant.depth));
+    const double share = limited ? std::max(0.0, 1.0 - b.large.depth / b.small.depth) : 0.0;
+    range += share / static_cast<double>(found.size());
+    widest = std::max(widest, share);
+  }
+  csv.save(request.out);
+  stability::drawBeside(request.out,
+                        axes(request.max_depth_mm) +
+                            "plot %FILE skip 1 using 1:5:2 with filledcurves lc 'gold' title 'still or "
+                            "chatter', %FILE skip 1 using 1:2 with lines lw 2 lc 'black' title 'the least "
+                            "vibration grows', %FILE skip 1 using 1:5 with lines lw 2 lc 'red' title 'a "
+                            "large vibration stays'");
+  const double chip = stability::meanChip(system, request.feed_mm * units::MM);
+  std::printf(
+      "mean chip %.4f mm: %.2f +- %.2f N/mm tangential, %.2f +- %.2f N/mm radial; slopes %.1f, %.1f "
+      "N/mm2\n",
+      chip / units::MM, law.tangential.at(chip) / units::N_PER_MM,
+      law.tangential.stdAt(chip) / units::N_PER_MM, law.radial.at(chip) / units::N_PER_MM,
+      law.radial.stdAt(chip) / units::N_PER_MM, law.tangential.slope(chip) / units::N_PER_MM2,
+      law.radial.slope(chip) / units::N_PER_MM2);
+  std::printf("a large vibration stays from %.1f %% (mean) below the limit of a small one, at most %.1f %%\n",
+              100.0 * range, 100.0 * widest);
+}
+
 void run(const Request& request) {
   const stability::Method method = stability::methodOf(request.method);
   if (!(request.max_depth_mm > 0.0)) throw Error("--max-depth-mm: above 0 is due");
+  if (!request.force_curve.empty()) {
+    bistable(request, method);
+    return;
+  }
   const std::vector<double> speeds = request.speedRange();
   stability::RegenerativeSystem system = request.system(readMachineModel(request.model));
   addChips(request, system);
@@ -164,6 +213,9 @@ int main(int argc, char** argv) {
   line.option(
       "--serration-mm", request.serration,
       "AMPLITUDE:WAVELENGTH [mm] of a serrated edge, evenly shifted from tooth to tooth; needs --feed-mm");
+  line.option("--force-curve", request.force_curve,
+              "force over chip thickness in place of the model's coefficients (force_law --curve writes it): "
+              "limits of small and of large vibrations; needs --feed-mm");
   line.flag("--errors", request.errors, "estimate the error of each limit by a refined solution");
   return runProgram(line, argc, argv, [&] { run(request); });
 }

@@ -25,8 +25,8 @@ struct Vibration {
 
 /// The tool begins at its deflection under the steady chip, off by
 /// `kick` [m].
-Vibration vibration(const loadmeter::ForceCurve& law, const Mode& mode, double period, double feed,
-                    double depth, double kick) {
+Vibration vibration(const ForceCurve& law, const Mode& mode, double period, double feed, double depth,
+                    double kick) {
   const double w = units::TWO_PI * mode.frequency;
   const int steps = std::max(LEAST_STEPS, static_cast<int>(std::ceil(LEAST_STEPS * mode.frequency * period)));
   const double dt = period / steps, rest = mode.gain * depth * law.at(feed);
@@ -64,9 +64,8 @@ double limit(double deepest, Vibrates vibrates) {
 
 }  // namespace
 
-std::vector<BistablePoint> bistableRange(const loadmeter::ForceCurve& law, const Mode& mode, int teeth,
-                                         double feed, const std::vector<double>& speeds, double kick,
-                                         double deepest) {
+std::vector<BistablePoint> bistableRange(const ForceCurve& law, const Mode& mode, int teeth, double feed,
+                                         const std::vector<double>& speeds, double kick, double deepest) {
   std::vector<BistablePoint> points;
   for (const double speed : speeds) {
     const double period = units::TWO_PI / speed / teeth;

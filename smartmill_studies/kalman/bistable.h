@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
+#include "smartmill_core/cutting/force_curve.h"
 #include "smartmill_core/modal/modal_model.h"
-#include "smartmill_loadmeter/identification/force_curve.h"
 
 namespace smartmill::kalman {
 
@@ -21,9 +21,8 @@ struct BistablePoint {
 /// @param mode of the tool tip, gain [m/N] @param feed [m] a tooth @param kick [1] of a large vibration, over
 /// feed
 /// @param deepest [m] looked at @return a point a speed
-std::vector<BistablePoint> bistableRange(const loadmeter::ForceCurve& law, const Mode& mode, int teeth,
-                                         double feed, const std::vector<double>& speeds, double kick,
-                                         double deepest);
+std::vector<BistablePoint> bistableRange(const ForceCurve& law, const Mode& mode, int teeth, double feed,
+                                         const std::vector<double>& speeds, double kick, double deepest);
 
 /// Draws the range with gnuplot. @throws Error.
 void drawBistable(const std::vector<BistablePoint>& points, const std::string& png);

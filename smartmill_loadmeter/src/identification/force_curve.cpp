@@ -16,25 +16,6 @@ constexpr int SLICES = 12;         // of the edge's height
 constexpr int MOST_SWEEPS = 4000;  // of the descent
 constexpr double STILL = 1e-10;    // [1] change of a sweep that ends it
 
-/// Cubic B-splines over even breaks from 0 to top, the ends' knots threefold: pieces + 3 of them.
-/// @return the values of the four at x, the first's number in `first`
-std::array<double, 4> basis(double x, double top, int pieces, int& first) {
-  const auto knot = [&](int k) { return top * std::clamp(k - 3, 0, pieces) / pieces; };
-  first = std::clamp(static_cast<int>(x / top * pieces), 0, pieces - 1);
-  std::array<double, 4> b{1.0, 0.0, 0.0, 0.0};
-  for (int degree = 1; degree <= 3; ++degree) {  // Cox and de Boor
-    double saved = 0.0;
-    for (int r = 0; r < degree; ++r) {
-      const double right = knot(first + 3 + r + 1) - x, left = x - knot(first + 3 + 1 - degree + r);
-      const double share = b[static_cast<std::size_t>(r)] / (right + left);
-      b[static_cast<std::size_t>(r)] = saved + right * share;
-      saved = left * share;
-    }
-    b[static_cast<std::size_t>(degree)] = saved;
-  }
-  return b;
-}
-
 /// Unknowns: rises of the coefficients, the first from 0, tangential then radial.
 struct System {
   Eigen::MatrixXd normal;
@@ -60,7 +41,7 @@ bool rowsAt(double angle, const ToolGeometry& tool, const Engagement& e, double 
       if (!(chip > 0.0)) continue;
       cuts = true;
       int first = 0;
-      const auto b = basis(std::min(chip, top), top, pieces, first);
+      const auto b = cubicSplines(std::min(chip, top), top, pieces, first);
       const double c = std::cos(phi), s = std::sin(phi);
       for (int k = 0; k < 4; ++k) {
         const double share = dz * b[static_cast<std::size_t>(k)];
@@ -154,29 +135,6 @@ Eigen::MatrixXd covarianceOf(const System& system, const Eigen::VectorXd& rises,
 
 }  // namespace
 
-double ForceCurve::at(double chip) const {
-  if (!(chip > 0.0)) return 0.0;
-  const double top = knots.back();
-  if (chip > top) return at(top) + slope(top) * (chip - top);
-  int first = 0;
-  const auto b = basis(chip, top, static_cast<int>(knots.size()) - 1, first);
-  double sum = 0.0;
-  for (std::size_t k = 0; k < 4; ++k) sum += b[k] * value[static_cast<std::size_t>(first) + k];
-  return sum;
-}
-
-double ForceCurve::slope(double chip) const {
-  const double top = knots.back(), step = 1e-4 * top, x = std::clamp(chip, step, top - step);
-  return (at(x + step) - at(x - step)) / (2.0 * step);
-}
-
-double ForceCurve::stdAt(double chip) const {
-  const double place = std::clamp(chip / knots.back(), 0.0, 1.0) * static_cast<double>(knots.size() - 1);
-  const auto k = std::min(static_cast<std::size_t>(place), knots.size() - 2);
-  const double share = place - static_cast<double>(k);
-  return (1.0 - share) * std_dev[k] + share * std_dev[k + 1];
-}
-
 ForceCurves fitForceCurves(const std::vector<AngleRecord>& records, const ToolGeometry& tool, int pieces) {
   if (pieces < 2 || pieces > 30) throw Error("force curve: 2..30 pieces are due");
   const double top = thickest(records);
@@ -217,7 +175,7 @@ ForceCurves fitForceCurves(const std::vector<AngleRecord>& records, const ToolGe
     for (int k = 0; k <= pieces; ++k) {
       curve.knots.push_back(top * k / pieces);
       int first = 0;
-      const auto b = basis(curve.knots.back(), top, pieces, first);
+      const auto b = cubicSplines(curve.knots.back(), top, pieces, first);
       Eigen::RowVectorXd row = Eigen::RowVectorXd::Zero(2 * n);
       for (int i = 0; i < 4; ++i) row(part * n + first + i) = b[static_cast<std::size_t>(i)];
       toRises(row, n);

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::loadmeter {
@@ -60,6 +61,24 @@ TEST(ForceCurve, FindsAPowerLawWithFourTeethInASlot) {
   // The slope is what chatter knows: power law times exponent over chip.
   EXPECT_NEAR(curves.tangential.slope(0.2e-3), 0.75 * tangential(0.2e-3) / 0.2e-3,
               0.06 * 0.75 * tangential(0.2e-3) / 0.2e-3);
+}
+
+TEST(ForceCurve, AFileTellsTheSameCurve) {
+  const TemporaryFolder folder;
+  const ForceCurves curves =
+      fitForceCurves({cut(2, {0.0, units::PI, 2e-3, 0.2e-3}, 2.0, 1)}, {2, 12e-3, 0.0, {}});
+  const std::string file = folder.file("law.yaml");
+  writeForceCurves(curves, file);
+  const ForceCurves again = readForceCurves(file);
+  for (const double h : {0.0, 0.01e-3, 0.1e-3, 0.2e-3, 0.3e-3}) {
+    EXPECT_NEAR(again.tangential.at(h), curves.tangential.at(h), 1e-6 * curves.tangential.at(h));
+    EXPECT_NEAR(again.radial.stdAt(h), curves.radial.stdAt(h), 1e-6 * curves.radial.stdAt(h));
+  }
+  const std::string falling =
+      folder.write("falling.yaml",
+                   "format: smartmill-force-curve/1\nthickest_chip_mm: 0.1\nrms_n: 1.0\ntangential: "
+                   "{coefficients_n_per_mm: [1.0, 2.0, 1.5, 3.0, 4.0], std_n_per_mm: [1.0, 1.0, 1.0]}\n");
+  EXPECT_NE(errorOf([&] { readForceCurves(falling); }).find("must not fall"), std::string::npos);
 }
 
 TEST(ForceCurve, RefusesARecordWithoutAChip) {

@@ -34,6 +34,16 @@ Eigen::Matrix2d directionalIntegral(double tangential, double radial, double ang
   return m;
 }
 
+/// directional() with the system's coefficients at an angle.
+Eigen::Matrix2d stiffnessAt(const RegenerativeSystem& system, double angle) {
+  if (!system.along_arc) return directional(system.kt, system.kr, angle);
+  const auto [tangential, radial] = system.along_arc(angle);
+  return directional(tangential, radial, angle);
+}
+
+constexpr double NO_SWEEP = 1e-9;  // [rad] of a straight edge
+constexpr int ARC_PARTS = 1024;
+
 double wrap(double angle) {
   angle = std::fmod(angle, TWO_PI);
   return angle < 0.0 ? angle + TWO_PI : angle;
@@ -58,6 +68,7 @@ class Teeth {
       if (d == delays_.size()) delays_.push_back(delay);
       delay_.push_back(d);
     }
+    if (system.along_arc && swept_ >= NO_SWEEP) sumAlongArc();
   }
 
   const std::vector<double>& delays() const { return delays_; }
@@ -89,7 +100,7 @@ class Teeth {
     for (std::size_t k = 0; k < angle_.size(); ++k) {
       const double middle = wrap(angle_[k] + speed_ * inside);
       const double angle = middle + speed_ * (t - inside);
-      if (swept_ < 1e-9) {
+      if (swept_ < NO_SWEEP) {
         add(feedback, k, angle, middle);
         // The angle of an exit beyond a full turn, and of an entry just below one.
         if (system_.exit > TWO_PI) add(feedback, k, angle + TWO_PI, middle + TWO_PI);
@@ -112,8 +123,24 @@ class Teeth {
 
   void add(Feedback& feedback, std::size_t k, double angle, double middle) const {
     if (middle <= system_.entry || middle >= system_.exit) return;
-    put(feedback, k, depth_ * directional(system_.kt, system_.kr, angle));
+    put(feedback, k, depth_ * stiffnessAt(system_, angle));
     if (damps_) feedback.velocity += depth_ * directional(tangential_damping_, radial_damping_, angle);
+  }
+
+  /// Integrals of the stiffness from the entry on, at even angles.
+  void sumAlongArc() {
+    const double step = (system_.exit - system_.entry) / ARC_PARTS;
+    arc_.assign(1, Eigen::Matrix2d::Zero());
+    for (int i = 0; i < ARC_PARTS; ++i)
+      arc_.push_back(arc_.back() + step * stiffnessAt(system_, system_.entry + (i + 0.5) * step));
+  }
+
+  Eigen::Matrix2d arcUpTo(double angle) const {
+    const double place =
+        std::clamp((angle - system_.entry) / (system_.exit - system_.entry), 0.0, 1.0) * ARC_PARTS;
+    const auto part = std::min(static_cast<std::size_t>(place), arc_.size() - 2);
+    const double share = place - static_cast<double>(part);
+    return (1.0 - share) * arc_[part] + share * arc_[part + 1];
   }
 
   void addBetween(Feedback& feedback, std::size_t k, double low, double high) const {
@@ -121,7 +148,8 @@ class Teeth {
       return (depth_ / swept_) *
              (directionalIntegral(tangential, radial, high) - directionalIntegral(tangential, radial, low));
     };
-    put(feedback, k, integral(system_.kt, system_.kr));
+    put(feedback, k,
+        arc_.empty() ? integral(system_.kt, system_.kr) : depth_ / swept_ * (arcUpTo(high) - arcUpTo(low)));
     if (damps_) feedback.velocity += integral(tangential_damping_, radial_damping_);
   }
 
@@ -131,6 +159,7 @@ class Teeth {
   double tangential_damping_ = 0.0, radial_damping_ = 0.0;
   std::vector<double> angle_, delays_;
   std::vector<std::size_t> delay_;
+  std::vector<Eigen::Matrix2d> arc_;
 };
 
 }  // namespace
@@ -151,6 +180,8 @@ void RegenerativeSystem::validate() const {
   require("overlap", overlap, Range::closed(0.0, 1.0));
   const bool needs_diameter = helix > 0.0 || damping_radial > 0.0 || damping_tangential > 0.0;
   require(diameter > 0.0 || !needs_diameter, "diameter [m]", diameter, "above 0");
+  if (chip && along_arc)
+    throw Error("a chip geometry with coefficients that change along the arc is impossible");
   if (chip) {
     if (cut != Cut::milling) throw Error("a chip geometry outside milling is impossible");
     require("feed per tooth [m]", chip->feed, Range::positive());
@@ -240,7 +271,7 @@ DelayedSystem delayedSystem(const RegenerativeSystem& system, double speed, doub
   if (system.cut == Cut::turning) {
     delayed.period = TWO_PI / speed;
     delayed.delays = {delayed.period};
-    const Eigen::Matrix2d stiffness = depth * directional(system.kt, system.kr, system.entry);
+    const Eigen::Matrix2d stiffness = depth * stiffnessAt(system, system.entry);
     Eigen::Matrix2d damping = Eigen::Matrix2d::Zero();
     if (system.diameter > 0.0)
       damping = depth / (0.5 * speed * system.diameter) *

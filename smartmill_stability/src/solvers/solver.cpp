@@ -258,6 +258,8 @@ std::unique_ptr<FloquetSolver> makeFloquetSolver(Method method, const Regenerati
 
 std::unique_ptr<StabilitySolver> makeSolver(Method method, const RegenerativeSystem& system,
                                             const SolverOptions& options) {
+  if (system.along_arc && (method == Method::zero_order || method == Method::multi_frequency))
+    throw Error(std::string("method ") + nameOf(method) + " knows no coefficients that change along the arc");
   if (method == Method::zero_order) return makeZeroOrder(system);
   if (method == Method::multi_frequency) return makeMultiFrequency(system, options);
   return makeFloquetSolver(method, system, options);

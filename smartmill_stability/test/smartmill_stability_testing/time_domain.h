@@ -2,9 +2,11 @@
 
 #include <array>
 #include <cmath>
+#include <optional>
 #include <random>
 #include <vector>
 
+#include "smartmill_core/cutting/force_curve.h"
 #include "smartmill_core/modal/modal_filter.h"
 #include "smartmill_stability/solvers/solver.h"
 
@@ -62,6 +64,12 @@ class TimeDomain {
                                       static_cast<double>(k) / static_cast<double>(tooth_.size())));
   }
 
+  /// Force over chip thickness that is no straight line, in place of kt and kr.
+  void setLaw(ForceCurves law) { law_ = std::move(law); }
+
+  /// [1] of the knock that follows the way in; 1: a twentieth of the force at the feed.
+  void setKnock(double times) { knock_ = times; }
+
   /// One step of the spindle. @return displacement x, y [m]; force() that made it.
   std::array<double, 2> step() {
     // Displacement with the force as it was, force with that displacement, then the true step.
@@ -83,8 +91,8 @@ class TimeDomain {
     // A knock once the tool is in: what grows must begin somewhere.
     const double turns = static_cast<double>(count_) / steps_ - RAMP;
     if (turns >= 0.0 && turns < 0.02) {
-      const double knock =
-          0.05 * (system_.kt + system_.kr) * feed_ * slice_depth_ * static_cast<double>(lag_.size());
+      const double knock = 0.05 * knock_ * (tangential(feed_) + radial(feed_)) * slice_depth_ *
+                           static_cast<double>(lag_.size());
       force = {{knock, knock}};
     }
     // Feed made so far, along x.
@@ -110,13 +118,16 @@ class TimeDomain {
         // The tool sinks in over some turns: a sudden start could throw it into chatter that lives beside the
         // stable cut.
         const double depth = slice_depth_ * std::min(1.0, static_cast<double>(count_) / (RAMP * steps_));
-        const double ft = system_.kt * chip * depth, fr = system_.kr * chip * depth;
+        const double ft = tangential(chip) * depth, fr = radial(chip) * depth;
         force[0] += -ft * co - fr * si;
         force[1] += ft * si - fr * co;
       }
     }
     return force;
   }
+
+  double tangential(double chip) const { return law_ ? law_->tangential.at(chip) : system_.kt * chip; }
+  double radial(double chip) const { return law_ ? law_->radial.at(chip) : system_.kr * chip; }
 
   /// What the last tooth that cut here left, and the feed made then.
   struct Mark {
@@ -130,6 +141,8 @@ class TimeDomain {
   ModalFilter x_, y_;
   std::vector<int> lag_, tooth_;
   std::vector<double> runout_;
+  std::optional<ForceCurves> law_;
+  double knock_ = 1.0;
   std::vector<std::vector<double>> serration_;  // [slice][tooth]
   std::vector<std::vector<Mark>> surface_;
   std::array<double, 2> force_{{0.0, 0.0}};

@@ -107,7 +107,7 @@ void errors(const SpindleRig::Record& r, const kalman::TransferMatrix& three, do
 }
 
 /// Depths between which a tool that cuts with this law may stand still or chatter.
-void bistable(const loadmeter::ForceCurve& law, int teeth, const std::string& picture) {
+void bistable(const ForceCurve& law, int teeth, const std::string& picture) {
   Mode mode;
   mode.frequency = 800.0;
   mode.damping_ratio = 0.02;
@@ -127,8 +127,7 @@ void bistable(const loadmeter::ForceCurve& law, int teeth, const std::string& pi
   if (!picture.empty()) kalman::drawBistable(points, picture);
 }
 
-loadmeter::ForceCurves chips(const std::vector<SpindleRig::Record>& passes, const MachineModel& model,
-                             double rpm) {
+ForceCurves chips(const std::vector<SpindleRig::Record>& passes, const MachineModel& model, double rpm) {
   std::printf(
       "\nforce against chip thickness at %.0f rpm, six feeds, N/mm: truth, from compensated +- band, from "
       "measured\n",

@@ -87,8 +87,8 @@ TEST(ExpandedDisturbance, TellsWhatItIsMadeFor) {
 }
 
 /// A law of given coefficients over 0 .. 1 mm.
-loadmeter::ForceCurve law(double power) {
-  loadmeter::ForceCurve curve;
+ForceCurve law(double power) {
+  ForceCurve curve;
   for (int k = 0; k <= 8; ++k) curve.knots.push_back(1e-3 * k / 8);
   curve.std_dev.assign(9, 0.0);
   // Greville's abscissae: a straight law is told without error.

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <complex>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -58,6 +59,10 @@ struct RegenerativeSystem {
   double exit = units::PI;    ///< [rad] > entry; unused in turning
   double kt = 0.0;            ///< [N/m2] tangential
   double kr = 0.0;            ///< [N/m2] radial
+  /// Coefficients that change along the arc, tangential and radial [N/m2] at an immersion angle (a force law
+  /// that is no straight line, about the chip there). Empty: kt and kr; else these tell the size alone. Known
+  /// to the Floquet solvers, without a chip geometry.
+  std::function<std::array<double, 2>(double angle)> along_arc;
   /// Process damping: a flank that moves into the material meets a force of coefficient x depth x velocity
   /// over cutting speed, velocity along the chip's normal. [N/m] >= 0
   double damping_tangential = 0.0;
