@@ -281,8 +281,7 @@ std::size_t CoefficientDatabase::Impl::insert(const RecordKind& kind, const std:
   const std::size_t count = kind.words.size() + kind.numbers.size() + (kind.by_speed ? 1 : 0);
   for (std::size_t i = 0; i < count; ++i) marks += ", ?" + std::to_string(i + 2);
   Statement insert(
-      db, file,
-      "INSERT OR IGNORE INTO " + kind.table + " (" + kind.columns() + ") VALUES (" + marks + ")");
+      db, file, "INSERT OR IGNORE INTO " + kind.table + " (" + kind.columns() + ") VALUES (" + marks + ")");
   for (const Row& row : rows) {
     int at = 1;
     insert.bind(at++, row.identity);
@@ -384,9 +383,8 @@ std::int64_t CoefficientDatabase::Impl::sentUpTo(const std::string& to, const Re
 CoefficientDatabase::Batch CoefficientDatabase::unsent(const std::string& fleet, const RecordKind& kind,
                                                        std::size_t limit) const {
   Batch batch;
-  Statement s(
-      impl_->db, impl_->file,
-      "SELECT " + kind.columns() + ", id FROM " + kind.table + " WHERE id > ?1 ORDER BY id LIMIT ?2");
+  Statement s(impl_->db, impl_->file,
+              "SELECT " + kind.columns() + ", id FROM " + kind.table + " WHERE id > ?1 ORDER BY id LIMIT ?2");
   s.bind(1, impl_->sentUpTo(fleet, kind));
   s.bind(2, static_cast<std::int64_t>(limit));
   const int id = static_cast<int>(kind.words.size() + kind.numbers.size()) + (kind.by_speed ? 2 : 1);

@@ -123,8 +123,8 @@ class PostgresqlServer : public FleetServer {
   }
 
   std::vector<Row> rows(const RecordKind& kind) override {
-    return rowsOf(kind, connection_.run("SELECT " + kind.columns() + " FROM " + kind.table +
-                                        " ORDER BY stamp, id"));
+    return rowsOf(
+        kind, connection_.run("SELECT " + kind.columns() + " FROM " + kind.table + " ORDER BY stamp, id"));
   }
 
   void notePush(const FleetTransfer& done, std::size_t behind) override {
@@ -205,8 +205,7 @@ class PostgresqlServer : public FleetServer {
     for (const RecordKind& kind : recordKinds())
       count += " + (SELECT count(*) FROM " + kind.table + " c WHERE c.shop = m.shop AND c.machine_id = m.id)";
     const FleetRows rows = connection_.run(
-        "SELECT m.name, m.login, m.shop, " +
-        count +
+        "SELECT m.name, m.login, m.shop, " + count +
         ", extract(epoch FROM now() - p.at), coalesce(p.behind, 0) FROM members() m LEFT "
         "JOIN "
         "LATERAL (SELECT at, behind FROM push WHERE push.shop = m.shop AND push.machine_id = m.id ORDER BY "

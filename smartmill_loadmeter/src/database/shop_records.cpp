@@ -38,8 +38,8 @@ struct Number {
 using I = ModelImprovement;
 // A report that is read twice, or copied, stays one record.
 const std::vector<Word<I>> IMPROVEMENT_WORDS{
-    {"machine", &I::machine}, {"verdict", &I::verdict},     {"effects", &I::effects},
-    {"rivals", &I::rivals},   {"resembles", &I::resembles}, {"tests", &I::tests},
+    {"machine", &I::machine}, {"verdict", &I::verdict},      {"effects", &I::effects},
+    {"rivals", &I::rivals},   {"resembles", &I::resembles},  {"tests", &I::tests},
     {"asked", &I::asked},     {"report", &I::report, false}, {"version", &I::version, false}};
 const std::vector<Number<I>> IMPROVEMENT_NUMBERS{{"stamp", &I::stamp, false},
                                                  {"fit_before", &I::fit_before},
@@ -52,8 +52,8 @@ const std::vector<Word<H>> HEALTH_WORDS{{"machine", &H::machine},
                                         {"quantity", &H::quantity},
                                         {"bag", &H::bag},
                                         {"version", &H::version, false}};
-const std::vector<Number<H>> HEALTH_NUMBERS{{"stamp", &H::stamp}, {"days", &H::days},
-                                            {"first", &H::first}, {"now", &H::now},
+const std::vector<Number<H>> HEALTH_NUMBERS{{"stamp", &H::stamp},           {"days", &H::days},
+                                            {"first", &H::first},           {"now", &H::now},
                                             {"deviations", &H::deviations}, {"drifted", &H::drifted}};
 
 template <typename R>

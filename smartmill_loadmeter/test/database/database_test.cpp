@@ -316,7 +316,8 @@ TEST(Database, healthIsReadAsTheHammerWritesIt) {
   const TemporaryFolder folder;
   const std::string head = "measured,bag,days,quantity,first,now,deviations,drifted,stamp\n";
   const auto rows = readHealth(folder.write(
-      "health.csv", head + "tool x,b.bag,1.5,\"gain of the mode at 930 Hz, gone\",2e-8,0,,true,1700000000.5\n"));
+      "health.csv",
+      head + "tool x,b.bag,1.5,\"gain of the mode at 930 Hz, gone\",2e-8,0,,true,1700000000.5\n"));
   ASSERT_EQ(rows.size(), 1u);
   EXPECT_EQ(rows[0].quantity, "gain of the mode at 930 Hz, gone");
   EXPECT_EQ(rows[0].stamp, 1700000000.5);

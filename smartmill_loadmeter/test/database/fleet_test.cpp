@@ -298,9 +298,9 @@ TEST_F(FleetDatabase, everyKindIsItsBringersOnly) {
       std::string values = "'x" + machine + "', '" + shop + "', " + machine;
       for (std::size_t i = 0; i <= static_cast<std::size_t>(std::count(words.begin(), words.end(), ',')); ++i)
         values += ", ''";
-      return server_->run("b", database_,
-                          "INSERT INTO " + table + " (identity, shop, machine_id, " + words + ") VALUES (" +
-                              values + ")");
+      return server_->run(
+          "b", database_,
+          "INSERT INTO " + table + " (identity, shop, machine_id, " + words + ") VALUES (" + values + ")");
     };
     EXPECT_FALSE(forge("1", "milling")) << table << ": machine a's";
     EXPECT_FALSE(forge("2", "turning")) << table << ": another shop's";

@@ -133,7 +133,7 @@ class CoefficientDatabase {
     std::int64_t last = 0;  ///< number of the last one
   };
   Batch unsent(const std::string& fleet, const RecordKind& kind, std::size_t limit) const;  ///< oldest first
-  std::size_t unsentCount(const std::string& fleet) const;  ///< of all kinds
+  std::size_t unsentCount(const std::string& fleet) const;                                  ///< of all kinds
   /// All up to this number.
   void markSent(const std::string& fleet, const RecordKind& kind, std::int64_t last);
   /// The fleet that was handed on to last, by its identity; empty: none yet.

@@ -14,16 +14,16 @@ namespace smartmill::loadmeter {
 struct ModelImprovement {
   static constexpr double UNKNOWN = std::numeric_limits<double>::quiet_NaN();
 
-  std::string machine;    ///< name of the machine
-  std::string verdict;    ///< as in the report
-  std::string effects;    ///< named: parameters with deviations, BIC lost without each, confidence, rivals
-  std::string rivals;     ///< not told apart, pair by pair
-  std::string resembles;  ///< what did not hold
-  std::string tests;      ///< each with the channel that changed most: gap before and after, condition
-  std::string asked;      ///< test that would tell more; for people
-  std::string report;     ///< where it stood
-  std::string version;    ///< of the software
-  double stamp = UNKNOWN;               ///< [s]
+  std::string machine;     ///< name of the machine
+  std::string verdict;     ///< as in the report
+  std::string effects;     ///< named: parameters with deviations, BIC lost without each, confidence, rivals
+  std::string rivals;      ///< not told apart, pair by pair
+  std::string resembles;   ///< what did not hold
+  std::string tests;       ///< each with the channel that changed most: gap before and after, condition
+  std::string asked;       ///< test that would tell more; for people
+  std::string report;      ///< where it stood
+  std::string version;     ///< of the software
+  double stamp = UNKNOWN;  ///< [s]
   double fit_before = UNKNOWN, fit_after = UNKNOWN;          ///< [1] gap of the tests fitted to
   double heldout_before = UNKNOWN, heldout_after = UNKNOWN;  ///< [1] of the others
 };
