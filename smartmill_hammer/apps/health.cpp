@@ -52,6 +52,7 @@ struct History {
   std::map<std::string, ModalModel> sensors;    // the newest, by channel of the dynamometer
 };
 
+constexpr double DAY = 86400.0;     // [s]
 constexpr double HOLD_BACK = 0.05;  // [s] see StreamSorter
 
 /// [s] of the last stretch
@@ -98,33 +99,33 @@ History read(const std::vector<std::string>& bags) {
 }
 
 /// Table and CSV rows of one measurement against the first. @return how many drifted
-int report(const std::string& name, const std::string& bag, double days,
+int report(const std::string& name, const std::string& bag, double first, double stamp,
            const std::vector<HealthChange>& changes, CsvWriter& csv) {
+  const double days = (stamp - first) / DAY;
   std::printf("%s, %s, %.2f days after the first\n", name.c_str(), bag.c_str(), days);
   int drifted = 0;
   for (const HealthChange& c : changes) {
     std::printf("  %-52s %12.5g -> %12.5g  %+8.2f %%  %7.1f deviations%s\n", c.what.c_str(), c.before, c.now,
                 100.0 * c.relative, c.sigmas, c.drifted() ? "  DRIFT" : "");
-    csv.row(name, bag, days, c.what, c.before, c.now, c.sigmas, c.drifted() ? "true" : "false");
+    csv.row(name, bag, days, c.what, c.before, c.now, c.sigmas, c.drifted() ? "true" : "false", stamp);
     drifted += c.drifted();
   }
   return drifted;
 }
 
 int run(const Options& options) {
-  constexpr double DAY = 86400.0;
   const History history = read(options.bags);
-  CsvWriter csv("measured,bag,days,quantity,first,now,deviations,drifted", 8);
+  CsvWriter csv("measured,bag,days,quantity,first,now,deviations,drifted,stamp", 16);
   int compared = 0, drifted = 0;
   for (const auto& [name, list] : history.modes) {
     for (std::size_t i = 1; i < list.size(); ++i, ++compared)
-      drifted += report(name, list[i].bag, (list[i].modes.stamp - list[0].modes.stamp) / DAY,
+      drifted += report(name, list[i].bag, list[0].modes.stamp, list[i].modes.stamp,
                         modeChanges(list[0].modes, list[i].modes, options.allowance), csv);
   }
   for (std::size_t i = 1; i < history.friction.size(); ++i, ++compared) {
     const Friction &first = history.friction[0], &now = history.friction[i];
     drifted +=
-        report("spindle", now.bag, (now.stamp - first.stamp) / DAY,
+        report("spindle", now.bag, first.stamp, now.stamp,
                {valueChange("viscous friction", {first.viscous}, {now.viscous}, options.allowance.friction),
                 valueChange("Coulomb friction", {first.coulomb}, {now.coulomb}, options.allowance.friction)},
                csv);
@@ -132,7 +133,7 @@ int run(const Options& options) {
   for (const auto& [tool, list] : history.air) {
     for (std::size_t i = 1; i < list.size(); ++i, ++compared)
       drifted += report("spindle in air, " + (tool.empty() ? std::string("tool") : tool), list[i].bag,
-                        (list[i].stamp - list[0].stamp) / DAY,
+                        list[0].stamp, list[i].stamp,
                         idleChanges(list[0].record, list[i].record, history.sensors, options.allowance), csv);
   }
   if (compared == 0)

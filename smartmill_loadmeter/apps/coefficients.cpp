@@ -58,6 +58,7 @@ void keep(const Options& o, CoefficientRecord record) {
   if (!o.material.empty()) record.set.material = o.material;
   record.rake = units::radFromDeg(o.rake);
   record.bag = o.source_path;
+  record.machine = o.parameters.machine;
   const bool is_new = CoefficientDatabase(o.database).add(record);
   std::printf("  %s: %s\n", o.database.c_str(), is_new ? "kept" : "was there already");
 }
@@ -68,6 +69,7 @@ void keepCuts(const Options& o, std::vector<CoefficientRecord> cuts) {
   for (CoefficientRecord& cut : cuts) {
     cut.rake = units::radFromDeg(o.rake);
     cut.bag = o.source_path;
+    cut.machine = o.parameters.machine;
   }
   std::printf("  %s: %zu of %zu cuts new\n", o.database.c_str(), CoefficientDatabase(o.database).add(cuts),
               cuts.size());

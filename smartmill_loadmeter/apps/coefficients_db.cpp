@@ -22,7 +22,7 @@ using namespace smartmill;             // NOLINT
 using namespace smartmill::loadmeter;  // NOLINT
 
 struct Options {
-  std::string file, tool, material, other, shop, login, password_file;
+  std::string file, tool, material, other, shop, login, password_file, machine, campaign;
   bool all = false;
   double cutting_speed = NAN, feed = NAN, diameter = NAN, helix = NAN, rake = NAN, age = NAN;
 };
@@ -166,6 +166,65 @@ void members(const Options& o) {
   }
 }
 
+template <typename Record>
+void keepAs(const Options& o, std::vector<Record> records) {
+  for (Record& r : records) r.machine = o.machine;
+  std::printf("%zu new of %zu\n", CoefficientDatabase(o.file).add(records), records.size());
+}
+
+void keep(const Options& o) {
+  if (std::filesystem::path(o.other).extension() == ".csv") {
+    keepAs(o, readHealth(o.other));
+  } else {
+    keepAs(o, std::vector<ModelImprovement>{readImprovement(o.other, o.campaign)});
+  }
+}
+
+void health(const Options& o) {
+  mustExist(o.file);
+  for (const HealthRecord& r : CoefficientDatabase(o.file).health()) {
+    if (!o.machine.empty() && r.machine != o.machine) continue;
+    std::printf("%s: %s, %s: %.5g -> %.5g in %.2f days, %.1f deviations%s\n",
+                r.machine.empty() ? "-" : r.machine.c_str(), r.measured.c_str(), r.quantity.c_str(), r.first,
+                r.now, r.days, r.deviations, r.drifted > 0.0 ? "  DRIFT" : "");
+  }
+}
+
+void improvements(const Options& o) {
+  mustExist(o.file);
+  for (const ModelImprovement& i : CoefficientDatabase(o.file).improvements()) {
+    if (!o.machine.empty() && i.machine != o.machine) continue;
+    std::printf("%s: %s, gap %.4g -> %.4g, held out %.4g -> %.4g, stamp %.0f s\n",
+                i.machine.empty() ? "-" : i.machine.c_str(), i.verdict.c_str(), i.fit_before, i.fit_after,
+                i.heldout_before, i.heldout_after, i.stamp);
+    for (const FoundCause& cause : causesOf(i)) std::printf("  %s\n", cause.text().c_str());
+    if (!i.asked.empty()) std::printf("  would tell more: %s\n", i.asked.c_str());
+  }
+}
+
+/// Commands about what is kept beside coefficients.
+class EvidenceCommands {
+ public:
+  EvidenceCommands(CommandLine& line, Options& o)
+      : keep_(line.command("keep", "takes a report of `explain`, or what `hammer health -o` wrote, in")),
+        health_(line.command("health", "what the spindles' health was, oldest first")),
+        improvements_(line.command("improvements", "what explanations found, with the evidence")) {
+    keep_.option("FILE", o.other, "folder of the report or report.json; or a .csv of health").required();
+    keep_.option("--machine", o.machine, "whose it is").required();
+    keep_.option("--campaign", o.campaign, "folder that was explained: tells the tests' conditions");
+    for (const CommandOptions* command : {&health_, &improvements_})
+      command->option("--machine", o.machine, "of this machine only");
+  }
+  void run(const Options& o) const {
+    if (keep_.parsed()) keep(o);
+    if (health_.parsed()) health(o);
+    if (improvements_.parsed()) improvements(o);
+  }
+
+ private:
+  CommandOptions keep_, health_, improvements_;
+};
+
 // What machines share and what is each one's own, from Ktc; then the next cut of each.
 void learn(const Options& o) {
   mustExist(o.file);
@@ -257,8 +316,10 @@ int main(int argc, char** argv) {
   pair(export_command);
   const CommandOptions import_command = line.command("import", "reads .csv or .yaml in");
   import_command.option("FILE", o.other, "file to read").required();
+  const EvidenceCommands evidence_commands(line, o);
   const FleetCommands fleet_commands(line, o);
   return runProgram(line, argc, argv, [&] {
+    evidence_commands.run(o);
     fleet_commands.run(o);
     if (list_command.parsed()) list(o);
     if (find_command.parsed()) find(o);

@@ -18,7 +18,8 @@ namespace smartmill::loadmeter {
 
 namespace {
 
-constexpr int SCHEMA = 1;
+// 1: coefficients. 2: improvements and health beside them, and what was handed on, each kind by itself.
+constexpr int SCHEMA = 2;
 constexpr int BUSY_TIMEOUT = 30000;  // [ms] that a writer waits for others
 
 class Statement {
@@ -72,6 +73,39 @@ CoefficientRecord recordOf(const Statement& row) {
   for (const WordField& f : wordFields()) f.at(record) = row.word(column++);
   for (const NumberField& f : numberFields()) f.set(record, f.index, row.number(column++));
   return record;
+}
+
+// Of RecordKind::columns().
+Row rowOf(const RecordKind& kind, const Statement& s) {
+  Row row;
+  int column = 0;
+  row.identity = s.word(column++);
+  if (kind.by_speed) row.speed_bucket = s.whole(column++);
+  for (std::size_t i = 0; i < kind.words.size(); ++i) row.words.push_back(s.word(column++));
+  for (std::size_t i = 0; i < kind.numbers.size(); ++i) row.numbers.push_back(s.number(column++));
+  return row;
+}
+
+// What was identified is kept with the version of the software that did it.
+template <typename Record>
+std::vector<Row> rowsOf(const std::string& file, const std::vector<Record>& records) {
+  std::vector<Row> rows;
+  for (Record record : records) {
+    if (record.version.empty()) record.version = SMARTMILL_VERSION;
+    try {
+      rows.push_back(rowOf(record));
+    } catch (const Error& error) {
+      throw Error(withoutPassword(file) + ": " + error.what());
+    }
+  }
+  return rows;
+}
+
+template <typename Record>
+std::vector<Record> recordsOf(const std::vector<Row>& rows) {
+  std::vector<Record> records(rows.size());
+  for (std::size_t i = 0; i < rows.size(); ++i) take(rows[i], &records[i]);
+  return records;
 }
 
 }  // namespace
@@ -130,38 +164,55 @@ struct CoefficientDatabase::Impl {
       }
     }
     execute("PRAGMA synchronous=FULL");
-    if (version() == 0) {
+    if (version() < SCHEMA) {
       transaction([this] {
-        if (version() != 0) return;  // another process was first
-        {
-          Statement tables(db, file, "SELECT count(*) FROM sqlite_master");
-          if (tables.step() && tables.integer(0) > 0) {
-            throw Error(file + ": a database, but not of cutting coefficients");
-          }
-        }
-        std::string sql =
-            "CREATE TABLE coefficients (id INTEGER PRIMARY KEY, identity TEXT NOT NULL UNIQUE, "
-            "speed_bucket INTEGER NOT NULL";
-        for (const WordField& f : wordFields()) sql += ", " + f.name + " TEXT NOT NULL";
-        for (const NumberField& f : numberFields()) sql += ", " + f.name + " REAL";
-        execute(sql + ")");
-        execute("CREATE INDEX pair ON coefficients (material, tool, speed_bucket, stamp)");
-        execute("CREATE INDEX material_speed ON coefficients (material, speed_bucket, stamp)");
-        execute("CREATE INDEX newest ON coefficients (material, tool, stamp)");
-        execute("CREATE INDEX newest_of_tool ON coefficients (tool, stamp)");
-        execute("CREATE INDEX newest_of_material ON coefficients (material, stamp)");
-        execute("CREATE INDEX newest_of_all ON coefficients (stamp)");
-        execute("PRAGMA user_version=" + std::to_string(SCHEMA));
+        // Another process may have been first.
+        if (version() == 0) makeFirst();
+        if (version() == 1) makeSecond();
       });
     }
-    // Beside the schema: what a program that knows no fleet leaves alone.
-    Statement sent(db, file, "SELECT 1 FROM sqlite_master WHERE name = 'sent'");
-    if (!sent.step())
-      execute("CREATE TABLE IF NOT EXISTS sent (fleet TEXT PRIMARY KEY, last INTEGER, at REAL)");
     if (version() != SCHEMA) {
       throw Error(file + ": schema " + std::to_string(version()) + " is not one this version knows (" +
                   std::to_string(SCHEMA) + ")");
     }
+  }
+
+  std::string createOf(const RecordKind& kind) const {
+    std::string sql =
+        "CREATE TABLE " + kind.table + " (id INTEGER PRIMARY KEY, identity TEXT NOT NULL UNIQUE";
+    if (kind.by_speed) sql += ", speed_bucket INTEGER NOT NULL";
+    for (const std::string& name : kind.words) sql += ", " + name + " TEXT NOT NULL";
+    for (const std::string& name : kind.numbers) sql += ", " + name + " REAL";
+    return sql + ")";
+  }
+
+  void makeFirst() const {
+    {
+      Statement tables(db, file, "SELECT count(*) FROM sqlite_master");
+      if (tables.step() && tables.integer(0) > 0) {
+        throw Error(file + ": a database, but not of cutting coefficients");
+      }
+    }
+    execute(createOf(coefficientKind()));
+    execute("CREATE INDEX pair ON coefficients (material, tool, speed_bucket, stamp)");
+    execute("CREATE INDEX material_speed ON coefficients (material, speed_bucket, stamp)");
+    execute("CREATE INDEX newest ON coefficients (material, tool, stamp)");
+    execute("CREATE INDEX newest_of_tool ON coefficients (tool, stamp)");
+    execute("CREATE INDEX newest_of_material ON coefficients (material, stamp)");
+    execute("CREATE INDEX newest_of_all ON coefficients (stamp)");
+    execute("PRAGMA user_version=1");
+  }
+
+  // Some of version 1 have the table `sent`, of coefficients only.
+  void makeSecond() const {
+    execute(createOf(improvementKind()));
+    execute(createOf(healthKind()));
+    execute(
+        "CREATE TABLE handed (fleet TEXT, kind TEXT, last INTEGER, at REAL, PRIMARY KEY (fleet, kind));"
+        "CREATE TABLE IF NOT EXISTS sent (fleet TEXT PRIMARY KEY, last INTEGER, at REAL);"
+        "INSERT INTO handed SELECT fleet, 'coefficients', last, at FROM sent;"
+        "DROP TABLE sent");
+    execute("PRAGMA user_version=2");
   }
 
   template <typename Work>
@@ -176,7 +227,8 @@ struct CoefficientDatabase::Impl {
     }
   }
 
-  std::int64_t sentUpTo(const std::string& to) const;
+  std::size_t insert(const RecordKind& kind, const std::vector<Row>& rows) const;
+  std::int64_t sentUpTo(const std::string& to, const RecordKind& kind) const;
 
   std::string where(const std::string& tool, const std::string& material) const {
     std::string sql;
@@ -205,36 +257,59 @@ bool CoefficientDatabase::add(const CoefficientSet& set) {
 }
 
 std::size_t CoefficientDatabase::add(const std::vector<CoefficientRecord>& records) {
-  std::vector<CoefficientRecord> complete = records;
-  for (CoefficientRecord& record : complete) {
-    if (record.version.empty()) record.version = SMARTMILL_VERSION;
-  }
-  if (impl_->fleet) return impl_->fleet->add(complete);
+  return add(coefficientKind(), rowsOf(impl_->file, records));
+}
+
+std::size_t CoefficientDatabase::add(const std::vector<ModelImprovement>& improvements) {
+  return add(improvementKind(), rowsOf(impl_->file, improvements));
+}
+
+std::size_t CoefficientDatabase::add(const std::vector<HealthRecord>& health) {
+  return add(healthKind(), rowsOf(impl_->file, health));
+}
+
+std::size_t CoefficientDatabase::add(const RecordKind& kind, const std::vector<Row>& rows) {
+  if (impl_->fleet) return impl_->fleet->add(kind, rows);
   std::size_t added = 0;
-  impl_->transaction([&] { added = insert(complete); });
+  impl_->transaction([&] { added = impl_->insert(kind, rows); });
   return added;
 }
 
-std::size_t CoefficientDatabase::insert(const std::vector<CoefficientRecord>& records) {
+std::size_t CoefficientDatabase::Impl::insert(const RecordKind& kind, const std::vector<Row>& rows) const {
   std::size_t added = 0;
-  std::string marks = "?1, ?2";
-  const std::size_t count = wordFields().size() + numberFields().size();
-  for (std::size_t i = 0; i < count; ++i) marks += ", ?" + std::to_string(i + 3);
-  Statement insert(impl_->db, impl_->file,
-                   "INSERT OR IGNORE INTO coefficients (identity, speed_bucket, " + columns() + ") VALUES (" +
-                       marks + ")");
-  for (CoefficientRecord record : records) {
-    if (!std::isfinite(record.set.stamp)) throw Error(impl_->file + ": stamp of a record is not a number");
+  std::string marks = "?1";
+  const std::size_t count = kind.words.size() + kind.numbers.size() + (kind.by_speed ? 1 : 0);
+  for (std::size_t i = 0; i < count; ++i) marks += ", ?" + std::to_string(i + 2);
+  Statement insert(
+      db, file, "INSERT OR IGNORE INTO " + kind.table + " (" + kind.columns() + ") VALUES (" + marks + ")");
+  for (const Row& row : rows) {
     int at = 1;
-    insert.bind(at++, identityOf(record));
-    insert.bind(at++, std::int64_t{bucketOf(record.cutting_speed)});
-    for (const WordField& f : wordFields()) insert.bind(at++, f.at(record));
-    for (const NumberField& f : numberFields()) insert.bind(at++, f.get(record, f.index));
+    insert.bind(at++, row.identity);
+    if (kind.by_speed) insert.bind(at++, row.speed_bucket);
+    for (const std::string& word : row.words) insert.bind(at++, word);
+    for (const double number : row.numbers) insert.bind(at++, number);
     insert.step();
-    added += static_cast<std::size_t>(sqlite3_changes(impl_->db));
+    added += static_cast<std::size_t>(sqlite3_changes(db));
     insert.reset();
   }
   return added;
+}
+
+std::vector<Row> CoefficientDatabase::rows(const RecordKind& kind) const {
+  if (impl_->fleet) return impl_->fleet->rows(kind);
+  Statement s(impl_->db, impl_->file,
+              "SELECT " + kind.columns() + " FROM " + kind.table + " ORDER BY stamp, id");
+  std::vector<Row> found;
+  while (s.step()) found.push_back(rowOf(kind, s));
+  return found;
+}
+
+std::vector<ModelImprovement> CoefficientDatabase::improvements() const {
+  return recordsOf<ModelImprovement>(rows(improvementKind()));
+}
+
+std::vector<HealthRecord> CoefficientDatabase::health() const {
+  return recordsOf<HealthRecord>(rows(healthKind()));
 }
 
 std::optional<CoefficientSet> CoefficientDatabase::find(const std::string& tool,
@@ -273,7 +348,10 @@ std::size_t CoefficientDatabase::merge(const std::string& file) {
   std::FILE* there = std::fopen(file.c_str(), "rb");
   if (!there) throw Error(file + ": cannot be read");
   std::fclose(there);
-  return add(CoefficientDatabase(file).records("", ""));
+  const CoefficientDatabase other(file);
+  std::size_t added = 0;
+  for (const RecordKind& kind : recordKinds()) added += add(kind, other.rows(kind));
+  return added;
 }
 
 std::string CoefficientDatabase::contents() const {
@@ -295,61 +373,70 @@ const std::string& CoefficientDatabase::file() const {
 }
 
 // Numbers of records follow the order in which they were kept: a file has one writer at a time.
-std::int64_t CoefficientDatabase::Impl::sentUpTo(const std::string& to) const {
-  Statement s(db, file, "SELECT last FROM sent WHERE fleet = ?1");
+std::int64_t CoefficientDatabase::Impl::sentUpTo(const std::string& to, const RecordKind& kind) const {
+  Statement s(db, file, "SELECT last FROM handed WHERE fleet = ?1 AND kind = ?2");
   s.bind(1, to);
+  s.bind(2, kind.table);
   return s.step() ? s.whole(0) : 0;
 }
 
-CoefficientDatabase::Batch CoefficientDatabase::unsent(const std::string& fleet, std::size_t limit) const {
+CoefficientDatabase::Batch CoefficientDatabase::unsent(const std::string& fleet, const RecordKind& kind,
+                                                       std::size_t limit) const {
   Batch batch;
   Statement s(impl_->db, impl_->file,
-              "SELECT " + columns() + ", id FROM coefficients WHERE id > ?1 ORDER BY id LIMIT ?2");
-  s.bind(1, impl_->sentUpTo(fleet));
+              "SELECT " + kind.columns() + ", id FROM " + kind.table + " WHERE id > ?1 ORDER BY id LIMIT ?2");
+  s.bind(1, impl_->sentUpTo(fleet, kind));
   s.bind(2, static_cast<std::int64_t>(limit));
-  const int id = static_cast<int>(wordFields().size() + numberFields().size());
+  const int id = static_cast<int>(kind.words.size() + kind.numbers.size()) + (kind.by_speed ? 2 : 1);
   while (s.step()) {
-    batch.records.push_back(recordOf(s));
+    batch.rows.push_back(rowOf(kind, s));
     batch.last = s.whole(id);
   }
   return batch;
 }
 
-std::size_t CoefficientDatabase::unsentCount(const std::string& fleet) const {
-  Statement s(impl_->db, impl_->file, "SELECT count(*) FROM coefficients WHERE id > ?1");
-  s.bind(1, impl_->sentUpTo(fleet));
+std::size_t CoefficientDatabase::unsentCount(const std::string& fleet, const RecordKind& kind) const {
+  Statement s(impl_->db, impl_->file, "SELECT count(*) FROM " + kind.table + " WHERE id > ?1");
+  s.bind(1, impl_->sentUpTo(fleet, kind));
   return s.step() ? static_cast<std::size_t>(s.whole(0)) : 0;
 }
 
-void CoefficientDatabase::markSent(const std::string& fleet, std::int64_t last) {
+std::size_t CoefficientDatabase::unsentCount(const std::string& fleet) const {
+  std::size_t count = 0;
+  for (const RecordKind& kind : recordKinds()) count += unsentCount(fleet, kind);
+  return count;
+}
+
+void CoefficientDatabase::markSent(const std::string& fleet, const RecordKind& kind, std::int64_t last) {
   Statement s(impl_->db, impl_->file,
-              "INSERT OR REPLACE INTO sent (fleet, last, at) VALUES (?1, ?2, julianday('now'))");
+              "INSERT OR REPLACE INTO handed (fleet, kind, last, at) VALUES (?1, ?2, ?3, julianday('now'))");
   s.bind(1, fleet);
-  s.bind(2, last);
+  s.bind(2, kind.table);
+  s.bind(3, last);
   s.step();
 }
 
 std::string CoefficientDatabase::lastFleet() const {
-  Statement s(impl_->db, impl_->file, "SELECT fleet FROM sent ORDER BY at DESC LIMIT 1");
+  Statement s(impl_->db, impl_->file, "SELECT fleet FROM handed ORDER BY at DESC LIMIT 1");
   return s.step() ? s.word(0) : "";
 }
 
-std::size_t CoefficientDatabase::addFrom(const std::string& fleet,
-                                         const std::vector<CoefficientRecord>& records) {
+std::size_t CoefficientDatabase::addFrom(const std::string& fleet, const RecordKind& kind,
+                                         const std::vector<Row>& rows) {
   std::size_t added = 0;
   impl_->transaction([&] {
-    const bool nothing_waits = unsentCount(fleet) == 0;
-    added = insert(records);
+    const bool nothing_waits = unsentCount(fleet, kind) == 0;
+    added = impl_->insert(kind, rows);
     if (!nothing_waits || added == 0) return;
-    Statement last(impl_->db, impl_->file, "SELECT max(id) FROM coefficients");
+    Statement last(impl_->db, impl_->file, "SELECT max(id) FROM " + kind.table);
     last.step();
-    markSent(fleet, last.whole(0));
+    markSent(fleet, kind, last.whole(0));
   });
   return added;
 }
 
-std::vector<std::string> CoefficientDatabase::identities() const {
-  Statement s(impl_->db, impl_->file, "SELECT identity FROM coefficients");
+std::vector<std::string> CoefficientDatabase::identities(const RecordKind& kind) const {
+  Statement s(impl_->db, impl_->file, "SELECT identity FROM " + kind.table);
   std::vector<std::string> found;
   while (s.step()) found.push_back(s.word(0));
   return found;

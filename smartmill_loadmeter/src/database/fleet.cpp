@@ -1,6 +1,7 @@
 #include "smartmill_loadmeter/database/fleet.h"
 
 #include "fleet_server.h"
+#include "record_fields.h"
 #include "smartmill_core/error.h"
 
 namespace smartmill::loadmeter {
@@ -41,16 +42,18 @@ FleetTransfer push(CoefficientDatabase& local, const std::string& url, const Fle
   mustBeFile(local);
   const auto server = connectFleet(url);
   const std::string fleet = server->identity();
-  if (all) local.markSent(fleet, 0);
   FleetTransfer done;
-  while (true) {
-    const CoefficientDatabase::Batch batch = local.unsent(fleet, BATCH);
-    if (batch.records.empty()) break;
-    done.fresh += server->add(batch.records);
-    // An end between the two sends the batch again, which adds nothing.
-    local.markSent(fleet, batch.last);
-    done.offered += batch.records.size();
-    if (progress) progress(done);
+  for (const RecordKind& kind : recordKinds()) {
+    if (all) local.markSent(fleet, kind, 0);
+    while (true) {
+      const CoefficientDatabase::Batch batch = local.unsent(fleet, kind, BATCH);
+      if (batch.rows.empty()) break;
+      done.fresh += server->add(kind, batch.rows);
+      // An end between the two sends the batch again, which adds nothing.
+      local.markSent(fleet, kind, batch.last);
+      done.offered += batch.rows.size();
+      if (progress) progress(done);
+    }
   }
   server->notePush(done, local.unsentCount(fleet));
   return done;
@@ -62,12 +65,19 @@ FleetTransfer pull(CoefficientDatabase& local, const std::string& url, const Fle
   const auto server = connectFleet(url);
   const std::string fleet = server->identity();
   FleetTransfer done;
-  server->missing(local.identities(), [&](const std::vector<CoefficientRecord>& batch) {
-    done.fresh += local.addFrom(fleet, batch);
-    done.offered += batch.size();
-    if (progress) progress(done);
-  });
+  for (const RecordKind& kind : recordKinds()) {
+    server->missing(kind, local.identities(kind), [&](const std::vector<Row>& batch) {
+      done.fresh += local.addFrom(fleet, kind, batch);
+      done.offered += batch.size();
+      if (progress) progress(done);
+    });
+  }
   return done;
+}
+
+std::function<void()> fleetEcho(const std::string& url) {
+  mustBeFleet(url);
+  return [server = std::shared_ptr<FleetServer>(connectFleet(url))] { server->echo(); };
 }
 
 std::vector<FleetMember> fleetMembers(const std::string& url) {

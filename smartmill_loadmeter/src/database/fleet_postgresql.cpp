@@ -27,18 +27,33 @@ void appendWord(const std::string& word, std::string* line) {
   }
 }
 
-// A line of COPY's text format: identity, bucket, words, numbers.
-void appendLine(CoefficientRecord record, std::string* lines) {
-  *lines += identityOf(record) + "\t" + std::to_string(bucketOf(record.cutting_speed));
-  for (const WordField& f : wordFields()) {
+// A line of COPY's text format, in the order of RecordKind::columns().
+void appendLine(const RecordKind& kind, const Row& row, std::string* lines) {
+  *lines += row.identity;
+  if (kind.by_speed) *lines += "\t" + std::to_string(row.speed_bucket);
+  for (const std::string& word : row.words) {
     *lines += '\t';
-    appendWord(f.at(record), lines);
+    appendWord(word, lines);
   }
-  for (const NumberField& f : numberFields()) {
-    const std::string number = exactNumber(f.get(record, f.index));
+  for (const double value : row.numbers) {
+    const std::string number = exactNumber(value);
     *lines += '\t' + (number.empty() ? "\\N" : number);
   }
   *lines += '\n';
+}
+
+std::vector<Row> rowsOf(const RecordKind& kind, const FleetRows& rows) {
+  std::vector<Row> found;
+  for (int r = 0; r < rows.size(); ++r) {
+    Row row;
+    int column = 0;
+    row.identity = rows.word(r, column++);
+    if (kind.by_speed) row.speed_bucket = static_cast<std::int64_t>(rows.number(r, column++));
+    for (std::size_t i = 0; i < kind.words.size(); ++i) row.words.push_back(rows.word(r, column++));
+    for (std::size_t i = 0; i < kind.numbers.size(); ++i) row.numbers.push_back(rows.number(r, column++));
+    found.push_back(row);
+  }
+  return found;
 }
 
 CoefficientRecord recordOf(const FleetRows& rows, int row) {
@@ -84,29 +99,32 @@ class PostgresqlServer : public FleetServer {
   }
 
   std::string identity() override { return identity_; }
+  void echo() override { connection_.ask("SELECT 1", {}); }
 
-  std::size_t add(const std::vector<CoefficientRecord>& records) override {
+  std::size_t add(const RecordKind& kind, const std::vector<Row>& rows) override {
     if (connection_.ask("SELECT (me()).id", {}).word(0, 0).empty())
       connection_.fail("this login is no machine of the fleet, `coefficients_db URL enrol` makes it one");
-    const std::string list = "identity, speed_bucket, " + columns();
+    const std::string list = kind.columns();
     std::string lines;
-    for (const CoefficientRecord& record : records) {
-      if (!std::isfinite(record.set.stamp)) connection_.fail("stamp of a record is not a number");
-      appendLine(record, &lines);
-    }
+    for (const Row& row : rows) appendLine(kind, row, &lines);
     std::size_t added = 0;
     connection_.transaction("BEGIN", [&] {
-      connection_.run("CREATE TEMP TABLE incoming ON COMMIT DROP AS SELECT " + list +
-                      " FROM coefficients WITH NO DATA");
+      connection_.run("CREATE TEMP TABLE incoming ON COMMIT DROP AS SELECT " + list + " FROM " + kind.table +
+                      " WITH NO DATA");
       connection_.copyIn("COPY incoming (" + list + ") FROM STDIN", lines);
       // In one order, or two machines with the same records wait for each other.
       added = connection_
-                  .run("INSERT INTO coefficients (shop, machine_id, " + list +
+                  .run("INSERT INTO " + kind.table + " (shop, machine_id, " + list +
                        ") SELECT m.shop, m.id, incoming.* FROM incoming, me() m ORDER BY incoming.identity "
                        "ON CONFLICT (shop, identity) DO NOTHING")
                   .affected();
     });
     return added;
+  }
+
+  std::vector<Row> rows(const RecordKind& kind) override {
+    return rowsOf(
+        kind, connection_.run("SELECT " + kind.columns() + " FROM " + kind.table + " ORDER BY stamp, id"));
   }
 
   void notePush(const FleetTransfer& done, std::size_t behind) override {
@@ -131,25 +149,23 @@ class PostgresqlServer : public FleetServer {
         "SELECT " + columns() + " FROM coefficients" + pair.where + " ORDER BY stamp, id", pair.parameters));
   }
 
+  // One question, whether there is something about that speed or not.
   std::vector<CoefficientRecord> near(const std::string& tool, const CoefficientQuery& query) override {
-    const Pair pair(tool, query.material);
+    Pair pair(tool, query.material);
     const std::string newest = " ORDER BY stamp DESC LIMIT " + std::to_string(NEWEST);
-    std::vector<CoefficientRecord> found;
-    if (query.cutting_speed > 0.0) {
-      Pair buckets = pair;
-      buckets.parameters.push_back(std::to_string(bucketOf(query.cutting_speed)));
-      const std::string middle = "$" + std::to_string(buckets.parameters.size()) + "::int";
-      const std::string span = std::to_string(BUCKETS);
-      found = recordsOf(connection_.ask(
-          "SELECT " + columnsOf("c") + " FROM (SELECT " + std::to_string(NO_SPEED) +
-              " AS at UNION ALL SELECT " + middle + " + b FROM generate_series(-" + span + ", " + span +
-              ") b) buckets, LATERAL (SELECT * FROM coefficients" + buckets.where +
-              (buckets.where.empty() ? " WHERE" : " AND") + " speed_bucket = buckets.at" + newest + ") c",
-          buckets.parameters));
-    }
-    if (!found.empty()) return found;
-    return recordsOf(
-        connection_.ask("SELECT " + columns() + " FROM coefficients" + pair.where + newest, pair.parameters));
+    const std::string any = "SELECT " + columns() + " FROM coefficients" + pair.where + newest;
+    if (!(query.cutting_speed > 0.0)) return recordsOf(connection_.ask(any, pair.parameters));
+    pair.parameters.push_back(std::to_string(bucketOf(query.cutting_speed)));
+    const std::string middle = "$" + std::to_string(pair.parameters.size()) + "::int";
+    const std::string span = std::to_string(BUCKETS);
+    return recordsOf(connection_.ask(
+        "WITH about AS MATERIALIZED (SELECT " + columnsOf("c") + " FROM (SELECT " + std::to_string(NO_SPEED) +
+            " AS at UNION ALL SELECT " + middle + " + b FROM generate_series(-" + span + ", " + span +
+            ") b) buckets, LATERAL (SELECT * FROM coefficients" + pair.where +
+            (pair.where.empty() ? " WHERE" : " AND") + " speed_bucket = buckets.at" + newest +
+            ") c) SELECT * FROM about UNION ALL SELECT * FROM (" + any +
+            ") anywhere WHERE NOT EXISTS (SELECT 1 FROM about)",
+        pair.parameters));
   }
 
   std::vector<std::pair<std::string, std::string>> pairs() override {
@@ -163,20 +179,21 @@ class PostgresqlServer : public FleetServer {
     return static_cast<std::size_t>(connection_.run("SELECT count(*) FROM coefficients").number(0, 0));
   }
 
-  void missing(const std::vector<std::string>& identities,
-               const std::function<void(const std::vector<CoefficientRecord>&)>& batch) override {
+  void missing(const RecordKind& kind, const std::vector<std::string>& identities,
+               const std::function<void(const std::vector<Row>&)>& batch) override {
     std::string lines;
     for (const std::string& identity : identities) lines += identity + "\n";
     connection_.transaction("BEGIN ISOLATION LEVEL REPEATABLE READ", [&] {
       connection_.run("CREATE TEMP TABLE have (identity text) ON COMMIT DROP");
       connection_.copyIn("COPY have FROM STDIN", lines);
       connection_.run("ANALYZE have");
-      connection_.run("DECLARE lacking NO SCROLL CURSOR FOR SELECT " + columnsOf("c") +
-                      " FROM coefficients c WHERE NOT EXISTS (SELECT 1 FROM have h WHERE h.identity = "
-                      "c.identity) ORDER BY c.id");
+      connection_.run("DECLARE lacking NO SCROLL CURSOR FOR SELECT " + kind.columns("c.") + " FROM " +
+                      kind.table +
+                      " c WHERE NOT EXISTS (SELECT 1 FROM have h WHERE h.identity = c.identity) ORDER BY "
+                      "c.id");
       while (true) {
-        const std::vector<CoefficientRecord> some =
-            recordsOf(connection_.run("FETCH " + std::to_string(BATCH) + " FROM lacking"));
+        const std::vector<Row> some =
+            rowsOf(kind, connection_.run("FETCH " + std::to_string(BATCH) + " FROM lacking"));
         if (some.empty()) break;
         batch(some);
       }
@@ -184,9 +201,12 @@ class PostgresqlServer : public FleetServer {
   }
 
   std::vector<FleetMember> members() override {
+    std::string count = "0";
+    for (const RecordKind& kind : recordKinds())
+      count += " + (SELECT count(*) FROM " + kind.table + " c WHERE c.shop = m.shop AND c.machine_id = m.id)";
     const FleetRows rows = connection_.run(
-        "SELECT m.name, m.login, m.shop, (SELECT count(*) FROM coefficients c WHERE c.shop = m.shop AND "
-        "c.machine_id = m.id), extract(epoch FROM now() - p.at), coalesce(p.behind, 0) FROM members() m LEFT "
+        "SELECT m.name, m.login, m.shop, " + count +
+        ", extract(epoch FROM now() - p.at), coalesce(p.behind, 0) FROM members() m LEFT "
         "JOIN "
         "LATERAL (SELECT at, behind FROM push WHERE push.shop = m.shop AND push.machine_id = m.id ORDER BY "
         "at DESC "

@@ -88,6 +88,31 @@ std::string second() {
          "UPDATE fleet SET schema = 2;";
 }
 
+// What version 1 has for coefficients, for another kind of record.
+std::string tableOf(const RecordKind& kind) {
+  std::string columns;
+  for (const std::string& name : kind.words) columns += ", " + name + " text NOT NULL";
+  for (const std::string& name : kind.numbers) columns += ", " + name + " double precision";
+  const std::string& t = kind.table;
+  return "CREATE TABLE " + t +
+         " (id bigint GENERATED ALWAYS AS IDENTITY PRIMARY KEY, identity text NOT NULL, shop text NOT NULL, "
+         "machine_id int NOT NULL REFERENCES machine, received timestamptz NOT NULL DEFAULT now()" +
+         columns + ", UNIQUE (shop, identity));CREATE INDEX " + t + "_brought ON " + t +
+         " (shop, machine_id);ALTER TABLE " + t + " ENABLE ROW LEVEL SECURITY; ALTER TABLE " + t +
+         " FORCE ROW LEVEL SECURITY;CREATE POLICY shop_rows ON " + t +
+         " FOR SELECT TO fleet_machine USING (shop = (SELECT (me()).shop));CREATE POLICY own_insert ON " + t +
+         " FOR INSERT TO fleet_machine WITH CHECK (machine_id = (SELECT (me()).id) AND shop = (SELECT "
+         "(me()).shop));CREATE POLICY read_all ON " +
+         t + " FOR SELECT TO fleet_reader USING (true);GRANT SELECT, INSERT ON " + t +
+         " TO fleet_machine; GRANT SELECT ON " + t + " TO fleet_reader;";
+}
+
+// Version 3: improvements of models, and spindles' health.
+std::string third() {
+  return tableOf(improvementKind()) + tableOf(healthKind()) +
+         "GRANT USAGE ON ALL SEQUENCES IN SCHEMA public TO fleet_machine;UPDATE fleet SET schema = 3;";
+}
+
 }  // namespace
 
 std::string checkFleet(FleetConnection& connection) {
@@ -111,7 +136,7 @@ int migrateFleet(const std::string& url, int schema) {
     found = versionOf(connection);
     if (found > schema)
       connection.fail("tables of version " + std::to_string(found) + " are newer than this program");
-    const std::string steps[] = {first(), second()};
+    const std::string steps[] = {first(), second(), third()};
     for (int version = found; version < schema; ++version) connection.run(steps[version]);
   });
   return found;

@@ -17,8 +17,10 @@ class FleetServer {
   virtual ~FleetServer() = default;
 
   virtual std::string identity() = 0;  ///< of this fleet, made with its tables
+  virtual void echo() = 0;             ///< one question that asks for nothing, there and back
   /// One transaction: all or none. @return how many were new.
-  virtual std::size_t add(const std::vector<CoefficientRecord>& records) = 0;
+  virtual std::size_t add(const RecordKind& kind, const std::vector<Row>& rows) = 0;
+  virtual std::vector<Row> rows(const RecordKind& kind) = 0;  ///< all, oldest first
   /// Notes beside the machine that it pushed just now, and how many records it still has.
   virtual void notePush(const FleetTransfer& done, std::size_t behind) = 0;
   virtual std::optional<CoefficientRecord> newest(const std::string& tool, const std::string& material) = 0;
@@ -27,8 +29,8 @@ class FleetServer {
   virtual std::vector<std::pair<std::string, std::string>> pairs() = 0;  ///< tool, material
   virtual std::size_t size() = 0;
   /// Records that are not among these, in batches, all of one moment.
-  virtual void missing(const std::vector<std::string>& identities,
-                       const std::function<void(const std::vector<CoefficientRecord>&)>& batch) = 0;
+  virtual void missing(const RecordKind& kind, const std::vector<std::string>& identities,
+                       const std::function<void(const std::vector<Row>&)>& batch) = 0;
   virtual std::vector<FleetMember> members() = 0;
 };
 

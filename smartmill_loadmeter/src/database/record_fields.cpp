@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/model/machine_model.h"
 
@@ -109,12 +110,57 @@ std::string identityOf(CoefficientRecord record) {
     if (f.name != "version") text += f.at(record) + '\x1f';
   }
   for (const NumberField& f : numberFields()) text += exactNumber(f.get(record, f.index)) + '\x1f';
+  return identityOf(text);
+}
+
+std::string identityOf(const std::string& text) {
   std::uint64_t a = 14695981039346656037ull, b = 1099511628211ull * 2654435761ull;
   for (const char c : text) {
     a = (a ^ static_cast<unsigned char>(c)) * 1099511628211ull;
     b = (b ^ static_cast<unsigned char>(c)) * 1099511628211ull + 0x9e3779b97f4a7c15ull;
   }
   return formatted("%016llx%016llx", static_cast<unsigned long long>(a), static_cast<unsigned long long>(b));
+}
+
+std::string RecordKind::columns(const std::string& prefix) const {
+  std::string list = prefix + "identity";
+  if (by_speed) list += ", " + prefix + "speed_bucket";
+  for (const std::string& name : words) list += ", " + prefix + name;
+  for (const std::string& name : numbers) list += ", " + prefix + name;
+  return list;
+}
+
+const RecordKind& coefficientKind() {
+  static const RecordKind kind = [] {
+    RecordKind k;
+    k.table = "coefficients";
+    k.by_speed = true;
+    for (const WordField& f : wordFields()) k.words.push_back(f.name);
+    for (const NumberField& f : numberFields()) k.numbers.push_back(f.name);
+    return k;
+  }();
+  return kind;
+}
+
+const std::vector<RecordKind>& recordKinds() {
+  static const std::vector<RecordKind> kinds{coefficientKind(), improvementKind(), healthKind()};
+  return kinds;
+}
+
+Row rowOf(CoefficientRecord record) {
+  if (!std::isfinite(record.set.stamp)) throw Error("stamp of a record is not a number");
+  Row row;
+  row.identity = identityOf(record);
+  row.speed_bucket = bucketOf(record.cutting_speed);
+  for (const WordField& f : wordFields()) row.words.push_back(f.at(record));
+  for (const NumberField& f : numberFields()) row.numbers.push_back(f.get(record, f.index));
+  return row;
+}
+
+void take(const Row& row, CoefficientRecord* record) {
+  for (std::size_t i = 0; i < row.words.size(); ++i) wordFields()[i].at(*record) = row.words[i];
+  for (std::size_t i = 0; i < row.numbers.size(); ++i)
+    numberFields()[i].set(*record, numberFields()[i].index, row.numbers[i]);
 }
 
 int bucketOf(double cutting_speed) {

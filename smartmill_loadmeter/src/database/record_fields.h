@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -24,6 +25,40 @@ struct WordField {
 const std::vector<WordField>& wordFields();
 const std::vector<NumberField>& numberFields();
 
+/// A kind of record: its table in both homes, columns words first.
+struct RecordKind {
+  std::string table;
+  std::vector<std::string> words, numbers;
+  bool by_speed = false;  ///< has the column speed_bucket, by which it is looked up
+
+  /// Names of what a Row holds, identity first, each after `prefix`, between commas.
+  std::string columns(const std::string& prefix = "") const;
+};
+
+/// A record of any kind, as it is stored and handed on. NaN: not known.
+struct Row {
+  std::string identity;
+  std::int64_t speed_bucket = 0;
+  std::vector<std::string> words;
+  std::vector<double> numbers;
+};
+
+/// @{ All kinds there are, in the order in which they are handed on.
+const std::vector<RecordKind>& recordKinds();
+const RecordKind& coefficientKind();
+const RecordKind& improvementKind();
+const RecordKind& healthKind();
+/// @}
+
+/// @{ Between a record and its row. @throws Error when its stamp is not a number.
+Row rowOf(CoefficientRecord record);
+Row rowOf(ModelImprovement improvement);
+Row rowOf(HealthRecord health);
+void take(const Row& row, CoefficientRecord* record);
+void take(const Row& row, ModelImprovement* improvement);
+void take(const Row& row, HealthRecord* health);
+/// @}
+
 /// 17 significant digits; empty for NaN.
 std::string exactNumber(double value);
 
@@ -33,6 +68,7 @@ std::string columns();
 /// Two FNV-1a hashes of everything that was identified: the same everywhere, so that merging twice adds
 /// nothing.
 std::string identityOf(CoefficientRecord record);
+std::string identityOf(const std::string& content);
 
 /// @{ Records are looked up by half octaves of cutting speed.
 constexpr int NO_SPEED = -1000000;  ///< bucket of records without a cutting speed

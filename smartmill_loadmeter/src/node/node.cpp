@@ -53,6 +53,9 @@ LoadMeterNode::LoadMeterNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
   connect(shell_.inputs(), parameters_, identification_);
   find_service_ = nh.advertiseService(names::FIND_COEFFICIENTS, &LoadMeterNode::find, this);
   recommend_service_ = nh.advertiseService(names::RECOMMEND_CUT, &LoadMeterNode::recommend, this);
+  discovered_ = nh.subscribe<smartmill_msgs::DiscoverActionResult>(
+      std::string(names::DISCOVER) + "/result", 10,
+      [this](const smartmill_msgs::DiscoverActionResult::ConstPtr& result) { keep(*result); });
   shell_.diagnose("load meter", [this](auto& status) { diagnose(status); });
   shell_.every(WATCH_PERIOD, [this] { watch(); });
   if (!parameters_.fleet.empty())
@@ -139,7 +142,9 @@ void LoadMeterNode::finish(const IdentifyResult& result) {
   if (found) {
     publisher_.publish(message.coefficients);
     try {
-      database_.add(result.record);
+      CoefficientRecord record = result.record;
+      record.machine = parameters_.machine;
+      database_.add(record);
     } catch (const Error& error) {
       ROS_ERROR("database: %s", error.what());
       message.message += "; not kept: " + std::string(error.what());
@@ -216,11 +221,25 @@ bool LoadMeterNode::recommend(smartmill_msgs::RecommendCut::Request& request,
   return true;
 }
 
-void LoadMeterNode::keep(const CoefficientRecord& cut) {
+void LoadMeterNode::keep(CoefficientRecord cut) {
+  cut.machine = parameters_.machine;
   try {
     kept_cuts_ += database_.add(cut);
   } catch (const Error& error) {
     ROS_ERROR("database: cut not kept: %s", error.what());
+  }
+}
+
+// Whoever explained: the report has the evidence.
+void LoadMeterNode::keep(const smartmill_msgs::DiscoverActionResult& discovered) {
+  if (discovered.result.verdict.empty()) return;
+  try {
+    ModelImprovement improvement = readImprovement(discovered.result.report);
+    improvement.machine = parameters_.machine;
+    improvement.stamp = discovered.header.stamp.toSec();
+    kept_explanations_ += database_.add(std::vector<ModelImprovement>{improvement});
+  } catch (const Error& error) {
+    ROS_ERROR("database: explanation not kept: %s", error.what());
   }
 }
 
@@ -253,6 +272,7 @@ void LoadMeterNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status
   }
   if (!last_force_.empty()) status.add("force by motor currents", last_force_);
   status.add("cuts kept", kept_cuts_);
+  status.add("explanations kept", kept_explanations_);
   if (pusher_) {
     const FleetPusher::State fleet = pusher_->state();
     status.add("not sent to the fleet [records]", fleet.behind);

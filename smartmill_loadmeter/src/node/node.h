@@ -12,6 +12,7 @@
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_loadmeter/database/database.h"
 #include "smartmill_loadmeter/identification/sorted_identification.h"
+#include "smartmill_msgs/DiscoverActionResult.h"
 #include "smartmill_msgs/FindCoefficients.h"
 #include "smartmill_msgs/IdentifyCoefficientsAction.h"
 #include "smartmill_msgs/RecommendCut.h"
@@ -37,7 +38,8 @@ class LoadMeterNode {
             smartmill_msgs::FindCoefficients::Response& response);
   bool recommend(smartmill_msgs::RecommendCut::Request& request,
                  smartmill_msgs::RecommendCut::Response& response);
-  void keep(const CoefficientRecord& cut);
+  void keep(CoefficientRecord cut);
+  void keep(const smartmill_msgs::DiscoverActionResult& discovered);
   void publish(const MotorForce& force);
   void publish(const ForceEstimate& force);
   void watch();
@@ -51,9 +53,10 @@ class LoadMeterNode {
   std::map<std::uint64_t, Server::GoalHandle> waiting_;
   std::uint64_t next_id_ = 1;
   std::string last_message_, last_force_;
-  std::size_t kept_cuts_ = 0;
+  std::size_t kept_cuts_ = 0, kept_explanations_ = 0;
 
   ros::Publisher publisher_, force_publisher_, estimate_publisher_;
+  ros::Subscriber discovered_;
   ros::ServiceServer find_service_, recommend_service_;
   Server server_;
 };

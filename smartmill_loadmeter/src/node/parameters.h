@@ -12,7 +12,7 @@ namespace smartmill::loadmeter {
 /// Parameters of loadmeter_node and of `coefficients` on a bag.
 struct NodeParameters {
   std::string model;
-  std::string database;
+  std::string database, machine;
   bool keep_cuts = true;
   std::string fleet;
   double fleet_period = 60.0;
@@ -32,6 +32,7 @@ struct NodeParameters {
     table.section();
     table.text("database", database,
                "path of the SQLite file that keeps what this machine identifies; empty: this run only");
+    table.text("machine", machine, "name of this machine, in every record of its database");
     table.flag("keep_cuts", keep_cuts,
                "true: every cut enters the database, with its condition and what it says");
     table.text("fleet", fleet,

@@ -253,6 +253,80 @@ TEST(Database, hundredThousandRecordsAreLookedUpInUnderFiveMilliseconds) {
   EXPECT_LT(times[30], 5e-3);
 }
 
+// A file as version 1 left it: with records, one of them handed on.
+TEST(Database, anOlderFileIsBroughtUpWithAllItHolds) {
+  const TemporaryFolder folder;
+  const std::string file = folder.file("old.sqlite");
+  {
+    CoefficientDatabase made(file);
+    made.add(std::vector<CoefficientRecord>{recordOf("t", 1, 1e9, 2.0), recordOf("t", 2, 1.1e9, 2.0)});
+  }
+  sqlite3* db = nullptr;
+  ASSERT_EQ(sqlite3_open(file.c_str(), &db), SQLITE_OK);
+  ASSERT_EQ(sqlite3_exec(db,
+                         "DROP TABLE improvements; DROP TABLE health; DROP TABLE handed; CREATE TABLE sent "
+                         "(fleet TEXT PRIMARY KEY, last INTEGER, at REAL); INSERT INTO sent VALUES ('f', 1, "
+                         "1); PRAGMA user_version=1",
+                         nullptr, nullptr, nullptr),
+            SQLITE_OK);
+  sqlite3_close(db);
+  CoefficientDatabase database(file);
+  EXPECT_EQ(database.size(), 2u);
+  EXPECT_EQ(database.lastFleet(), "f");
+  EXPECT_EQ(database.unsentCount("f"), 1u);
+  HealthRecord health;
+  health.stamp = 5.0;
+  EXPECT_EQ(database.add(std::vector<HealthRecord>{health}), 1u);
+  EXPECT_EQ(database.unsentCount("f"), 2u);
+  health.stamp = NAN;
+  EXPECT_THAT(errorOf([&] { database.add(std::vector<HealthRecord>{health}); }),
+              HasSubstr("old.sqlite: stamp of a record is not a number"));
+}
+
+// Keys and numbers as docs/formats.md has them.
+TEST(Database, aReportIsKeptWithItsEvidenceAndOnce) {
+  const TemporaryFolder folder;
+  const std::string report = folder.write("report.json", R"({"format": "smartmill-report/1",
+    "verdict": "explained", "effects": [{"name": "runout", "parameters": {"angle_deg": {"value": 261.8,
+    "std": 0.01}, "offset_um": {"value": 21.08, "std": 0.004}}, "delta_bic": 2.69e8, "confidence": 0.99,
+    "heldout_gap_reduction": 1.0, "alternatives": []}, {"name": "empirical", "stage": "sensor",
+    "form": "tone", "parameters": {}, "delta_bic": 9.0, "confidence": 0.9}], "not_separable": [],
+    "resembles": [], "suggested_test": null, "gap": {"before": {"fit": 42.5, "heldout": 57.4},
+    "after": {"fit": 1.006, "heldout": 1.009}}, "gaps": [
+    {"test": "air", "channel": "fx", "heldout": false, "before": 1.0, "after": 1.0},
+    {"test": "slot", "channel": "fx", "heldout": false, "before": 50.0, "after": 1.0},
+    {"test": "slot", "channel": "fy", "heldout": false, "before": 90.0, "after": 1.1}]})");
+  ModelImprovement kept = readImprovement(report);
+  kept.machine = "mill 07";
+  const auto causes = causesOf(kept);
+  ASSERT_EQ(causes.size(), 1u) << "a cause without a name is none to look for";
+  EXPECT_EQ(causes[0].text(), "runout: angle_deg 261.8 +- 0.01, offset_um 21.08 +- 0.004");
+  EXPECT_EQ(causes[0].shown_in, "slot, fy: gap 90 -> 1.1");
+  EXPECT_EQ(kept.heldout_after, 1.009);
+  CoefficientDatabase database("");
+  EXPECT_EQ(database.add(std::vector<ModelImprovement>{kept}), 1u);
+  kept.stamp += 60.0;
+  kept.report = "a copy";
+  EXPECT_EQ(database.add(std::vector<ModelImprovement>{kept}), 0u);
+  EXPECT_THAT(errorOf([&] { readImprovement(folder.write("bad.json", "{}")); }), HasSubstr("bad.json: "));
+  EXPECT_THAT(errorOf([&] { readImprovement(folder.file("none")); }), HasSubstr("none: cannot be read"));
+}
+
+TEST(Database, healthIsReadAsTheHammerWritesIt) {
+  const TemporaryFolder folder;
+  const std::string head = "measured,bag,days,quantity,first,now,deviations,drifted,stamp\n";
+  const auto rows = readHealth(folder.write(
+      "health.csv",
+      head + "tool x,b.bag,1.5,\"gain of the mode at 930 Hz, gone\",2e-8,0,,true,1700000000.5\n"));
+  ASSERT_EQ(rows.size(), 1u);
+  EXPECT_EQ(rows[0].quantity, "gain of the mode at 930 Hz, gone");
+  EXPECT_EQ(rows[0].stamp, 1700000000.5);
+  EXPECT_TRUE(std::isnan(rows[0].deviations));
+  EXPECT_EQ(rows[0].drifted, 1.0);
+  EXPECT_THAT(errorOf([&] { readHealth(folder.write("old.csv", "measured,bag\n")); }),
+              HasSubstr("old.csv: line 1: column 'days' is missing"));
+}
+
 // The full minute is loadmeter_database crash. Writers tell through a pipe what add() has acknowledged; one
 // after the other is killed and started anew.
 TEST(Database, whatWasAcknowledgedSurvivesKilledWriters) {

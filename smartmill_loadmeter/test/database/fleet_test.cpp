@@ -3,6 +3,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <csignal>
 #include <memory>
@@ -36,6 +37,32 @@ CoefficientRecord recordOf(const std::string& machine, int number) {
   r.cutting_speed = 0.5 + 0.01 * number;
   r.covariance[CoefficientRecord::covarianceIndex(0, 3)] = -1.0 / 3.0;
   r.bag = "night\nshift\r.bag";
+  return r;
+}
+
+ModelImprovement improvementOf(const std::string& machine, int number) {
+  ModelImprovement i;
+  i.machine = machine;
+  i.verdict = "explained";
+  i.effects = "[{\"name\":\"runout\",\"at\":\"a\\\\b\\tc\"}]";
+  i.rivals = i.resembles = i.tests = "[]";
+  i.report = "/shop/\t" + std::to_string(number);
+  i.stamp = 1700000000.0 + number;
+  i.fit_before = 10.0 + number / 3.0;
+  i.fit_after = 1.0;
+  return i;
+}
+
+HealthRecord healthOf(const std::string& machine, int number) {
+  HealthRecord r;
+  r.machine = machine;
+  r.measured = "tool x";
+  r.quantity = "damping of the mode at 930 Hz";
+  r.bag = "a.bag";
+  r.stamp = 1700000000.0 + number;
+  r.first = 0.02;
+  r.now = 0.02 + number / 700.0;
+  r.drifted = 1.0;
   return r;
 }
 
@@ -190,7 +217,7 @@ TEST_F(FleetDatabase, olderTablesAreToldAndBroughtUpWithAllTheyHold) {
   EXPECT_THAT(errorOf([&] { CoefficientDatabase database(old); }), HasSubstr("no fleet's tables"));
   EXPECT_EQ(migrateFleet(old, 1), 0);
   EXPECT_THAT(errorOf([&] { CoefficientDatabase database(old); }),
-              HasSubstr("tables of version 1, 2 is due: `coefficients_db URL migrate`"));
+              HasSubstr("tables of version 1, 3 is due: `coefficients_db URL migrate`"));
   ASSERT_TRUE(server_->run("owner", "old",
                            "INSERT INTO machine (name, login, shop) VALUES ('a', 'owner', 'milling')"));
   ASSERT_TRUE(server_->run("owner", "old",
@@ -198,10 +225,89 @@ TEST_F(FleetDatabase, olderTablesAreToldAndBroughtUpWithAllTheyHold) {
                            "material, source, machine, bag, version, "
                            "stamp, ktc) VALUES ('1', 'milling', 1, 0, 't', 'm', '', '', '', '', 5, 7e8)"));
   EXPECT_EQ(migrateFleet(old), 1);
-  EXPECT_EQ(migrateFleet(old), 2) << "again does nothing";
+  EXPECT_EQ(migrateFleet(old), 3) << "again does nothing";
   EXPECT_EQ(CoefficientDatabase(old).find("t", "m")->value.ktc, 7e8);
-  ASSERT_TRUE(server_->run("owner", "old", "UPDATE fleet SET schema = 3"));
-  EXPECT_THAT(errorOf([&] { CoefficientDatabase database(old); }), HasSubstr("newer than this program's 2"));
+  ASSERT_TRUE(server_->run("owner", "old", "UPDATE fleet SET schema = 4"));
+  EXPECT_THAT(errorOf([&] { CoefficientDatabase database(old); }), HasSubstr("newer than this program's 3"));
+}
+
+// As a shop's server was before improvements and health: a machine that pushed then goes on.
+TEST_F(FleetDatabase, tablesOfVersionTwoTakeTheNewKindsAfterMigration) {
+  server_->makeDatabase("second");
+  const auto there = [&](const std::string& login) { return server_->url(login, "", "second"); };
+  EXPECT_EQ(migrateFleet(there("owner"), 2), 0);
+  ASSERT_TRUE(server_->run("owner", "second",
+                           "INSERT INTO machine (name, login, shop) VALUES ('machine a', 'a', 'milling')"));
+  ASSERT_TRUE(server_->run("a", "second",
+                           "INSERT INTO coefficients (identity, shop, machine_id, speed_bucket, tool, "
+                           "material, source, machine, bag, version, stamp, ktc) VALUES ('1', 'milling', 1, "
+                           "0, 't', 'm', '', '', '', '', 5, 7e8)"));
+  ASSERT_TRUE(server_->run("a", "second",
+                           "INSERT INTO push (shop, machine_id, offered, fresh, behind) VALUES ('milling', "
+                           "1, 1, 1, 0)"));
+  CoefficientDatabase a(file("a"));
+  a.add(std::vector<HealthRecord>{healthOf("a", 1)});
+  EXPECT_THAT(errorOf([&] { push(a, there("a")); }), HasSubstr("tables of version 2, 3 is due"));
+  EXPECT_EQ(migrateFleet(there("owner")), 2);
+  EXPECT_EQ(push(a, there("a")).fresh, 1u);
+  EXPECT_EQ(CoefficientDatabase(there("a")).find("t", "m")->value.ktc, 7e8);
+  EXPECT_EQ(CoefficientDatabase(there("a")).health().size(), 1u);
+  EXPECT_EQ(fleetMembers(there("a")).at(0).records, 2u);
+}
+
+TEST_F(FleetDatabase, everyKindOfRecordGoesThereAndBack) {
+  CoefficientDatabase a(file("a")), b(file("b"));
+  CoefficientRecord cut = recordOf("a", 7);
+  cut.set.source = SOURCE_PRODUCTION;
+  a.add(cut);
+  a.add(std::vector<ModelImprovement>{improvementOf("a", 1), improvementOf("a", 2)});
+  a.add(std::vector<HealthRecord>{healthOf("a", 1), healthOf("a", 2), healthOf("a", 3)});
+  EXPECT_EQ(a.add(std::vector<HealthRecord>{healthOf("a", 3)}), 0u) << "what is there is there once";
+  EXPECT_EQ(push(a, url("a")).fresh, 6u);
+  EXPECT_EQ(push(a, url("a")).offered, 0u);
+  EXPECT_EQ(push(a, url("a"), {}, true).fresh, 0u);
+  b.add(std::vector<HealthRecord>{healthOf("b", 1)});
+  EXPECT_EQ(pull(b, url("b")).fresh, 6u);
+  EXPECT_EQ(pull(b, url("b")).offered, 0u);
+  EXPECT_EQ(push(b, url("b")).fresh, 1u) << "its own waited";
+  EXPECT_EQ(b.unsentCount(b.lastFleet()), 0u);
+  EXPECT_EQ(b.records("", "").at(0).set.source, SOURCE_PRODUCTION);
+  const ModelImprovement got = b.improvements().at(1), due = improvementOf("a", 2);
+  EXPECT_EQ(got.effects, due.effects);
+  EXPECT_EQ(got.fit_before, due.fit_before);
+  EXPECT_TRUE(std::isnan(got.heldout_before));
+  EXPECT_EQ(got.report, due.report);
+  const HealthRecord health = b.health().at(3), sent = healthOf("a", 3);
+  EXPECT_EQ(health.quantity, sent.quantity);
+  EXPECT_EQ(health.now, sent.now);
+  EXPECT_EQ(CoefficientDatabase(url("b")).health().size(), 4u);
+  EXPECT_EQ(CoefficientDatabase(url("c")).health().size(), 0u) << "another shop";
+  EXPECT_EQ(CoefficientDatabase(url("c")).improvements().size(), 0u);
+}
+
+TEST_F(FleetDatabase, everyKindIsItsBringersOnly) {
+  CoefficientDatabase a(file("a"));
+  a.add(std::vector<ModelImprovement>{improvementOf("a", 1)});
+  a.add(std::vector<HealthRecord>{healthOf("a", 1)});
+  push(a, url("a"));
+  const std::pair<std::string, std::string> kinds[] = {
+      {"improvements", "machine, verdict, effects, rivals, resembles, tests, asked, report, version"},
+      {"health", "machine, measured, quantity, bag, version"}};
+  for (const auto& [table, words] : kinds) {
+    const auto forge = [&](const std::string& machine, const std::string& shop) {
+      std::string values = "'x" + machine + "', '" + shop + "', " + machine;
+      for (std::size_t i = 0; i <= static_cast<std::size_t>(std::count(words.begin(), words.end(), ',')); ++i)
+        values += ", ''";
+      return server_->run(
+          "b", database_,
+          "INSERT INTO " + table + " (identity, shop, machine_id, " + words + ") VALUES (" + values + ")");
+    };
+    EXPECT_FALSE(forge("1", "milling")) << table << ": machine a's";
+    EXPECT_FALSE(forge("2", "turning")) << table << ": another shop's";
+    EXPECT_TRUE(forge("2", "milling")) << table << ": its own";
+    EXPECT_FALSE(server_->run("b", database_, "UPDATE " + table + " SET stamp = 1"));
+    EXPECT_FALSE(server_->run("b", database_, "DELETE FROM " + table));
+  }
 }
 
 TEST_F(FleetDatabase, rowsOfOthersCanBeNeitherForgedNorChanged) {

@@ -1,4 +1,5 @@
 #include <actionlib/client/simple_action_client.h>
+#include <diagnostic_msgs/DiagnosticArray.h>
 #include <geometry_msgs/WrenchStamped.h>
 #include <ros/ros.h>
 
@@ -10,9 +11,11 @@
 #include "../session.h"
 #include "smartmill_core/force_names.h"
 #include "smartmill_core/names.h"
+#include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_msgs/CncState.h"
 #include "smartmill_msgs/CuttingCoefficients.h"
 #include "smartmill_msgs/CuttingCondition.h"
+#include "smartmill_msgs/DiscoverActionResult.h"
 #include "smartmill_msgs/FindCoefficients.h"
 #include "smartmill_msgs/ForceEstimate.h"
 #include "smartmill_msgs/IdentifyCoefficientsAction.h"
@@ -150,6 +153,44 @@ TEST(LoadMeterNode, identifiesPublishesAndAnswers) {
   EXPECT_LT(estimate->mean_std.x, 0.1 * std::abs(truth));
   EXPECT_GT(estimate->mean_std.y, estimate->mean_std.x);
   EXPECT_GT(estimate->rms.y, 0.0);
+}
+
+// What a discovery explained is kept with its evidence; one that explained nothing is not.
+TEST(LoadMeterNode, keepsWhatADiscoveryFound) {
+  ros::NodeHandle nh;
+  ros::AsyncSpinner spinner(1);
+  spinner.start();
+  const TemporaryFolder folder;
+  folder.write("report.json", R"({"format": "smartmill-report/1", "verdict": "no_disagreement",
+    "effects": [], "not_separable": [], "resembles": [], "suggested_test": null, "gaps": [],
+    "gap": {"before": {"fit": 1.0, "heldout": 1.0}, "after": {"fit": 1.0, "heldout": 1.0}}})");
+  const auto results = nh.advertise<smartmill_msgs::DiscoverActionResult>("discover/result", 0);
+  for (int i = 0; i < 2400 && results.getNumSubscribers() == 0; ++i) ros::WallDuration(0.05).sleep();
+  std::mutex lock;
+  std::string kept;
+  const boost::function<void(const diagnostic_msgs::DiagnosticArray&)> take = [&](const auto& m) {
+    const std::lock_guard<std::mutex> guard(lock);
+    for (const auto& status : m.status) {
+      for (const auto& value : status.values) {
+        if (value.key == "explanations kept") kept = value.value;
+      }
+    }
+  };
+  const auto diagnostics = nh.subscribe<diagnostic_msgs::DiagnosticArray>("/diagnostics", 10, take);
+  smartmill_msgs::DiscoverActionResult result;
+  result.header.stamp = ros::Time(1000.0);
+  results.publish(result);
+  result.result.verdict = "no_disagreement";
+  result.result.report = folder.file("");
+  results.publish(result);
+  results.publish(result);  // the same again
+  for (int i = 0; i < 2400; ++i) {
+    ros::WallDuration(0.05).sleep();
+    const std::lock_guard<std::mutex> guard(lock);
+    if (kept == "1") break;
+  }
+  const std::lock_guard<std::mutex> guard(lock);
+  EXPECT_EQ(kept, "1");
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "smartmill_core/cutting/coefficient_set.h"
+#include "smartmill_loadmeter/database/shop_records.h"
 
 namespace smartmill::loadmeter {
 
@@ -77,7 +78,11 @@ struct CoefficientEstimate {
   bool other_tool = false;  ///< nothing was tried with the asked tool
 };
 
-/// Everything a machine has identified: one SQLite file a machine, or in memory. Each add() is one durable
+struct RecordKind;
+struct Row;
+
+/// Everything a machine has identified, what its model was found to lack, and its spindle's health: one
+/// SQLite file a machine, or in memory. Each add() is one durable
 /// transaction (write-ahead log, synchronised): when it has returned, no crash takes it back, and any number
 /// of processes may write at once. A record with the content of one that is there is kept once. The same
 /// questions go to a fleet's server (fleet.h), where its address stands in the file's place.
@@ -93,8 +98,11 @@ class CoefficientDatabase {
   /// @return false when it is there already. @throws Error when it cannot be written.
   bool add(const CoefficientRecord& record);
   bool add(const CoefficientSet& set);
-  /// One transaction: all or none. @return how many were new.
+  /// @{ One transaction: all or none. @return how many were new.
   std::size_t add(const std::vector<CoefficientRecord>& records);
+  std::size_t add(const std::vector<ModelImprovement>& improvements);
+  std::size_t add(const std::vector<HealthRecord>& health);
+  /// @}
 
   /// The newest of this tool and material; empty words match any.
   std::optional<CoefficientSet> find(const std::string& tool, const std::string& material) const;
@@ -107,6 +115,8 @@ class CoefficientDatabase {
   /// Oldest first. Empty words match any.
   std::vector<CoefficientRecord> records(const std::string& tool, const std::string& material) const;
   std::size_t size() const;
+  std::vector<ModelImprovement> improvements() const;  ///< oldest first
+  std::vector<HealthRecord> health() const;            ///< oldest first
 
   /// Takes over what another machine's file has. @return how many were new.
   std::size_t merge(const std::string& file);
@@ -116,23 +126,27 @@ class CoefficientDatabase {
 
   const std::string& file() const;
 
-  /// @{ Of a file, for a fleet (by its identity) to which it is handed on. Records are numbered as they come.
+  /// @{ Of a file, for a fleet (by its identity) to which it is handed on. Records are numbered as they come,
+  /// each kind by itself.
   struct Batch {
-    std::vector<CoefficientRecord> records;
+    std::vector<Row> rows;
     std::int64_t last = 0;  ///< number of the last one
   };
-  Batch unsent(const std::string& fleet, std::size_t limit) const;  ///< oldest first
-  std::size_t unsentCount(const std::string& fleet) const;
-  void markSent(const std::string& fleet, std::int64_t last);  ///< all up to this number
+  Batch unsent(const std::string& fleet, const RecordKind& kind, std::size_t limit) const;  ///< oldest first
+  std::size_t unsentCount(const std::string& fleet) const;                                  ///< of all kinds
+  /// All up to this number.
+  void markSent(const std::string& fleet, const RecordKind& kind, std::int64_t last);
   /// The fleet that was handed on to last, by its identity; empty: none yet.
   std::string lastFleet() const;
   /// Records that came from the fleet are not to be handed back. @return how many were new.
-  std::size_t addFrom(const std::string& fleet, const std::vector<CoefficientRecord>& records);
-  std::vector<std::string> identities() const;
+  std::size_t addFrom(const std::string& fleet, const RecordKind& kind, const std::vector<Row>& rows);
+  std::vector<std::string> identities(const RecordKind& kind) const;
   /// @}
 
  private:
-  std::size_t insert(const std::vector<CoefficientRecord>& records);
+  std::size_t add(const RecordKind& kind, const std::vector<Row>& rows);
+  std::vector<Row> rows(const RecordKind& kind) const;
+  std::size_t unsentCount(const std::string& fleet, const RecordKind& kind) const;
   std::vector<CoefficientRecord> near(const std::string& tool, const CoefficientQuery& query) const;
 
   struct Impl;

@@ -24,7 +24,7 @@ bool fleetSupported();
 std::string withoutPassword(const std::string& url);
 
 /// Version of the server's tables that this program writes and reads; older servers: migrateFleet().
-constexpr int FLEET_SCHEMA = 2;
+constexpr int FLEET_SCHEMA = 3;
 
 /// What a transfer did.
 struct FleetTransfer {
@@ -44,6 +44,10 @@ FleetTransfer push(CoefficientDatabase& local, const std::string& url, const Fle
 
 /// Takes over what the login's shop has and the file has not, a batch a transaction. @throws Error as above.
 FleetTransfer pull(CoefficientDatabase& local, const std::string& url, const FleetProgress& progress = {});
+
+/// On a connection of its own: each call asks the server for nothing ("SELECT 1"), there and back, which is
+/// what any look-up takes at least.
+std::function<void()> fleetEcho(const std::string& url);
 
 /// Makes the tables in an empty database, or brings those of an older version to `schema`; nothing is lost.
 /// To be done by the database's owner. @return the version found, 0: none.

@@ -1,0 +1,295 @@
+#include "smartmill_loadmeter/database/shop_records.h"
+
+#include <sys/stat.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <map>
+
+#include <nlohmann/json.hpp>
+
+#include "record_fields.h"
+#include "smartmill_core/campaign/campaign.h"
+#include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
+#include "smartmill_core/io/csv.h"
+#include "smartmill_core/units.h"
+
+namespace smartmill::loadmeter {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+template <typename R>
+struct Word {
+  const char* name;
+  std::string R::*at;
+  bool told = true;  ///< part of what makes the record itself
+};
+template <typename R>
+struct Number {
+  const char* name;
+  double R::*at;
+  bool told = true;
+};
+
+using I = ModelImprovement;
+// A report that is read twice, or copied, stays one record.
+const std::vector<Word<I>> IMPROVEMENT_WORDS{
+    {"machine", &I::machine}, {"verdict", &I::verdict},      {"effects", &I::effects},
+    {"rivals", &I::rivals},   {"resembles", &I::resembles},  {"tests", &I::tests},
+    {"asked", &I::asked},     {"report", &I::report, false}, {"version", &I::version, false}};
+const std::vector<Number<I>> IMPROVEMENT_NUMBERS{{"stamp", &I::stamp, false},
+                                                 {"fit_before", &I::fit_before},
+                                                 {"fit_after", &I::fit_after},
+                                                 {"heldout_before", &I::heldout_before},
+                                                 {"heldout_after", &I::heldout_after}};
+using H = HealthRecord;
+const std::vector<Word<H>> HEALTH_WORDS{{"machine", &H::machine},
+                                        {"measured", &H::measured},
+                                        {"quantity", &H::quantity},
+                                        {"bag", &H::bag},
+                                        {"version", &H::version, false}};
+const std::vector<Number<H>> HEALTH_NUMBERS{{"stamp", &H::stamp},           {"days", &H::days},
+                                            {"first", &H::first},           {"now", &H::now},
+                                            {"deviations", &H::deviations}, {"drifted", &H::drifted}};
+
+template <typename R>
+RecordKind kindOf(const char* table, const std::vector<Word<R>>& words,
+                  const std::vector<Number<R>>& numbers) {
+  RecordKind kind;
+  kind.table = table;
+  for (const auto& w : words) kind.words.push_back(w.name);
+  for (const auto& n : numbers) kind.numbers.push_back(n.name);
+  return kind;
+}
+
+template <typename R>
+Row rowFrom(const R& record, const std::vector<Word<R>>& words, const std::vector<Number<R>>& numbers) {
+  if (!std::isfinite(record.stamp)) throw Error("stamp of a record is not a number");
+  Row row;
+  std::string content;
+  for (const auto& w : words) {
+    row.words.push_back(record.*w.at);
+    if (w.told) content += record.*w.at + '\x1f';
+  }
+  for (const auto& n : numbers) {
+    row.numbers.push_back(record.*n.at);
+    if (n.told) content += exactNumber(record.*n.at) + '\x1f';
+  }
+  row.identity = identityOf(content);
+  return row;
+}
+
+template <typename R>
+void takeFrom(const Row& row, const std::vector<Word<R>>& words, const std::vector<Number<R>>& numbers,
+              R* record) {
+  for (std::size_t i = 0; i < words.size(); ++i) record->*words[i].at = row.words[i];
+  for (std::size_t i = 0; i < numbers.size(); ++i) record->*numbers[i].at = row.numbers[i];
+}
+
+// In the keys of a campaign's tests, as the report's suggested_cut.
+void addCondition(const CampaignTest& test, Json* json) {
+  (*json)["spindle_speed_rpm"] = units::rpmFromRadPerSec(test.spindle_speed);
+  if (!test.engagement) return;
+  (*json)["feed_per_tooth_mm"] = test.engagement->feed_per_tooth / units::MM;
+  (*json)["axial_depth_mm"] = test.engagement->axial_depth / units::MM;
+  (*json)["entry_deg"] = units::degFromRad(test.engagement->entry);
+  (*json)["exit_deg"] = units::degFromRad(test.engagement->exit);
+}
+
+// Each test once, by the channel in which the gap changed most.
+std::string testsOf(const Json& gaps, const std::string& campaign) {
+  std::map<std::string, Json> conditions;
+  if (!campaign.empty()) {
+    for (const CampaignTest& t : readCampaign(campaign).tests) addCondition(t, &conditions[t.name]);
+  }
+  std::vector<std::string> order;
+  std::map<std::string, Json> tests;
+  const auto change = [](const Json& g) {
+    const double before = g.at("before"), after = g.at("after");
+    return std::abs(before * before - after * after);
+  };
+  for (const Json& gap : gaps) {
+    const std::string name = gap.at("test");
+    const bool is_new = tests.find(name) == tests.end();
+    if (is_new) order.push_back(name);
+    if (!is_new && change(tests[name]) >= change(gap)) continue;
+    Json kept = {{"test", name},
+                 {"channel", gap.at("channel")},
+                 {"heldout", gap.at("heldout")},
+                 {"before", gap.at("before")},
+                 {"after", gap.at("after")}};
+    if (const auto at = conditions.find(name); at != conditions.end()) kept.update(at->second);
+    tests[name] = kept;
+  }
+  Json list = Json::array();
+  for (const std::string& name : order) list.push_back(tests[name]);
+  return list.dump();
+}
+
+ModelImprovement improvementOf(const Json& report, const std::string& campaign) {
+  if (report.at("format") != "smartmill-report/1")
+    throw Error("format " + report.at("format").dump() + ", \"smartmill-report/1\" is due");
+  ModelImprovement i;
+  i.verdict = report.at("verdict");
+  i.effects = report.at("effects").dump();
+  i.rivals = report.at("not_separable").dump();
+  i.resembles = report.at("resembles").dump();
+  i.tests = testsOf(report.at("gaps"), campaign);
+  if (report.at("suggested_test").is_string()) i.asked = report.at("suggested_test");
+  const Json &before = report.at("gap").at("before"), &after = report.at("gap").at("after");
+  i.fit_before = before.at("fit");
+  i.fit_after = after.at("fit");
+  i.heldout_before = before.at("heldout");
+  i.heldout_after = after.at("heldout");
+  return i;
+}
+
+}  // namespace
+
+const RecordKind& improvementKind() {
+  static const RecordKind kind = kindOf("improvements", IMPROVEMENT_WORDS, IMPROVEMENT_NUMBERS);
+  return kind;
+}
+
+const RecordKind& healthKind() {
+  static const RecordKind kind = kindOf("health", HEALTH_WORDS, HEALTH_NUMBERS);
+  return kind;
+}
+
+Row rowOf(ModelImprovement improvement) {
+  return rowFrom(improvement, IMPROVEMENT_WORDS, IMPROVEMENT_NUMBERS);
+}
+Row rowOf(HealthRecord health) {
+  return rowFrom(health, HEALTH_WORDS, HEALTH_NUMBERS);
+}
+void take(const Row& row, ModelImprovement* improvement) {
+  takeFrom(row, IMPROVEMENT_WORDS, IMPROVEMENT_NUMBERS, improvement);
+}
+void take(const Row& row, HealthRecord* health) {
+  takeFrom(row, HEALTH_WORDS, HEALTH_NUMBERS, health);
+}
+
+namespace {
+
+// The test whose gap fell most, in words.
+std::string mostShown(const Json& tests) {
+  const Json* most = nullptr;
+  double largest = 0.0;
+  for (const Json& t : tests) {
+    const double before = t.at("before"), after = t.at("after"), fell = before * before - after * after;
+    if (fell <= largest) continue;
+    largest = fell;
+    most = &t;
+  }
+  if (!most) return "";
+  const auto number = [most](const char* key) { return most->at(key).get<double>(); };
+  std::string text = most->at("test").get<std::string>();
+  if (most->contains("axial_depth_mm")) {
+    text += formatted(" (a cut at %.0f rpm, %.3g mm a tooth, %.3g mm deep)", number("spindle_speed_rpm"),
+                      number("feed_per_tooth_mm"), number("axial_depth_mm"));
+  } else if (most->contains("spindle_speed_rpm")) {
+    text += formatted(" (%.0f rpm, no cut)", number("spindle_speed_rpm"));
+  }
+  return text + formatted(", %s: gap %.3g -> %.3g", most->at("channel").get<std::string>().c_str(),
+                          number("before"), number("after"));
+}
+
+FoundCause causeOf(const Json& effect) {
+  FoundCause cause;
+  cause.name = effect.at("name");
+  cause.delta_bic = effect.at("delta_bic");
+  cause.confidence = effect.at("confidence");
+  for (const auto& [key, content] : effect.at("parameters").items()) {
+    FoundCause::Parameter p;
+    p.key = key;
+    if (content.at("value").is_string()) {
+      p.word = content.at("value");
+    } else {
+      p.value = content.at("value");
+      p.std_dev = content.value("std", 0.0);
+    }
+    cause.parameters.push_back(p);
+  }
+  return cause;
+}
+
+}  // namespace
+
+std::string FoundCause::text() const {
+  std::string line = name;
+  for (const Parameter& p : parameters) {
+    line += (&p == &parameters.front() ? ": " : ", ") + p.key + " " +
+            (p.word.empty() ? formatted("%.5g +- %.2g", p.value, p.std_dev) : p.word);
+  }
+  return line;
+}
+
+std::vector<FoundCause> causesOf(const ModelImprovement& improvement) {
+  std::vector<FoundCause> causes;
+  try {
+    for (const Json& effect : Json::parse(improvement.effects)) {
+      if (effect.contains("form")) continue;
+      causes.push_back(causeOf(effect));
+      causes.back().shown_in = mostShown(Json::parse(improvement.tests));
+    }
+  } catch (const Json::exception& error) {
+    throw Error("explanation of '" + improvement.machine + "': " + error.what());
+  }
+  return causes;
+}
+
+ModelImprovement readImprovement(const std::string& report, const std::string& campaign) {
+  const std::string file = std::filesystem::is_directory(report) ? report + "/report.json" : report;
+  std::ifstream in(file);
+  struct stat state {};
+  if (!in || stat(file.c_str(), &state) != 0) throw Error(file + ": cannot be read");
+  try {
+    ModelImprovement improvement = improvementOf(Json::parse(in), campaign);
+    improvement.report = file;
+    improvement.stamp = static_cast<double>(state.st_mtime);
+    return improvement;
+  } catch (const Json::exception& error) {
+    throw Error(file + ": " + error.what());
+  }
+}
+
+std::vector<HealthRecord> readHealth(const std::string& file) {
+  CsvReader reader(file);
+  std::vector<std::string_view> cells;
+  if (!reader.next(&cells)) throw Error(file + ": is empty");
+  std::map<std::string, std::size_t> columns;
+  for (std::size_t i = 0; i < cells.size(); ++i) columns[std::string(cells[i])] = i;
+  for (const char* name :
+       {"measured", "bag", "days", "quantity", "first", "now", "deviations", "drifted", "stamp"}) {
+    if (!columns.count(name)) reader.fail(std::string("column '") + name + "' is missing");
+  }
+  std::vector<HealthRecord> records;
+  while (reader.nextFilled(&cells)) {
+    if (cells.size() != columns.size())
+      reader.fail(std::to_string(cells.size()) + " values, " + std::to_string(columns.size()) + " are due");
+    const auto word = [&](const char* name) { return std::string(cells[columns[name]]); };
+    const auto number = [&](const char* name) {
+      const std::string_view cell = cells[columns[name]];
+      return cell.empty() ? HealthRecord::UNKNOWN : reader.number(cell, name);
+    };
+    HealthRecord r;
+    r.measured = word("measured");
+    r.quantity = word("quantity");
+    r.bag = word("bag");
+    r.stamp = number("stamp");
+    if (!std::isfinite(r.stamp)) reader.fail("stamp is due");
+    r.days = number("days");
+    r.first = number("first");
+    r.now = number("now");
+    r.deviations = number("deviations");
+    r.drifted = word("drifted") == "true" ? 1.0 : 0.0;
+    records.push_back(r);
+  }
+  return records;
+}
+
+}  // namespace smartmill::loadmeter
