@@ -80,14 +80,16 @@ void Cutter::setLaw(const CuttingLaw& law) {
   }
 }
 
-CuttingForce Cutter::forceOf(Part& part, const ToolMotion& motion) {
-  CutSums sums;
+CuttingForce Cutter::forceOf(Part& part, const ToolMotion& now) {
   if (followed_) {
-    sums = followed_->at(place_++);
-  } else if (part.rigid) {
-    sums.edges = part.rigid->sumsAt(motion.angle);
+    const CutSums& sums = followed_->at(place_++);
+    return part.rigid ? part.rigid->force(sums.edges) : part.process->force(sums);
+  }
+  CutSums sums;
+  if (part.rigid) {
+    sums.edges = part.rigid->sumsAt(now.angle - lag_ * part.slice.low);
   } else {
-    sums = part.process->sumsAt(motion);
+    sums = part.process->sumsAt(motionOf(part, now));
   }
   if (kept_) kept_->push_back(sums);
   return part.rigid ? part.rigid->force(sums.edges) : part.process->force(sums);
@@ -98,7 +100,7 @@ CuttingForce Cutter::step(const ToolMotion& now) {
   CuttingForce sum;
   for (Part& part : parts_) {
     if (part.arcs == 0) continue;
-    const CuttingForce force = forceOf(part, motionOf(part, now));
+    const CuttingForce force = forceOf(part, now);
     sum.fx += force.fx;
     sum.fy += force.fy;
     sum.fz += force.fz;

@@ -18,6 +18,12 @@ ModalModel firstModeAt(ModalModel axis, double factor) {
   return axis;
 }
 
+// What a resonance adds to its channel.
+double resonated(const Resonance& resonance, ModalFilter& filter, double from) {
+  const double itself = resonance.channel == resonance.from ? resonance.mode.gain * from : 0.0;
+  return filter.step(from) - itself;
+}
+
 }  // namespace
 
 CuttingMachine::CuttingMachine(const MachineModel& model, double time_step, Feed feed)
@@ -203,7 +209,12 @@ void CuttingMachine::takeOver(const Input& input) {
   now_.chip = now_.depth = 0.0;
   if (!cutting() || now_.speed == 0.0) return;
   const std::array<double, 2>& feed = input.motion.velocity;
-  now_.chip = std::hypot(feed[0], feed[1]) * units::TWO_PI / (std::abs(now_.speed) * model_.tool->teeth);
+  const std::array<double, 3> chip_of{{feed[0], feed[1], now_.speed}};
+  if (chip_of != chip_of_) {
+    chip_of_ = chip_of;
+    chip_ = std::hypot(feed[0], feed[1]) * units::TWO_PI / (std::abs(now_.speed) * model_.tool->teeth);
+  }
+  now_.chip = chip_;
   now_.depth = arcs_.front().depth;
 }
 
@@ -285,11 +296,8 @@ void CuttingMachine::showLoad(double speed, Output& out) {
 void CuttingMachine::passOn(Output& out) {
   if (!resonances_.empty()) {
     const ChannelValues before = out.early;
-    for (auto& [resonance, filter] : resonances_) {
-      const double itself =
-          resonance.channel == resonance.from ? resonance.mode.gain * before[resonance.from] : 0.0;
-      out.early[resonance.channel] += filter.step(before[resonance.from]) - itself;
-    }
+    for (auto& [resonance, filter] : resonances_)
+      out.early[resonance.channel] += resonated(resonance, filter, before[resonance.from]);
   }
   for (auto& [channel, shelf] : shelves_) out.early[channel] = shelf.step(out.early[channel]);
   for (auto& [channel, line] : delays_) out.early[channel] = line.step(out.early[channel]);
@@ -303,6 +311,115 @@ void CuttingMachine::passTime(const ToolMotion& motion) {
   if (state_.depth_slope != 0.0 && cutting()) {
     const std::array<double, 2>& v = motion.velocity;
     feed_path_ += time_step_ * state_.feed_ratio * std::hypot(v[0], v[1]);
+  }
+}
+
+void CuttingMachine::run(std::size_t steps, const std::function<void(std::size_t, Input&)>& next,
+                         const EarlyRows& early) {
+  // What is not asked for may still show in what is.
+  const bool mixes = effects_.has(Stage::sensor_output) || !resonances_.empty();
+  std::array<std::vector<double>, LOAD_METER + 1> own;
+  EarlyRows rows = early;
+  for (std::size_t c = 0; c < own.size() && mixes; ++c) {
+    if (rows[c]) continue;
+    own[c].resize(steps);
+    rows[c] = &own[c];
+  }
+  Course course;
+  cutAll(steps, next, rows, course);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (shows_force_[axis] && rows[FX + axis]) showForces(course, axis, *rows[FX + axis]);
+  }
+  if (drive_ && shows_load_ && rows[LOAD_METER]) showLoads(course, *rows[LOAD_METER]);
+  if (effects_.has(Stage::sensor_output)) measureAll(course, rows);
+  passAllOn(steps, rows);
+}
+
+void CuttingMachine::cutAll(std::size_t steps, const std::function<void(std::size_t, Input&)>& next,
+                            const EarlyRows& early, Course& course) {
+  const bool pushed = effects_.has(Stage::sensor_force), measured = effects_.has(Stage::sensor_output);
+  course.before = last_cut_;
+  course.force.resize(steps);
+  if (pushed) course.applied.resize(steps);
+  if (measured) course.instants.resize(steps);
+  if (kept_) (keepsSums() ? kept_->sums.reserve(steps) : kept_->steps.reserve(steps));
+  Input input;
+  Output out;
+  for (std::size_t k = 0; k < steps; ++k) {
+    next(k, input);
+    takeOver(input);
+    if (measured) course.instants[k] = now_;
+    out.force = course.force[k] = cut(input);
+    if (pushed) {
+      course.applied[k] = {{out.force.fx, out.force.fy, out.force.fz}};
+      effects_.addForce(now_, course.applied[k]);
+    }
+    moveTip(input, out);
+    for (const std::size_t c : {TOOL_X, TOOL_Y}) {
+      if (early[c]) (*early[c])[k] = out.early[c];
+    }
+    last_cut_ = {{out.force.fx, out.force.fy, out.force.fz}};
+    if (jump_ != 0.0) course.jumps.emplace_back(k, jump_);
+    jump_ = 0.0;
+    engaged_ = false;
+    passTime(input.motion);
+  }
+}
+
+void CuttingMachine::showForces(const Course& course, std::size_t axis, std::vector<double>& shown) {
+  constexpr std::array<double CuttingForce::*, 3> OF_AXIS{
+      {&CuttingForce::fx, &CuttingForce::fy, &CuttingForce::fz}};
+  ModalFilter& sensor = sensor_[axis];
+  auto jump = course.jumps.begin();
+  for (std::size_t k = 0; k < shown.size(); ++k) {
+    const double cut = course.force[k].*OF_AXIS[axis];
+    const double applied = course.applied.empty() ? cut : course.applied[k][axis];
+    if (jump == course.jumps.end() || jump->first != k) {
+      shown[k] = sign_ * sensor.step(applied);
+      continue;
+    }
+    const double last = k > 0 ? course.force[k - 1].*OF_AXIS[axis] : course.before[axis];
+    shown[k] = sign_ * sensor.jump(applied - (jump++)->second * (cut - last), applied);
+  }
+}
+
+void CuttingMachine::showLoads(const Course& course, std::vector<double>& shown) {
+  auto jump = course.jumps.begin();
+  for (std::size_t k = 0; k < shown.size(); ++k) {
+    const bool jumps = jump != course.jumps.end() && jump->first == k;
+    const double rise = 1.0 - (jumps ? (jump++)->second : 0.0), torque = course.force[k].torque;
+    shown[k] = drive_->step(last_torque_ + 0.5 * rise * (torque - last_torque_), now_.speed);
+    last_torque_ = torque;
+  }
+}
+
+void CuttingMachine::measureAll(const Course& course, const EarlyRows& early) const {
+  for (std::size_t k = 0; k < course.instants.size(); ++k) {
+    ChannelValues values{};
+    for (std::size_t c = 0; c < CHANNELS; ++c) {
+      if (early[c]) values[c] = (*early[c])[k];
+    }
+    effects_.measure(Stage::sensor_output, course.instants[k], values);
+    for (std::size_t c = 0; c < CHANNELS; ++c) {
+      if (early[c]) (*early[c])[k] = values[c];
+    }
+  }
+}
+
+void CuttingMachine::passAllOn(std::size_t steps, const EarlyRows& early) {
+  for (std::size_t k = 0; k < steps && !resonances_.empty(); ++k) {
+    ChannelValues before{};
+    for (const auto& [resonance, filter] : resonances_) before[resonance.from] = (*early[resonance.from])[k];
+    for (auto& [resonance, filter] : resonances_)
+      (*early[resonance.channel])[k] += resonated(resonance, filter, before[resonance.from]);
+  }
+  for (auto& [channel, shelf] : shelves_) {
+    if (!early[channel]) continue;
+    for (double& v : *early[channel]) v = shelf.step(v);
+  }
+  for (auto& [channel, line] : delays_) {
+    if (!early[channel]) continue;
+    for (double& v : *early[channel]) v = line.step(v);
   }
 }
 

@@ -173,18 +173,57 @@ TapTarget targetOf(const Record& record, std::size_t axis) {
   return target;
 }
 
-// Runs the machine over the record, with substeps between the samples; recorded columns are kept.
+using Rows = CuttingMachine::EarlyRows;
+
+// Step after step: early channels of each sample, with substeps between the samples.
 // input(i, share): what happens at a share 0..1 of the way from sample i to the next.
-// recorded: nullptr when there is none.
 template <class Input>
+void stepThrough(CuttingMachine& machine, std::size_t samples, int substeps, const Input& input,
+                 const Rows& out) {
+  CuttingMachine::Output now, between;
+  for (std::size_t i = 0; i < samples; ++i) {
+    machine.step(input(i, 0.0), now);
+    for (std::size_t c = 0; c < CHANNELS; ++c) {
+      if (out[c]) (*out[c])[i] = now.early[c];
+    }
+    for (int s = 1; s < substeps; ++s) machine.step(input(i, static_cast<double>(s) / substeps), between);
+  }
+}
+
+// The same stage after stage. input(i, share, input): sets what moves on.
+template <class Input>
+void passThrough(CuttingMachine& machine, std::size_t samples, int substeps, const Input& input,
+                 const Rows& out) {
+  const auto every = static_cast<std::size_t>(substeps);
+  std::array<std::vector<double>, CHANNELS> fine;
+  Rows rows = out;
+  for (std::size_t c = 0; c < CHANNELS && every > 1; ++c) {
+    if (!out[c]) continue;
+    fine[c].resize(samples * every);
+    rows[c] = &fine[c];
+  }
+  machine.run(
+      samples * every,
+      [&](std::size_t step, CuttingMachine::Input& at) {
+        input(step / every, static_cast<double>(step % every) / substeps, at);
+      },
+      rows);
+  for (std::size_t c = 0; c < CHANNELS && every > 1; ++c) {
+    for (std::size_t i = 0; i < samples && out[c]; ++i) (*out[c])[i] = fine[c][i * every];
+  }
+}
+
+// Runs the machine over the record; recorded columns are kept.
+// move(rows): writes early channels of each sample. recorded: nullptr when there is none.
+template <class Move>
 void run(const MachineModel& model, const CampaignTest& test, const SimulationOptions& options,
-         CuttingMachine& machine, const Input& input, const Record* recorded, Record& record) {
+         CuttingMachine& machine, const Move& move, const Record* recorded, Record& record) {
   machine.setClock(clockOf(model, test, record));
   if (record.has("load_meter")) {
     model.needSpindle("simulate load_meter");
     if (!test.running_before) machine.resetLoadMeter(test.spindle_speed);
   }
-  std::array<std::vector<double>*, CHANNELS> out{};
+  Rows out{};
   std::vector<std::size_t> shown;
   for (std::size_t c = 0; c < CHANNELS; ++c) {
     if (!record.has(channelName(c))) continue;
@@ -192,15 +231,7 @@ void run(const MachineModel& model, const CampaignTest& test, const SimulationOp
     shown.push_back(c);
   }
   if (options.channels) machine.showOnly(shown);
-  CuttingMachine::Output now;
-  CuttingMachine::Output between;
-  for (std::size_t i = 0; i < record.size(); ++i) {
-    machine.step(input(i, 0.0), now);
-    for (const std::size_t c : shown) (*out[c])[i] = now.early[c];
-    for (int s = 1; s < options.substeps; ++s) {
-      machine.step(input(i, static_cast<double>(s) / options.substeps), between);
-    }
-  }
+  move(out);
 
   if (model.force_sensor.mean_samples) {
     for (const std::size_t c : {FX, FY, FZ}) {
@@ -219,7 +250,7 @@ void run(const MachineModel& model, const CampaignTest& test, const SimulationOp
     }
   }
   findBursts(recorded && !options.random_phases ? recorded : nullptr, out, test.sample_rate, machine, random);
-  for (std::size_t i = 0; i < record.size(); ++i) {
+  for (std::size_t i = 0; i < record.size() && (options.noise || machine.finishes()); ++i) {
     ChannelValues values{};
     for (const std::size_t c : shown) values[c] = (*out[c])[i];
     machine.finish(static_cast<double>(i) / test.sample_rate, values);
@@ -240,16 +271,18 @@ Record simulateTap(const MachineModel& model, const CampaignTest& test, const Re
   const std::size_t axis = test.direction == "x" ? 0 : test.direction == "y" ? 1 : 2;
   if (axis < 2) machine.setProbe(axis);
   const TapTarget target = targetOf(recorded ? *recorded : record, axis);
+  const auto input = [&](std::size_t i, double share) {
+    CuttingMachine::Input hit;
+    const double force = interpolated(hammer, i, share);
+    if (target.tip) hit.tip_force[axis] = force;
+    if (target.sensor) hit.sensor_force[axis] = force;
+    return hit;
+  };
+  const std::size_t samples = record.size();
   run(
       model, test, options, machine,
-      [&](std::size_t i, double share) {
-        CuttingMachine::Input input;
-        const double force = interpolated(hammer, i, share);
-        if (target.tip) input.tip_force[axis] = force;
-        if (target.sensor) input.sensor_force[axis] = force;
-        return input;
-      },
-      recorded, record);
+      [&](const Rows& out) { stepThrough(machine, samples, options.substeps, input, out); }, recorded,
+      record);
   return record;
 }
 
@@ -272,23 +305,20 @@ class SteadyTest {
             units::TWO_PI;
   }
 
-  CuttingMachine::Input inputAt(double t) const {
-    CuttingMachine::Input input;
+  void inputAt(double t, CuttingMachine::Input& input) const {
     input.motion.angle = phase_ + test_.spindle_speed * (t - begin_);
     input.motion.speed = test_.spindle_speed;
     input.motion.velocity[0] = feed_;
     input.motion.centre[0] = feed_ * (t - begin_);
-    return input;
   }
 
   // The same in a record; the tool engages when its time has come.
-  CuttingMachine::Input next(double t) {
-    const CuttingMachine::Input input = inputAt(t);
+  void next(double t, CuttingMachine::Input& input) {
+    inputAt(t, input);
     const double start = test_.engage_time.value_or(begin_ - 1.0);
     // A rounded time stamp must not put the sample of engagement on the wrong side.
     if (cut() && !engaged_ && t >= start - 1e-3 / test_.sample_rate)
       engage(input.motion, test_.engagement->axial_depth);
-    return input;
   }
 
   // What ran before the record.
@@ -297,9 +327,10 @@ class SteadyTest {
     const double time = *test_.running_before < LEAST_STEADY ? *test_.running_before : LEAD;
     const auto steps = static_cast<long>(time * test_.sample_rate * substeps_);
     const double step = 1.0 / test_.sample_rate / substeps_;
+    CuttingMachine::Input input;
     CuttingMachine::Output out;
     for (long k = steps; k > 0; --k) {
-      const CuttingMachine::Input input = inputAt(begin_ - static_cast<double>(k) * step);
+      inputAt(begin_ - static_cast<double>(k) * step, input);
       if (cut() && (k % GROWTH_STEPS == 0 || !engaged_)) {
         const double share =
             LEAST_GROWTH + (1.0 - LEAST_GROWTH) * growth(static_cast<double>(steps - k) /
@@ -359,14 +390,14 @@ Record simulateOn(CuttingMachine& machine, const MachineModel& model, const Camp
     steady.lead();
   }
   const double dt = 1.0 / test.sample_rate;
+  const auto input = [&](std::size_t i, double share, CuttingMachine::Input& at) {
+    steady.next(record.time[i] + share * dt, at);
+    if (guide) at.tip = guide->at(i, share);
+  };
   run(
       model, test, options, machine,
-      [&](std::size_t i, double share) {
-        CuttingMachine::Input input = steady.next(record.time[i] + share * dt);
-        if (guide) input.tip = guide->at(i, share);
-        return input;
-      },
-      recorded, record);
+      [&](const Rows& out) { passThrough(machine, record.size(), options.substeps, input, out); }, recorded,
+      record);
   return record;
 }
 

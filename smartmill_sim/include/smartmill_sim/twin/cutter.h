@@ -54,7 +54,7 @@ class Cutter {
   };
   void place(Part& part);
   ToolMotion motionOf(const Part& part, const ToolMotion& now) const;
-  CuttingForce forceOf(Part& part, const ToolMotion& motion);
+  CuttingForce forceOf(Part& part, const ToolMotion& now);
 
   Way way_;
   double corner_radius_, lag_;

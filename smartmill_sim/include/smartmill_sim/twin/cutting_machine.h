@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -89,6 +90,7 @@ class CuttingMachine {
   std::vector<BurstTrain*> bursts() { return effects_.bursts(); }
   /// Early channels to what is shown: drift, hum and saturation at a time since the record began [s].
   void finish(double record_time, ChannelValues& channels) const;
+  bool finishes() const { return effects_.has(Stage::signal); }  ///< whether that changes anything
 
   /// The size that each channel can show at most; infinity: any.
   ChannelValues limits() const { return effects_.limits(); }
@@ -121,6 +123,13 @@ class CuttingMachine {
   /// The same into an Output that earlier steps may have filled.
   void step(const Input& input, Output& output);
 
+  /// Early channels of many steps: a row each, of those that are asked for.
+  using EarlyRows = std::array<std::vector<double>*, CHANNELS>;
+  /// So many steps at one speed, without a probe and with no force from elsewhere: what step() gives, stage
+  /// after stage instead of step after step. @param next sets what of an input moves on, may engage()
+  /// @param early as long as there are steps, or nullptr
+  void run(std::size_t steps, const std::function<void(std::size_t, Input&)>& next, const EarlyRows& early);
+
   /// Rounded to the load meter's resolution [V].
   double rounded(double voltage) const { return drive_ ? drive_->rounded(voltage) : voltage; }
 
@@ -135,6 +144,20 @@ class CuttingMachine {
   void showLoad(double speed, Output& out);
   void passOn(Output& out);  // what effects on channels make of them, in time
   void passTime(const ToolMotion& motion);
+  // The same stages of many steps.
+  struct Course {
+    std::array<double, 3> before{{0, 0, 0}};  // [N] force of the cut before the first step
+    std::vector<CuttingForce> force;
+    std::vector<std::array<double, 3>> applied;         // [N] on the sensor, where it is not the cut's alone
+    std::vector<std::pair<std::size_t, double>> jumps;  // steps at which some of the force comes on at once
+    std::vector<Instant> instants;                      // where effects ask for them
+  };
+  void cutAll(std::size_t steps, const std::function<void(std::size_t, Input&)>& next, const EarlyRows& early,
+              Course& course);
+  void showForces(const Course& course, std::size_t axis, std::vector<double>& shown);
+  void showLoads(const Course& course, std::vector<double>& shown);
+  void measureAll(const Course& course, const EarlyRows& early) const;
+  void passAllOn(std::size_t steps, const EarlyRows& early);
 
   bool rigid() const { return cutter_ && cutter_->way() == Cutter::Way::tables; }
   bool keepsSums() const { return cutter_ && (rigid() || guided_); }
@@ -174,6 +197,8 @@ class CuttingMachine {
   std::vector<std::pair<std::size_t, DelayLine>> delays_;
   std::array<std::array<double, 2>, 2> tip_history_{};  // [N] total force on the tip one and two steps ago
   std::array<double, 3> last_cut_{{0, 0, 0}};           // [N] force of the cut at the last step
+  std::array<double, 3> chip_of_{{0, 0, 0}};            // velocity and speed of which this is the chip:
+  double chip_ = 0.0;                                   // [m]
   double last_torque_ = 0.0;
   bool engaged_ = false;  // or left the cut since the last step
   double jump_ = 0.0;     // [1] share of the change in force that comes on at once at this step
