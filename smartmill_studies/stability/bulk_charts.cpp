@@ -8,8 +8,9 @@
 namespace smartmill::stability {
 namespace {
 
-constexpr double HIGHEST = 6000.0;  // [Hz] of the modes that a hammer shows
-constexpr int DRAWS = 200;          // behind a probability
+constexpr double HIGHEST = 20e3;  // [Hz] of the modes
+constexpr double COUNTS = 0.003;  // [1] of the softest mode's compliance: stiffer ones limit no cut
+constexpr int DRAWS = 100;        // behind a probability
 
 double between(std::mt19937_64& random, double low, double high) {
   return std::uniform_real_distribution<double>(low, high)(random);
@@ -17,7 +18,11 @@ double between(std::mt19937_64& random, double low, double high) {
 
 ModalModel trueModes(const plant::ToolInSpindle& tool) {
   ModalModel model;
-  for (const plant::PointMode& seen : plant::tipModes(tool, HIGHEST)) {
+  const std::vector<plant::PointMode> modes = plant::tipModes(tool, HIGHEST);
+  double softest = 0.0;
+  for (const plant::PointMode& seen : modes) softest = std::max(softest, seen.compliance);
+  for (const plant::PointMode& seen : modes) {
+    if (seen.compliance < COUNTS * softest) continue;
     Mode mode;
     mode.frequency = seen.frequency;
     mode.damping_ratio = seen.damping_ratio;

@@ -37,7 +37,7 @@ struct BulkChart {
 
 /// Measures a machine with deviations, makes the chart that stability_node would make of it (ChartMaker), and
 /// asks the true machine about the best recommended point.
-/// @param parameters arc, speeds, risk; method collocation. @throws Error where no chart can be made
+/// @param parameters arc, speeds, risk; a method that takes modes. @throws Error where no chart can be made
 BulkChart bulkChart(const ChartMachine& machine, const ChartParameters& parameters, const ChartDoubt& doubt,
                     std::mt19937_64& random);
 

@@ -26,7 +26,7 @@ struct Request {
   int cases = 1000, speeds = 300;
   std::uint64_t seed = 1;
   double entry_deg = 90.0, exit_deg = 180.0, risk = 0.05;
-  std::string range = "3000:24000", overhangs;
+  std::string range = "3000:24000", overhangs, method = "zero_order";
   StudyCase one;
 
   stability::ChartParameters parameters() const {
@@ -37,7 +37,8 @@ struct Request {
     p.speeds = speeds;
     p.entry = units::radFromDeg(entry_deg);
     p.exit = units::radFromDeg(exit_deg);
-    p.method = "collocation";
+    p.method = method;
+    p.use_modes = true;
     p.risk = risk;
     return p;
   }
@@ -147,6 +148,7 @@ int main(int argc, char** argv) {
   line.option("--lines", request.speeds, "speeds of a chart").within(2, 100000).showDefault();
   line.option("--entry-deg", request.entry_deg, "immersion angle at which a tooth enters").showDefault();
   line.option("--exit-deg", request.exit_deg, "immersion angle at which a tooth leaves").showDefault();
+  line.option("--method", request.method, "of the chart: zero_order or collocation").showDefault();
   line.option("--risk", request.risk, "of chatter that a recommended point may have")
       .within(0.0, 0.5)
       .showDefault();
