@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <fstream>
+#include <limits>
 #include <random>
 #include <string>
 #include <vector>
@@ -57,6 +58,12 @@ inline std::vector<nlohmann::json> readJsonLines(const std::string& file) {
     if (!line.is_discarded()) lines.push_back(std::move(line));
   }
   return lines;
+}
+
+/// A number of a line; null, as NaN and infinity are written: NaN.
+inline double numberOf(const nlohmann::json& line, const char* name) {
+  const nlohmann::json& value = line.at(name);
+  return value.is_null() ? std::numeric_limits<double>::quiet_NaN() : value.get<double>();
 }
 
 }  // namespace smartmill

@@ -16,6 +16,7 @@
 #include "smartmill_core/units.h"
 #include "smartmill_hammer/sequence/hammer_sequence.h"
 #include "smartmill_sim/world/world.h"
+#include "study_case.h"
 
 namespace {
 
@@ -281,7 +282,7 @@ class Driver {
       collision = collision || alarm.number == COLLISION;
       overtravel = overtravel || alarm.type == 4;
       if (alarm.number == COLLISION || alarm.type == 4) {
-        std::printf("run %d: %s at %.1f s\n", counts_.runs, alarm.text.c_str(), time_);
+        std::fprintf(stderr, "run %d: %s at %.1f s\n", counts_.runs, alarm.text.c_str(), time_);
       }
     }
     ++counts_.runs;
@@ -312,40 +313,91 @@ void print(const Counts& c) {
   std::printf("\n");
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  std::string model_file;
+struct Request {
+  std::string model;
   int runs = 1000;
   std::uint64_t seed = 1;
   double trouble_share = 0.4;
+  StudyCase one;
+};
+
+void runOnce(const Request& request, const MachineModel& model, int number, Counts& counts) {
+  std::seed_seq mix{request.seed, static_cast<std::uint64_t>(number)};
+  std::mt19937_64 random(mix);
+  const Draw draw = drawRun(model, random, request.trouble_share);
+  Driver(draw, request.seed + static_cast<std::uint64_t>(number), counts).run();
+}
+
+nlohmann::json lineOf(int number, const Counts& c) {
+  return {{"case", number},
+          {"collisions", c.collisions},
+          {"beyond_limits", c.beyond_limits},
+          {"moved_unasked", c.moved_unasked},
+          {"unfinished", c.unfinished},
+          {"refused_by_limits", c.refused_by_limits},
+          {"refused_by_state", c.refused_by_state},
+          {"results", c.results},
+          {"troubles", c.by_trouble}};
+}
+
+/// Counts over the lines of all runs.
+Counts countsOf(const std::string& file) {
+  Counts all;
+  for (const nlohmann::json& line : readJsonLines(file)) {
+    ++all.runs;
+    all.collisions += line.at("collisions").get<int>();
+    all.beyond_limits += line.at("beyond_limits").get<int>();
+    all.moved_unasked += line.at("moved_unasked").get<int>();
+    all.unfinished += line.at("unfinished").get<int>();
+    all.refused_by_limits += line.at("refused_by_limits").get<int>();
+    all.refused_by_state += line.at("refused_by_state").get<int>();
+    for (const auto& [name, count] : line.at("results").items()) all.results[name] += count.get<int>();
+    for (const auto& [name, count] : line.at("troubles").items()) all.by_trouble[name] += count.get<int>();
+  }
+  return all;
+}
+
+int run(const Request& request) {
+  request.one.check(request.runs);
+  Counts counts;
+  if (request.one.scores()) {
+    counts = countsOf(request.one.lines);
+  } else {
+    const MachineModel model = readMachineModel(request.model);
+    if (request.one.one()) {
+      runOnce(request, model, request.one.number, counts);
+      request.one.print(lineOf(request.one.number, counts));
+      return 0;
+    }
+    for (int i = 0; i < request.runs; ++i) {
+      runOnce(request, model, i, counts);
+      if ((i + 1) % 10 == 0) {
+        print(counts);
+        std::fflush(stdout);
+      }
+    }
+  }
+  print(counts);
+  return counts.collisions + counts.beyond_limits + counts.moved_unasked + counts.unfinished > 0 ? 1 : 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Request request;
   CommandLine line{
       "The automatic hammer's motions on the simulated machine with drawn tools, starts, errors of belief "
       "(station "
       "0.1 mm, diameter 0.05 mm) and troubles; exit code 1 when the tool met anything, went beyond its "
       "limits or "
       "moved unasked."};
-  line.option("MODEL", model_file, "machine model with a hammer station").required();
-  line.option("--runs", runs, "how many").positive().showDefault();
-  line.option("--seed", seed, "of the first run; each further one takes the next").showDefault();
-  line.option("--troubles", trouble_share,
+  line.option("MODEL", request.model, "machine model with a hammer station").required();
+  request.one.addTo(line, "--runs,--cases", request.runs, "how many");
+  request.one.addScore(line);
+  line.option("--seed", request.seed, "of the first run; each further one takes the next").showDefault();
+  line.option("--troubles", request.trouble_share,
               "share of runs with an alarm, stop, reset, hold, cancel or change of mode")
       .within(0.0, 1.0)
       .showDefault();
-  return runProgram(line, argc, argv, [&] {
-    const MachineModel model = readMachineModel(model_file);
-    Counts counts;
-    for (int i = 0; i < runs; ++i) {
-      std::seed_seq mix{seed, static_cast<std::uint64_t>(i)};
-      std::mt19937_64 random(mix);
-      const Draw draw = drawRun(model, random, trouble_share);
-      Driver(draw, seed + static_cast<std::uint64_t>(i), counts).run();
-      if ((i + 1) % 10 == 0) {
-        print(counts);
-        std::fflush(stdout);
-      }
-    }
-    print(counts);
-    return counts.collisions + counts.beyond_limits + counts.moved_unasked + counts.unfinished > 0 ? 1 : 0;
-  });
+  return runProgram(line, argc, argv, [&] { return run(request); });
 }

@@ -3,28 +3,32 @@
 // coefficients (Dunwoody chapter 3); each voltage is the mean of what a controller tells at 50 Hz while the
 // tooth passing, behind the load meter's first-order lag, still ripples it.
 
-#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <random>
+#include <string>
 #include <vector>
 
 #include <Eigen/Core>
 
 #include "smartmill_core/cutting/mechanistic.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/program.h"
+#include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/units.h"
+#include "study_case.h"
 
 namespace {
 
 using namespace smartmill;
 
-constexpr double POLL = 0.02;                        // [s]
-constexpr int POLLS = 75;                            // of a cut of 1.5 s
-constexpr double JITTER = 0.002;                     // [s] of the time at which a reply was made
-constexpr std::size_t KTC = 0, KTE = 3, TORQUE = 3;  // of meanForceMatrix()
+constexpr double POLL = 0.02;     // [s]
+constexpr int POLLS = 75;         // of a cut of 1.5 s
+constexpr double JITTER = 0.002;  // [s] of the time at which a reply was made
+constexpr double STEPS[] = {0.0, 3.0e-4, 8.0e-4, 8.0e-3, 8.0e-2};  // [V]
+constexpr std::size_t KTC = 0, KTE = 3, TORQUE = 3;                // of meanForceMatrix()
 
 struct Cell {
   Spindle spindle;
@@ -82,36 +86,75 @@ struct Cell {
   }
 };
 
+/// A machine with a step of its load meter, before a coefficient is drawn.
+Cell cellOf(const MachineModel& model, double step, std::uint64_t seed) {
+  return {model.needSpindle("draw machines"),
+          model.needTool("draw machines"),
+          0.0,
+          0.0,
+          step,
+          std::mt19937_64(seed)};
+}
+
+/// Draws coefficients and identifies them. @return relative error of Ktc
+double errorOf(Cell& cell) {
+  std::uniform_real_distribution<double> ktc(600e6, 2200e6), kte(10e3, 40e3);
+  cell.ktc = ktc(cell.random);
+  cell.kte = kte(cell.random);
+  return cell.identify();
+}
+
+std::string nameOf(double step) {
+  return formatted("step_%.1f_mv", 1e3 * step);
+}
+
+void runOne(const StudyCase& one, const MachineModel& model, std::uint64_t seed) {
+  nlohmann::json line{{"case", one.number}};
+  for (const double step : STEPS) {
+    Cell cell = cellOf(model, step, seedOfCase(seed, one.number));
+    line[nameOf(step)] = errorOf(cell);
+  }
+  one.print(line);
+}
+
+void print(double step, const std::vector<double>& errors) {
+  std::printf("step %6.1f mV: Ktc off by %.3f %% (median), %.3f %% (95 %%)\n", 1e3 * step,
+              100.0 * percentile(errors, 0.5), 100.0 * percentile(errors, 0.95));
+}
+
+void score(const std::string& file) {
+  const auto lines = readJsonLines(file);
+  if (lines.empty()) throw Error(file + ": no case");
+  for (const double step : STEPS) {
+    std::vector<double> errors;
+    for (const nlohmann::json& line : lines) errors.push_back(line.at(nameOf(step)));
+    print(step, errors);
+  }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   std::string model_file;
   int machines = 500;
   std::uint64_t seed = 1;
+  StudyCase one;
   CommandLine line{
       "Error of Ktc from polled loads over their rounding: drawn coefficients on a model's machine."};
   line.option("MODEL", model_file, "machine model with tool and spindle").required();
-  line.option("--machines", machines, "drawn machines for each step").positive().showDefault();
+  one.addTo(line, "--machines,--cases", machines, "drawn machines for each step");
+  one.addScore(line);
   line.option("--seed", seed, "of the draws").showDefault();
   return runProgram(line, argc, argv, [&] {
+    one.check(machines);
+    if (one.scores()) return score(one.lines);
     const MachineModel model = readMachineModel(model_file);
-    for (const double step : {0.0, 3.0e-4, 8.0e-4, 8.0e-3, 8.0e-2}) {
+    if (one.one()) return runOne(one, model, seed);
+    for (const double step : STEPS) {
       std::vector<double> errors;
-      Cell cell{model.needSpindle("draw machines"),
-                model.needTool("draw machines"),
-                0.0,
-                0.0,
-                step,
-                std::mt19937_64(seed)};
-      std::uniform_real_distribution<double> ktc(600e6, 2200e6), kte(10e3, 40e3);
-      for (int i = 0; i < machines; ++i) {
-        cell.ktc = ktc(cell.random);
-        cell.kte = kte(cell.random);
-        errors.push_back(cell.identify());
-      }
-      std::sort(errors.begin(), errors.end());
-      std::printf("step %6.1f mV: Ktc off by %.3f %% (median), %.3f %% (95 %%)\n", 1e3 * step,
-                  100.0 * errors[errors.size() / 2], 100.0 * errors[errors.size() * 95 / 100]);
+      Cell cell = cellOf(model, step, seed);
+      for (int i = 0; i < machines; ++i) errors.push_back(errorOf(cell));
+      print(step, errors);
     }
   });
 }

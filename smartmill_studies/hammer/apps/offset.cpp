@@ -14,6 +14,7 @@
 #include "smartmill_core/io/csv.h"
 #include "smartmill_core/program.h"
 #include "smartmill_core/signal/statistics.h"
+#include "study_case.h"
 
 namespace {
 
@@ -25,25 +26,11 @@ struct Request {
   unsigned seed = 14;
   double noise = 0.005;
   std::string out;
+  StudyCase one;
 };
 
 /// Modes below this share of the largest gain show in no chart.
 constexpr double COUNTS = 0.03;
-
-struct Tally {
-  std::vector<double> gains, frfs;
-  int stated = 0, inside = 0;
-
-  void add(const OffsetOutcome& outcome, int way) {
-    frfs.push_back(outcome.frf_error[way]);
-    for (const GainError& e : outcome.modes[way]) {
-      if (e.share < COUNTS) continue;
-      gains.push_back(std::abs(e.error));
-      stated += e.std > 0.0;
-      inside += e.std > 0.0 && std::abs(e.error) < 1.96 * e.std;
-    }
-  }
-};
 
 /// [m/N] A slot is limited to a depth in proportion to -1 / (2 Re H) where Re H is most negative: what
 /// figure 4.8 compares.
@@ -54,6 +41,25 @@ double softest(const FrequencyResponse& frf) {
   }
   return -least;
 }
+
+struct Tally {
+  std::vector<double> gains, frfs, depths;
+  int stated = 0, inside = 0;
+
+  void add(double gain, double std) {
+    gains.push_back(std::abs(gain));
+    stated += std > 0.0;
+    inside += std > 0.0 && std::abs(gain) < 1.96 * std;
+  }
+
+  void add(const OffsetOutcome& outcome, int way) {
+    frfs.push_back(outcome.frf_error[way]);
+    for (const GainError& e : outcome.modes[way]) {
+      if (e.share >= COUNTS) add(e.error, e.std);
+    }
+    depths.push_back(std::abs(softest(outcome.truth) / softest(outcome.frf[way]) - 1.0));
+  }
+};
 
 void save(const OffsetOutcome& outcome, const std::string& folder, int machine) {
   std::filesystem::create_directories(folder);
@@ -76,28 +82,34 @@ void save(const OffsetOutcome& outcome, const std::string& folder, int machine) 
                  folder + "/figure_4_8_machine_" + std::to_string(machine) + ".png");
 }
 
-void run(const Request& request) {
-  std::mt19937_64 random(request.seed);
-  Tally tallies[WAYS];
-  std::vector<double> depths[WAYS];
-  int failed = 0;
-  for (int i = 0; i < request.machines; ++i) {
-    const OffsetCase drawn = drawOffsetCase(random);
-    try {
-      const OffsetOutcome outcome = judgeOffset(drawn, request.noise, random);
-      for (int w = 0; w < WAYS; ++w) {
-        tallies[w].add(outcome, w);
-        depths[w].push_back(std::abs(softest(outcome.truth) / softest(outcome.frf[w]) - 1.0));
-      }
-      if (!request.out.empty() && i < 10) save(outcome, request.out, i);
-    } catch (const Error& error) {
-      ++failed;
-      std::printf("machine %d: %s\n", i, error.what());
+/// One machine of its own seed.
+void runOne(const Request& request) {
+  request.one.check(request.machines);
+  std::mt19937_64 random(seedOfCase(request.seed, request.one.number));
+  const OffsetCase drawn = drawOffsetCase(random);
+  nlohmann::json line{{"case", request.one.number}, {"failed", false}};
+  try {
+    const OffsetOutcome outcome = judgeOffset(drawn, request.noise, random);
+    for (int w = 0; w < WAYS; ++w) {
+      Tally tally;
+      tally.add(outcome, w);
+      nlohmann::json modes = nlohmann::json::array();  // relative error of the gain, its deviation
+      for (const GainError& e : outcome.modes[w])
+        if (e.share >= COUNTS) modes.push_back({e.error, e.std});
+      line[nameOf(static_cast<Way>(w))] = {
+          {"modes", modes}, {"frf", tally.frfs.front()}, {"least_depth", tally.depths.front()}};
     }
-    if (i % 10 == 9) std::fprintf(stderr, "%d of %d\n", i + 1, request.machines);
+  } catch (const Error& error) {
+    line["failed"] = true;
+    line["why"] = error.what();
   }
+  request.one.print(line);
+}
+
+void report(const Tally (&tallies)[WAYS], int machines, int failed) {
   std::printf("%d machines, %d failed; modes below 5 kHz with %.0f %% of the largest gain and more\n",
-              request.machines, failed, 100.0 * COUNTS);
+              machines, failed, 100.0 * COUNTS);
+  if (failed == machines) return;
   std::printf("%-24s %-22s %-22s %-26s %s\n", "", "gain: median, 95 %", "FRF: median, 95 %",
               "least depth: median, 95 %", "within 1.96 deviations");
   for (int w = 0; w < WAYS; ++w) {
@@ -106,11 +118,50 @@ void run(const Request& request) {
       return formatted("%.1f %%, %.1f %%", 100.0 * percentile(x, 0.5), 100.0 * percentile(x, 0.95));
     };
     std::printf("%-24s %-22s %-22s %-26s", nameOf(static_cast<Way>(w)).c_str(), show(t.gains).c_str(),
-                show(t.frfs).c_str(), show(depths[w]).c_str());
+                show(t.frfs).c_str(), show(t.depths).c_str());
     if (w >= 2 && t.stated > 0)
       std::printf(" %d of %d (%.0f %%)", t.inside, t.stated, 100.0 * t.inside / t.stated);
     std::printf("\n");
   }
+}
+
+void score(const std::string& file) {
+  Tally tallies[WAYS];
+  int machines = 0, failed = 0;
+  for (const nlohmann::json& line : readJsonLines(file)) {
+    ++machines;
+    failed += line.at("failed").get<bool>();
+    if (line.at("failed")) continue;
+    for (int w = 0; w < WAYS; ++w) {
+      const nlohmann::json& way = line.at(nameOf(static_cast<Way>(w)));
+      for (const nlohmann::json& mode : way.at("modes")) tallies[w].add(mode.at(0), mode.at(1));
+      tallies[w].frfs.push_back(way.at("frf"));
+      tallies[w].depths.push_back(way.at("least_depth"));
+    }
+  }
+  if (machines == 0) throw Error(file + ": no case");
+  report(tallies, machines, failed);
+}
+
+void run(const Request& request) {
+  if (request.one.scores()) return score(request.one.lines);
+  if (request.one.one()) return runOne(request);
+  std::mt19937_64 random(request.seed);
+  Tally tallies[WAYS];
+  int failed = 0;
+  for (int i = 0; i < request.machines; ++i) {
+    const OffsetCase drawn = drawOffsetCase(random);
+    try {
+      const OffsetOutcome outcome = judgeOffset(drawn, request.noise, random);
+      for (int w = 0; w < WAYS; ++w) tallies[w].add(outcome, w);
+      if (!request.out.empty() && i < 10) save(outcome, request.out, i);
+    } catch (const Error& error) {
+      ++failed;
+      std::printf("machine %d: %s\n", i, error.what());
+    }
+    if (i % 10 == 9) std::fprintf(stderr, "%d of %d\n", i + 1, request.machines);
+  }
+  report(tallies, request.machines, failed);
 }
 
 }  // namespace
@@ -119,7 +170,8 @@ int main(int argc, char** argv) {
   Request request;
   CommandLine line(
       "The tip's FRF from one struck above it: no correction, Dunwoody's eq. 4.44, spindle and tool apart.");
-  line.option("--machines", request.machines, "drawn tools and spindles").positive().showDefault();
+  request.one.addTo(line, "--machines,--cases", request.machines, "drawn tools and spindles");
+  request.one.addScore(line);
   line.option("--seed", request.seed).showDefault();
   line.option("--noise", request.noise, "of the FRF, a share of its rms").notNegative().showDefault();
   line.option("-o,--out", request.out, "folder for the FRFs of the first ten as CSV, and figure 4.8 of each");

@@ -11,11 +11,14 @@
 #include "smartmill_core/io/csv.h"
 #include "smartmill_core/program.h"
 #include "smartmill_core/units.h"
+#include "study_case.h"
 
 namespace {
 
 using namespace smartmill;             // NOLINT
 using namespace smartmill::loadmeter;  // NOLINT
+
+constexpr double LAST_PART = 0.7;  // of the year's days, from there on
 
 /// What was asked in some part of the year.
 struct Part {
@@ -41,7 +44,8 @@ struct Part {
 };
 
 void print(const std::vector<ShopJob>& jobs, int days) {
-  constexpr double ENDS[] = {0.0, 0.02, 0.06, 0.16, 0.4, 0.7, 1.0};  // of the year: most is learnt early
+  constexpr double ENDS[] = {0.0, 0.02,      0.06, 0.16,
+                             0.4, LAST_PART, 1.0};  // of the year: most is learnt early
   std::printf("%-28s %5s %8s %8s %8s %10s\n", "days", "jobs", "answered", "median %", "95 % [%]",
               "inside 95 %");
   for (std::size_t part = 0; part + 1 < std::size(ENDS); ++part) {
@@ -74,6 +78,46 @@ void save(const std::vector<ShopJob>& jobs, const std::string& file) {
   csv.save(file);
 }
 
+/// What a year came to, of all jobs and of those of its last part.
+nlohmann::json lineOf(int number, const std::vector<ShopJob>& jobs, int days) {
+  nlohmann::json line{{"case", number}};
+  const auto add = [&](const std::string& name, const auto& belongs) {
+    Part part;
+    for (const ShopJob& job : jobs)
+      if (belongs(job)) part.add(job);
+    const auto answered = static_cast<double>(part.errors.size());
+    line[name] = {{"jobs", part.asked},
+                  {"answered", part.errors.size()},
+                  {"median_percent", part.at(0.5)},
+                  {"percent_95", part.at(0.95)},
+                  {"inside", part.errors.empty() ? std::nan("") : part.inside / answered}};
+  };
+  add("whole_year", [](const ShopJob&) { return true; });
+  add("last_part", [days](const ShopJob& job) { return job.day >= LAST_PART * days; });
+  add("never_met", [](const ShopJob& job) { return !job.met; });
+  return line;
+}
+
+void report(const std::vector<nlohmann::json>& lines) {
+  if (lines.empty()) throw Error("no case");
+  std::printf("%zu shops, means over them\n%-12s %8s %8s %8s %8s %10s\n", lines.size(), "", "jobs",
+              "answered", "median %", "95 % [%]", "inside 95 %");
+  for (const char* name : {"whole_year", "last_part", "never_met"}) {
+    const auto mean = [&](const char* field) {
+      double sum = 0.0, count = 0.0;
+      for (const nlohmann::json& line : lines) {
+        const double value = numberOf(line.at(name), field);
+        if (std::isnan(value)) continue;
+        sum += value;
+        ++count;
+      }
+      return sum / count;
+    };
+    std::printf("%-12s %8.1f %8.1f %8.1f %8.1f %8.1f %%\n", name, mean("jobs"), mean("answered"),
+                mean("median_percent"), mean("percent_95"), 100.0 * mean("inside"));
+  }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -81,6 +125,10 @@ int main(int argc, char** argv) {
       "A year of a shop whose database starts empty and keeps every cut: how wrong its answers are.");
   ShopOptions options;
   std::string out;
+  int shops = 1;
+  StudyCase one;
+  one.addTo(line, "--cases", shops, "shops, for --case: each a year of its own");
+  one.addScore(line);
   line.option("--days", options.days, "working days (250)");
   line.option("--jobs", options.jobs, "a day (4)");
   line.option("--cuts", options.cuts, "a job (4)");
@@ -89,6 +137,13 @@ int main(int argc, char** argv) {
   line.option("--seed", options.seed, "(1)");
   line.option("-o,--out", out, "CSV of all jobs");
   return runProgram(line, argc, argv, [&] {
+    one.check(shops);
+    if (one.scores()) return report(readJsonLines(one.lines));
+    if (one.one()) {
+      options.seed = static_cast<unsigned>(seedOfCase(options.seed, one.number));
+      return one.print(lineOf(one.number, shopYear(options), options.days));
+    }
+    if (shops > 1) throw UsageError("--cases: goes with --case");
     const auto jobs =
         shopYear(options, [](double share) { std::fprintf(stderr, "\r%3.0f %%", 100.0 * share); });
     std::fprintf(stderr, "\n");

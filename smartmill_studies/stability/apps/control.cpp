@@ -13,6 +13,7 @@
 #include "smartmill_core/units.h"
 #include "stability/control_study.h"
 #include "stability/study_request.h"
+#include "study_case.h"
 
 namespace {
 
@@ -21,6 +22,7 @@ using namespace smartmill;
 struct Request : stability::StudyRequest {
   int cuts = 100;
   double frequency = 2.0, gain = 5.0, reaction = 0.2;
+  StudyCase one;
 };
 
 double quantile(std::vector<double> values, double share) {
@@ -78,7 +80,60 @@ void save(const std::vector<stability::ControlCut>& cuts, const std::string& fil
   csv.save(file);
 }
 
+nlohmann::json lineOf(int number, const stability::ControlCut& c) {
+  return {{"case", number},
+          {"speed_rpm", units::rpmFromRadPerSec(c.speed)},
+          {"depth_mm", c.depth / units::MM},
+          {"limit_mm", c.limit / units::MM},
+          {"onset_rev", c.onset},
+          {"asked_rev", c.asked},
+          {"ended_rev", c.ended},
+          {"ended", c.end()},
+          {"moves", c.moves},
+          {"spindle", c.spindle},
+          {"feed", c.feed},
+          {"removal", c.removal},
+          {"careful", c.careful},
+          {"next_rpm", units::rpmFromRadPerSec(c.next_speed)},
+          {"next_mm", c.next_depth / units::MM},
+          {"next_stable", c.next_stable},
+          {"said", c.said},
+          {"thinking", c.thinking}};
+}
+
+stability::ControlCut cutOf(const nlohmann::json& line) {
+  stability::ControlCut c;
+  c.speed = units::radPerSecFromRpm(line.at("speed_rpm"));
+  c.depth = line.at("depth_mm").get<double>() * units::MM;
+  c.limit = line.at("limit_mm").get<double>() * units::MM;
+  c.onset = line.at("onset_rev");
+  c.asked = numberOf(line, "asked_rev");
+  c.ended = numberOf(line, "ended_rev");
+  c.moves = line.at("moves");
+  c.spindle = line.at("spindle");
+  c.feed = line.at("feed");
+  c.removal = line.at("removal");
+  c.careful = line.at("careful");
+  c.next_speed = units::radPerSecFromRpm(line.at("next_rpm"));
+  c.next_depth = line.at("next_mm").get<double>() * units::MM;
+  c.next_stable = line.at("next_stable");
+  c.said = line.at("said");
+  c.thinking = line.at("thinking");
+  return c;
+}
+
+void report(const Request& request, const std::vector<stability::ControlCut>& cuts) {
+  print(cuts);
+  if (!request.out.empty()) save(cuts, request.out);
+}
+
 void run(const Request& request) {
+  request.one.check(request.cuts);
+  if (request.one.scores()) {
+    std::vector<stability::ControlCut> cuts;
+    for (const nlohmann::json& line : readJsonLines(request.one.lines)) cuts.push_back(cutOf(line));
+    return report(request, cuts);
+  }
   MachineModel model = request.machine();
   model.uncertainty.frequency = request.frequency;
   model.uncertainty.damping = model.uncertainty.stiffness = model.uncertainty.cutting = request.gain;
@@ -86,11 +141,16 @@ void run(const Request& request) {
   options.cuts = request.cuts;
   options.reaction = request.reaction;
   options.control.adaptive = true;
+  if (request.one.one()) {
+    options.cuts = 1;
+    options.seed = static_cast<unsigned>(seedOfCase(options.seed, request.one.number));
+    const auto cut = controlStudy(model, request.system(model), options).front();
+    return request.one.print(lineOf(request.one.number, cut));
+  }
   const auto cuts = controlStudy(model, request.system(model), options,
                                  [](double share) { std::fprintf(stderr, "\r%3.0f %%", 100.0 * share); });
   std::fprintf(stderr, "\n");
-  print(cuts);
-  if (!request.out.empty()) save(cuts, request.out);
+  report(request, cuts);
 }
 
 }  // namespace
@@ -102,7 +162,8 @@ int main(int argc, char** argv) {
       "and feed "
       "end the chatter, against an operator who halves the depth."};
   request.addTo(line);
-  line.option("--cuts", request.cuts, "how many (100)");
+  request.one.addTo(line, "--cuts,--cases", request.cuts, "how many");
+  request.one.addScore(line);
   line.option("--frequency-percent", request.frequency, "standard deviation of the modes' frequencies (2)");
   line.option("--gain-percent", request.gain, "of damping, compliance and coefficients (5)");
   line.option("--reaction", request.reaction, "from an advice to the controller's new overrides [s] (0.2)");

@@ -13,6 +13,7 @@
 #include "smartmill_core/units.h"
 #include "stability/detection_study.h"
 #include "stability/study_request.h"
+#include "study_case.h"
 
 namespace {
 
@@ -22,6 +23,7 @@ struct Request : stability::StudyRequest {
   std::string signal = "force";
   double runout_um = 5.0, noise_n = 3.0, severity = -1.0;
   int cuts = 300, teeth = 0;
+  StudyCase one;
 };
 
 MachineModel machineOf(const Request& request) {
@@ -108,25 +110,73 @@ void write(const std::vector<stability::DetectionCut>& cuts, const std::string& 
   if (!csv) throw Error(file + ": cannot be written");
 }
 
+nlohmann::json lineOf(int number, const stability::DetectionCut& c) {
+  return {{"case", number},
+          {"speed_rpm", units::rpmFromRadPerSec(c.speed)},
+          {"depth_mm", c.depth / units::MM},
+          {"multiplier", c.radius},
+          {"chatters", c.chatters},
+          {"onset_s", c.onset},
+          {"frequency_hz", c.frequency},
+          {"found", c.found},
+          {"detected_s", c.detected},
+          {"found_hz", c.found_frequency},
+          {"alternation", c.alternation},
+          {"energy", c.energy}};
+}
+
+stability::DetectionCut cutOf(const nlohmann::json& line) {
+  stability::DetectionCut c;
+  c.speed = units::radPerSecFromRpm(line.at("speed_rpm"));
+  c.depth = line.at("depth_mm").get<double>() * units::MM;
+  c.radius = line.at("multiplier");
+  c.chatters = line.at("chatters");
+  c.onset = numberOf(line, "onset_s");
+  c.frequency = numberOf(line, "frequency_hz");
+  c.found = line.at("found");
+  c.detected = line.at("detected_s");
+  c.found_frequency = numberOf(line, "found_hz");
+  c.alternation = line.at("alternation");
+  c.energy = line.at("energy");
+  return c;
+}
+
+/// @return whether the targets are met.
+bool report(const Request& request, const std::vector<stability::DetectionCut>& cuts, int teeth) {
+  Tally tally;
+  for (const stability::DetectionCut& cut : cuts) tally.add(cut);
+  tally.print(request.signal);
+  if (teeth % 2 == 0) std::printf("largest alternation of a stable cut %.3f\n", tally.most_alternation);
+  if (!request.out.empty()) write(cuts, request.out);
+  return tally.meetsTargets();
+}
+
 /// @return whether the targets are met.
 bool run(const Request& request) {
   const MachineModel model = machineOf(request);
   const stability::RegenerativeSystem system = request.system(model);
+  request.one.check(request.cuts);
+  if (request.one.scores()) {
+    std::vector<stability::DetectionCut> cuts;
+    for (const nlohmann::json& line : readJsonLines(request.one.lines)) cuts.push_back(cutOf(line));
+    return report(request, cuts, system.teeth);
+  }
   stability::DetectionOptions options{request.range()};
   options.cuts = request.cuts;
   options.signal = request.signal;
   if (request.signal != "force") options.detector.least_severity = 0.0;
   if (request.severity >= 0.0) options.detector.least_severity = request.severity;
+  if (request.one.one()) {
+    options.cuts = 1;
+    options.first = request.one.number;
+    options.seed = static_cast<unsigned>(seedOfCase(options.seed, request.one.number));
+    request.one.print(lineOf(request.one.number, detectionStudy(model, system, options).front()));
+    return true;
+  }
   const auto cuts = detectionStudy(model, system, options,
                                    [](double share) { std::fprintf(stderr, "\r%3.0f %%", 100.0 * share); });
   std::fprintf(stderr, "\n");
-  Tally tally;
-  for (const stability::DetectionCut& cut : cuts) tally.add(cut);
-  tally.print(request.signal);
-  if (system.teeth % 2 == 0)
-    std::printf("largest alternation of a stable cut %.3f\n", tally.most_alternation);
-  if (!request.out.empty()) write(cuts, request.out);
-  return tally.meetsTargets();
+  return report(request, cuts, system.teeth);
 }
 
 }  // namespace
@@ -137,7 +187,8 @@ int main(int argc, char** argv) {
       "Chatter detection over simulated cuts with noise, runout and sudden entry and exit. Exit code 0: at "
       "most 1 % false alarms and at least 98 % found, 3: not so."};
   request.addTo(line);
-  line.option("--cuts", request.cuts, "how many (300)");
+  request.one.addTo(line, "--cuts,--cases", request.cuts, "how many");
+  request.one.addScore(line);
   line.option("--teeth", request.teeth, "instead of the model's");
   line.option("--signal", request.signal, "force, vibration or sound (force)");
   line.option("--runout-um", request.runout_um, "offset of the tool's axis [um] (5)");

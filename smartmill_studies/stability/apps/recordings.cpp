@@ -14,40 +14,93 @@
 #include "smartmill_core/units.h"
 #include "stability/sound_scenes.h"
 #include "stability/study_request.h"
+#include "study_case.h"
 
 namespace {
 
 using namespace smartmill;
 
 struct Request : stability::StudyRequest {
-  int each = 10;
+  int each = 10, cases = 0;
   bool modes = false;
+  StudyCase one;
 };
 
+struct Count {
+  int all = 0, said = 0, right = 0;
+  void add(bool chatter, bool truth) {
+    ++all;
+    said += chatter;
+    right += chatter == truth;
+  }
+};
+using Counts = std::map<std::string, Count>;  // by kind
+
+void print(const Counts& counts) {
+  int right = 0, all = 0;
+  std::printf("%-38s %6s %12s %6s\n", "kind", "scenes", "said chatter", "right");
+  for (const stability::SoundKind kind : stability::soundKinds()) {
+    const auto found = counts.find(nameOf(kind));
+    if (found == counts.end()) continue;
+    const Count& count = found->second;
+    std::printf("%-38s %6d %12d %6d\n", nameOf(kind), count.all, count.said, count.right);
+    right += count.right;
+    all += count.all;
+  }
+  std::printf("right in %d of %d\n", right, all);
+}
+
+stability::RecordingVerdict judged(const Request& request, const MachineModel& model,
+                                   const stability::SoundScene& scene) {
+  stability::RecordingRequest asked;
+  asked.speed = scene.told_speed;
+  asked.teeth = model.tool->teeth;
+  if (request.modes)
+    for (const ModalModel* axis : {&model.tool_tip.x, &model.tool_tip.y})
+      for (const Mode& mode : axis->modes) asked.modes.push_back(mode.frequency);
+  return judgeRecording(scene.recording, asked);
+}
+
+/// One scene, its kind by turns.
+void runOne(const Request& request, const MachineModel& model, int cases) {
+  request.one.check(cases);
+  const auto kinds = stability::soundKinds();
+  stability::StudyRange range = request.range();
+  range.seed = static_cast<unsigned>(seedOfCase(range.seed, request.one.number));
+  const auto scene = soundScenes(model, request.system(model), range,
+                                 {kinds[static_cast<std::size_t>(request.one.number) % kinds.size()]})
+                         .front();
+  const stability::RecordingVerdict verdict = judged(request, model, scene);
+  request.one.print({{"case", request.one.number},
+                     {"kind", nameOf(scene.kind)},
+                     {"speed_rpm", units::rpmFromRadPerSec(scene.speed)},
+                     {"depth_mm", scene.depth / units::MM},
+                     {"chatters", scene.chatters},
+                     {"said", verdict.chatter},
+                     {"right", verdict.chatter == scene.chatters}});
+}
+
 void run(const Request& request) {
+  if (request.one.scores()) {
+    Counts counts;
+    for (const nlohmann::json& line : readJsonLines(request.one.lines))
+      counts[line.at("kind")].add(line.at("said"), line.at("chatters"));
+    return print(counts);
+  }
   const MachineModel model = request.machine();
   std::vector<stability::SoundKind> kinds;
   for (const stability::SoundKind kind : stability::soundKinds())
-    kinds.insert(kinds.end(), request.each, kind);
+    kinds.insert(kinds.end(), static_cast<std::size_t>(request.each), kind);
+  const int cases = request.cases > 0 ? request.cases : static_cast<int>(kinds.size());
+  if (request.one.one()) return runOne(request, model, cases);
+  if (request.cases > 0) throw UsageError("--cases: goes with --case, --each says how many of each kind");
   const auto scenes = soundScenes(model, request.system(model), request.range(), kinds);
-  struct Count {
-    int all = 0, said = 0, right = 0, near = 0;
-  };
-  std::map<stability::SoundKind, Count> counts;
+  Counts counts;
   std::string list;  // file, told and true speed [rpm], truth, kind
   for (std::size_t k = 0; k < scenes.size(); ++k) {
     const stability::SoundScene& scene = scenes[k];
-    stability::RecordingRequest asked;
-    asked.speed = scene.told_speed;
-    asked.teeth = model.tool->teeth;
-    if (request.modes)
-      for (const ModalModel* axis : {&model.tool_tip.x, &model.tool_tip.y})
-        for (const Mode& mode : axis->modes) asked.modes.push_back(mode.frequency);
-    const stability::RecordingVerdict verdict = judgeRecording(scene.recording, asked);
-    Count& count = counts[scene.kind];
-    ++count.all;
-    count.said += verdict.chatter;
-    count.right += verdict.chatter == scene.chatters;
+    const stability::RecordingVerdict verdict = judged(request, model, scene);
+    counts[nameOf(scene.kind)].add(verdict.chatter, scene.chatters);
     if (verdict.chatter != scene.chatters)
       std::printf("scene %zu, %s, %s, %.0f rpm (told %.0f), %.2f mm: %s\n", k, nameOf(scene.kind),
                   scene.chatters ? "chatters" : "does not", units::rpmFromRadPerSec(scene.speed),
@@ -62,13 +115,7 @@ void run(const Request& request) {
                   units::rpmFromRadPerSec(scene.speed), static_cast<int>(scene.chatters), nameOf(scene.kind));
   }
   if (!request.out.empty()) std::ofstream(request.out + "/scenes.txt") << list;
-  int right = 0;
-  std::printf("%-38s %6s %12s %6s\n", "kind", "scenes", "said chatter", "right");
-  for (const auto& [kind, count] : counts) {
-    std::printf("%-38s %6d %12d %6d\n", nameOf(kind), count.all, count.said, count.right);
-    right += count.right;
-  }
-  std::printf("right in %d of %zu\n", right, scenes.size());
+  print(counts);
 }
 
 }  // namespace
@@ -77,7 +124,12 @@ int main(int argc, char** argv) {
   Request request;
   CommandLine line{"Recorded sound of many kinds, synthesised, through the judge of recordings."};
   request.addTo(line);
-  line.option("--each", request.each, "scenes of each kind (10)");
+  line.option("--each", request.each, "scenes of each kind (10)").within(1, 1000000);
+  line.option("--cases", request.cases, "scenes, of each kind by turns, for --case (12 x EACH)")
+      .within(1, 1000000);
+  line.option("--case", request.one.number,
+              "only this one of them, 0.., its line of JSON on standard output");
+  request.one.addScore(line);
   line.flag("--modes", request.modes, "the judge knows the machine's modes");
   line.option("-o,--out", request.out, "folder that is there, for the scenes as WAV files");
   return runProgram(line, argc, argv, [&] { run(request); });

@@ -12,6 +12,7 @@
 #include "smartmill_core/units.h"
 #include "stability/study_request.h"
 #include "stability/twin_agreement.h"
+#include "study_case.h"
 
 namespace {
 
@@ -23,30 +24,31 @@ struct Request : stability::StudyRequest {
   std::vector<double> pitch_deg;
   int points = 400, revolutions = 180;
   bool linear = false;
+  StudyCase one;
 };
 
+nlohmann::json lineOf(int number, const stability::AgreementPoint& p) {
+  return {{"case", number},
+          {"speed_rpm", units::rpmFromRadPerSec(p.speed)},
+          {"depth_mm", p.depth / units::MM},
+          {"limit_mm", p.limit / units::MM},
+          {"multiplier", p.radius},
+          {"seen", p.seen},
+          {"agrees", p.agrees()}};
+}
+
+stability::AgreementPoint pointOf(const nlohmann::json& line) {
+  stability::AgreementPoint p;
+  p.speed = units::radPerSecFromRpm(line.at("speed_rpm"));
+  p.depth = line.at("depth_mm").get<double>() * units::MM;
+  p.limit = numberOf(line, "limit_mm") * units::MM;
+  p.radius = line.at("multiplier");
+  p.seen = line.at("seen");
+  return p;
+}
+
 /// @return whether the target is met.
-bool run(const Request& request) {
-  MachineModel model = request.machine();
-  if (request.helix_deg >= 0.0) model.tool->helix = units::radFromDeg(request.helix_deg);
-  if (!request.pitch_deg.empty()) {
-    model.tool->pitch.clear();
-    for (const double p : request.pitch_deg) model.tool->pitch.push_back(units::radFromDeg(p));
-  }
-  stability::AgreementOptions options{request.range()};
-  options.band = 0.01 * request.band_percent;
-  options.feed = request.feed_mm * units::MM;
-  options.points = request.points;
-  options.revolutions = request.revolutions;
-  stability::RegenerativeSystem system = request.system(model);
-  if (!system.evenPitch() && !request.linear) {
-    system.chip.emplace();
-    system.chip->feed = options.feed;
-  }
-  const auto points = agreementWithTwin(model, system, options, [](double share) {
-    std::fprintf(stderr, "\r%3.0f %% of the cuts", 100.0 * share);
-  });
-  std::fprintf(stderr, "\n");
+bool report(const Request& request, const std::vector<stability::AgreementPoint>& points) {
   std::printf("%10s %10s %10s %11s %10s %10s\n", "rpm", "depth_mm", "limit_mm", "multiplier", "solver",
               "twin");
   const auto word = [](bool chatters) { return chatters ? "chatter" : "stable"; };
@@ -74,6 +76,43 @@ bool run(const Request& request) {
   return share >= request.least_percent;
 }
 
+/// @return whether the target is met.
+bool run(const Request& request) {
+  MachineModel model = request.machine();
+  if (request.helix_deg >= 0.0) model.tool->helix = units::radFromDeg(request.helix_deg);
+  if (!request.pitch_deg.empty()) {
+    model.tool->pitch.clear();
+    for (const double p : request.pitch_deg) model.tool->pitch.push_back(units::radFromDeg(p));
+  }
+  stability::AgreementOptions options{request.range()};
+  options.band = 0.01 * request.band_percent;
+  options.feed = request.feed_mm * units::MM;
+  options.points = request.points;
+  options.revolutions = request.revolutions;
+  stability::RegenerativeSystem system = request.system(model);
+  if (!system.evenPitch() && !request.linear) {
+    system.chip.emplace();
+    system.chip->feed = options.feed;
+  }
+  request.one.check(request.points);
+  if (request.one.scores()) {
+    std::vector<stability::AgreementPoint> points;
+    for (const nlohmann::json& line : readJsonLines(request.one.lines)) points.push_back(pointOf(line));
+    return report(request, points);
+  }
+  if (request.one.one()) {
+    options.points = 1;
+    options.seed = static_cast<unsigned>(seedOfCase(options.seed, request.one.number));
+    request.one.print(lineOf(request.one.number, agreementWithTwin(model, system, options).front()));
+    return true;
+  }
+  const auto points = agreementWithTwin(model, system, options, [](double share) {
+    std::fprintf(stderr, "\r%3.0f %% of the cuts", 100.0 * share);
+  });
+  std::fprintf(stderr, "\n");
+  return report(request, points);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -82,7 +121,8 @@ int main(int argc, char** argv) {
       "Compares the solver with the simulator in time at random speeds and depths outside a band around the "
       "boundary. Exit code 0: they agree often enough, 3: they do not."};
   request.addTo(line);
-  line.option("--points", request.points, "how many (400)");
+  request.one.addTo(line, "--points,--cases", request.points, "how many");
+  request.one.addScore(line);
   line.option("--band", request.band_percent, "around the boundary, without points [% of the depth] (5)");
   line.option("--least", request.least_percent, "agreement due [%] (98)");
   line.option("--helix-deg", request.helix_deg, "instead of the model's [deg]");
