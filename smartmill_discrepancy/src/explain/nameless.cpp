@@ -260,7 +260,7 @@ bool Nameless::addRevolution(SearchResult* found, double least) {
   for (std::size_t m = 0; m + 1 < found->best.state.members.size();) {
     if (!leaveOut(m, found)) ++m;
   }
-  if (law) bendRevolution(*law, found);
+  if (law) bendRevolution(cuts, found);
   return true;
 }
 
@@ -344,16 +344,19 @@ void Nameless::say(const std::string& what, const Standing& standing) const {
 }
 
 // Law and sensor together bend the table over the feed, where the tests do ask for it.
-void Nameless::bendRevolution(const BentLaw& law, SearchResult* found) {
+void Nameless::bendRevolution(const std::vector<std::size_t>& cuts, SearchResult* found) {
+  const FitState straight = found->best.state;
+  const FitState bare = without(straight, straight.members.size() - 1);
+  bench_.turnTo(straight);
+  const auto law = bentLaw(bench_.quick().runner(), cuts, bench_.data().nominal, bench_.quick().model(bare));
+  if (!law) return;
   options_.search.say(formatted(
       "  a law that bends: exponent %.2g, edge force of %.2g of the model's that comes on over %.3g um; "
       "weighted squares of the lines %.4g (straight %.4g)",
-      law.exponent, law.edge_share, law.onset / units::UM, law.squares, law.straight_squares));
-  const double cost = 3.0 * std::log(law.lines) * law.squares / law.lines;
-  if (!law.bends() || law.straight_squares - law.squares < cost || bench_.cancelled()) return;
-  const FitState straight = found->best.state;
-  const FitState bare = without(straight, straight.members.size() - 1);
-  std::optional<Fit> with = withBend(bare, law.bend);
+      law->exponent, law->edge_share, law->onset / units::UM, law->squares, law->straight_squares));
+  const double cost = 3.0 * std::log(law->lines) * law->squares / law->lines;
+  if (!law->bends() || law->straight_squares - law->squares < cost || bench_.cancelled()) return;
+  std::optional<Fit> with = withBend(bare, law->bend);
   if (!with || !repeats(bare, *with)) return;
   const Standing standing = weightedStanding(with->state, straight);
   say("bent against straight", standing);

@@ -45,7 +45,7 @@ class Nameless {
   bool leaveOut(std::size_t member, SearchResult* found);
   void takeLess(std::size_t member, const Fit& less, SearchResult* found);
   void say(const std::string& what, const Standing& standing) const;
-  void bendRevolution(const BentLaw& law, SearchResult* found);
+  void bendRevolution(const std::vector<std::size_t>& cuts, SearchResult* found);
   std::optional<Fit> withBend(FitState state, const Bend& bend);
   Standing weightedStanding(const FitState& better, const FitState& other) const;
   FitState turned(FitState state, const std::vector<double>& by) const;
