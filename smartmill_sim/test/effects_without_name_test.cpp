@@ -344,6 +344,34 @@ TEST(EffectsWithoutName, aForceOverTheRevolutionGrowsWithTheFeed) {
   EXPECT_THROW(makeEffect(short_list), Error);
 }
 
+// 8 cos(a) besides at 0.2 mm a tooth, nothing at 0.1 and 0.4 mm and beyond, straight between them.
+TEST(EffectsWithoutName, aForceOverTheRevolutionBendsOverTheFeed) {
+  const MachineModel machine = mill(2, 0.0);
+  EffectEntry table = effectEntry(
+      "empirical:revolution",
+      {{"share", 0.5}, {"speed_rpm", EVEN_RPM}, {"depth_mm", 1e3 * DEPTH}, {"chip_um", 100.0}}, {},
+      {{"order", {1.0}},
+       {"fx_n", std::vector<double>(4, 0.0)},
+       {"fy_n", std::vector<double>(4, 0.0)},
+       {"fz_n", std::vector<double>(4, 0.0)},
+       {"bend_um", {100.0, 200.0, 400.0}},
+       {"fx_bend_n", {0.0, 0.0, 8.0, 0.0, 0.0, 0.0}},
+       {"fy_bend_n", std::vector<double>(6, 0.0)},
+       {"fz_bend_n", std::vector<double>(6, 0.0)}});
+  const auto added = [&](double chip) {
+    const CampaignTest test = slotCut(EVEN_RPM, DEPTH, chip);
+    return at(run(with(machine, {table}), test, 0.05), "fx", 0.0, EVEN_SPEED) -
+           at(run(machine, test, 0.05), "fx", 0.0, EVEN_SPEED);
+  };
+  EXPECT_NEAR(added(1.5e-4), 0.5 * 4.0, 1e-6);
+  EXPECT_NEAR(added(2e-4), 0.5 * 8.0, 1e-6);
+  EXPECT_NEAR(added(3e-4), 0.5 * 4.0, 1e-6);
+  EXPECT_EQ(added(0.5e-4), 0.0);
+  EXPECT_EQ(added(5e-4), 0.0);
+  table.lists["bend_um"] = {100.0, 100.0, 400.0};
+  EXPECT_THROW(makeEffect(table), Error);
+}
+
 TEST(EffectsWithoutName, everyFormHasItsClassAndCanDoNothing) {
   const MachineModel model = mill(4, 30.0);
   const EffectScope scope{model, {"fx", "fy", "fz", "load_meter"}};

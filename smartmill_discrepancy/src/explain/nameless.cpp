@@ -11,6 +11,7 @@
 #include "smartmill_core/units.h"
 #include "smartmill_discrepancy/explain/places.h"
 #include "smartmill_discrepancy/explain/revolution.h"
+#include "smartmill_discrepancy/gap/repeatability.h"
 #include "smartmill_discrepancy/search/evidence.h"
 #include "smartmill_discrepancy/search/refinement.h"
 #include "smartmill_discrepancy/search/screening.h"
@@ -235,43 +236,198 @@ bool Nameless::addOne(SearchResult* found, const std::vector<Finding>& unexplain
     const std::vector<Fit> instead = fitsInstead(found);
     if (takeOne(instead, {before.nominal, {}, before.turns}, found)) return true;
   }
-  return takeOne(beside, before, found) || addRevolution(found, tangents, least);
+  return takeOne(beside, before, found) || addRevolution(found, least);
 }
 
 // What no form of few values explains may still come again with each revolution.
-bool Nameless::addRevolution(SearchResult* found, const NominalTangents& tangents, double least) {
+bool Nameless::addRevolution(SearchResult* found, double least) {
   if (hasRevolution(found->best.state)) return false;
   const TwinRunner& runner = bench_.quick().runner();
-  const auto left = revolutionLeft(runner, empiricalHypotheses(runner.data()), found->best);
-  if (!left || bench_.cancelled()) return false;
+  const std::vector<std::size_t> cuts = cutsOfOneKind(runner);
+  if (cuts.empty() || bench_.cancelled()) return false;
+  bench_.turnTo(found->best.state);
+  const auto law = bentLaw(runner, cuts, bench_.data().nominal, bench_.quick().model(found->best.state));
+  const FitState state = law ? turned(found->best.state, law->turned) : found->best.state;
+  const NominalTangents tangents = bench_.linearise(state);
+  const Fit now = bench_.quick().fit(state, &tangents, {0, 1e-8, true});
+  if (!now.converged) return false;
+  const auto left = revolutionLeft(runner, empiricalHypotheses(runner.data()), now);
+  if (!left) return false;
   forms_.push_back({*left});
-  const std::vector<Fit> fits = fitsBeside(found->best, tangents, 0.5 * least, least, 1, found);
+  const std::vector<Fit> fits = fitsBeside(now, tangents, 0.5 * least, least, 1, found);
   if (!takeOne(fits, found->best.state, found)) return false;
-  settleRevolution(found);
+  settleRevolution(state.turns, found);
+  for (std::size_t m = 0; m + 1 < found->best.state.members.size();) {
+    if (!leaveOut(m, found)) ++m;
+  }
+  if (law) bendRevolution(cuts, found);
   return true;
 }
 
 // In the fit every sample counted alike, and values moved to what comes again in no other test; the table
 // takes back what it can say of that with the weights of its own.
-void Nameless::settleRevolution(SearchResult* found) {
+void Nameless::settleRevolution(const std::vector<double>& turns, SearchResult* found) {
   const TwinRunner& runner = bench_.quick().runner();
   FitState state = found->best.state;
-  const NominalTangents tangents = bench_.linearise(state);
-  Fit here = bench_.quick().fit(state, &tangents, {0, 1e-8, true});
+  state.turns = turns;
+  const NominalTangents before = bench_.linearise(state);
+  Fit here = bench_.quick().fit(state, &before, {0, 1e-8, true});
   if (!here.converged) return;
   const auto settled = revolutionLeft(runner, empiricalHypotheses(runner.data()), here);
   if (!settled) return;
   forms_.push_back({*settled});
   state.members.back() = {&forms_.back().front(), {1.0}};
+  const NominalTangents tangents = bench_.linearise(state);
   here = bench_.quick().fit(state, &tangents, {0, 1e-8, true});
-  if (!here.converged) return;
-  const std::size_t last = state.members.size() - 1;
-  for (std::size_t m = 0; m < last && m < found->lacking.size(); ++m) {
+  if (here.converged) putTable(std::move(here), found);
+}
+
+// Records without angle lie further.
+FitState Nameless::turned(FitState state, const std::vector<double>& by) const {
+  const std::vector<Fitter::TurnOf>& turns = bench_.quick().turns();
+  state.turns.resize(turns.size(), 0.0);
+  for (std::size_t k = 0; k < turns.size(); ++k) {
+    if (turns[k].freedom.value == &Turn::middle) state.turns[k] += by[turns[k].chosen];
+  }
+  return state;
+}
+
+// In the place of the table that is the last member.
+void Nameless::putTable(Fit with, SearchResult* found) const {
+  const Member& table = with.state.members.back();
+  const Hypothesis* const old = found->best.state.members.back().hypothesis;
+  for (std::size_t m = 0; m + 1 < with.state.members.size() && m < found->lacking.size(); ++m) {
     for (Member& other : found->lacking[m].members) {
-      if (other.hypothesis == found->best.state.members[last].hypothesis) other = state.members[last];
+      if (other.hypothesis == old) other = table;
     }
   }
-  found->best = std::move(here);
+  found->contribution.back() += found->best.bic - with.bic;
+  found->best = std::move(with);
+}
+
+// A name beside a table stays where the tests ask for it against a table that stands for it too.
+// @return false: it stays
+bool Nameless::leaveOut(std::size_t member, SearchResult* found) {
+  const FitState now = found->best.state;
+  const FitState bare = without(without(now, now.members.size() - 1), member);
+  const std::optional<Fit> less = bench_.cancelled() ? std::nullopt : withBend(bare, {});
+  if (!less) return false;
+  const Standing standing = weightedStanding(now, less->state);
+  const std::string title = now.members[member].hypothesis->title();
+  say(title + " beside the table", standing);
+  const bool stays = standing.holds();
+  if (!stays) takeLess(member, *less, found);
+  bench_.turnTo(found->best.state);
+  return !stays;
+}
+
+void Nameless::takeLess(std::size_t member, const Fit& less, SearchResult* found) {
+  options_.search.say("  not needed any more: " + found->best.state.members[member].hypothesis->title());
+  const auto at = static_cast<std::ptrdiff_t>(member);
+  found->contribution.erase(found->contribution.begin() + at);
+  found->needed.erase(found->needed.begin() + at);
+  found->rivals.clear();
+  found->best = less;
+  found->lacking.clear();
+  const NominalTangents tangents = bench_.linearise(less.state);
+  for (std::size_t m = 0; m < less.state.members.size(); ++m) {
+    const Fit rest = bench_.quick().fit(without(less.state, m), &tangents, {6, 1e-3, true});
+    found->lacking.push_back(rest.state);
+    found->contribution[m] = rest.bic - less.bic;
+  }
+}
+
+void Nameless::say(const std::string& what, const Standing& standing) const {
+  options_.search.say(formatted("  %s: tests ask for %.3g +- %.2g of it, held-out ones for %.3g +- %.2g",
+                                what.c_str(), standing.fitted.share, standing.fitted.std_dev,
+                                standing.heldout.share, standing.heldout.std_dev));
+}
+
+// Law and sensor together bend the table over the feed, where the tests do ask for it.
+void Nameless::bendRevolution(const std::vector<std::size_t>& cuts, SearchResult* found) {
+  const FitState straight = found->best.state;
+  const FitState bare = without(straight, straight.members.size() - 1);
+  bench_.turnTo(straight);
+  const auto law = bentLaw(bench_.quick().runner(), cuts, bench_.data().nominal, bench_.quick().model(bare));
+  if (!law) return;
+  options_.search.say(formatted(
+      "  a law that bends: exponent %.2g, edge force of %.2g of the model's that comes on over %.3g um; "
+      "weighted squares of the lines %.4g (straight %.4g)",
+      law->exponent, law->edge_share, law->onset / units::UM, law->squares, law->straight_squares));
+  const double cost = 3.0 * std::log(law->lines) * law->squares / law->lines;
+  if (!law->bends() || law->straight_squares - law->squares < cost || bench_.cancelled()) return;
+  std::optional<Fit> with = withBend(bare, law->bend);
+  if (!with || !repeats(bare, *with)) return;
+  const Standing standing = weightedStanding(with->state, straight);
+  say("bent against straight", standing);
+  // The fit tests have chosen the law; beside a table that takes up what either leaves of them they say no
+  // more.
+  if (standing.heldout.beyond() > Standing::HELDOUT_BEYOND) putTable(std::move(*with), found);
+  bench_.turnTo(found->best.state);
+}
+
+// A table with a bend, beside a state.
+std::optional<Fit> Nameless::withBend(FitState state, const Bend& bend) {
+  const NominalTangents tangents = bench_.linearise(state);
+  const Fit bare = bench_.quick().fit(state, &tangents, {0, 1e-8, true});
+  if (!bare.converged) return {};
+  const TwinRunner& runner = bench_.quick().runner();
+  const auto bent = revolutionLeft(runner, empiricalHypotheses(runner.data()), bare, bend);
+  if (!bent) return {};
+  forms_.push_back({*bent});
+  state.members.push_back({&forms_.back().front(), {1.0}});
+  const NominalTangents here = bench_.linearise(state);
+  Fit with = bench_.quick().fit(state, &here, {0, 1e-8, true});
+  if (!with.converged) return {};
+  return with;
+}
+
+namespace {
+
+// What each block leaves, over what of its record does not come again with the revolution.
+std::vector<double> floorsOf(const TwinRunner& runner) {
+  std::vector<double> floors;
+  for (const Block& b : runner.blocks()) {
+    floors.push_back(1.0);
+    const TestData& test = runner.data().tests[b.test];
+    if (b.slow || test.test.kind != TestKind::cut || !test.record.has("spindle_angle")) continue;
+    const auto from = static_cast<std::ptrdiff_t>(test.first_cut + (b.size - test.first_cut) / 8);
+    const auto at = runner.measured().begin() + static_cast<std::ptrdiff_t>(b.offset);
+    const std::vector<double>& angle = test.record.column("spindle_angle");
+    const auto told = repeatability({at + from, at + static_cast<std::ptrdiff_t>(b.size)},
+                                    {angle.begin() + from, angle.end()});
+    if (told) floors.back() = std::max(1.0, told->floor);
+  }
+  return floors;
+}
+
+std::vector<AskedTest> weightedAsked(const TwinRunner& runner, const std::vector<double>& better,
+                                     const std::vector<double>& other) {
+  const std::vector<double> floors = floorsOf(runner);
+  std::map<std::size_t, AskedTest> tests;
+  for (std::size_t k = 0; k < runner.blocks().size(); ++k) {
+    const Block& b = runner.blocks()[k];
+    std::vector<double> between(b.size), left(b.size);
+    for (std::size_t i = 0; i < b.size; ++i) {
+      left[i] = better[b.offset + i] / floors[k];
+      between[i] = other[b.offset + i] / floors[k] - left[i];
+    }
+    tests[b.test].add(between.data(), left.data(), b.size);
+  }
+  std::vector<AskedTest> all;
+  for (const auto& [test, asked] : tests) all.push_back(asked);
+  return all;
+}
+
+}  // namespace
+
+// The rule of names (search/standing.h), each record over what of it does not come again and laid where each
+// model fits it.
+Standing Nameless::weightedStanding(const FitState& better, const FitState& other) const {
+  const auto [fit_other, held_other] = leftOf(other);
+  const auto [fit_better, held_better] = leftOf(better);
+  return {sharedBy(weightedAsked(bench_.heldout(), held_better, held_other)),
+          sharedBy(weightedAsked(bench_.fitted(), fit_better, fit_other))};
 }
 
 bool Nameless::takeOne(std::vector<Fit> fits, const FitState& before, SearchResult* found) const {

@@ -38,30 +38,14 @@ bool sameButFeed(const CampaignTest& a, const CampaignTest& b) {
          a.engagement->entry == b.engagement->entry && a.engagement->exit == b.engagement->exit;
 }
 
-// Fit cuts with an angle; empty unless they differ in feed only, in three feeds or more.
-std::vector<std::size_t> cutsOfOneKind(const TwinRunner& runner) {
-  std::vector<std::size_t> cuts;
-  std::vector<double> feeds;
-  for (const std::size_t t : runner.tests()) {
-    const TestData& data = runner.data().tests[t];
-    if (data.test.kind != TestKind::cut) continue;
-    if (!data.record.has("spindle_angle")) return {};
-    if (!cuts.empty() && !sameButFeed(data.test, runner.data().tests[cuts.front()].test)) return {};
-    cuts.push_back(t);
-    const double feed = data.test.engagement->feed_per_tooth;
-    if (std::none_of(feeds.begin(), feeds.end(), [&](double f) { return alike(f, feed); }))
-      feeds.push_back(feed);
-  }
-  return feeds.size() >= LEAST_FEEDS ? cuts : std::vector<std::size_t>{};
-}
-
 std::vector<double> part(const std::vector<double>& all, std::size_t from, std::size_t to) {
   return {all.begin() + static_cast<std::ptrdiff_t>(from), all.begin() + static_cast<std::ptrdiff_t>(to)};
 }
 
-// By force channel. Entry and the sensor's first ringing are left out.
+// By force channel, beside a bend. Entry and the sensor's first ringing are left out.
 std::map<std::string, std::vector<Rest>> restsOf(const TwinRunner& runner, const Fit& now,
-                                                 const std::vector<std::size_t>& cuts, double largest_chip) {
+                                                 const std::vector<std::size_t>& cuts, double largest_chip,
+                                                 const Bend& bend) {
   std::map<std::string, std::vector<Rest>> rests;
   for (const Block& b : runner.blocks()) {
     if (b.slow || std::find(FORCES.begin(), FORCES.end(), b.channel) == FORCES.end() ||
@@ -71,8 +55,17 @@ std::map<std::string, std::vector<Rest>> restsOf(const TwinRunner& runner, const
     const std::size_t from = test.first_cut + (b.size - test.first_cut) / 8;
     std::vector<double> left = part(now.residual, b.offset + from, b.offset + b.size);
     for (double& v : left) v *= b.noise;
-    const auto lines = repeatability(left, part(test.record.column("spindle_angle"), from, b.size));
-    if (lines) rests[b.channel].push_back({test.test.engagement->feed_per_tooth / largest_chip, *lines});
+    auto lines = repeatability(left, part(test.record.column("spindle_angle"), from, b.size));
+    if (!lines) continue;
+    const double chip = test.test.engagement->feed_per_tooth;
+    for (const auto& [order, channels] : bend.orders) {
+      const auto [cosine, sine] = bend.at(order, b.channel, chip);
+      const auto k = static_cast<std::size_t>(order);
+      if (2 * k >= lines->lines.size()) continue;
+      lines->lines[k == 0 ? 0 : 2 * k - 1] -= cosine;
+      if (k > 0) lines->lines[2 * k] -= sine;
+    }
+    rests[b.channel].push_back({chip / largest_chip, *lines});
   }
   return rests;
 }
@@ -148,23 +141,77 @@ void addTable(const Member& member, Lines* lines) {
   }
 }
 
+// The bend of a table, with its share.
+Bend bendOf(const Member& member) {
+  const EffectEntry entry = member.hypothesis->entry(member.values);
+  Bend bend;
+  const auto chips = entry.lists.find("bend_um");
+  if (chips == entry.lists.end()) return bend;
+  for (const double chip : chips->second) bend.chips.push_back(units::UM * chip);
+  const std::vector<double>& orders = entry.lists.at("order");
+  const std::size_t each = 2 * bend.chips.size();
+  for (std::size_t k = 0; k < orders.size(); ++k) {
+    for (const std::string& channel : FORCES) {
+      std::vector<double>& table = bend.orders[orders[k]][channel];
+      const std::vector<double>& all = entry.lists.at(channel + "_bend_n");
+      table = part(all, each * k, each * (k + 1));
+      for (double& v : table) v *= member.values[0];
+    }
+  }
+  return bend;
+}
+
+void place(const Bend& bend, const std::vector<double>& orders, Hypothesis* table) {
+  if (bend.chips.empty()) return;
+  std::vector<double> chips;
+  for (const double chip : bend.chips) chips.push_back(chip / units::UM);
+  table->list("bend_um", chips);
+  for (const std::string& channel : FORCES) {
+    std::vector<double> all;
+    for (const double order : orders) {
+      const auto found = bend.orders.find(order);
+      const std::vector<double> none(2 * chips.size(), 0.0);
+      const std::vector<double>& own = found == bend.orders.end() ? none : found->second.at(channel);
+      all.insert(all.end(), own.begin(), own.end());
+    }
+    table->list(channel + "_bend_n", all);
+  }
+}
+
 }  // namespace
 
+std::vector<std::size_t> cutsOfOneKind(const TwinRunner& runner) {
+  std::vector<std::size_t> cuts;
+  std::vector<double> feeds;
+  for (const std::size_t t : runner.tests()) {
+    const TestData& data = runner.data().tests[t];
+    if (data.test.kind != TestKind::cut) continue;
+    if (!data.record.has("spindle_angle")) return {};
+    if (!cuts.empty() && !sameButFeed(data.test, runner.data().tests[cuts.front()].test)) return {};
+    cuts.push_back(t);
+    const double feed = data.test.engagement->feed_per_tooth;
+    if (std::none_of(feeds.begin(), feeds.end(), [&](double f) { return alike(f, feed); }))
+      feeds.push_back(feed);
+  }
+  return feeds.size() >= LEAST_FEEDS ? cuts : std::vector<std::size_t>{};
+}
+
 std::optional<Hypothesis> revolutionLeft(const TwinRunner& runner, const std::vector<Hypothesis>& all,
-                                         const Fit& now) {
+                                         const Fit& now, const Bend& bend) {
   const auto form = std::find_if(all.begin(), all.end(), isTable);
   const std::vector<std::size_t> cuts = cutsOfOneKind(runner);
   if (form == all.end() || cuts.empty()) return {};
   double chip = 0.0;
   for (const std::size_t t : cuts)
     chip = std::max(chip, runner.data().tests[t].test.engagement->feed_per_tooth);
-  const std::map<std::string, std::vector<Rest>> rests = restsOf(runner, now, cuts, chip);
+  const std::map<std::string, std::vector<Rest>> rests = restsOf(runner, now, cuts, chip, bend);
   if (std::any_of(rests.begin(), rests.end(), [](const auto& r) { return r.second.size() < LEAST_FEEDS; }))
     return {};
   const double cost = std::log(static_cast<double>(runner.size()));
   Lines lines = linesOf(rests, cost);
   const bool again = !now.state.members.empty() && isTable(*now.state.members.back().hypothesis);
   if (again) addTable(now.state.members.back(), &lines);
+  for (const auto& [order, channels] : bend.orders) lines[order];
   if (lines.empty()) return {};
   std::vector<double> orders;
   std::map<std::string, std::vector<double>> tables;
@@ -183,6 +230,7 @@ std::optional<Hypothesis> revolutionLeft(const TwinRunner& runner, const std::ve
       .number("chip_um", chip / units::UM)
       .list("order", orders);
   for (const auto& [channel, table] : tables) placed.list(channel + "_n", table);
+  place(again && bend.chips.empty() ? bendOf(now.state.members.back()) : bend, orders, &placed);
   placed.probe({0.0}, {{1.0}}).named(formatted("%zu orders", orders.size()));
   placed.handicap = cost * (4.0 * static_cast<double>(orders.size() * rests.size()) - 1.0);
   return placed;

@@ -6,7 +6,9 @@
 
 #include <gtest/gtest.h>
 
+#include "smartmill_core/model/effect_catalogue.h"
 #include "smartmill_core/testing/temporary_folder.h"
+#include "smartmill_discrepancy/explain/bent_law.h"
 #include "smartmill_discrepancy/search/workbench.h"
 
 #include "explain/small_campaign.h"
@@ -28,7 +30,8 @@ double overTheTurn(const CampaignTest& test, double angle) {
   return force;
 }
 
-Dataset slotsAt(const std::vector<CampaignTest>& tests, const std::string& folder) {
+Dataset slotsAt(const std::vector<CampaignTest>& tests, const std::string& folder,
+                const MachineModel& machine = believed(), double over_the_turn = 1.0) {
   Campaign campaign;
   campaign.folder = folder;
   campaign.model_file = "model.yaml";
@@ -41,10 +44,11 @@ Dataset slotsAt(const std::vector<CampaignTest>& tests, const std::string& folde
   options.substeps = 8;
   options.noise = false;
   for (const CampaignTest& test : campaign.tests) {
-    Record record = sim::simulateTest(believed(), test, 0.15, options);
+    Record record = sim::simulateTest(machine, test, 0.15, options);
     std::vector<double>& fy = record.add("fy");
     for (std::size_t i = 0; i < fy.size(); ++i) {
-      if (record.time[i] >= *test.engage_time) fy[i] += overTheTurn(test, record.column("spindle_angle")[i]);
+      if (record.time[i] >= *test.engage_time)
+        fy[i] += over_the_turn * overTheTurn(test, record.column("spindle_angle")[i]);
     }
     for (const char* c : {"fx", "fy", "fz"}) {
       for (double& f : record.add(c)) f += normal(random);
@@ -89,6 +93,43 @@ TEST(Revolution, theTableIsWhatWasAdded) {
     for (std::size_t part = 0; part < 4; ++part)
       EXPECT_NEAR(entry.lists.at("fx_n")[4 * k + part], 0.0, NEAR) << o;
   }
+}
+
+const std::vector<double> FEEDS{0.03, 0.045, 0.06, 0.075, 0.09, LARGEST};
+
+std::optional<BentLaw> lawOf(const MachineModel& machine) {
+  const TemporaryFolder folder;
+  std::vector<CampaignTest> tests;
+  for (const double feed : FEEDS) tests.push_back(slot("f" + std::to_string(tests.size()), 4500, feed, 90.0));
+  const Dataset data = slotsAt(tests, folder.file("."), machine, 0.0);
+  const Workbench bench(data, {});
+  const TwinRunner& runner = bench.quick().runner();
+  return bentLaw(runner, cutsOfOneKind(runner), data.nominal, data.nominal);
+}
+
+// A chip force that goes with h^0.7 behind sensors that show x and y 1.5 and 0.8 times as large: the law is
+// told, whatever the sensor makes of it.
+TEST(Revolution, aLawIsToldThroughASensorThatNobodyKnows) {
+  MachineModel machine = believed();
+  machine.effects = {effectEntry("size_effect", {{"exponent", 0.3}, {"reference_chip_um", 60.0}}),
+                     effectEntry("gain_error", {{"gain", 1.5}}, {{"channel", "fx"}}),
+                     effectEntry("gain_error", {{"gain", 0.8}}, {{"channel", "fy"}})};
+  const auto law = lawOf(machine);
+  ASSERT_TRUE(law);
+  EXPECT_TRUE(law->bends());
+  EXPECT_NEAR(law->exponent, 0.3, 0.1);
+  EXPECT_LT(law->squares, 0.2 * law->straight_squares);
+  // Nothing at the ends; between them the mean of fy, which goes with the feed to 0.7, lies above its chord.
+  const auto level = [&](double chip) { return law->bend.at(0.0, "fy", chip)[0]; };
+  EXPECT_EQ(level(law->bend.chips.front()), 0.0);
+  EXPECT_GT(level(0.06e-3), 1.0);
+}
+
+// Lines of a law that is straight over the chip leave nothing for one that bends.
+TEST(Revolution, noLawWhereTheLinesAreStraight) {
+  const auto law = lawOf(believed());
+  ASSERT_TRUE(law);
+  EXPECT_LT(law->straight_squares, 1.2 * law->lines);
 }
 
 TEST(Revolution, noTableWhereCutsDifferInMoreThanTheFeed) {

@@ -6,7 +6,9 @@
 #include <utility>
 #include <vector>
 
+#include "smartmill_discrepancy/explain/bent_law.h"
 #include "smartmill_discrepancy/explain/explain.h"
+#include "smartmill_discrepancy/search/standing.h"
 
 namespace smartmill::discrepancy {
 
@@ -38,8 +40,16 @@ class Nameless {
 
  private:
   bool addOne(SearchResult* found, const std::vector<Finding>& unexplained);
-  bool addRevolution(SearchResult* found, const NominalTangents& tangents, double least);
-  void settleRevolution(SearchResult* found);
+  bool addRevolution(SearchResult* found, double least);
+  void settleRevolution(const std::vector<double>& turns, SearchResult* found);
+  bool leaveOut(std::size_t member, SearchResult* found);
+  void takeLess(std::size_t member, const Fit& less, SearchResult* found);
+  void say(const std::string& what, const Standing& standing) const;
+  void bendRevolution(const std::vector<std::size_t>& cuts, SearchResult* found);
+  std::optional<Fit> withBend(FitState state, const Bend& bend);
+  Standing weightedStanding(const FitState& better, const FitState& other) const;
+  FitState turned(FitState state, const std::vector<double>& by) const;
+  void putTable(Fit with, SearchResult* found) const;
   std::vector<Fit> fitsBeside(const Fit& now, const NominalTangents& tangents, double promised, double least,
                               std::size_t most, SearchResult* found) const;
   std::vector<Fit> fitsInstead(SearchResult* found) const;

@@ -200,7 +200,7 @@ EffectEntry effectEntry(const std::string& name, const std::map<std::string, dou
   }
   for (const EffectParameter& p : kind->parameters) {
     if (p.value == EffectValue::number && p.optional) entry.numbers.emplace(p.key, 0.0);
-    if (p.value == EffectValue::modes) continue;
+    if (p.optional) continue;
     if (entry.numbers.count(p.key) + entry.words.count(p.key) + entry.lists.count(p.key) == 0)
       throw Error(name + "." + p.key + " is missing");
   }

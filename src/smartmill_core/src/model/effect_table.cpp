@@ -35,7 +35,8 @@ std::string keyText(const EffectParameter& p) {
              (p.sum ? ", sum " + shortNumber(*p.sum) + ")" : ")");
     case EffectValue::series:
     case EffectValue::table:
-      return p.key + " (" + p.unit + ", any number of them" + rangeText(p) + ")";
+      return p.key + " (" + p.unit + ", any number of them" + rangeText(p) +
+             (p.optional ? "; absent: none)" : ")");
     case EffectValue::modes:
       return p.key + " (modes as in tool_tip; absent: none)";
     case EffectValue::word:

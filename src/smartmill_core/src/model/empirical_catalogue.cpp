@@ -40,6 +40,12 @@ EffectParameter orZero(const char* name, const char* unit, const Range& range = 
   return p;
 }
 
+EffectParameter orNothing(const char* name, const char* unit, const Range& range = {}) {
+  EffectParameter p = key(name, unit, range, EffectValue::table);
+  p.optional = true;
+  return p;
+}
+
 EffectParameter oneOf(const char* name, const std::vector<std::string>& words) {
   EffectParameter p = key(name, "1", {}, EffectValue::word);
   p.words = words;
@@ -435,12 +441,15 @@ std::vector<EffectKind> channelForms() {
           "channel", "revolution", Stage::sensor_output,
           "share times a sum over orders of the spindle is added to each force channel while the tool "
           "cuts at this speed and depth: of each order the cosine and the sine of what is always "
-          "there, then of what grows with feed per tooth / chip_um",
-          "Fourier series over a revolution, straight over the feed",
+          "there, then of what grows with feed per tooth / chip_um; besides of each order cosine and sine "
+          "at each feed per tooth bend_um, straight between them, nothing beyond",
+          "Fourier series over a revolution, straight over the feed or bent",
           {key("share", "1", not_negative), key("speed_rpm", "rpm", positive),
            key("depth_mm", "mm", positive), key("chip_um", "um", positive),
            key("order", "1", not_negative, EffectValue::table), key("fx_n", "N", {}, EffectValue::table),
-           key("fy_n", "N", {}, EffectValue::table), key("fz_n", "N", {}, EffectValue::table)},
+           key("fy_n", "N", {}, EffectValue::table), key("fz_n", "N", {}, EffectValue::table),
+           orNothing("bend_um", "um", positive), orNothing("fx_bend_n", "N"), orNothing("fy_bend_n", "N"),
+           orNothing("fz_bend_n", "N")},
           {Need::cuts, Need::forces}, revolutions),
       empirical("channel", "curve", Stage::signal,
                 "a channel that should show f shows f + odd f|f| + even f^2 + cubic f^3, f in kN",

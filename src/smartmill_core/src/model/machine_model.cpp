@@ -234,6 +234,7 @@ EffectEntry readEffect(const StrictYaml& map, const MachineModel& model) {
       case EffectValue::list:
       case EffectValue::series:
       case EffectValue::table: {
+        if (p.optional && !map.has(p.key)) break;
         const bool per_tooth = p.value == EffectValue::list && model.tool;
         const std::size_t teeth = per_tooth ? static_cast<std::size_t>(model.tool->teeth) : 0;
         effect.lists[p.key] = readPerTooth(map, p.key, teeth, p.range, p.sum);
