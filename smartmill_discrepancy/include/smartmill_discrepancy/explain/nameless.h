@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "smartmill_discrepancy/explain/explain.h"
+#include "smartmill_discrepancy/search/screening.h"
 
 namespace smartmill::discrepancy {
 
@@ -41,8 +42,8 @@ class Nameless {
   bool addRevolution(SearchResult* found, const NominalTangents& tangents, double least);
   void settleRevolution(SearchResult* found);
   std::vector<Fit> fitsBeside(const Fit& now, const NominalTangents& tangents, double promised, double least,
-                              std::size_t most, SearchResult* found) const;
-  std::vector<Fit> fitsInstead(SearchResult* found) const;
+                              std::size_t most, SearchResult* found, ScreeningMemory* memory) const;
+  std::vector<Fit> fitsInstead(SearchResult* found, ScreeningMemory* memory) const;
   bool takeOne(std::vector<Fit> fits, const FitState& before, SearchResult* found) const;
   bool take(const Fit& start, const FitState& before, SearchResult* found) const;
   Fit fitted(const FitState& state) const;
