@@ -165,18 +165,21 @@ Fit Nameless::withoutNeedless(Fit fit, const NominalTangents& tangents) const {
 // Fits the forms that promise most beside what a fit holds already.
 // @param promised, least gain of the tangents and of BIC against that fit @param most fits
 std::vector<Fit> Nameless::fitsBeside(const Fit& now, const NominalTangents& tangents, double promised,
-                                      double least, std::size_t most, SearchResult* found) const {
+                                      double least, std::size_t most, SearchResult* found,
+                                      ScreeningMemory* memory) const {
   const std::size_t round = found->ladder.empty() ? 0 : found->ladder.back().tried.round + 1;
   const Fitter& quick = bench_.quick();
   std::vector<Fit> fits;
   std::size_t fitted = 0;
-  for (const Promise& p : screen(quick, now, tangents, forms_.back())) {
+  FitOptions options = CLOSELY;
+  options.to_beat = now.chi2 + now.penalty - least;
+  for (const Promise& p : screen(quick, now, tangents, forms_.back(), promised, memory)) {
     if (p.gain < promised || ++fitted > most || bench_.cancelled()) break;
     FitState with = now.state;
     with.members.push_back({p.hypothesis, bestStart(quick, now, p)});
     const auto begin = std::chrono::steady_clock::now();
     const std::size_t simulations = quick.runner().simulations();
-    Fit fit = quick.fit(with, &tangents, CLOSELY);
+    Fit fit = quick.fit(with, &tangents, options);
     const double gain = now.bic - fit.bic;
     options_.search.say(formatted("  without a name, promise %.4g, gain %.4g: %s", p.gain, gain,
                                   p.hypothesis->title().c_str()));
@@ -191,13 +194,15 @@ std::vector<Fit> Nameless::fitsBeside(const Fit& now, const NominalTangents& tan
 }
 
 // One cause without a name may do all that several names stand for.
-std::vector<Fit> Nameless::fitsInstead(SearchResult* found) const {
-  const Fit now = fitted({found->best.state.nominal, {}, found->best.state.turns});
+std::vector<Fit> Nameless::fitsInstead(SearchResult* found, ScreeningMemory* memory) const {
+  const FitState nominal{found->null.state.nominal, {}, found->best.state.turns};
+  const NominalTangents here = bench_.linearise(nominal);
+  const Fit now = bench_.quick().fit(nominal, &here, CLOSELY);
   if (!now.converged) return {};
   // Tangents say little of what is far away.
   constexpr double PROMISED = 0.1;
   const double least = now.bic - found->best.bic;
-  return fitsBeside(now, bench_.linearise(now.state), PROMISED * least, least, rule_.fitted_instead, found);
+  return fitsBeside(now, here, PROMISED * least, least, rule_.fitted_instead, found, memory);
 }
 
 bool Nameless::take(const Fit& start, const FitState& before, SearchResult* found) const {
@@ -224,7 +229,9 @@ bool Nameless::addOne(SearchResult* found, const std::vector<Finding>& unexplain
   const NominalTangents tangents = bench_.linearise(before);
   const double least =
       std::max(options_.search.least_gain, rule_.least_share * (found->best.chi2 - bench_.samples()));
-  const std::vector<Fit> beside = fitsBeside(found->best, tangents, 0.5 * least, least, rule_.fitted, found);
+  ScreeningMemory memory;
+  const std::vector<Fit> beside =
+      fitsBeside(found->best, tangents, 0.5 * least, least, rule_.fitted, found, &memory);
   const bool named = std::any_of(before.members.begin(), before.members.end(), [](const Member& m) {
     return !findEffect(m.hypothesis->effect)->empirical();
   });
@@ -233,7 +240,7 @@ bool Nameless::addOne(SearchResult* found, const std::vector<Finding>& unexplain
   const bool left = found->best.chi2 > (1.0 + NEXT_TO_NOTHING) * bench_.samples();
   if (named && left && !tried_instead_) {
     tried_instead_ = true;
-    const std::vector<Fit> instead = fitsInstead(found);
+    const std::vector<Fit> instead = fitsInstead(found, &memory);
     if (takeOne(instead, {before.nominal, {}, before.turns}, found)) return true;
   }
   return takeOne(beside, before, found) || addRevolution(found, least);
@@ -254,7 +261,8 @@ bool Nameless::addRevolution(SearchResult* found, double least) {
   const auto left = revolutionLeft(runner, empiricalHypotheses(runner.data()), now);
   if (!left) return false;
   forms_.push_back({*left});
-  const std::vector<Fit> fits = fitsBeside(now, tangents, 0.5 * least, least, 1, found);
+  ScreeningMemory memory;
+  const std::vector<Fit> fits = fitsBeside(now, tangents, 0.5 * least, least, 1, found, &memory);
   if (!takeOne(fits, found->best.state, found)) return false;
   settleRevolution(state.turns, found);
   for (std::size_t m = 0; m + 1 < found->best.state.members.size();) {

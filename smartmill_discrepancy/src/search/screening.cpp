@@ -4,6 +4,9 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <optional>
+#include <random>
+#include <utility>
 
 #include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_discrepancy/search/mode_probes.h"
@@ -13,6 +16,46 @@ namespace smartmill::discrepancy {
 namespace {
 
 using Eigen::Index;
+
+// Some of the samples of a campaign, with weights that make up for the others: one in four, and all of what
+// has few. Which one of the four is drawn, since at even distances a line would look like another.
+class Thinned {
+ public:
+  explicit Thinned(const TwinRunner& runner) {
+    constexpr std::size_t EVERY = 4, FEW = 256;
+    std::minstd_rand random(1);
+    for (const Block& b : runner.blocks()) {
+      const std::size_t every = b.size < FEW ? 1 : EVERY;
+      for (std::size_t i = 0; i + every <= b.size; i += every) {
+        rows_.push_back(static_cast<Index>(b.offset + i + (every > 1 ? random() % every : 0)));
+        weights_.push_back(std::sqrt(static_cast<double>(every)));
+      }
+    }
+    size_ = static_cast<Index>(runner.size());
+  }
+
+  Eigen::VectorXd of(const Eigen::Ref<const Eigen::VectorXd>& values) const {
+    const Eigen::Map<const Eigen::VectorXd> weights(weights_.data(), static_cast<Index>(weights_.size()));
+    return values(rows_).cwiseProduct(weights);
+  }
+  Eigen::VectorXd of(const std::vector<double>& values) const {
+    return of(Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Index>(values.size())));
+  }
+  Eigen::MatrixXd of(const BlockColumns& columns) const {
+    Eigen::MatrixXd few(static_cast<Index>(rows_.size()), columns.cols());
+    for (Index k = 0; k < columns.cols(); ++k) {
+      Eigen::VectorXd column = Eigen::VectorXd::Zero(size_);
+      columns.addTo(Eigen::VectorXd::Unit(columns.cols(), k), &column);
+      few.col(k) = of(column);
+    }
+    return few;
+  }
+
+ private:
+  std::vector<Index> rows_;
+  std::vector<double> weights_;
+  Index size_ = 0;
+};
 
 // Orthogonal projection off the nominal tangents (with their priors), off where the records lie, and off the
 // tangents of the members.
@@ -24,7 +67,8 @@ class Projection {
         tangents_(tangents),
         held_(freedom_.size(), false),
         residual_(Eigen::Map<const Eigen::VectorXd>(now.residual.data(),
-                                                    static_cast<Index>(fitter.runner().size()))) {
+                                                    static_cast<Index>(fitter.runner().size()))),
+        thinned_(fitter.runner()) {
     addMembers(fitter, now.state);
     information_.resize(prior_.size(), prior_.size());
     information_.leftCols(tangents.columns.cols()) =
@@ -40,9 +84,11 @@ class Projection {
         right[at] -= now.state.turns[k] * prior_[at];
     }
     solveWithinBounds(right);
+    thinOut();
   }
 
   const SimulatedBlocks& base() const { return base_; }
+  const Thinned& thinned() const { return thinned_; }
 
   // Chi2 that these columns take away, with the amplitudes that do it. @param apart receives the share of
   // them that nothing else can stand for
@@ -58,13 +104,24 @@ class Projection {
     return score.dot(*amplitudes);
   }
 
+  // About the same, from thinned columns.
+  double roughGain(const Eigen::MatrixXd& columns) const {
+    const Eigen::MatrixXd cross = few_beside_.transpose() * columns;
+    Eigen::MatrixXd own =
+        columns.transpose() * columns - cross.transpose() * linear::solveSymmetric(few_information_, cross);
+    const Eigen::VectorXd raw = columns.colwise().squaredNorm();
+    for (Index k = 0; k < own.rows(); ++k) own(k, k) += 1e-9 * raw[k] + 1e-30;
+    const Eigen::VectorXd score = columns.transpose() * few_left_;
+    return score.dot(linear::solveSymmetric(own, score));
+  }
+
   // The same of each column by itself; 0 where it has no trace, no number, or a sign that cannot be.
-  Eigen::VectorXd gains(const BlockColumns& columns, bool positive) const {
-    const Eigen::MatrixXd cross = crossWith(columns);
-    const Eigen::MatrixXd solved = linear::solveSymmetric(information_, cross);
-    const Eigen::VectorXd raw = columns.squares();
+  Eigen::VectorXd roughGains(const Eigen::MatrixXd& columns, bool positive) const {
+    const Eigen::MatrixXd cross = few_beside_.transpose() * columns;
+    const Eigen::MatrixXd solved = linear::solveSymmetric(few_information_, cross);
+    const Eigen::VectorXd raw = columns.colwise().squaredNorm();
     const Eigen::VectorXd own = raw - (cross.cwiseProduct(solved)).colwise().sum().transpose();
-    const Eigen::VectorXd score = columns.along(residual_) - cross.transpose() * solved_residual_;
+    const Eigen::VectorXd score = columns.transpose() * few_left_;
     Eigen::VectorXd result = Eigen::VectorXd::Zero(columns.cols());
     for (Index k = 0; k < columns.cols(); ++k) {
       if (!std::isfinite(own[k]) || !std::isfinite(score[k]) || raw[k] == 0.0) continue;
@@ -148,6 +205,19 @@ class Projection {
     }
   }
 
+  // What is left beside all that moves, thinned.
+  void thinOut() {
+    const Eigen::MatrixXd nominal = thinned_.of(tangents_.columns), members = thinned_.of(members_);
+    few_beside_.resize(nominal.rows(), nominal.cols() + members.cols());
+    few_beside_ << nominal, members;
+    for (std::size_t c = 0; c < held_.size(); ++c) {
+      if (held_[c]) few_beside_.col(static_cast<Index>(c)).setZero();
+    }
+    few_left_ = thinned_.of(residual_) - few_beside_ * solved_residual_;
+    few_information_ = few_beside_.transpose() * few_beside_;
+    few_information_.diagonal() += prior_;
+  }
+
   const std::vector<Coordinate>& freedom_;
   const std::vector<double>& nominal_;
   const NominalTangents& tangents_;
@@ -156,6 +226,9 @@ class Projection {
   std::vector<bool> held_;  // nominal values that do not move
   Eigen::VectorXd prior_, residual_, solved_residual_;
   Eigen::MatrixXd information_;
+  Thinned thinned_;
+  Eigen::MatrixXd few_beside_, few_information_;
+  Eigen::VectorXd few_left_;
 };
 
 // The two best frequencies of a mode, one octave-third or more apart, from columns to first order.
@@ -166,9 +239,12 @@ std::vector<double> bestFrequencies(const Projection& projection, const TwinRunn
   std::vector<double> gains(frequencies.size(), 0.0);
   runParallel((frequencies.size() + BATCH - 1) / BATCH, runner.threads(), [&](std::size_t batch) {
     const std::size_t first = batch * BATCH, count = std::min(BATCH, frequencies.size() - first);
-    std::vector<std::vector<double>> columns;
-    for (std::size_t k = 0; k < count; ++k) columns.push_back(column(frequencies[first + k]));
-    const Eigen::VectorXd each = projection.gains(BlockColumns(runner, columns), positive);
+    std::vector<Eigen::VectorXd> few;
+    for (std::size_t k = 0; k < count; ++k)
+      few.push_back(projection.thinned().of(column(frequencies[first + k])));
+    Eigen::MatrixXd columns(few.front().size(), static_cast<Index>(count));
+    for (std::size_t k = 0; k < count; ++k) columns.col(static_cast<Index>(k)) = few[k];
+    const Eigen::VectorXd each = projection.roughGains(columns, positive);
     for (std::size_t k = 0; k < count; ++k) gains[first + k] = each[static_cast<Index>(k)];
   });
   std::vector<double> best;
@@ -297,8 +373,48 @@ std::vector<double> startOf(const Hypothesis& h, const Hypothesis::Probe& probe,
 
 }  // namespace
 
+namespace {
+
+// The most that a hypothesis promises by what it did when it was simulated last; no number: it was not.
+std::optional<double> rememberedGain(const Projection& projection, const Hypothesis& h,
+                                     const ScreeningMemory& memory) {
+  const auto found = memory.find(&h);
+  if (found == memory.end()) return {};
+  double gain = 0.0;
+  for (const Eigen::MatrixXf& columns : found->second)
+    gain = std::max(gain, projection.roughGain(columns.cast<double>()));
+  return gain;
+}
+
+Promise promiseOf(const Fitter& fitter, const Fit& now, const Projection& projection, Seeker& seeker,
+                  const Hypothesis& h, ScreeningMemory* memory) {
+  Promise best;
+  best.hypothesis = &h;
+  std::vector<Eigen::MatrixXf>& did = (*memory)[&h];
+  did.clear();
+  for (const Hypothesis::Probe& probe : seeker.probesOf(h)) {
+    const BlockColumns columns = columnsOf(fitter, now.state, h, probe, projection.base());
+    if (!columns.allFinite() || columns.squares().sum() == 0.0) continue;
+    did.push_back(projection.thinned().of(columns).cast<float>());
+    Eigen::VectorXd amplitudes;
+    double apart = 1.0;
+    const double gain = projection.gain(columns, &amplitudes, &apart);
+    if (gain <= best.gain) continue;
+    std::vector<double> start = startOf(h, probe, amplitudes);
+    if (start == probe.null) continue;  // the data ask for what cannot be
+    best.gain = gain;
+    best.apart = apart;
+    best.start = std::move(start);
+    best.null = probe.from_points ? std::vector<double>{} : probe.null;
+  }
+  return best;
+}
+
+}  // namespace
+
 std::vector<Promise> screen(const Fitter& fitter, const Fit& now, const NominalTangents& tangents,
-                            const std::vector<Hypothesis>& tried) {
+                            const std::vector<Hypothesis>& tried, double due, ScreeningMemory* memory) {
+  constexpr double NOWHERE_NEAR = 0.1;
   const Projection projection(fitter, now, tangents);
   const MachineModel model = fitter.model(now.state);
   Seeker seeker(projection, fitter.runner(), model, now);
@@ -308,23 +424,18 @@ std::vector<Promise> screen(const Fitter& fitter, const Fit& now, const NominalT
     if (isMember(now.state, h.effect, h.variant) ||
         (!h.after.empty() && !isMember(now.state, h.effect, h.after)))
       continue;
-    Promise best;
-    best.hypothesis = &h;
-    for (const Hypothesis::Probe& probe : seeker.probesOf(h)) {
-      const BlockColumns columns = columnsOf(fitter, now.state, h, probe, projection.base());
-      if (!columns.allFinite() || columns.squares().sum() == 0.0) continue;
-      Eigen::VectorXd amplitudes;
-      double apart = 1.0;
-      const double gain = projection.gain(columns, &amplitudes, &apart);
-      if (gain <= best.gain) continue;
-      std::vector<double> start = startOf(h, probe, amplitudes);
-      if (start == probe.null) continue;  // the data ask for what cannot be
-      best.gain = gain;
-      best.apart = apart;
-      best.start = std::move(start);
-      best.null = probe.from_points ? std::vector<double>{} : probe.null;
+    // What is to be sought lies elsewhere each time.
+    if (h.seek == Hypothesis::Seek::nothing) {
+      const std::optional<double> gain = rememberedGain(projection, h, *memory);
+      if (gain && *gain < NOWHERE_NEAR * due) {
+        Promise rough;
+        rough.hypothesis = &h;
+        rough.gain = *gain;
+        promises.push_back(std::move(rough));
+        continue;
+      }
     }
-    promises.push_back(std::move(best));
+    promises.push_back(promiseOf(fitter, now, projection, seeker, h, memory));
   }
   std::stable_sort(promises.begin(), promises.end(),
                    [](const Promise& a, const Promise& b) { return a.gain > b.gain; });

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <optional>
 #include <utility>
@@ -109,7 +110,9 @@ class Search {
   void tellCourse() const;
   void rounds();
   void keepStatedWhereBetter();
-  void fitNominalHere(const std::vector<double>& from);
+  // @param hopeless squares above which it is given up
+  void fitNominalHere(const std::vector<double>& from,
+                      double hopeless = std::numeric_limits<double>::infinity());
   bool addEffect(std::size_t number);
   Round fitPromises(std::size_t number);
   bool isHint(const Round& round, const Promise& promise) const;
@@ -119,8 +122,13 @@ class Search {
   void settle(Fit best);
   void dropNeedless();
   bool helpsElsewhere(const Fit& before, const Hypothesis& newest);
-  void stepBack(const Fit& before);
-  void refuse(const Fit& before, const Hypothesis* newest);
+  // Where a round began.
+  struct Begin {
+    Fit fit;
+    NominalTangents tangents;
+  };
+  void stepBack(Begin begin);
+  void refuse(Begin begin, const Hypothesis* newest);
   void letGo();
   void finish();
   bool takeBetterRivals();
@@ -143,6 +151,7 @@ class Search {
   Fit now_;
   double exact_now_ = 0.0;  // squares that the exact twin leaves
   std::vector<const Hypothesis*> refused_;
+  ScreeningMemory screened_;
   std::vector<Promise> promises_;  // of the last round
   bool stepped_back_ = false;      // to where they were made
   std::size_t repeated_ = 0;       // rounds that did not count
@@ -173,8 +182,11 @@ Fit Search::refit(const Fit& from, const FitOptions& options) const {
 
 Fit Search::withPhasesTurned(Fit fit) {
   constexpr int PASSES = 4;
+  constexpr double ANOTHER = 0.1;  // [rad] where everything looks otherwise
   for (int pass = 0; pass < PASSES && bench_.phasesEstimated() && !bench_.cancelled(); ++pass) {
-    if (bench_.turnPhases(fit.state) < PHASE_SETTLED) break;
+    const double turn = bench_.turnPhases(fit.state);
+    if (turn < PHASE_SETTLED) break;
+    if (turn > ANOTHER) screened_.clear();
     tangents_ = linearise(fit.state);
     const double before = fit.bic;
     fit = refit(fit, {8, 1e-4, true});
@@ -183,7 +195,7 @@ Fit Search::withPhasesTurned(Fit fit) {
   return fit;
 }
 
-void Search::fitNominalHere(const std::vector<double>& from) {
+void Search::fitNominalHere(const std::vector<double>& from, double hopeless) {
   constexpr int FRESH = 2;
   now_ = Fit{};
   now_.state.nominal = from;
@@ -192,6 +204,7 @@ void Search::fitNominalHere(const std::vector<double>& from) {
   const int passes = bench_.phasesEstimated() ? 8 : 3;
   const double share =
       bench_.phasesEstimated() ? 1e-6 : 1e-3;  // of the cost, by which the last pass may gain
+  bool settled = false;
   for (int pass = 0; pass < passes; ++pass) {
     // Where the first passes went the tangents are much alike.
     tangents_ =
@@ -200,11 +213,14 @@ void Search::fitNominalHere(const std::vector<double>& from) {
     if (!fit.converged && pass == 0)
       throw Error(bench_.data().campaign.folder + ": the twin gives no numbers for the nominal model");
     if (!fit.converged) break;
-    const bool settled = pass > 0 && std::abs(now_.bic - fit.bic) < std::max(1.0, share * fit.bic);
+    settled = pass > 0 && std::abs(now_.bic - fit.bic) < std::max(1.0, share * fit.bic);
     now_ = std::move(fit);
+    if (now_.chi2 > hopeless) return;
     if (settled || bench_.cancelled()) break;
   }
-  tangents_ = linearise(now_.state);
+  tangents_ = settled && !bench_.phasesEstimated()
+                  ? bench_.lineariseBy(std::move(tangents_), near(now_.state))
+                  : linearise(now_.state);
   now_ = withPhasesTurned(refit(now_, {3, 1e-5, true}));
   keepStatedWhereBetter();
   result_.null = now_;
@@ -229,16 +245,18 @@ void Search::fitNominal() {
   const std::vector<double> stated(bench_.freedom().coordinates().size(), 0.0);
   fitNominalHere(stated);
   if (!bench_.canGuide() || excess(now_) < 0.02 * bench_.samples() || bench_.cancelled()) return;
+  constexpr double HOPELESS = 4.0;  // times the squares of the free one, left by the first pass
   const Fit free = now_;
+  NominalTangents free_tangents = std::move(tangents_);
   bench_.guide(true);
-  fitNominalHere(stated);
+  fitNominalHere(stated, HOPELESS * free.chi2);
   if (now_.chi2 < free.chi2) {
     options_.say("  guided by the displacement of the tool");
     return;
   }
   bench_.guide(false);
   now_ = result_.null = free;
-  tangents_ = linearise(now_.state);
+  tangents_ = bench_.lineariseBy(std::move(free_tangents), near(now_.state));
   exact_now_ = bench_.exactSquares(now_.state);
 }
 
@@ -252,6 +270,7 @@ bool Search::isHint(const Round& round, const Promise& promise) const {
 }
 
 bool Search::worthFitting(const Round& round, const Promise& promise, double largest) const {
+  if (promise.start.empty()) return false;
   constexpr std::size_t MOST_HINTS = 2;
   const std::size_t fitted = round.rungs.size();
   const bool hint = isHint(round, promise);
@@ -272,6 +291,7 @@ void Search::fitPromise(const Promise& promise, Round& round) {
   const NominalTangents turns = tangents_.ofTurns();
   FitOptions options{6, 1e-3, true};
   options.to_beat = round.best.chi2 + round.best.penalty;
+  if (!round.strained) options.to_beat = std::min(options.to_beat, now_.chi2 + now_.penalty - round.least);
   const Fit tried = quick_.fit(with, round.strained ? &turns : &tangents_, options);
   const Member& newest = tried.state.members.back();
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
@@ -288,8 +308,6 @@ void Search::fitPromise(const Promise& promise, Round& round) {
 }
 
 Search::Round Search::fitPromises(std::size_t number) {
-  if (!stepped_back_) promises_ = screen(quick_, now_, tangents_, hypotheses_);
-  stepped_back_ = false;
   Round round;
   round.number = number;
   round.best = now_;
@@ -298,6 +316,9 @@ Search::Round Search::fitPromises(std::size_t number) {
   // With next to nothing left but nominal values far off, an effect may do what they do; only all values
   // moved together go along that valley.
   round.strained = excess(now_) < 0.01 * bench_.samples() && now_.penalty > 4.0 * options_.least_prior_gain;
+  const double due = round.strained ? 4.0 * options_.least_prior_gain : round.least;
+  if (!stepped_back_) promises_ = screen(quick_, now_, tangents_, hypotheses_, due, &screened_);
+  stepped_back_ = false;
   for (const Promise& p : promises_) {
     if (std::find(refused_.begin(), refused_.end(), p.hypothesis) != refused_.end()) continue;
     if (bench_.cancelled()) break;
@@ -327,7 +348,10 @@ void Search::settle(Fit best) {
   }
   const Fit refined = refit(best, CLOSELY);
   // The tangents held where the fit began; where it went far they are taken anew.
-  tangents_ = linearise(refined.state);
+  constexpr double FAR = 0.01;  // [1] of the squares that it took
+  tangents_ = best.bic - refined.bic > FAR * refined.bic
+                  ? linearise(refined.state)
+                  : bench_.lineariseBy(std::move(tangents_), near(refined.state));
   now_ = withPhasesTurned(refit(refined, CLOSELY));
 }
 
@@ -355,19 +379,20 @@ bool Search::helpsElsewhere(const Fit& before, const Hypothesis& newest) {
   return false;
 }
 
-void Search::stepBack(const Fit& before) {
+void Search::stepBack(Begin begin) {
   ++repeated_;
-  now_ = before;
-  bench_.turnPhases(now_.state);
-  tangents_ = linearise(now_.state);
+  now_ = std::move(begin.fit);
+  const bool turned = bench_.turnPhases(now_.state) > PHASE_SETTLED;
+  tangents_ =
+      turned ? linearise(now_.state) : bench_.lineariseBy(std::move(begin.tangents), near(now_.state));
   now_ = refit(now_, {8, 1e-4, true});
   exact_now_ = bench_.exactSquares(now_.state);
 }
 
-void Search::refuse(const Fit& before, const Hypothesis* newest) {
+void Search::refuse(Begin begin, const Hypothesis* newest) {
   ++in_vain_;
   refused_.push_back(newest);
-  stepBack(before);
+  stepBack(std::move(begin));
   stepped_back_ = true;
 }
 
@@ -380,7 +405,7 @@ bool Search::addEffect(std::size_t number) {
   const std::size_t first = result_.ladder.size();
   result_.ladder.insert(result_.ladder.end(), round.rungs.begin(), round.rungs.end());
   if (!better) return false;
-  const Fit before = now_;
+  Begin before{now_, std::move(tangents_)};
   settle(std::move(round.best));
   dropNeedless();
   const double exact_squares = bench_.exactSquares(now_.state);
@@ -389,15 +414,16 @@ bool Search::addEffect(std::size_t number) {
     // What was not needed beside the others is not for want of small steps.
     if (isMember(now_.state, newest->effect) && bench_.refineQuick()) {
       options_.say("  again with smaller steps");
-      stepBack(before);
+      screened_.clear();
+      stepBack(std::move(before));
     } else {
-      refuse(before, newest);
+      refuse(std::move(before), newest);
     }
     return true;
   }
-  if (!helpsElsewhere(before, *newest)) {
+  if (!helpsElsewhere(before.fit, *newest)) {
     result_.refused.push_back(newest);
-    refuse(before, newest);
+    refuse(std::move(before), newest);
     return in_vain_ < MOST_IN_VAIN;
   }
   in_vain_ = 0;

@@ -8,6 +8,7 @@
 
 #include "smartmill_discrepancy/explain/bent_law.h"
 #include "smartmill_discrepancy/explain/explain.h"
+#include "smartmill_discrepancy/search/screening.h"
 #include "smartmill_discrepancy/search/standing.h"
 
 namespace smartmill::discrepancy {
@@ -51,8 +52,8 @@ class Nameless {
   FitState turned(FitState state, const std::vector<double>& by) const;
   void putTable(Fit with, SearchResult* found) const;
   std::vector<Fit> fitsBeside(const Fit& now, const NominalTangents& tangents, double promised, double least,
-                              std::size_t most, SearchResult* found) const;
-  std::vector<Fit> fitsInstead(SearchResult* found) const;
+                              std::size_t most, SearchResult* found, ScreeningMemory* memory) const;
+  std::vector<Fit> fitsInstead(SearchResult* found, ScreeningMemory* memory) const;
   bool takeOne(std::vector<Fit> fits, const FitState& before, SearchResult* found) const;
   bool take(const Fit& start, const FitState& before, SearchResult* found) const;
   Fit fitted(const FitState& state) const;

@@ -3,9 +3,11 @@
 #include <fftw3.h>
 
 #include <algorithm>
+#include <deque>
 #include <memory>
 #include <mutex>
 #include <string>
+#include <utility>
 
 #include "smartmill_core/error.h"
 
@@ -39,11 +41,31 @@ class Plan {
   }
   Plan(const Plan&) = delete;
   Plan& operator=(const Plan&) = delete;
-  void run() const { fftw_execute(plan_); }
+  void forward(double* real, fftw_complex* complex) const { fftw_execute_dft_r2c(plan_, real, complex); }
+  void backward(fftw_complex* complex, double* real) const { fftw_execute_dft_c2r(plan_, complex, real); }
 
  private:
   fftw_plan plan_;
 };
+
+// Of the lengths that were asked for last: a plan costs more than the transform. It serves any memory of
+// FFTW's own allocation.
+std::shared_ptr<const Plan> planOf(std::size_t n, double* real, fftw_complex* complex, bool forward) {
+  constexpr std::size_t KEPT = 16;
+  using Key = std::pair<std::size_t, bool>;
+  static std::mutex mutex;
+  static std::deque<std::pair<Key, std::shared_ptr<const Plan>>> kept;  // newest use first
+  const Key key{n, forward};
+  const std::lock_guard<std::mutex> lock(mutex);
+  const auto found = std::find_if(kept.begin(), kept.end(), [&](const auto& k) { return k.first == key; });
+  if (found != kept.end()) {
+    std::rotate(kept.begin(), found, found + 1);
+    return kept.front().second;
+  }
+  kept.emplace_front(key, std::make_shared<const Plan>(n, real, complex, forward));
+  if (kept.size() > KEPT) kept.pop_back();
+  return kept.front().second;
+}
 
 }  // namespace
 
@@ -54,9 +76,9 @@ std::vector<std::complex<double>> fourier(const std::vector<double>& signal) {
   }
   const auto real = allocate<double>(n);
   const auto complex = allocate<fftw_complex>(n / 2 + 1);
-  const Plan plan(n, real.get(), complex.get(), true);
+  const auto plan = planOf(n, real.get(), complex.get(), true);
   std::copy(signal.begin(), signal.end(), real.get());
-  plan.run();
+  plan->forward(real.get(), complex.get());
   std::vector<std::complex<double>> spectrum(n / 2 + 1);
   for (std::size_t k = 0; k < spectrum.size(); ++k) {
     spectrum[k] = {complex[k][0], complex[k][1]};
@@ -71,12 +93,12 @@ std::vector<double> inverseFourier(const std::vector<std::complex<double>>& spec
   }
   const auto real = allocate<double>(n);
   const auto complex = allocate<fftw_complex>(n / 2 + 1);
-  const Plan plan(n, real.get(), complex.get(), false);
+  const auto plan = planOf(n, real.get(), complex.get(), false);
   for (std::size_t k = 0; k < spectrum.size(); ++k) {
     complex[k][0] = spectrum[k].real();
     complex[k][1] = spectrum[k].imag();
   }
-  plan.run();
+  plan->backward(complex.get(), real.get());
   std::vector<double> signal(real.get(), real.get() + n);
   for (double& value : signal) {
     value /= static_cast<double>(n);
