@@ -44,31 +44,33 @@ std::vector<double> scores(const FoundEffect& found, const EffectEntry& truth) {
   return all;
 }
 
-// What no model can get below: the gap between two runs of the plant, each of which strays by as much.
-double floorOf(const plant::Drawn& drawn, const std::vector<Record>& one, const std::vector<Record>& other) {
+// What no model can get below: the gap between two runs of the plant, each of which strays by as much, over
+// the tests and channels that a gap counts.
+double floorOf(const Dataset& data, bool heldout, const std::vector<Record>& one,
+               const std::vector<Record>& other) {
   double squares = 0.0, count = 0.0;
   for (std::size_t k = 0; k < one.size(); ++k) {
-    if (drawn.campaign.tests[k].kind == TestKind::tap) continue;
-    const Record &first = one[k], &second = other[k];
-    const auto add = [&](const char* channel, double noise) {
-      if (!first.has(channel)) return;
-      const std::vector<double>&x = first.column(channel), &y = second.column(channel);
+    const std::string& name = data.campaign.tests[k].name;
+    const auto test = std::find_if(data.tests.begin(), data.tests.end(),
+                                   [&](const TestData& t) { return t.test.name == name; });
+    if (test == data.tests.end() || test->heldout != heldout || test->test.kind == TestKind::tap) continue;
+    for (const std::string& channel : test->channels) {
+      const std::vector<double>&x = one[k].column(channel), &y = other[k].column(channel);
       for (std::size_t i = 0; i < std::min(x.size(), y.size()); ++i)
-        squares += std::pow((x[i] - y[i]) / noise, 2);
+        squares += std::pow((x[i] - y[i]) / data.noise.at(channel), 2);
       count += static_cast<double>(x.size());
-    };
-    add("fx", drawn.plant.noise_rms[0]);
-    add("fy", drawn.plant.noise_rms[1]);
-    add("fz", drawn.plant.noise_rms[2]);
-    add("tool_x", drawn.plant.tip_noise);
-    add("tool_y", drawn.plant.tip_noise);
+    }
   }
-  return std::sqrt(0.5 * squares / count);
+  return count > 0.0 ? std::sqrt(0.5 * squares / count) : 0.0;
 }
 
-Explanation look(const std::string& folder, const std::function<void(const std::string&)>& progress) {
+Dataset loaded(const std::string& folder) {
   const Campaign campaign = readCampaign(folder);
-  const Dataset data = loadDataset(campaign, readMachineModel(campaign.modelPath()));
+  return loadDataset(campaign, readMachineModel(campaign.modelPath()));
+}
+
+Explanation look(const Dataset& data, const std::string& folder,
+                 const std::function<void(const std::string&)>& progress) {
   ExplainOptions options;
   options.bench.threads = 1;
   options.search.progress = progress;
@@ -159,9 +161,12 @@ json runBenchCase(const plant::Case& hidden, int number, const std::string& fold
   const plant::Drawn drawn = plant::draw(hidden);
   const std::vector<Record> records = plant::runCampaign(drawn, hidden);
   plant::writeCampaignOf(drawn, records, folder);
-  line["floor"] = floorOf(drawn, records, plant::runCampaign(drawn, hidden, true));
   try {
-    score(hidden, drawn, look(folder, progress), &line);
+    const Dataset data = loaded(folder);
+    const std::vector<Record> again = plant::runCampaign(drawn, hidden, true);
+    line["floor"] = floorOf(data, false, records, again);
+    line["heldout_floor"] = floorOf(data, true, records, again);
+    score(hidden, drawn, look(data, folder, progress), &line);
   } catch (const Error& error) {
     line["verdict"] = std::string("refused: ") + error.what();
   }

@@ -49,18 +49,20 @@ void AskedTest::add(const double* between, const double* left, std::size_t size,
   variance += std::max(sum - own, 0.5 * sum);
 }
 
+// The common share follows a test by that test's part of the squares: by just that part the square of what is
+// left of it is less than its variance.
 double varianceOfProducts(const std::vector<AskedTest>& tests) {
-  double squares = 0.0, variance = 0.0, product = 0.0, scatter = 0.0, count = 0.0;
+  double squares = 0.0, variance = 0.0, product = 0.0, scatter = 0.0;
   for (const AskedTest& t : tests) {
     squares += t.squares;
     variance += t.variance;
     product += t.product;
-    count += t.squares > 0.0 ? 1.0 : 0.0;
   }
-  const double share = squares > 0.0 ? product / squares : 0.0;
-  for (const AskedTest& t : tests) scatter += std::pow(t.product - t.squares * share, 2);
-  if (count > 1.0) variance = std::max(variance, scatter * count / (count - 1.0));
-  return variance;
+  for (const AskedTest& t : tests) {
+    const double others = squares - t.squares;
+    if (others > 0.0) scatter += std::pow(t.product - t.squares * product / squares, 2) * squares / others;
+  }
+  return std::max(variance, scatter);
 }
 
 }  // namespace smartmill::discrepancy

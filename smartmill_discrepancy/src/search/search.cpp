@@ -279,8 +279,10 @@ bool Search::worthFitting(const Round& round, const Promise& promise, double lar
     return false;
   if (hint ? round.hints >= MOST_HINTS : fitted - round.hints >= options_.fitted_per_round) return false;
   if (fitted >= 2 && promise.gain < 0.02 * largest) return false;
-  // One that leaves next to nothing can be bettered only by one that promises about as much.
-  return !(excess(round.best) < 0.02 * excess(now_) && promise.gain < 0.5 * round.best_promise);
+  // One that leaves next to nothing can be bettered only by one that promises about as much, as far as
+  // promises hold: the best one's own was short by this.
+  const double beyond = std::max(1.0, (now_.bic - round.best.bic) / round.best_promise);
+  return !(excess(round.best) < 0.02 * excess(now_) && beyond * promise.gain < 0.5 * round.best_promise);
 }
 
 void Search::fitPromise(const Promise& promise, Round& round) {

@@ -64,5 +64,21 @@ TEST(VarianceOfProducts, DeviationsOfFittedValuesAreHonest) {
   }
 }
 
+// Of a test that tells more than all others together the fit leaves next to nothing: products of unit noise
+// along columns of unequal squares, the common share taken from them, have on average the variance of noise.
+TEST(VarianceOfProducts, AWeightyTestHidesNoScatter) {
+  const std::vector<double> squares{100.0, 4.0, 9.0, 1.0};
+  std::mt19937_64 random(6);
+  std::normal_distribution<double> noise;
+  constexpr int RUNS = 20000;
+  double mean = 0.0;
+  for (int run = 0; run < RUNS; ++run) {
+    std::vector<AskedTest> tests;
+    for (const double s : squares) tests.push_back({s, std::sqrt(s) * noise(random), 0.0});
+    mean += varianceOfProducts(tests) / RUNS;
+  }
+  EXPECT_NEAR(mean / 114.0, 1.0, 0.03);
+}
+
 }  // namespace
 }  // namespace smartmill::discrepancy

@@ -296,7 +296,7 @@ std::vector<EffectKind> geometry() {
        {Need::cuts, Need::several_teeth},
        [](const Scope& s) {
          return Forms{EffectForm({contrasts("offset_um", s.nominal.tool->teeth, {-200.0, 200.0, 5e-4, 20.0})})
-                          .straight({1.0})};
+                          .straight({1.0, 15.0})};
        },
        drawTeeth,
        20.0},  // up to three teeth no record tells it from runout
