@@ -211,6 +211,7 @@ json runStation(const StationStudy& study, int number, StationFrfs* frfs) {
   parameters.frf_high = parameters.fit_high = FIT_HIGH;
   parameters.max_modes = 12;
   parameters.sensor_face = drawn.traits.housing;  // whoever set the sensor up knows it
+  parameters.sensor_electrode = drawn.traits.electrode;
   parameters.max_bad_hits = 2 * study.hits;
   MeasureFrfGoal goal;
   goal.stamp = 1000.0;

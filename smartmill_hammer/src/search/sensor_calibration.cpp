@@ -20,6 +20,11 @@ constexpr double RANGE_SHARE = 0.95;
 /// Readings must reach so far of what is asked; and how often the reach follows the gap found.
 constexpr double LEAST_REACH = 0.2;
 constexpr int CURVE_ROUNDS = 4;
+/// Of the jog that reads the curve's bend.
+constexpr double CURVE_REACH = 1.2;
+constexpr std::size_t LEAST_READINGS = 5;
+/// [1] of the gain: deviation of the voltage far off, above which the curve is not known.
+constexpr double KNOWN_FAR = 0.01;
 /// [m] of a jog whose slope tells of the gap, and by how much the next one's must be steeper.
 constexpr double LEAST_SLOPE = 10e-6;
 constexpr double CLEAR_RISE = 1.05;
@@ -52,6 +57,12 @@ void SensorCalibration::start(double volt, double volt_std) {
   volt_ = volt;
   volt_std_ = volt_std;
   readings_.push_back({0.0, volt});
+  // Little room, and perhaps only because the curve is not known: readings further off tell of it first.
+  if (!clipped(volt) && volt < -options_.zero_volt && options_.curve_jog > 0.0 &&
+      options_.safe_travel < static_cast<double>(LEAST_READINGS) * options_.max_jog) {
+    away_ = LEAST_READINGS - 1;
+    return further();
+  }
   if (clipped(volt)) {
     ask(volt < 0.0 ? options_.max_jog : -options_.max_jog);
   } else {
@@ -137,9 +148,15 @@ void SensorCalibration::give(double volt, double volt_std) {
       sensitivity_ = 1.0 / slope;
       sensitivity_std_ = sensitivity_ * std::hypot(std::hypot(near_std_, volt_std) / (near_volt_ - volt),
                                                    options_.position_std / std::abs(moved));
-      phase_ = Phase::check_back;
-      return ask(options_.check_jog);
+      if (options_.curve_jog <= 2.0 * options_.check_jog) return askBack();
+      phase_ = Phase::bend_near;
+      return ask(options_.check_jog - 0.5 * options_.curve_jog);
     }
+    case Phase::bend_near:
+      phase_ = Phase::bend_far;
+      return ask(-0.5 * options_.curve_jog);
+    case Phase::bend_far:
+      return askBack();
     case Phase::check_back:
       return finish();
     case Phase::approach:
@@ -160,11 +177,22 @@ void SensorCalibration::give(double volt, double volt_std) {
   ask(volt < 0.0 ? options_.max_jog : -options_.max_jog);
 }
 
+void SensorCalibration::askBack() {
+  phase_ = Phase::check_back;
+  ask(rest_ - travelled_);
+}
+
+void SensorCalibration::further() {
+  --away_;
+  ask(-options_.max_jog);
+}
+
 void SensorCalibration::approached(double change, double moved, double noise) {
   if (std::abs(moved) < options_.least_jog) return plan();  // the last bit: too short to tell a sensitivity
   const double slope = change / moved;                      // eq. 4.8
   const bool clear = std::abs(change) >= 5.0 * noise;
   // Far off, hardly sensitive.
+  if (!clear && away_ > 0) away_ = 0;
   if (!clear && volt_ < -0.5 * options_.range_volt) return ask(options_.max_jog);
   if (!clear || !(slope > 0.0)) {
     return fail(
@@ -173,7 +201,7 @@ void SensorCalibration::approached(double change, double moved, double noise) {
   sensitivity_ = 1.0 / slope;
   sensitivity_std_ =
       sensitivity_ * std::hypot(noise / std::abs(change), options_.position_std / std::abs(moved));
-  plan();
+  away_ > 0 ? further() : plan();
 }
 
 void SensorCalibration::plan() {
@@ -188,6 +216,7 @@ void SensorCalibration::plan() {
 void SensorCalibration::check() {
   if (options_.check_jog <= 0.0) return finish();
   phase_ = Phase::check_near;
+  rest_ = travelled_;
   ask(options_.check_jog);
 }
 
@@ -208,9 +237,11 @@ void SensorCalibration::finish() {
   state_ = State::done;
 }
 
-/// [m] g of V = a + K / (g - (x - x_now)) through the readings nearby, as near as that gap itself where
-/// there are enough: further off another part of the tool counts.
+/// [m] g of V = a + K / (g - (x - x_now)) through the readings nearby: within `curve_jog` where they were
+/// taken, else as near as that gap itself where there are enough. Further off another part of the tool
+/// counts.
 SensorCalibration::Hyperbola SensorCalibration::hyperbola() const {
+  if (options_.curve_jog > 2.0 * options_.check_jog) return hyperbola(CURVE_REACH * options_.curve_jog);
   Hyperbola found = hyperbola(options_.gap_at_zero_volt);
   for (int k = 0; k < CURVE_ROUNDS && std::isfinite(found.gap); ++k) {
     const Hyperbola nearer = hyperbola(std::max(found.gap, 2.0 * options_.check_jog));
@@ -220,7 +251,7 @@ SensorCalibration::Hyperbola SensorCalibration::hyperbola() const {
   return found;
 }
 
-/// Least squares of V x = g V + a x + c over the readings within `reach` [m]; NaN: too few tell.
+/// Over the readings within `reach` [m]; NaN: too few tell.
 SensorCalibration::Hyperbola SensorCalibration::hyperbola(double reach) const {
   std::vector<Reading> near;
   double furthest = 0.0;
@@ -230,9 +261,37 @@ SensorCalibration::Hyperbola SensorCalibration::hyperbola(double reach) const {
     near.push_back(r);
     furthest = std::max(furthest, away);
   }
+  Hyperbola found = through(near);
+  const double share = found.gap / options_.gap_at_zero_volt;
+  if (furthest < LEAST_REACH * reach || !(share > LEAST_BEND && share < MOST_BEND))
+    found.gap = found.gap_std = std::numeric_limits<double>::quiet_NaN();
+  return found;
+}
+
+std::optional<SensorCurve> SensorCalibration::curve() const {
+  std::vector<Reading> all;
+  double nearest = -std::numeric_limits<double>::infinity(), furthest = -nearest;
+  for (const Reading& r : readings_) {
+    if (clipped(r.volt)) continue;
+    all.push_back(r);
+    nearest = std::max(nearest, r.at);
+    furthest = std::min(furthest, r.at);
+  }
+  if (phase_ != Phase::approach || all.size() < LEAST_READINGS ||
+      nearest - furthest < options_.gap_at_zero_volt) {
+    return std::nullopt;
+  }
+  const Hyperbola h = through(all);
+  if (!(h.gap > 0.0 && h.constant > 0.0 && h.far_volt_std < KNOWN_FAR * options_.gain_volt))
+    return std::nullopt;
+  return SensorCurve{h.far_volt, h.constant};
+}
+
+/// Least squares of V x = g V + a x + c, so that V = a + K / (g - x) with K = -c - a g; NaN: too few tell.
+SensorCalibration::Hyperbola SensorCalibration::through(const std::vector<Reading>& near) const {
   const double nan = std::numeric_limits<double>::quiet_NaN();
-  const Hyperbola none{nan, nan};
-  if (near.size() < 5 || furthest < LEAST_REACH * reach) return none;
+  const Hyperbola none{nan, nan, nan, nan, nan};
+  if (near.size() < LEAST_READINGS) return none;
   const auto rows = static_cast<Eigen::Index>(near.size());
   Eigen::MatrixXd a(rows, 3), b(rows, 1);
   for (Eigen::Index i = 0; i < rows; ++i) {
@@ -242,23 +301,25 @@ SensorCalibration::Hyperbola SensorCalibration::hyperbola(double reach) const {
     b(i, 0) = v * x;
   }
   const linear::LeastSquares fit = linear::leastSquares(a, b);
-  const double gap = fit.x(0, 0);
-  if (fit.rank < 3 || !(gap > LEAST_BEND && gap < MOST_BEND)) return none;
+  if (fit.rank < 3) return none;
+  const double gap = fit.x(0, 0), far = fit.x(1, 0);
   // Of each row's error: of the place (a distance has both its ends'), of the reading, and of the law.
   const Eigen::MatrixXd influence =
       linear::inverseSymmetric(Eigen::MatrixXd(a.transpose() * a)) * a.transpose();
   const double place = options_.position_std / std::sqrt(2.0) / options_.gap_at_zero_volt;
   const double reading = std::hypot(volt_std_, near_std_) / options_.range_volt;
-  double variance = 0.0, squares = 0.0, due = 0.0;
+  double variance[2] = {0.0, 0.0}, squares = 0.0, due = 0.0;
   for (Eigen::Index i = 0; i < rows; ++i) {
-    const double error = std::hypot((a(i, 0) - fit.x(1, 0)) * place, (a(i, 1) - gap) * reading);
+    const double error = std::hypot((a(i, 0) - far) * place, (a(i, 1) - gap) * reading);
     const double left = b(i, 0) - a.row(i).dot(fit.x.col(0));
-    variance += std::pow(influence(0, i) * error, 2);
+    for (Eigen::Index k = 0; k < 2; ++k) variance[k] += std::pow(influence(k, i) * error, 2);
     squares += left * left;
     due += error * error * static_cast<double>(rows - 3) / static_cast<double>(rows);
   }
   const double misfit = due > 0.0 ? std::max(1.0, squares / due) : 1.0;
-  return {gap * options_.gap_at_zero_volt, std::sqrt(variance * misfit) * options_.gap_at_zero_volt};
+  return {gap * options_.gap_at_zero_volt, std::sqrt(variance[0] * misfit) * options_.gap_at_zero_volt,
+          far * options_.range_volt, std::sqrt(variance[1] * misfit) * options_.range_volt,
+          -(fit.x(2, 0) + far * gap) * options_.range_volt * options_.gap_at_zero_volt};
 }
 
 void SensorCalibration::fail(std::string reason) {

@@ -5,6 +5,7 @@
 #include <complex>
 #include <string>
 
+#include "sequence_detail.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/modal/modal_fit.h"
@@ -19,7 +20,6 @@ namespace {
 
 constexpr std::size_t LEAST_HITS = 3, LEAST_JACKKNIFE = 4;
 constexpr const char* UNKNOWN = "unknown";
-constexpr const char* AXIS_NAMES[] = {"x", "y", "z"};
 /// The line at zero is the drift of the sensor. [Hz]
 constexpr double FIRST_LINE = 1e-3;
 /// Fluted length of a tool of which it is not known, in diameters; [m] to which it and the diameter are
@@ -63,6 +63,7 @@ ImpactOptions HammerSequence::impactOptions(const SensorState& sensor) const {
   if (parameters_.straighten_sensor == 0) return options;
   options.sensor_gain = std::isfinite(sensor.bend_gap) ? sensor.bend_gap / sensor.sensitivity - sensor.volt
                                                        : station_.gain_volt;
+  options.averaged_share = parameters_.averaged_share;
   return options;
 }
 

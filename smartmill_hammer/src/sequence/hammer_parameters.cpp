@@ -68,6 +68,14 @@ void declareCalibration(HammerParameters& p, ParameterTable& table) {
   table.number(
       "sensor_face", p.sensor_face, "m", Range::closed(0.0, 0.1),
       "diameter of the sensor's face, which the tool beside the sensor's middle must not touch either");
+  table.number(
+      "curve_error", p.curve_error, "1", Range::closed(0.0, 0.5),
+      "by which the sensor's voltage may stand off its nominal curve's before it is calibrated: what is "
+      "read of the tool's flanks is believed so far only");
+  table.number(
+      "curve_jog", p.curve_jog, "m", Range::closed(0.0, 1e-3),
+      "away from the sensor, at the calibration's end: how far the curve's bend is read; 0: only by the "
+      "approach's readings");
   table.number("max_approach", p.max_approach, "m", Range::positive(),
                "to the sensor, beyond the depth between two flutes");
 }
@@ -111,6 +119,10 @@ void HammerParameters::declare(ParameterTable& table) {
                "time constant of an exponential window; 0: none");
   table.number("straighten_sensor", straighten_sensor, "1", Range::closed(0, 1),
                "1: bend the sensor's curve straight over the vibration, as calibrated; 0: linear");
+  table.number(
+      "averaged_share", averaged_share, "1", Range::closed(0.0, 1.0),
+      "of the time between two samples, over which the converter averages the sensor's bent curve; 0: "
+      "it samples");
   table.number(
       "coil_share", coil_share, "1", Range::closed(0.0, 0.2),
       "of a channel's largest, that the solenoid's current may add to it: what is full until the touch "

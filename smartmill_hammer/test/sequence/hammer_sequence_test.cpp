@@ -90,7 +90,9 @@ TEST(HammerSequence, StrikesAsOftenAsTheAskedUncertaintyNeeds) {
 // sensor.
 TEST(HammerSequence, MeasuresTheToolTipInBothDirections) {
   ClosedFormMachine machine(1);
-  HammerSequence sequence(HammerParameters(), machine.model);
+  HammerParameters parameters;
+  parameters.sensor_face = parameters.sensor_electrode = 0.0;  // the machine's is a point
+  HammerSequence sequence(parameters, machine.model);
   for (const std::string direction : {"x", "y"}) {
     std::vector<std::string> stages;
     const double began = machine.time;

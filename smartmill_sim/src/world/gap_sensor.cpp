@@ -10,7 +10,7 @@ namespace smartmill::sim {
 namespace {
 
 constexpr int ACROSS = 9, ALONG = 5;  // spots of an electrode's diameter, across and along the tool
-constexpr int HOUSING = 32;           // spots across the housing
+constexpr int HOUSING = 10;           // spots on the housing's radius
 constexpr double TOUCHING = 0.5e-6;   // [m] gap that a voltage is still told of
 
 }  // namespace
@@ -72,8 +72,11 @@ GapSensor::GapSensor(const StationTraits& traits, const smartmill::HammerStation
     }
     for (Spot& s : spots_) s.share /= sum;
   }
-  for (int i = 0; i <= HOUSING && traits.housing > 0.0; ++i)
-    spots_.push_back({traits.housing * (static_cast<double>(i) / HOUSING - 0.5), 0.0, 0.0});
+  const double step = 0.5 * traits.housing / HOUSING;
+  for (int i = -HOUSING; i <= HOUSING && step > 0.0; ++i) {
+    for (int k = -HOUSING; k <= HOUSING; ++k)
+      if (i * i + k * k <= HOUSING * HOUSING) spots_.push_back({step * i, step * k, 0.0});
+  }
   behind_.assign(spots_.size(), 0.0);
 }
 
@@ -81,7 +84,7 @@ void GapSensor::face(const ToolSurface& surface, double angle, double above, dou
   const double radius = surface.radius(), towards = surface.throwTo(angle, facing_);
   for (std::size_t i = 0; i < spots_.size(); ++i) {
     const double across = (spots_[i].lateral + beside) / radius;
-    if (std::abs(across) >= 1.0) {  // beside the tool
+    if (std::abs(across) >= 1.0 || above + spots_[i].height < 0.0) {  // beside the tool, below its tip
       behind_[i] = radius;
       continue;
     }

@@ -91,6 +91,7 @@ TEST(Station, TheCrossFrfIsThatOfTheStructure) {
   StationMachine machine(drawn, 1);
   HammerParameters parameters;
   parameters.sensor_face = drawn.traits.housing;
+  parameters.sensor_electrode = drawn.traits.electrode;
   double seconds = 0.0;
   const MeasureFrfResult result = measure(machine, parameters, drawn.believed, goalOf(drawn, 10), seconds);
   ASSERT_EQ(result.code, FrfCode::ok) << result.message;
@@ -164,6 +165,7 @@ TEST(Station, ACancelAtEveryStageRetracts) {
       firstWith([](const DrawnStation& d) { return d.traits.cross_sensor && !d.out_of_range; });
   HammerParameters parameters;
   parameters.sensor_face = drawn.traits.housing;
+  parameters.sensor_electrode = drawn.traits.electrode;
   std::size_t stages = 0;
   for (std::size_t stop_at = 0; stop_at <= stages; ++stop_at) {
     StationMachine machine(drawn, 1);

@@ -15,6 +15,7 @@
 #include "smartmill_core/signal/streams.h"
 #include "smartmill_hammer/analysis/tip_correction.h"
 #include "smartmill_hammer/search/flute_search.h"
+#include "smartmill_hammer/search/sensor_approach.h"
 #include "smartmill_hammer/search/sensor_calibration.h"
 
 namespace smartmill {
@@ -56,12 +57,16 @@ struct HammerParameters : HitTestParameters {
   double position_std = 0.1e-6;
   double min_gap_share = 0.5;
   double sensor_face = 8.0e-3;
+  double sensor_electrode = 2.0e-3;
+  double curve_error = 0.15;
+  double curve_jog = 100.0e-6;
   double max_approach = 1.0e-3;
   // Hits.
   double force_high = 3000.0;
   double asked_std = 0.0;
   double exponential_time = 0.0;
   int straighten_sensor = 1;
+  double averaged_share = 1.0;
   double coil_share = 0.1;
   double axes_turn_std = 0.03;
   int cross_frf = 1;
@@ -208,17 +213,12 @@ class HammerSequence {
 
   FluteSearchOptions searchOptions() const;
   SensorCalibrationOptions calibrationOptions(std::size_t axis) const;
-  double turnedFromTooth(double off, int tooth, int found) const;
   double safeTravel(std::size_t axis) const;
-  void keepProfile();
-  void addToProfile(std::size_t axis, double further, double volt);
+  double movedFrom(std::size_t axis) const;
   bool surveyDue(double volt);
   void surveyed(double now, double volt);
   void tried(double now, const Hit& hit);
-  double nominalGap(double volt) const;
-  double retreatOf(double volt, double moved) const;
   double turnedFrom(std::size_t axis) const;
-  double leastRetreat(double off) const;
   std::size_t calibratedAxis() const;
   void sensorKnown(double now);
   void crossFailed(double now);
@@ -269,6 +269,7 @@ class HammerSequence {
   MachineModel model_;
   HammerStation station_;
   ToolGeometry tool_;
+  SensorApproach approach_;  // of the tool at the tip, as the first search saw it
 
   Stage stage_ = Stage::idle;
   Wait wait_ = Wait::nothing;
@@ -293,15 +294,9 @@ class HammerSequence {
 
   std::optional<FluteSearch> search_;
   double expected_angle_ = 0.0;
-  struct Retreat {
-    double off = 0.0, depth = 0.0;  // [rad] of the spindle from a flute at the sensor, [m] behind that flute
-  };
-  std::vector<Retreat> profile_;  // of the tool at the tip, as the first search saw it
-  std::vector<double> survey_;    // [rad] still to be read beside the place for the hammer, last first
+  std::vector<double> survey_;  // [rad] still to be read beside the place for the hammer, last first
   bool surveyed_ = false;
   std::optional<double> swing_;  // [m] towards the sensor that a blow may make
-  double flute_volt_ = 0.0;      // [V] of that flute at the sensor
-  double flute_gap_ = 0.0;       // [m] at most, from the sensor to a flute that points at it, at the station
   std::optional<SensorCalibration> calibration_;
   SensorState sensor_, cross_sensor_, second_sensor_;
   bool second_ = false;      // at the second height

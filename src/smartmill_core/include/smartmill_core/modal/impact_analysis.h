@@ -28,6 +28,9 @@ struct ImpactOptions {
   /// before)), so that a strong mode's second harmonic does not show as another mode; response_scale is then
   /// the slope at rest. 0: linear.
   double sensor_gain = 0.0;
+  /// [1] of the time between two samples, over which the converter averages such a sensor's bent voltage:
+  /// what a mode of a high frequency swings within it raises the mean. 0: it samples.
+  double averaged_share = 0.0;
   std::string unit = "m/N";  ///< of the FRF
 };
 
