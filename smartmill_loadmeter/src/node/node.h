@@ -40,6 +40,7 @@ class LoadMeterNode {
   void keep(const CoefficientRecord& cut);
   void publish(const MotorForce& force);
   void publish(const ForceEstimate& force);
+  void tell(const ForceEstimate& force);
   void watch();
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
