@@ -218,11 +218,13 @@ std::vector<MotorCut> runDay(const MotorDay& day, const std::optional<MotorCalib
   std::optional<LoadMeterIdentification> estimator;
   std::optional<Shop> shop;
   std::optional<ForceEstimate> newest;
+  std::vector<ForceEstimate> windows;
   for (int i = 0; i < day.cuts; ++i) {
     if (i % GROUP == 0) {
       estimator.emplace(model, estimatorParameters());
       estimator->setMotors(calibration.value_or(MotorCalibration()));
       estimator->onForce([&](const ForceEstimate& e) { newest = e; });
+      estimator->onForceWindow([&](const ForceEstimate& e) { windows.push_back(e); });
       shop.emplace(day, model, *estimator);
     }
     Pass pass;
@@ -242,6 +244,7 @@ std::vector<MotorCut> runDay(const MotorDay& day, const std::optional<MotorCalib
     shop->run(air, metal, static_cast<unsigned>(random()));
     shop->end();
     newest.reset();
+    windows.clear();
     MotorCut cut = shop->run(pass, metal, static_cast<unsigned>(random()));
     shop->end();
     if (estimator->cuts().empty() || !estimator->cuts().back().motor || !estimator->airCuts().back().motor)
@@ -251,6 +254,7 @@ std::vector<MotorCut> runDay(const MotorDay& day, const std::optional<MotorCalib
     cut.motors = estimator->cuts().back().force;
     cut.torque = MechanisticForce(*model.tool, metal, {0.0, units::PI, pass.depth, pass.feed}).mean().torque;
     cut.estimate = newest;
+    cut.windows = windows;
     all.push_back(cut);
     if (progress) progress(static_cast<double>(i + 1) / day.cuts);
   }
@@ -320,6 +324,20 @@ void judgeEstimates(const std::vector<MotorCut>& cuts, DayErrors* errors) {
     }
   }
   for (double& e : errors->estimate) e = std::sqrt(e);
+  for (const MotorCut& cut : cuts) errors->windows += static_cast<int>(cut.windows.size());
+  for (const MotorCut& cut : cuts) {
+    for (const ForceEstimate& one : cut.windows) {
+      for (std::size_t a = 0; a < 3; ++a) {
+        const Estimate &mean = one.mean[a], &rms = one.rms[a];
+        errors->window[a] += std::pow(mean.value - cut.force[a], 2) / errors->windows;
+        errors->inside_window[a] += (std::abs(mean.value - cut.force[a]) < 1.96 * mean.std_dev) /
+                                    static_cast<double>(errors->windows);
+        errors->inside_window_rms[a] +=
+            (std::abs(rms.value - cut.rms[a]) < 1.96 * rms.std_dev) / static_cast<double>(errors->windows);
+      }
+    }
+  }
+  for (double& e : errors->window) e = std::sqrt(e);
 }
 
 }  // namespace

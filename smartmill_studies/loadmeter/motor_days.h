@@ -30,6 +30,7 @@ struct MotorCut {
   MotorReading cut, air;                                      ///< ranges out of the signal chain
   std::optional<MotorForce> motors;                           ///< where a calibration is given
   std::optional<ForceEstimate> estimate;
+  std::vector<ForceEstimate> windows;  ///< while it was steady
 };
 
 /// Every sample goes through the product's estimator as the node feeds it. @param calibration empty: currents
@@ -48,6 +49,9 @@ struct DayErrors {
   /// Of the estimator's forces X, Y, Z: error, share within 1.96 standard deviations, of means and
   /// variations.
   std::array<double, 3> estimate{}, inside{}, inside_rms{};
+  /// The same of the windows while a cut is steady.
+  std::array<double, 3> window{}, inside_window{}, inside_window_rms{};
+  int windows = 0;
 };
 /// @param learnt the cuts of the first day, of which regression and ANFIS were made.
 DayErrors judgeDay(const std::vector<MotorCut>& learnt, const MotorCalibration& calibration,

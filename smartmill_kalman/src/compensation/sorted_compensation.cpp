@@ -41,7 +41,9 @@ SortedCompensation::SortedCompensation(const CompensationParameters& parameters,
                                      : sorter_.addRegular(names::SPINDLE_ANGLE)),
       blocks_(sorter_.addRegular(names::DYNAMOMETER)),
       taps_(withRange(taps, parameters.saturation)),
-      calibrator_(taps_, SpindleSensorCalibration::table3()) {
+      calibrator_(taps_, SpindleSensorCalibration::table3()),
+      plate_(taps_),
+      bandwidth_(parameters.filter.bandwidth) {
   useModelFile();
   sorter_.onRestart([this] {
     compensation_.reset();
@@ -49,6 +51,7 @@ SortedCompensation::SortedCompensation(const CompensationParameters& parameters,
     if (spindle_) spindle_->reset();
     if (inverse_) inverse_->reset();
     calibrator_.reset();
+    plate_.reset();
     condition_.reset();
     invalid_.clear();
     useModelFile();
@@ -98,6 +101,7 @@ void SortedCompensation::push(SampleBlock block) {
       } else {
         compensation_.handle(block);
       }
+      plate_.handle(block);
       measurement_.handleSensor(block);
     }
     drain();
@@ -145,6 +149,7 @@ void SortedCompensation::pushHammer(SampleBlock block) {
   const double stamp = block.stamp;
   sorter_.push(hammers_, stamp, [this, block = std::move(block)] {
     calibrator_.handleHammer(block);
+    plate_.handleHammer(block);
     measurement_.handleHammer(block);
     drain();
   });
@@ -170,7 +175,11 @@ void SortedCompensation::push(const MeasureFrfGoal& goal, std::function<bool(boo
     const bool free = !measurement_.active();
     const bool wanted = !begin || begin(free);  // before the goal's own results
     if (free && wanted) {
-      if (spindle_) calibrator_.tapping(goal.direction, spindle_length_);
+      if (spindle_) {
+        calibrator_.tapping(goal.direction, spindle_length_);
+      } else {
+        plate_.tapping(goal.direction);
+      }
       measurement_.handle(goal);
     }
     drain();
@@ -181,7 +190,14 @@ void SortedCompensation::push(const CalibrationGoal& goal, std::function<bool(bo
   sorter_.push(goals_, goal.stamp, [this, goal, begin = std::move(begin)] {
     const bool free = !calibrator_.active();
     const bool wanted = !begin || begin(free);
-    if (free && wanted) calibrator_.handle(goal);
+    using Step = CalibrationGoal::Step;
+    const bool plate = goal.step == Step::point || (goal.step == Step::fit && !plate_.taps().taps.empty());
+    if (goal.step == Step::forget) plate_.reset();
+    if (free && wanted && plate) {
+      serve(plate_.handle(goal));
+    } else if (free && wanted) {
+      calibrator_.handle(goal);
+    }
     drainCalibration();
   });
 }
@@ -194,18 +210,27 @@ void SortedCompensation::cancelCalibration() {
 }
 
 void SortedCompensation::drainCalibration() {
-  auto result = calibrator_.takeResult();
-  if (!result) return;
-  if (result->calibration && spindle_length_ > 0.0) {
-    // What was found serves from now on; the zero is learnt anew.
+  if (auto result = calibrator_.takeResult()) serve(std::move(*result));
+}
+
+void SortedCompensation::serve(CalibrationResult result) {
+  if (result.matrix) {
     try {
-      spindle_.emplace(*result->calibration, spindle_length_);
-      if (condition_) spindle_->handle(*condition_);
+      useTransferMatrix(*result.matrix, bandwidth_);
     } catch (const Error& e) {
-      result->message += std::string("; it does not serve here: ") + e.what();
+      result.message += std::string("; it does not serve here: ") + e.what();
     }
   }
-  if (outputs_.calibration) outputs_.calibration(*result);
+  if (result.calibration && spindle_length_ > 0.0) {
+    // What was found serves from now on; the zero is learnt anew.
+    try {
+      spindle_.emplace(*result.calibration, spindle_length_);
+      if (condition_) spindle_->handle(*condition_);
+    } catch (const Error& e) {
+      result.message += std::string("; it does not serve here: ") + e.what();
+    }
+  }
+  if (outputs_.calibration) outputs_.calibration(result);
 }
 
 void SortedCompensation::event(std::function<void(SensorMeasurement&)> what) {
@@ -247,6 +272,7 @@ void SortedCompensation::drain() {
     outputs_.feedback(*feedback);
   if (const auto result = measurement_.takeResult()) {
     calibrator_.tapped(*result);
+    plate_.tapped(*result);
     if (result->code == FrfCode::ok) {
       const auto axis = static_cast<std::size_t>(axisOf(result->modes.direction));
       identified_[axis] = result->modes.stamp;

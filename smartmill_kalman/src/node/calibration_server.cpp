@@ -12,6 +12,7 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/signal/force_channels.h"
+#include "smartmill_kalman/sensor/tap_file.h"
 #include "smartmill_ros/conversions.h"
 
 namespace smartmill::kalman {
@@ -31,6 +32,8 @@ CalibrationGoal fromMsg(const smartmill_msgs::CalibrateForceSensorGoal& message,
   goal.test = static_cast<int>(message.test);
   goal.length = message.length;
   goal.load = {message.load.x, message.load.y, message.load.z};
+  if (goal.step == CalibrationGoal::Step::point)
+    goal.load = {message.point.x, message.point.y, message.point.z};
   goal.reference = message.reference;
   goal.duration = message.duration == 0.0 ? USUAL_DURATION : message.duration;
   goal.file = message.file;
@@ -61,8 +64,9 @@ struct CalibrationServer::Impl {
   void onGoal(Handle handle) {
     const smartmill_msgs::CalibrateForceSensorGoal& message = *handle.getGoal();
     const auto reject = [&](const std::string& why) { handle.setRejected(answer(Code::bad_goal, why), why); };
-    if (message.step > smartmill_msgs::CalibrateForceSensorGoal::FORGET)
-      return reject("step " + std::to_string(message.step) + ": READING, FIT, VERIFY or FORGET is due");
+    if (message.step > smartmill_msgs::CalibrateForceSensorGoal::POINT)
+      return reject("step " + std::to_string(message.step) +
+                    ": READING, FIT, VERIFY, FORGET or POINT is due");
     if (active) return reject("another step is running");
     handle.setAccepted();
     active = handle;
@@ -125,6 +129,7 @@ void CalibrationServer::finish(const CalibrationResult& result) {
   message.error.z = result.error[2];
   try {
     if (result.calibration) impl_->write(*result.calibration);
+    if (result.matrix && !impl_->file.empty()) writeTapFile(impl_->sorted.plate().taps(), impl_->file);
   } catch (const Error& e) {
     message.code = message.FIT_FAILED;
     message.message = e.what();

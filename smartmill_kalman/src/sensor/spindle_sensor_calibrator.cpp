@@ -14,19 +14,16 @@ namespace {
 
 using Code = CalibrationResult::Code;
 
-constexpr double SAME_TIME = 1e-6;    // [s] stamps are rounded to nanoseconds
-constexpr double DUE = 0.05;          // [1] Burzoni 3.2.1
-constexpr double MOST_WAITING = 1e6;  // samples of one stream without the other's index
+constexpr double SAME_TIME = 1e-6;  // [s] stamps are rounded to nanoseconds
+constexpr double DUE = 0.05;        // [1] Burzoni 3.2.1
 
 }  // namespace
 
 SpindleSensorCalibrator::SpindleSensorCalibrator(const TapParameters& taps,
                                                  const SpindleSensorCalibration& base)
-    : parameters_(taps), base_(base) {
+    : parameters_(taps), base_(base), collector_(taps, 3) {
   readings_.file = "readings";
   reference_.file = "reference readings";
-  collectors_.assign(
-      3, HitCollector({parameters_.trigger_force, parameters_.pre_trigger, parameters_.record_length}));
 }
 
 void SpindleSensorCalibrator::reset() {
@@ -82,9 +79,9 @@ void SpindleSensorCalibrator::handle(const SampleBlock& block) {
   for (std::size_t i = 0; i < block.size(); ++i) {
     std::array<double, 6> sensors{};
     for (std::size_t k = 0; k < 6; ++k) sensors[k] = block.at(i, column[k]);
-    means_.push_back({block.timeOf(i), block.first_index + i, block.sample_rate, pairMeans(sensors)});
+    const auto means = pairMeans(sensors);
+    collector_.add(block.timeOf(i), block.first_index + i, block.sample_rate, {means.begin(), means.end()});
   }
-  join();
 }
 
 void SpindleSensorCalibrator::read(const SampleBlock& block, const std::array<std::size_t, 6>& column) {
@@ -120,54 +117,26 @@ void SpindleSensorCalibrator::read(const SampleBlock& block, const std::array<st
 }
 
 void SpindleSensorCalibrator::handleHammer(const SampleBlock& block) {
-  if (direction_.empty()) return;
-  const std::size_t c = block.channel("hammer");
-  for (std::size_t i = 0; i < block.size(); ++i) hammer_.push_back({block.first_index + i, block.at(i, c)});
-  join();
-}
-
-void SpindleSensorCalibrator::join() {
-  while (!hammer_.empty() && !means_.empty()) {
-    const Sample h = hammer_.front();
-    const Means m = means_.front();
-    if (h.index <= m.index) hammer_.pop_front();
-    if (m.index <= h.index) means_.pop_front();
-    if (h.index != m.index) continue;
-    tap_rate_ = m.rate;
-    std::array<Hit, 3> hit;
-    std::size_t whole = 0;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      HitCollector& collector = collectors_[axis];
-      if (!collector.armed() && !collector.recording()) collector.arm();
-      auto record = collector.add(m.time, m.index, m.rate, h.force, m.pair[axis]);
-      if (!record || !record->fault.empty()) continue;
-      hit[axis] = std::move(record->hit);
-      ++whole;
-    }
-    if (whole == 3) hits_.push_back(std::move(hit));
-  }
-  if (static_cast<double>(std::max(hammer_.size(), means_.size())) > MOST_WAITING) tapping("");
+  collector_.handleHammer(block);
 }
 
 void SpindleSensorCalibrator::tapping(const std::string& direction, double length) {
   direction_ = direction;
   if (length > 0.0) tap_length_ = length;
-  hammer_.clear();
-  means_.clear();
-  hits_.clear();
-  for (HitCollector& collector : collectors_) collector.reset();
+  if (direction.empty()) {
+    collector_.end();
+  } else {
+    collector_.begin();
+  }
 }
 
 void SpindleSensorCalibrator::tapped(const SensorResult& result) {
   const std::size_t along = direction_ == "x" ? 0 : direction_ == "y" ? 1 : 2;
   if (!direction_.empty() && result.code == FrfCode::ok) {
     taps_[along].clear();
-    for (const std::array<Hit, 3>& hit : hits_) {
-      const double stamp = hit[0].stamp;
-      const bool good = std::any_of(result.hit_stamps.begin(), result.hit_stamps.end(),
-                                    [stamp](double s) { return std::abs(s - stamp) < SAME_TIME; });
-      if (good) taps_[along].push_back({hit[0].response, hit[1].response, hit[2].response});
-    }
+    tap_rate_ = collector_.rate();
+    for (const std::vector<Hit>& hit : collector_.counted(result))
+      taps_[along].push_back({hit[0].response, hit[1].response, hit[2].response});
   }
   tapping("");
 }

@@ -1,9 +1,14 @@
 #include "smartmill_kalman/sensor/tap_file.h"
 
+#include <array>
+#include <cstddef>
 #include <filesystem>
+#include <fstream>
 #include <iterator>
 #include <utility>
 
+#include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/io/csv.h"
 #include "smartmill_core/model/strict_yaml.h"
 #include "smartmill_core/signal/force_channels.h"
@@ -36,6 +41,38 @@ TapRecords readTapFile(const std::string& path) {
   }
   yaml.finish();
   return found;
+}
+
+void writeTapFile(const TapRecords& records, const std::string& path) {
+  const std::filesystem::path file(path);
+  const std::size_t channels = records.taps.empty() ? 0 : records.taps.front().channels.size();
+  std::ofstream out(path);
+  out << "format: smartmill-taps/1\nchannels: " << channels
+      << "\nsample_rate_hz: " << yamlNumber(records.rate) << "\ntaps:\n";
+  std::string head = "hammer[N]";
+  for (std::size_t c = 0; c < channels; ++c)
+    head += std::string(",") + PLATE_CHANNELS[c] + (c < 3 ? "[N]" : "[Nm]");
+  for (std::size_t t = 0; t < records.taps.size(); ++t) {
+    const MatrixTap& tap = records.taps[t];
+    const std::string name = file.stem().string() + formatted("_%02zu.csv", t + 1);
+    const auto list = [](const std::array<double, 3>& v, double unit) {
+      return "[" + yamlNumber(v[0] / unit) + ", " + yamlNumber(v[1] / unit) + ", " + yamlNumber(v[2] / unit) +
+             "]";
+    };
+    out << "- {file: " << yamlWord(name) << ", direction: " << list(tap.direction, 1.0)
+        << ", point_mm: " << list(tap.point, units::MM) << "}\n";
+    std::ofstream table(file.parent_path() / name);
+    table << head << "\n";
+    for (std::size_t i = 0; i < tap.hammer.size(); ++i) {
+      table << formatted("%.9g", tap.hammer[i]);
+      for (const auto& channel : tap.channels) table << formatted(",%.9g", channel[i]);
+      table << "\n";
+    }
+    table.close();
+    if (!table) throw Error((file.parent_path() / name).string() + ": cannot be written");
+  }
+  out.close();
+  if (!out) throw Error(path + ": cannot be written");
 }
 
 }  // namespace smartmill::kalman

@@ -7,7 +7,9 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/testing/coverage.h"
+#include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_core/units.h"
+#include "smartmill_kalman/sensor/tap_file.h"
 #include "smartmill_kalman_testing/plate_sensor.h"
 
 namespace smartmill::kalman {
@@ -114,6 +116,26 @@ TEST(TransferMatrix, StandardDeviationsAreHonest) {
     const Eigen::MatrixXcd truth = plate.response(places[p]).topLeftCorner(3, 3);
     EXPECT_TRUE(both_of_inverse[p].honest(RUNS * independentParts(truth.inverse()))) << places[p];
   }
+}
+
+TEST(TransferMatrix, TapsOfAFileAreTheSame) {
+  const PlateSensor plate;
+  std::mt19937 random(1);
+  const TapRecords taps{tapPlate(plate, 25600.0, 6, 1, random), 25600.0};
+  const TemporaryFolder folder;
+  writeTapFile(taps, folder.file("plate.yaml"));
+  const TapRecords again = readTapFile(folder.file("plate.yaml"));
+  EXPECT_EQ(again.rate, taps.rate);
+  ASSERT_EQ(again.taps.size(), taps.taps.size());
+  for (std::size_t t = 0; t < taps.taps.size(); ++t) {
+    ASSERT_EQ(again.taps[t].channels.size(), 6u);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      EXPECT_NEAR(again.taps[t].point[axis], taps.taps[t].point[axis], 1e-9);
+      EXPECT_NEAR(again.taps[t].direction[axis], taps.taps[t].direction[axis], 1e-9);
+    }
+    EXPECT_NEAR(again.taps[t].channels[5].at(200), taps.taps[t].channels[5].at(200), 1e-6);
+  }
+  EXPECT_THROW(writeTapFile(taps, folder.file("none/plate.yaml")), Error);
 }
 
 TEST(TransferMatrix, RefusesTapsThatDoNotTellEverything) {

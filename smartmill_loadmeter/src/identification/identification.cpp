@@ -13,6 +13,8 @@ namespace smartmill::loadmeter {
 
 namespace {
 
+constexpr int FEWEST_IN_WINDOW = 5;  // readings of the load meter
+
 std::string countOf(std::size_t n, const char* what) {
   return std::to_string(n) + " " + what + (n == 1 ? "" : "s");
 }
@@ -48,7 +50,7 @@ void LoadMeterIdentification::reset() {
   condition_.reset();
   speed_since_.reset();
   path_since_.reset();
-  last_reading_ = last_state_ = 0.0;
+  last_reading_ = last_state_ = next_window_ = 0.0;
   readings_.clear();
   motor_record_.clear();
   force_record_.clear();
@@ -115,8 +117,8 @@ void LoadMeterIdentification::handle(const ForceBlock& block) {
   if (counts(block.stamp)) force_record_.add(block);
 }
 
-void LoadMeterIdentification::readMotorsOf(LoadTest* test) {
-  if (!motors_ || motor_record_.empty()) return;
+void LoadMeterIdentification::readMotorsOf(LoadTest* test, const MotorRecord& record, bool is_short) const {
+  if (!motors_ || record.empty()) return;
   std::array<double, 3> velocity{{0.0, 0.0, 0.0}};
   if (path_first_ && path_last_ && path_last_->stamp > path_first_->stamp) {
     for (std::size_t a = 0; a < 3; ++a) {
@@ -124,7 +126,7 @@ void LoadMeterIdentification::readMotorsOf(LoadTest* test) {
           (path_last_->position[a] - path_first_->position[a]) / (path_last_->stamp - path_first_->stamp);
     }
   }
-  test->motor = readMotors(motor_record_, parameters_.motor, velocity, test->speed);
+  test->motor = readMotors(record, parameters_.motor, velocity, test->speed, is_short);
   if (test->condition.kind != CuttingCondition::Kind::cut) return;
   std::vector<MotorReading> air;
   for (const LoadTest& one : air_cuts_) {
@@ -165,6 +167,20 @@ void LoadMeterIdentification::handle(const LoadSample& sample) {
   if (sample.stamp < since + settle) return;
   readings_.push_back(
       {sample.stamp, sample.spindle_load * *spindle_.load_meter_full_scale, sample.spindle_speed});
+  if (window_ && parameters_.force.period > 0.0 && condition_->kind == CuttingCondition::Kind::cut)
+    lookBack(sample.stamp);
+}
+
+// Force of the last part of a steady cut.
+void LoadMeterIdentification::lookBack(double now) {
+  const double since = now - parameters_.force.window;
+  if (now < next_window_ || readings_.front().stamp > since) return;
+  next_window_ = now + parameters_.force.period - 1e-6;
+  LoadTest part = steadyTest(since);
+  if (part.readings < FEWEST_IN_WINDOW) return;
+  readMotorsOf(&part, motor_record_.last(parameters_.force.window), true);
+  part.sensor = force_record_.reading(since);
+  if (const auto found = estimate(part)) window_(*found);
 }
 
 void LoadMeterIdentification::handle(const CuttingCondition& condition) {
@@ -199,39 +215,44 @@ void LoadMeterIdentification::closeTest() {
   path_last_.reset();
 }
 
-LoadTest LoadMeterIdentification::steadyTest() const {
+LoadTest LoadMeterIdentification::steadyTest(double since) const {
   LoadTest test;
   test.condition = *condition_;
-  const double n = static_cast<double>(readings_.size());
-  for (const Reading& r : readings_) {
+  const auto first = std::find_if(readings_.begin(), readings_.end(),
+                                  [since](const Reading& r) { return r.stamp >= since; });
+  const std::vector<Reading> steady(first, readings_.end());
+  test.readings = static_cast<int>(steady.size());
+  if (test.readings < 2) return test;
+  const double n = static_cast<double>(steady.size());
+  for (const Reading& r : steady) {
     test.voltages.push_back(r.voltage);
-    test.times.push_back(r.stamp - readings_.front().stamp);
+    test.times.push_back(r.stamp - steady.front().stamp);
     test.speed += r.speed / n;
   }
   double speed2 = 0.0;
-  for (const Reading& r : readings_) speed2 += (r.speed - test.speed) * (r.speed - test.speed);
+  for (const Reading& r : steady) speed2 += (r.speed - test.speed) * (r.speed - test.speed);
   test.speed_std = std::sqrt(speed2 / (n * (n - 1.0)));
-  test.readings = static_cast<int>(readings_.size());
-  test.stamp = readings_.back().stamp;
-  test.duration = readings_.back().stamp - readings_.front().stamp;
+  test.stamp = steady.back().stamp;
+  test.duration = steady.back().stamp - steady.front().stamp;
   test.takeMean(spindle_, stepOf(test.voltages, spindle_.load_meter_resolution));
   return test;
 }
 
 void LoadMeterIdentification::keep(LoadTest test) {
-  readMotorsOf(&test);
+  readMotorsOf(&test, motor_record_, false);
   test.sensor = force_record_.reading();
   const bool cut = test.condition.kind == CuttingCondition::Kind::cut;
   (cut ? cuts_ : air_cuts_).push_back(test);
   if (cut) follow(test);
   if (test_) test_(test);
   if (motor_force_ && test.force) motor_force_(*test.force);
-  if (cut && force_) estimate(test);
+  if (!cut || !force_) return;
+  if (const auto found = estimate(test)) force_(*found);
 }
 
 // All three components by all that was measured of the cut; a sensor's zero and noise are those of the last
 // air cut.
-void LoadMeterIdentification::estimate(const LoadTest& cut) const {
+std::optional<ForceEstimate> LoadMeterIdentification::estimate(const LoadTest& cut) const {
   ForceReadings readings;
   readings.stamp = cut.stamp;
   readings.name = cut.condition.name;
@@ -255,9 +276,11 @@ void LoadMeterIdentification::estimate(const LoadTest& cut) const {
     }
   }
   try {
-    force_(estimateForce(readings, parameters_.force));
+    ForceEstimate found = estimateForce(readings, parameters_.force);
+    found.duration = cut.duration;
+    return found;
   } catch (const Error&) {
-    // Nothing was measured of it: friction is not known yet, no motor, no sensor.
+    return std::nullopt;  // nothing was measured of it: friction is not known yet, no motor, no sensor
   }
 }
 

@@ -185,6 +185,11 @@ void ForceEstimateParameters::declare(ParameterTable& table) {
                "share of the largest component by which a force sensor may be wrong (gain, cross-talk)");
   table.number("sensor_zero", sensor_zero, "N", Range::closed(0.0, 1000.0),
                "by which its zero may have moved");
+  table.number("period", period, "s", Range::closed(0.0, 10.0),
+               "between estimates while a cut is steady; 0: one a cut, at its end");
+  table.number(
+      "window", window, "s", Range::closed(0.05, 60.0),
+      "that such an estimate looks back; a drive whose current turns less than twice in it says nothing");
 }
 
 std::string ForceEstimate::text() const {

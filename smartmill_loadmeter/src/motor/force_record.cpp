@@ -1,6 +1,7 @@
 #include "smartmill_loadmeter/motor/force_record.h"
 
 #include <cmath>
+#include <vector>
 
 namespace smartmill::loadmeter {
 
@@ -43,17 +44,21 @@ void ForceRecord::dropAfter(double stamp) {
   while (!parts_.empty() && parts_.back().end > stamp) parts_.pop_back();
 }
 
-std::optional<ForceReading> ForceRecord::reading() const {
-  if (parts_.size() < FEWEST) return std::nullopt;
-  const double n = static_cast<double>(parts_.size());
+std::optional<ForceReading> ForceRecord::reading(double since) const {
+  std::vector<Part> parts;
+  for (const Part& part : parts_) {
+    if (part.end > since) parts.push_back(part);
+  }
+  if (parts.size() < FEWEST) return std::nullopt;
+  const double n = static_cast<double>(parts.size());
   ForceReading reading;
   for (std::size_t a = 0; a < 3; ++a) {
     double mean = 0.0, square = 0.0, mean2 = 0.0, square2 = 0.0;
-    for (const Part& part : parts_) {
+    for (const Part& part : parts) {
       mean += part.mean[a] / n;
       square += part.square[a] / n;
     }
-    for (const Part& part : parts_) {
+    for (const Part& part : parts) {
       mean2 += std::pow(part.mean[a] - mean, 2);
       square2 += std::pow(part.square[a] - square, 2);
     }

@@ -65,8 +65,17 @@ void MotorRecord::dropAfter(double stamp) {
   }
 }
 
+MotorRecord MotorRecord::last(double duration) const {
+  MotorRecord part = *this;
+  const auto count = static_cast<std::size_t>(duration * rate_);
+  for (auto& s : part.samples_) {
+    if (s.size() > count) s.erase(s.begin(), s.end() - static_cast<std::ptrdiff_t>(count));
+  }
+  return part;
+}
+
 MotorReading readMotors(const MotorRecord& record, const MotorParameters& parameters,
-                        const std::array<double, 3>& velocity, double spindle_speed) {
+                        const std::array<double, 3>& velocity, double spindle_speed, bool is_short) {
   MotorReading reading;
   reading.velocity = velocity;
   reading.spindle_speed = spindle_speed;
@@ -92,8 +101,10 @@ MotorReading readMotors(const MotorRecord& record, const MotorParameters& parame
       continue;
     }
     try {
-      (spindle ? reading.spindle_range : reading.range[c]) =
-          phaseRange(samples, record.rate(), frequency, spindle ? parameters.largest_slip : 0.0);
+      const Estimate range =
+          phaseRangeEstimate(samples, record.rate(), frequency, spindle ? parameters.largest_slip : 0.0);
+      (spindle ? reading.spindle_range : reading.range[c]) = range.value;
+      if (is_short) reading.short_std[c] = range.std_dev;
     } catch (const Error& error) {
       reading.reason[c] = error.what();
     }
@@ -142,6 +153,9 @@ MotorForce forceFromMotors(const MotorReading& cut, const std::vector<MotorReadi
     }
     Estimate force = calibration.drive[a]->opposing(*cut.range[a], *nearest->range[a]);
     Estimate other = calibration.drive[a]->opposing(-*cut.range[a], *nearest->range[a]);
+    const double noise = calibration.drive[a]->newton_per_ampere.value * cut.short_std[a];
+    force.std_dev = std::hypot(force.std_dev, noise);
+    other.std_dev = std::hypot(other.std_dev, noise);
     if (cut.velocity[a] > 0.0) {
       force.value = -force.value;
       other.value = -other.value;
@@ -164,9 +178,11 @@ MotorForce forceFromMotors(const MotorReading& cut, const std::vector<MotorReadi
       result.reason[3] = "no air cut near this spindle speed";
     } else {
       try {
-        result.torque = Estimate{calibration.spindle->torque(units::rpmFromRadPerSec(cut.spindle_speed),
-                                                             *cut.spindle_range - *nearest->spindle_range),
-                                 calibration.spindle->scatter()};
+        const double rpm = units::rpmFromRadPerSec(cut.spindle_speed),
+                     rise = *cut.spindle_range - *nearest->spindle_range;
+        const double torque = calibration.spindle->torque(rpm, rise);
+        const double noise = calibration.spindle->torque(rpm, rise + cut.short_std[3]) - torque;
+        result.torque = Estimate{torque, std::hypot(calibration.spindle->scatter(), noise)};
       } catch (const Error& error) {
         result.reason[3] = error.what();
       }

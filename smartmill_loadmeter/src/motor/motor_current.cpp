@@ -58,6 +58,11 @@ int levelFor(double frequency, double sample_rate) {
 }
 
 double phaseRange(const std::vector<double>& current, double sample_rate, double frequency, double slip) {
+  return phaseRangeEstimate(current, sample_rate, frequency, slip).value;
+}
+
+Estimate phaseRangeEstimate(const std::vector<double>& current, double sample_rate, double frequency,
+                            double slip) {
   const double periods = static_cast<double>(current.size()) * frequency / sample_rate;
   if (!(periods >= 2.0)) throw Error("phase current: less than two periods in the record");
   const std::vector<double> smooth = denoise(current, levelFor(frequency, sample_rate));
@@ -88,7 +93,11 @@ double phaseRange(const std::vector<double>& current, double sample_rate, double
   for (int step = -4; step <= steps; ++step) tryAt(0.25 * step);
   const double middle = found_at;
   for (int step = -4; step <= 4; ++step) tryAt(middle + 0.05 * step);
-  return 2.0 * amplitude;
+  // The sum of squares that level and sine leave, over independent samples.
+  double squares = 0.0;
+  for (const double value : current) squares += value * value;
+  const double n = static_cast<double>(current.size()), left = std::max(0.0, squares - best) / n;
+  return {2.0 * amplitude, 2.0 * std::sqrt(2.0 * left / n)};
 }
 
 double Line::stdAt(double x) const {

@@ -48,7 +48,8 @@ LoadMeterNode::LoadMeterNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
     identification_.identification().onMotorForce([this](const MotorForce& force) { publish(force); });
     force_publisher_ = nh.advertise<geometry_msgs::WrenchStamped>(names::FORCE_OF_MOTORS, 10, true);
   }
-  identification_.identification().onForce([this](const ForceEstimate& force) { publish(force); });
+  identification_.identification().onForce([this](const ForceEstimate& force) { tell(force); });
+  identification_.identification().onForceWindow([this](const ForceEstimate& force) { publish(force); });
   estimate_publisher_ = nh.advertise<smartmill_msgs::ForceEstimate>(names::FORCE_ESTIMATE, 10, true);
   connect(shell_.inputs(), parameters_, identification_);
   find_service_ = nh.advertiseService(names::FIND_COEFFICIENTS, &LoadMeterNode::find, this);
@@ -85,6 +86,7 @@ void LoadMeterNode::publish(const ForceEstimate& force) {
   message.header.stamp = fromSec(force.stamp);
   message.header.frame_id = frames::MACHINE;
   message.cut = force.name;
+  message.duration = force.duration;
   const auto fill = [](const std::array<Estimate, 3>& from, auto& value, auto& std_dev) {
     value.x = from[0].value, value.y = from[1].value, value.z = from[2].value;
     std_dev.x = from[0].std_dev, std_dev.y = from[1].std_dev, std_dev.z = from[2].std_dev;
@@ -96,6 +98,10 @@ void LoadMeterNode::publish(const ForceEstimate& force) {
   message.surprise = force.surprise;
   message.sources = force.sources;
   estimate_publisher_.publish(message);
+}
+
+void LoadMeterNode::tell(const ForceEstimate& force) {
+  publish(force);
   ROS_INFO("force, test '%s': %s", force.name.c_str(), force.text().c_str());
 }
 

@@ -42,6 +42,7 @@ class LoadMeterNode {
   void keep(const smartmill_msgs::DiscoverActionResult& discovered);
   void publish(const MotorForce& force);
   void publish(const ForceEstimate& force);
+  void tell(const ForceEstimate& force);
   void watch();
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 

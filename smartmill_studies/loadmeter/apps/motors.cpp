@@ -42,6 +42,12 @@ void tell(const char* name, const DayErrors& e) {
               100 * e.inside[1], 100 * e.inside[2]);
   std::printf("  %-44s %6.1f%% %6.1f%% %6.1f%%\n", "  within 1.96 std: dynamic", 100 * e.inside_rms[0],
               100 * e.inside_rms[1], 100 * e.inside_rms[2]);
+  std::printf("  %d windows of 0.5 s, ten a second while a cut is steady\n", e.windows);
+  row("  RMSE X, Y, Z [N]", e.window);
+  std::printf("  %-44s %6.1f%% %6.1f%% %6.1f%%\n", "  within 1.96 std: static", 100 * e.inside_window[0],
+              100 * e.inside_window[1], 100 * e.inside_window[2]);
+  std::printf("  %-44s %6.1f%% %6.1f%% %6.1f%%\n", "  within 1.96 std: dynamic", 100 * e.inside_window_rms[0],
+              100 * e.inside_window_rms[1], 100 * e.inside_window_rms[2]);
 }
 
 void run(int cuts, unsigned seed, double warmer, const std::string& out) {

@@ -28,6 +28,13 @@ TEST(MotorDays, currentsOfTheTwinBecomeForces) {
     std::printf("regression %.1f, ANFIS %.1f, old air %.1f N; estimate %.1f N, inside %.2f, dynamic %.2f\n",
                 errors.regression[a], errors.anfis[a], errors.old_air[a], errors.estimate[a],
                 errors.inside[a], errors.inside_rms[a]);
+  // Windows of one cut share their errors: 12 cuts, each inside with 95 %.
+  for (std::size_t a = 0; a < 3; ++a) {
+    std::printf("windows: %.1f N, inside %.2f, dynamic %.2f\n", errors.window[a], errors.inside_window[a],
+                errors.inside_window_rms[a]);
+    EXPECT_GT(errors.inside_window[a], 0.8);
+    EXPECT_GT(errors.inside_window_rms[a], 0.8);
+  }
   // Table 1 of Cheng & Venuvinod has 29 N for a feed drive, 36 N for the tangential force.
   EXPECT_LT(errors.regression[0], 10.0);
   EXPECT_LT(errors.regression[1], 10.0);
@@ -36,6 +43,8 @@ TEST(MotorDays, currentsOfTheTwinBecomeForces) {
   EXPECT_GT(errors.old_air[0], errors.regression[0]);
   for (const MotorCut& cut : warm) {
     ASSERT_TRUE(cut.estimate);
+    // Ten a second over 1.4 s, less settling and the first half second.
+    EXPECT_GE(cut.windows.size(), 4u);
     for (std::size_t a = 0; a < 3; ++a) {
       EXPECT_LT(std::abs(cut.estimate->mean[a].value - cut.force[a]), 4.0 * cut.estimate->mean[a].std_dev);
       EXPECT_LT(std::abs(cut.estimate->rms[a].value - cut.rms[a]), 4.0 * cut.estimate->rms[a].std_dev);

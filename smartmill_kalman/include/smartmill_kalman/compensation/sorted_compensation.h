@@ -13,6 +13,7 @@
 #include "smartmill_core/signal/stream_sorter.h"
 #include "smartmill_kalman/compensation/force_compensation.h"
 #include "smartmill_kalman/compensation/matrix_compensation.h"
+#include "smartmill_kalman/sensor/plate_calibrator.h"
 #include "smartmill_kalman/sensor/sensor_measurement.h"
 #include "smartmill_kalman/sensor/spindle_force_sensor.h"
 #include "smartmill_kalman/sensor/spindle_sensor_calibrator.h"
@@ -76,6 +77,7 @@ class SortedCompensation {
   /// Ends a reading, at the stamp of the newest input.
   void cancelCalibration();
   const SpindleSensorCalibrator& calibrator() const { return calibrator_; }
+  const PlateCalibrator& plate() const { return plate_; }
   /// Something that happened outside the streams, at the stamp of the newest input.
   void event(std::function<void(SensorMeasurement&)> what);
   /// Modes measured earlier (tool/modes of the force sensor) serve from their stamp on, unless the same or
@@ -105,6 +107,7 @@ class SortedCompensation {
  private:
   void drain();
   void drainCalibration();
+  void serve(CalibrationResult result);
   SampleBlock toForces(const SampleBlock& block);
   void forward(const ForceBlock& measured, const ForceBlock& compensated);
   void useModelFile();
@@ -123,6 +126,8 @@ class SortedCompensation {
   std::optional<CuttingCondition> condition_;
   TapParameters taps_;
   SpindleSensorCalibrator calibrator_;
+  PlateCalibrator plate_;
+  double bandwidth_;  // [Hz] of a matrix that is made here
   std::optional<SensorMatrix> matrix_;
   std::deque<std::pair<std::uint64_t, std::uint64_t>> invalid_;  // samples [from, to) that are no measurement
   std::function<void()> restarted_;

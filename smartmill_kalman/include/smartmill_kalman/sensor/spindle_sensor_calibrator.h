@@ -2,26 +2,26 @@
 
 #include <array>
 #include <cstdint>
-#include <deque>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "smartmill_core/signal/hit_collector.h"
 #include "smartmill_core/signal/streams.h"
 #include "smartmill_kalman/sensor/sensor_measurement.h"
 #include "smartmill_kalman/sensor/spindle_sensor_calibration.h"
+#include "smartmill_kalman/sensor/tap_collector.h"
+#include "smartmill_kalman/sensor/transfer_matrix.h"
 
 namespace smartmill::kalman {
 
 /// A step of a calibration, as the operator asks for it.
 struct CalibrationGoal {
-  enum class Step : std::uint8_t { reading = 0, fit = 1, verify = 2, forget = 3 };
+  enum class Step : std::uint8_t { reading = 0, fit = 1, verify = 2, forget = 3, point = 4 };
   double stamp = 0.0;  ///< [s] sensor data before it are not used
   Step step = Step::reading;
   int test = 0;                           ///< readings of one test drift together
   double length = 0.0;                    ///< [m] of tool and holder
-  std::array<double, 3> load{{0, 0, 0}};  ///< [N] that acts on the tool now
+  std::array<double, 3> load{{0, 0, 0}};  ///< [N] that acts on the tool now; of point: [m] of the taps
   bool reference = false;                 ///< the reading serves verify, not fit
   double duration = 0.5;                  ///< [s] that a reading is the mean of
   std::string file;                       ///< of fit: where the calibration goes, its readings beside it
@@ -35,6 +35,7 @@ struct CalibrationResult {
   std::array<double, 3> error{{0, 0, 0}};  ///< [1] of verify, x, y, z
   /// Of fit: serves from now on.
   std::optional<SpindleSensorCalibration> calibration;
+  std::optional<TransferMatrix> matrix;  ///< of a plate, likewise
 };
 
 /// Calibrates a spindle-integrated sensor on the machine (Burzoni 3.2, 3.4): readings under known loads give
@@ -63,14 +64,7 @@ class SpindleSensorCalibrator {
   std::string readingsTable() const;
 
  private:
-  struct Means {
-    double time;  // [s]
-    std::uint64_t index;
-    double rate;                 // [Hz]
-    std::array<double, 3> pair;  // [N]
-  };
   void read(const SampleBlock& block, const std::array<std::size_t, 6>& column);
-  void join();
   void finish(CalibrationResult::Code code, const std::string& message);
   void fit();
   std::string fitCourses(SpindleSensorCalibration& calibration) const;
@@ -85,15 +79,8 @@ class SpindleSensorCalibrator {
   std::size_t count_ = 0;
   std::optional<std::uint64_t> next_index_;
 
-  struct Sample {
-    std::uint64_t index;
-    double force;  // [N]
-  };
-  std::string direction_;  // of the blows; empty: none
-  std::deque<Sample> hammer_;
-  std::deque<Means> means_;
-  std::vector<HitCollector> collectors_;  // of x, y, z
-  std::vector<std::array<Hit, 3>> hits_;  // of the measurement that runs; pairs' means of x, y, z
+  std::string direction_;   // of the blows; empty: none
+  TapCollector collector_;  // pairs' means of x, y, z
   /// By direction: pairs' means after every blow that counts, x, y, z.
   std::array<std::vector<std::array<std::vector<double>, 3>>, 3> taps_;
   double tap_rate_ = 0.0;    // [Hz]

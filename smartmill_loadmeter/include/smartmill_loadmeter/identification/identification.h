@@ -113,6 +113,8 @@ class LoadMeterIdentification {
   void onMotorForce(std::function<void(const MotorForce&)> callback) { motor_force_ = std::move(callback); }
   /// Force of each cut by all that was measured of it.
   void onForce(std::function<void(const ForceEstimate&)> callback) { force_ = std::move(callback); }
+  /// The same while a cut is steady: of its last ForceEstimateParameters::window, each period.
+  void onForceWindow(std::function<void(const ForceEstimate&)> callback) { window_ = std::move(callback); }
   void onTest(std::function<void(const LoadTest&)> callback) { test_ = std::move(callback); }
   /// Every cut whose friction is known, for the database: condition, age of the edge, and the running
   /// estimate with it, whose standard deviations are those of one cut among as many as it rests on, so that
@@ -146,15 +148,16 @@ class LoadMeterIdentification {
   void dropAfter(double stamp);
   bool counts(double stamp) const;
   std::optional<Estimate> cuttingTorque(const LoadTest& cut) const;
-  void estimate(const LoadTest& cut) const;
+  std::optional<ForceEstimate> estimate(const LoadTest& cut) const;
+  void lookBack(double now);
   void closeTest();
-  LoadTest steadyTest() const;
+  LoadTest steadyTest(double since = -1e300) const;
   void keep(LoadTest test);
   void follow(const LoadTest& cut);
   void tell(const LoadTest& cut);
   IdentifyResult identify(const IdentifyGoal& goal) const;
   std::string addFromMotors(const std::vector<LoadTest>& cuts, CoefficientRecord* record) const;
-  void readMotorsOf(LoadTest* test);
+  void readMotorsOf(LoadTest* test, const MotorRecord& record, bool is_short) const;
 
   std::string file_;
   Spindle spindle_;
@@ -171,7 +174,8 @@ class LoadMeterIdentification {
   std::vector<Reading> readings_;
   MotorRecord motor_record_;
   ForceRecord force_record_;
-  std::function<void(const ForceEstimate&)> force_;
+  std::function<void(const ForceEstimate&)> force_, window_;
+  double next_window_ = 0.0;  // [s]
   std::optional<MotorCalibration> motors_;
   std::function<void(const MotorForce&)> motor_force_;
   struct PathPoint {

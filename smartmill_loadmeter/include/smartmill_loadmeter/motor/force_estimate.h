@@ -21,6 +21,8 @@ struct ForceEstimateParameters {
   double motor_error = 0.03;
   double sensor_error = 0.02;
   double sensor_zero = 2.0;
+  double period = 0.1;
+  double window = 0.5;
 
   void declare(ParameterTable& table);
 };
@@ -44,7 +46,8 @@ struct ForceReadings {
 /// All three components of one cut. A component that no sensor saw is what the others and the mechanics of
 /// the cut say of it, as uncertain as that is.
 struct ForceEstimate {
-  double stamp = 0.0;  ///< [s]
+  double stamp = 0.0;     ///< [s]
+  double duration = 0.0;  ///< [s] steady, that it is the mean of
   std::string name;
   std::array<Estimate, 3> mean;  ///< [N] static part: mean on the tool, machine X, Y, Z
   std::array<Estimate, 3> rms;   ///< [N] dynamic part: root mean square about the mean, over a tooth

@@ -28,8 +28,8 @@ class ForceRecord {
   /// Blocks of a filter that settles, and blocks with numbers that are not finite, do not count.
   void add(const ForceBlock& block);
   void dropAfter(double stamp);
-  /// Empty with fewer than 8 blocks.
-  std::optional<ForceReading> reading() const;
+  /// Of blocks that end after `since` [s]. Empty with fewer than 8 of them.
+  std::optional<ForceReading> reading(double since = -1e300) const;
 
  private:
   struct Part {

@@ -43,6 +43,8 @@ class MotorRecord {
   /// one.
   void add(const SampleBlock& block);
   void dropAfter(double stamp);
+  /// The last of it. @param duration [s]
+  MotorRecord last(double duration) const;
   bool empty() const { return rate_ == 0.0; }
   double rate() const { return rate_; }  ///< [Hz]
   /// [A] of channel x, y, z, spindle (0..3); empty without the channel.
@@ -61,10 +63,13 @@ struct MotorReading {
   double spindle_speed = 0.0;                  ///< [rad/s]
   std::array<std::optional<double>, 3> range;  ///< [A] X, Y, Z; empty: at rest, or not measured
   std::optional<double> spindle_range;         ///< [A]
-  std::array<std::string, 4> reason;           ///< why there is none
+  /// [A] of a range beyond the scatter of the calibration's cuts: of a record much shorter than theirs.
+  std::array<double, 4> short_std{{0, 0, 0, 0}};
+  std::array<std::string, 4> reason;  ///< why there is none
 };
+/// @param is_short of a part of a cut: the noise counts beside the calibration's scatter
 MotorReading readMotors(const MotorRecord& record, const MotorParameters& parameters,
-                        const std::array<double, 3>& velocity, double spindle_speed);
+                        const std::array<double, 3>& velocity, double spindle_speed, bool is_short = false);
 
 /// Cutting force by the motors: F = m (I - Ia), T = a(N) dI^b(N).
 struct MotorForce {

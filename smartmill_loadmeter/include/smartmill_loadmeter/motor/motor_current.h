@@ -26,6 +26,9 @@ int levelFor(double frequency, double sample_rate);
 /// @throws Error with less than two periods.
 double phaseRange(const std::vector<double>& current, double sample_rate, double frequency,
                   double slip = 0.0);
+/// The same with the standard deviation that what is left beside the sine gives it.
+Estimate phaseRangeEstimate(const std::vector<double>& current, double sample_rate, double frequency,
+                            double slip = 0.0);
 
 /// A straight line y = slope x + level, with its covariance.
 struct Line {

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <vector>
+
+#include "smartmill_core/signal/hit_collector.h"
+#include "smartmill_core/signal/streams.h"
+#include "smartmill_kalman/sensor/sensor_measurement.h"
+
+namespace smartmill::kalman {
+
+/// Records of all channels of a force sensor at the blows of a measurement that another class judges.
+class TapCollector {
+ public:
+  TapCollector(const TapParameters& taps, std::size_t channels);
+
+  void begin();
+  void end();
+  bool active() const { return active_; }
+  /// Block of the hammer (channel hammer [N]). @throws Error when the channel is missing.
+  void handleHammer(const SampleBlock& block);
+  /// One sample of all channels. @param time [s] @param index running index @param rate [Hz]
+  void add(double time, std::uint64_t index, double rate, std::vector<double> values);
+  /// Blows so far that the measurement counts: a hit a channel.
+  std::vector<std::vector<Hit>> counted(const SensorResult& result) const;
+  double rate() const { return rate_; }  ///< [Hz] of the last blow; 0 before
+
+ private:
+  struct Force {
+    std::uint64_t index;
+    double force;  // [N]
+  };
+  struct Sample {
+    double time;
+    std::uint64_t index;
+    double rate;
+    std::vector<double> values;
+  };
+  void join();
+
+  bool active_ = false;
+  double rate_ = 0.0;
+  std::deque<Force> hammer_;
+  std::deque<Sample> samples_;
+  std::vector<HitCollector> collectors_;
+  std::vector<std::vector<Hit>> hits_;
+};
+
+}  // namespace smartmill::kalman
