@@ -10,6 +10,7 @@
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/program.h"
 #include "smartmill_core/units.h"
+#include "smartmill_loadmeter/database/causes.h"
 #include "smartmill_loadmeter/database/database.h"
 #include "smartmill_loadmeter/database/fleet.h"
 #include "smartmill_loadmeter/database/fleet_model.h"
@@ -202,13 +203,30 @@ void improvements(const Options& o) {
   }
 }
 
+void proposals(const Options& o) {
+  mustExist(o.file);
+  const auto improvements = CoefficientDatabase(o.file).improvements();
+  const FleetCauses fleet = fleetCauses(improvements, o.machine);
+  if (fleet.explained == 0) throw Error(withoutPassword(o.file) + ": no other machine was explained yet");
+  std::printf("# %zu machines explained; each cause none of them has: odds %.3g\n", fleet.explained,
+              fleet.other_odds);
+  int number = 0;
+  for (const Proposal& p : proposalsFor(o.machine, improvements)) {
+    std::printf("%d. %s: tells %.3f nat of the cause\n", ++number, p.test.c_str(), p.information);
+    for (const std::string& reason : p.reasons) std::printf("     %s\n", reason.c_str());
+  }
+  if (number == 0) std::printf("nothing to check: this machine has what the others were found to have\n");
+}
+
 /// Commands about what is kept beside coefficients.
 class EvidenceCommands {
  public:
   EvidenceCommands(CommandLine& line, Options& o)
       : keep_(line.command("keep", "takes a report of `explain`, or what `hammer health -o` wrote, in")),
         health_(line.command("health", "what the spindles' health was, oldest first")),
-        improvements_(line.command("improvements", "what explanations found, with the evidence")) {
+        improvements_(line.command("improvements", "what explanations found, with the evidence")),
+        proposals_(line.command("proposals", "what a machine should check, as others have it")) {
+    proposals_.option("MACHINE", o.machine, "whose model is believed until now").required();
     keep_.option("FILE", o.other, "folder of the report or report.json; or a .csv of health").required();
     keep_.option("--machine", o.machine, "whose it is").required();
     keep_.option("--campaign", o.campaign, "folder that was explained: tells the tests' conditions");
@@ -219,10 +237,11 @@ class EvidenceCommands {
     if (keep_.parsed()) keep(o);
     if (health_.parsed()) health(o);
     if (improvements_.parsed()) improvements(o);
+    if (proposals_.parsed()) proposals(o);
   }
 
  private:
-  CommandOptions keep_, health_, improvements_;
+  CommandOptions keep_, health_, improvements_, proposals_;
 };
 
 // What machines share and what is each one's own, from Ktc; then the next cut of each.

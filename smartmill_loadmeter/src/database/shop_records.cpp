@@ -100,33 +100,23 @@ void addCondition(const CampaignTest& test, Json* json) {
   (*json)["exit_deg"] = units::degFromRad(test.engagement->exit);
 }
 
-// Each test once, by the channel in which the gap changed most.
+// Each test once, with its channels.
 std::string testsOf(const Json& gaps, const std::string& campaign) {
   std::map<std::string, Json> conditions;
   if (!campaign.empty()) {
     for (const CampaignTest& t : readCampaign(campaign).tests) addCondition(t, &conditions[t.name]);
   }
-  std::vector<std::string> order;
-  std::map<std::string, Json> tests;
-  const auto change = [](const Json& g) {
-    const double before = g.at("before"), after = g.at("after");
-    return std::abs(before * before - after * after);
-  };
+  std::map<std::string, std::size_t> at;
+  Json list = Json::array();
   for (const Json& gap : gaps) {
     const std::string name = gap.at("test");
-    const bool is_new = tests.find(name) == tests.end();
-    if (is_new) order.push_back(name);
-    if (!is_new && change(tests[name]) >= change(gap)) continue;
-    Json kept = {{"test", name},
-                 {"channel", gap.at("channel")},
-                 {"heldout", gap.at("heldout")},
-                 {"before", gap.at("before")},
-                 {"after", gap.at("after")}};
-    if (const auto at = conditions.find(name); at != conditions.end()) kept.update(at->second);
-    tests[name] = kept;
+    if (at.try_emplace(name, list.size()).second) {
+      list.push_back({{"test", name}, {"heldout", gap.at("heldout")}, {"gaps", Json::object()}});
+      if (const auto known = conditions.find(name); known != conditions.end())
+        list.back().update(known->second);
+    }
+    list[at[name]]["gaps"][gap.at("channel").get<std::string>()] = {gap.at("before"), gap.at("after")};
   }
-  Json list = Json::array();
-  for (const std::string& name : order) list.push_back(tests[name]);
   return list.dump();
 }
 
@@ -175,27 +165,28 @@ void take(const Row& row, HealthRecord* health) {
 
 namespace {
 
-// The test whose gap fell most, in words.
-std::string mostShown(const Json& tests) {
-  const Json* most = nullptr;
-  double largest = 0.0;
-  for (const Json& t : tests) {
-    const double before = t.at("before"), after = t.at("after"), fell = before * before - after * after;
-    if (fell <= largest) continue;
-    largest = fell;
-    most = &t;
+// Name and condition, in words.
+std::string nameOf(const Json& test) {
+  const auto number = [&test](const char* key) { return test.at(key).get<double>(); };
+  const std::string name = test.at("test");
+  if (test.contains("axial_depth_mm")) {
+    return name + formatted(" (a cut at %.0f rpm, %.3g mm a tooth, %.3g mm deep, from %.0f to %.0f deg)",
+                            number("spindle_speed_rpm"), number("feed_per_tooth_mm"),
+                            number("axial_depth_mm"), number("entry_deg"), number("exit_deg"));
   }
-  if (!most) return "";
-  const auto number = [most](const char* key) { return most->at(key).get<double>(); };
-  std::string text = most->at("test").get<std::string>();
-  if (most->contains("axial_depth_mm")) {
-    text += formatted(" (a cut at %.0f rpm, %.3g mm a tooth, %.3g mm deep)", number("spindle_speed_rpm"),
-                      number("feed_per_tooth_mm"), number("axial_depth_mm"));
-  } else if (most->contains("spindle_speed_rpm")) {
-    text += formatted(" (%.0f rpm, no cut)", number("spindle_speed_rpm"));
+  if (test.contains("spindle_speed_rpm"))
+    return name + formatted(" (no cut, %.0f rpm)", number("spindle_speed_rpm"));
+  return name;
+}
+
+// Lists of a record. @throws Error naming whose it is.
+template <typename Work>
+void eachOf(const ModelImprovement& improvement, const std::string& list, const Work& work) {
+  try {
+    for (const Json& item : Json::parse(list)) work(item);
+  } catch (const Json::exception& error) {
+    throw Error("explanation of '" + improvement.machine + "': " + error.what());
   }
-  return text + formatted(", %s: gap %.3g -> %.3g", most->at("channel").get<std::string>().c_str(),
-                          number("before"), number("after"));
 }
 
 FoundCause causeOf(const Json& effect) {
@@ -230,16 +221,20 @@ std::string FoundCause::text() const {
 
 std::vector<FoundCause> causesOf(const ModelImprovement& improvement) {
   std::vector<FoundCause> causes;
-  try {
-    for (const Json& effect : Json::parse(improvement.effects)) {
-      if (effect.contains("form")) continue;
-      causes.push_back(causeOf(effect));
-      causes.back().shown_in = mostShown(Json::parse(improvement.tests));
-    }
-  } catch (const Json::exception& error) {
-    throw Error("explanation of '" + improvement.machine + "': " + error.what());
-  }
+  eachOf(improvement, improvement.effects, [&](const Json& effect) {
+    if (!effect.contains("form")) causes.push_back(causeOf(effect));
+  });
   return causes;
+}
+
+std::vector<TestEvidence> evidenceOf(const ModelImprovement& improvement) {
+  std::vector<TestEvidence> tests;
+  eachOf(improvement, improvement.tests, [&](const Json& t) {
+    tests.push_back({nameOf(t), {}});
+    for (const auto& [channel, gap] : t.at("gaps").items())
+      tests.back().gaps.push_back({channel, gap.at(0), gap.at(1)});
+  });
+  return tests;
 }
 
 ModelImprovement readImprovement(const std::string& report, const std::string& campaign) {

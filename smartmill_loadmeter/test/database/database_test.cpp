@@ -301,7 +301,9 @@ TEST(Database, aReportIsKeptWithItsEvidenceAndOnce) {
   const auto causes = causesOf(kept);
   ASSERT_EQ(causes.size(), 1u) << "a cause without a name is none to look for";
   EXPECT_EQ(causes[0].text(), "runout: angle_deg 261.8 +- 0.01, offset_um 21.08 +- 0.004");
-  EXPECT_EQ(causes[0].shown_in, "slot, fy: gap 90 -> 1.1");
+  EXPECT_EQ(evidenceOf(kept).at(1).test, "slot");
+  EXPECT_EQ(evidenceOf(kept).at(1).gaps.at(1).channel, "fy");
+  EXPECT_EQ(evidenceOf(kept).at(1).gaps.at(1).before, 90.0);
   EXPECT_EQ(kept.heldout_after, 1.009);
   CoefficientDatabase database("");
   EXPECT_EQ(database.add(std::vector<ModelImprovement>{kept}), 1u);

@@ -52,13 +52,25 @@ struct FoundCause {
   std::string name;  ///< as in the catalogue of effects
   std::vector<Parameter> parameters;
   double delta_bic = 0.0, confidence = 0.0;  ///< [1] as in the report
-  std::string shown_in;  ///< test of the report in which it took most, with its condition where that is known
 
   std::string text() const;  ///< "runout: offset_um 9.02 +- 0.02, angle_deg 41 +- 1"
 };
 
 /// Causes with a name. @throws Error when the record's lists are no such JSON.
 std::vector<FoundCause> causesOf(const ModelImprovement& improvement);
+
+/// A test of an explanation.
+struct TestEvidence {
+  struct Gap {
+    std::string channel;
+    double before = 0.0, after = 0.0;  ///< [1]
+  };
+  std::string test;  ///< name, with its condition where that is known
+  std::vector<Gap> gaps;
+};
+
+/// @throws Error as causesOf().
+std::vector<TestEvidence> evidenceOf(const ModelImprovement& improvement);
 
 /// From a report of `explain` (its folder or report.json). @param campaign folder whose tests say the
 /// conditions; empty: only their names. @throws Error naming file and fault.

@@ -1,0 +1,169 @@
+// rosrun smartmill_studies loadmeter_causes: tests needed to tell a machine's cause, with and without what
+// its shop was found to have before. What each cause shows in which test comes from real reports of
+// `explain`; the sizes are drawn, and what a test shows scales with them.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <map>
+#include <random>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/program.h"
+#include "smartmill_loadmeter/database/causes.h"
+
+namespace {
+
+using namespace smartmill;             // NOLINT
+using namespace smartmill::loadmeter;  // NOLINT
+using nlohmann::json;
+
+constexpr double SAMPLES = 3840.0;  // of a record of 0.15 s at 25.6 kHz
+
+struct Options {
+  std::vector<std::string> reports;
+  int shops = 200, explained = 30, newcomers = 50;
+  double ratio = 0.6;
+  unsigned seed = 1;
+};
+
+/// One machine: a cause (the number of a report) of a size.
+class Draw {
+ public:
+  Draw(const std::vector<ModelImprovement>& causes, const Options& o) : causes_(causes), random_(o.seed) {
+    for (std::size_t c = 0; c < causes.size(); ++c) weights_.push_back(std::pow(o.ratio, double(c)));
+  }
+  /// Which causes are frequent differs from shop to shop.
+  void newShop() { std::shuffle(weights_.begin(), weights_.end(), random_); }
+  std::size_t cause() {
+    return std::discrete_distribution<std::size_t>(weights_.begin(), weights_.end())(random_);
+  }
+  /// 0: the most frequent of this shop
+  std::size_t rankOf(std::size_t cause) const {
+    return static_cast<std::size_t>(
+        std::count_if(weights_.begin(), weights_.end(), [&](double w) { return w > weights_[cause]; }));
+  }
+  /// What an explanation of the whole plan would show: squares over the noise grow with the size's square,
+  /// and scatter by 4 m / n about their mean m over n samples (noncentral chi-square).
+  ModelImprovement machine(const std::string& name, std::size_t cause) {
+    const double size =
+        std::exp(std::uniform_real_distribution<double>(std::log(0.1), std::log(1.5))(random_));
+    std::normal_distribution<double> normal;
+    ModelImprovement drawn = causes_[cause];
+    drawn.machine = name;
+    json tests = json::parse(drawn.tests);
+    for (json& test : tests) {
+      for (auto& [channel, gap] : test["gaps"].items()) {
+        const double before = gap[0], after = gap[1];
+        double lost = std::max(0.0, before * before - after * after) * size * size;
+        lost += std::sqrt(4.0 * lost / (channel == "load_meter" ? 1.0 : SAMPLES)) * normal(random_);
+        gap = {std::sqrt(std::max(0.0, 1.0 + lost)), 1.0};
+      }
+    }
+    drawn.tests = tests.dump();
+    return drawn;
+  }
+
+ private:
+  const std::vector<ModelImprovement>& causes_;
+  std::mt19937_64 random_;
+  std::vector<double> weights_;
+};
+
+/// Of one way to choose tests.
+struct Count {
+  int machines = 0, right = 0, wrong = 0;
+  double tests = 0.0;  // of those named right
+
+  void print(const char* name) const {
+    std::printf("%-44s %6d %6d %6d %8.2f\n", name, machines, right, wrong, right ? tests / right : 0.0);
+  }
+};
+
+enum class Way { fleet, alone, plan };
+
+/// @param due the truth's place among the fleet's causes; causes.size() + 1: none of these
+void search(const FleetCauses& fleet, const ModelImprovement& machine, std::size_t due, Way way,
+            Count* count) {
+  std::map<std::string, Outcome> shows;
+  for (const TestEvidence& t : evidenceOf(machine)) shows[t.test] = outcomeOf(t);
+  std::vector<double> odds;
+  for (const FleetCause& c : fleet.causes)
+    odds.push_back(way == Way::fleet ? c.odds : 1.0 / static_cast<double>(fleet.causes.size()));
+  CauseSearch search(fleet, odds);
+  ++count->machines;
+  for (std::size_t made = 0; made <= fleet.tests.size(); ++made) {
+    if (const auto alone = search.alone()) {
+      (*alone == due ? count->right : count->wrong) += 1;
+      if (*alone == due) count->tests += static_cast<double>(made);
+      return;
+    }
+    const auto test = way == Way::plan ? std::optional<std::size_t>(made) : search.next();
+    if (!test || *test >= fleet.tests.size()) return;
+    search.saw(*test, shows[fleet.tests[*test]]);
+  }
+}
+
+void run(const Options& o) {
+  std::vector<ModelImprovement> causes;
+  for (const std::string& report : o.reports) {
+    const ModelImprovement i = readImprovement(report);
+    const auto named = causesOf(i);
+    if (named.size() != 1)
+      throw Error(report + ": names " + std::to_string(named.size()) + " causes, one is due");
+    causes.push_back(i);
+  }
+  Draw draw(causes, o);
+  std::map<Way, Count> all, frequent, rare, unmet;
+  for (int s = 0; s < o.shops; ++s) {
+    draw.newShop();
+    std::vector<ModelImprovement> known;
+    for (int m = 0; m < o.explained; ++m)
+      known.push_back(draw.machine("m" + std::to_string(m), draw.cause()));
+    const FleetCauses fleet = fleetCauses(known, "");
+    for (int m = 0; m < o.newcomers; ++m) {
+      const std::size_t truth = draw.cause();
+      const ModelImprovement machine = draw.machine("new", truth);
+      const std::string name = causesOf(causes[truth]).at(0).name;
+      const auto at = std::find_if(fleet.causes.begin(), fleet.causes.end(),
+                                   [&](const FleetCause& c) { return c.name == name; });
+      const bool met = at != fleet.causes.end();
+      const auto due = met ? static_cast<std::size_t>(at - fleet.causes.begin()) : fleet.causes.size() + 1;
+      for (const Way way : {Way::fleet, Way::alone, Way::plan}) {
+        search(fleet, machine, due, way, &all[way]);
+        search(fleet, machine, due, way, &(!met ? unmet : draw.rankOf(truth) < 2 ? frequent : rare)[way]);
+      }
+    }
+  }
+  std::printf("%zu causes, %d shops, %d machines explained in each, %d more to tell\n%-44s %6s %6s %6s %8s\n",
+              causes.size(), o.shops, o.explained, o.newcomers, "", "all", "right", "wrong", "tests");
+  for (auto& [name, counts] :
+       {std::make_pair("all", &all), std::make_pair("the two most frequent causes", &frequent),
+        std::make_pair("rarer ones", &rare), std::make_pair("never met before", &unmet)}) {
+    (*counts)[Way::fleet].print((std::string(name) + ", tests by the fleet's prior").c_str());
+    (*counts)[Way::alone].print((std::string(name) + ", each cause as likely").c_str());
+    (*counts)[Way::plan].print((std::string(name) + ", in the plan's order").c_str());
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  Options o;
+  CommandLine line(
+      "Tests needed to tell a machine's cause, with what its shop was found to have, and without.");
+  line.option("REPORT", o.reports, "of `explain`, each naming one cause").required();
+  line.option("--shops", o.shops).showDefault().within(1, 100000);
+  line.option("--explained", o.explained, "machines of a shop explained before")
+      .showDefault()
+      .within(1, 1000);
+  line.option("--newcomers", o.newcomers, "machines of a shop to tell").showDefault().within(1, 1000);
+  line.option("--ratio", o.ratio, "frequency of each cause to the next more frequent one")
+      .showDefault()
+      .within(0.01, 1.0);
+  line.option("--seed", o.seed, "of the draws").showDefault();
+  return runProgram(line, argc, argv, [&] { run(o); });
+}
