@@ -296,6 +296,7 @@ def the_fleet_is_told(browser, machine):
     browser.resize(*SIZES["1280x800"])
     machine.fleet()
     browser.wait("!document.querySelector('#fleet-server .word.bad')")
+    browser.js("(location.hash = 'overview', 1)")
 
 
 def silence_turns_values_grey(browser, machine):
