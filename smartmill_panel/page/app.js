@@ -10,11 +10,12 @@ import { Dynamics } from './views/dynamics.js';
 import { Session, Progress, Notes, Replay } from './views/session.js';
 import { Commands } from './views/commands.js';
 import { Discrepancy, Report, Database, Diagnostics } from './views/model.js';
+import { Fleet } from './views/fleet.js';
 
 const REFRESH = 100;  // [ms] ten times a second, as controllers' own panels do
 
 const VIEWS = {
-  overview: 'Overview', forces: 'Forces', stability: 'Stability', dynamics: 'Dynamics', session: 'Session', model: 'Model',
+  overview: 'Overview', forces: 'Forces', stability: 'Stability', dynamics: 'Dynamics', session: 'Session', model: 'Model', fleet: 'Fleet',
 };
 
 // A card with a headline.
@@ -133,6 +134,8 @@ class Page {
       more.append(element);
       this.add('model', element, build(element));
     }
+
+    this.add('fleet', null, new Fleet(this.views.fleet, link, card));
   }
 
   setTheme(theme) {

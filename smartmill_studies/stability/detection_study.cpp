@@ -103,8 +103,8 @@ std::vector<DetectionCut> drawCuts(const RegenerativeSystem& system, const Detec
     const double limit = solver->limit(cut.speed, options.max_depth).depth;
     const double share = unit(random);
     if (!std::isfinite(limit)) continue;
-    const bool deep = (cuts.size() + static_cast<std::size_t>(options.first)) % 2 == 1;
-    cut.depth = limit * (deep ? 0.4 + 0.5 * share : 1.2 + 0.8 * share);
+    const bool below = (cuts.size() + static_cast<std::size_t>(options.first)) % 2 == 1;
+    cut.depth = limit * (below ? 0.4 + 0.5 * share : 1.2 + 0.8 * share);
     const auto at = solver->at(cut.speed);
     cut.radius = at->multiplier(cut.depth).radius();
     // Beyond a first loss a pocket may follow; ask for clear cases.

@@ -13,7 +13,7 @@ namespace smartmill::stability {
 
 struct DetectionOptions : StudyRange {
   int cuts = 300;
-  int first = 0;  ///< [1] >= 0 number of the first: even ones are to be stable, odd ones to chatter
+  int first = 0;  ///< [1] >= 0 number of the first: even ones are to chatter, odd ones not
   /// force: fx, fy, fz with the model's noise; vibration: acceleration of the tip; sound: pressure that goes
   /// with the tip's acceleration. Noise of the latter two: a share of the signal's rms.
   std::string signal = "force";

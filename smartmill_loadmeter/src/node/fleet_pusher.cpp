@@ -36,14 +36,34 @@ void FleetPusher::work() {
   }
 }
 
+// Who pushed when changes with every look; what is known only with new records.
+void FleetPusher::look(State& next) {
+  CoefficientDatabase seen(file_ + ".fleet");
+  const std::vector<FleetMember> members = fleetMembers(url_);
+  if (CoefficientDatabase(url_).size() != seen.size()) {
+    pull(seen, url_);
+  } else if (next.overview) {
+    auto same = std::make_shared<FleetOverview>(*next.overview);
+    if (renew(members, *same)) {
+      next.overview = same;
+      return;
+    }
+  }
+  next.overview =
+      std::make_shared<FleetOverview>(fleetOverview(members, seen.records("", ""), loginOf(url_)));
+}
+
 void FleetPusher::pushOnce() {
   State next;
+  next.tries = state_.tries + 1;
+  next.overview = state_.overview;
   try {
     CoefficientDatabase local(file_);
     try {
       const FleetTransfer done = push(local, url_);
       next.message = std::to_string(done.fresh) + " new of " + std::to_string(done.offered) + " sent to " +
                      withoutPassword(url_);
+      look(next);
     } catch (const Error& error) {
       next.failing = true;
       next.message = error.what();

@@ -3,6 +3,7 @@
 #include <geometry_msgs/WrenchStamped.h>
 #include <smartmill_msgs/ForceEstimate.h>
 
+#include "node/fleet_message.h"
 #include "node/wiring.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/force_names.h"
@@ -59,9 +60,11 @@ LoadMeterNode::LoadMeterNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
       [this](const smartmill_msgs::DiscoverActionResult::ConstPtr& result) { keep(*result); });
   shell_.diagnose("load meter", [this](auto& status) { diagnose(status); });
   shell_.every(WATCH_PERIOD, [this] { watch(); });
-  if (!parameters_.fleet.empty())
+  if (!parameters_.fleet.empty()) {
+    fleet_publisher_ = nh.advertise<smartmill_msgs::FleetState>(FLEET_STATE, 1, true);
     pusher_ =
         std::make_unique<FleetPusher>(parameters_.database, parameters_.fleet, parameters_.fleet_period);
+  }
   server_.start();
 }
 
@@ -249,8 +252,20 @@ void LoadMeterNode::keep(const smartmill_msgs::DiscoverActionResult& discovered)
   }
 }
 
+// After every try of the pusher.
+void LoadMeterNode::tellFleet() {
+  if (!pusher_) return;
+  const FleetPusher::State state = pusher_->state();
+  if (state.tries == fleet_told_) return;
+  fleet_told_ = state.tries;
+  smartmill_msgs::FleetState message = toMsg(state, parameters_.fleet);
+  message.header.stamp = ros::Time::now();
+  fleet_publisher_.publish(message);
+}
+
 // Liveness only: when every input has fallen silent nothing more can come before what waits.
 void LoadMeterNode::watch() {
+  tellFleet();
   if (!shell_.inputs().any().dead()) return;
   if (!waiting_.empty()) ROS_WARN_THROTTLE(5.0, "no controller state or load any more: using what has come");
   identification_.flush();

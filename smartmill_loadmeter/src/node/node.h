@@ -44,6 +44,7 @@ class LoadMeterNode {
   void publish(const ForceEstimate& force);
   void tell(const ForceEstimate& force);
   void watch();
+  void tellFleet();
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
   NodeParameters parameters_;
@@ -55,8 +56,9 @@ class LoadMeterNode {
   std::uint64_t next_id_ = 1;
   std::string last_message_, last_force_;
   std::size_t kept_cuts_ = 0, kept_explanations_ = 0;
+  std::uint64_t fleet_told_ = 0;
 
-  ros::Publisher publisher_, force_publisher_, estimate_publisher_;
+  ros::Publisher publisher_, force_publisher_, estimate_publisher_, fleet_publisher_;
   ros::Subscriber discovered_;
   ros::ServiceServer find_service_, recommend_service_;
   Server server_;

@@ -12,6 +12,7 @@
 #include <smartmill_msgs/CuttingCoefficients.h>
 #include <smartmill_msgs/CuttingCondition.h>
 #include <smartmill_msgs/DiscrepancyState.h>
+#include <smartmill_msgs/FleetState.h>
 #include <smartmill_msgs/ForceBlock.h>
 #include <smartmill_msgs/ForceRevolution.h>
 #include <smartmill_msgs/ForceSpectrum.h>
@@ -47,8 +48,8 @@ const std::map<std::string, std::string>& known() {
   using namespace smartmill_msgs;
   static const auto definitions =
       definitionsOf<ChatterAdvice, ChatterState, CncState, CuttingCoefficients, CuttingCondition,
-                    DiscrepancyState, ForceBlock, ForceRevolution, ForceSpectrum, ForceStrip, Frf, LoadSample,
-                    ModalModel, SampleBlock, SessionState, SpindleAngle, StabilityChart,
+                    DiscrepancyState, FleetState, ForceBlock, ForceRevolution, ForceSpectrum, ForceStrip, Frf,
+                    LoadSample, ModalModel, SampleBlock, SessionState, SpindleAngle, StabilityChart,
                     diagnostic_msgs::DiagnosticArray>();
   return definitions;
 }

@@ -94,6 +94,9 @@ TEST_F(PageTest, ForceAndSpectrumAreThoseOfTheMachine) {
 TEST_F(PageTest, EveryViewIsDrawn) {
   check("EveryViewIsDrawn");
 }
+TEST_F(PageTest, TheFleetIsTold) {
+  check("TheFleetIsTold");
+}
 TEST_F(PageTest, SilenceTurnsValuesGrey) {
   check("SilenceTurnsValuesGrey");
 }

@@ -18,7 +18,7 @@ from browser import PATIENCE, Browser, free_port
 NODE, PAGE, OUT = sys.argv[1:4]
 TOKEN = "a token that is long enough"
 SIZES = {"1280x800": (1280, 800), "1920x1080": (1920, 1080), "phone": (390, 844)}
-VIEWS = ["overview", "forces", "stability", "dynamics", "session", "model"]
+VIEWS = ["overview", "forces", "stability", "dynamics", "session", "model", "fleet"]
 GONE = 2.0  # [s] within which the page must say that the node is gone
 
 
@@ -73,6 +73,23 @@ class Machine:
             kte_std=800.0, kre_std=nan, kae_std=nan, friction_viscous=nan, friction_coulomb=nan, source="load_meter", test_count=12), latch=True)
         steps = [m.SessionStep(name="connect", detail="all there", elapsed=1.5, state=1), m.SessionStep(name="slot test", elapsed=61.0)]
         self.publish("session/state", m.SessionState(tool="end_mill", material="al7050", running=True, steps=steps), latch=True)
+        self.fleet()
+
+    def fleet(self, reached=True, message="2 new of 2 sent to postgresql://mill_07@shop/fleet"):
+        """A shop of twelve machines: mill 3 shows 24 % more, mill 7 is this one, mill 9 never pushed."""
+        m, nan = self.msg, math.nan
+        pairs = [m.FleetPair(tool="end_mill", material="al7050", records=220, own=14, ktc=796.4e6, ktc_std=9.1e6),
+                 m.FleetPair(tool="end_mill_16", material="1045 steel", records=85, own=0, ktc=1893e6, ktc_std=61e6)]
+        machines = []
+        for k in range(1, 13):
+            odd = k == 3
+            machines.append(m.FleetMachine(
+                name=f"mill {k}", here=k == 7, member=k != 12, records=20 + k, knows=[18, 0 if k == 7 else 9 + k], silent=nan if k == 9 else 40.0 + 400.0 * k,
+                behind=17 if k == 5 else 0, effect=nan if k == 9 else 0.215 if odd else 0.012 * math.sin(k), effect_std=nan if k == 9 else 0.009,
+                odd=nan if k == 9 else 0.981 if odd else 0.004, meaning="the same in all cuts: a wrong load-meter constant" if odd else ""))
+        self.publish("loadmeter/fleet", m.FleetState(
+            server="postgresql://mill_07@shop/fleet", reached=reached, message=message, behind=0 if reached else 3, between_machines=0.021,
+            between_batches=0.008, between_tools=0.09, between_cuts=0.015, pairs=pairs, machines=machines), latch=True)
 
     def run(self):
         while not self.rospy.is_shutdown():
@@ -190,7 +207,7 @@ def values_are_the_topics(browser):
 
 def messages_are_decoded_as_by_ros(browser, machine):
     import io
-    for topic in ("stability/chart", "tool/frf", "tool/modes", "material/coefficients", "cut/condition", "session/state"):
+    for topic in ("stability/chart", "tool/frf", "tool/modes", "material/coefficients", "cut/condition", "session/state", "loadmeter/fleet"):
         browser.wait("window.smartmill.link.message(arguments[0]) !== undefined", topic)
         sent = machine.last[topic]
         wire = io.BytesIO()
@@ -243,6 +260,43 @@ def force_and_spectrum_are_those_of_the_machine(browser):
     strip = browser.js("(m => [Math.min(...m.low.filter((v, i) => i % 3 == 0 && v == v)), Math.max(...m.high.filter((v, i) => i % 3 == 0 && v == v))])"
                        "(window.smartmill.link.message('panel/strip'))")
     assert abs(strip[0] - 60.0) < 0.5 and abs(strip[1] - 140.0) < 0.5, strip
+
+
+def the_fleet_is_told(browser, machine):
+    browser.js("(location.hash = 'fleet', 1)")
+    browser.wait("document.querySelectorAll('#fleet-machines tbody tr').length == 12")
+    rows = browser.js("[...document.querySelectorAll('#fleet-machines tbody tr')].map(r => [...r.children].map(e => e.textContent))")
+    equal(rows[0][0], "mill 3")  # the odd one first
+    equal(rows[0][4], "21.5 ± 0.9 %")
+    equal(rows[0][6], "odd, 98.1 %: the same in all cuts: a wrong load-meter constant")
+    equal([r[0] for r in rows[1:4]], ["mill 1", "mill 2", "mill 4"])
+    by_name = {r[0]: r for r in rows}
+    equal(by_name["mill 5"][2:4], ["17", "25"])
+    equal(by_name["mill 9"][1], "never")
+    equal(by_name["mill 12"][1], "no login")
+    assert by_name["mill 2"][1].endswith(" min ago"), by_name["mill 2"]
+    assert "mill 7 this one" in by_name, list(by_name)
+    equal(browser.js("[...document.querySelectorAll('#fleet-pairs tbody td')].map(e => e.textContent)"),
+          ["end_mill", "al7050", "220", "796 ± 9", "14 own", "end_mill_16", "1045 steel", "85", "1893 ± 61", "none of its own"])
+    equal(browser.js("[...document.querySelectorAll('#fleet-knows tbody tr:nth-child(7) td')].map(e => e.textContent)"), ["mill 7", "18", "·"])
+    said = browser.text("#fleet-server")
+    for words in ("The server answers: 2 new of 2 sent", "odd: mill 3", "2.1 % between machines"):
+        assert words in said, said
+    browser.picture(OUT + "/fleet.png")
+    why = 'postgresql://mill_07@shop/fleet: connection to server at "shop", port 5432 failed: FATAL: password authentication failed for user "mill_07"'
+    machine.fleet(False, why)
+    browser.wait("document.querySelector('#fleet-server .word.bad')")
+    equal(browser.text("#fleet-server .word.bad"), "The server did not take the last push: " + why)
+    assert "3 of this machine's records wait here" in browser.text("#fleet-server")
+    assert "what was known before" in browser.text("#fleet-server")
+    browser.resize(*SIZES["phone"])
+    browser.picture(OUT + "/fleet_away_phone.png")
+    wide = browser.js("document.documentElement.scrollWidth")
+    assert wide <= SIZES["phone"][0], wide
+    browser.resize(*SIZES["1280x800"])
+    machine.fleet()
+    browser.wait("!document.querySelector('#fleet-server .word.bad')")
+    browser.js("(location.hash = 'overview', 1)")
 
 
 def silence_turns_values_grey(browser, machine):
@@ -432,6 +486,7 @@ def main():
             bench.case(messages_are_decoded_as_by_ros, browser, machine)
             bench.case(force_and_spectrum_are_those_of_the_machine, browser)
             bench.case(every_view_is_drawn, browser)
+            bench.case(the_fleet_is_told, browser, machine)
             bench.case(silence_turns_values_grey, browser, machine)
             bench.case(hostile_origins_and_commands_without_token_are_refused, bench)
             bench.case(the_page_commands_after_an_unlock, browser)

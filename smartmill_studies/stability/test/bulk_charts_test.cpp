@@ -1,0 +1,60 @@
+// Charts in bulk: what they must show whatever machine is drawn.
+#include "stability/bulk_charts.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+namespace smartmill::stability {
+namespace {
+
+constexpr ChartDoubt NO_DOUBT{1e-9, 1e-9, 1e-9, 1e-9, 1e-9};
+
+ChartParameters parameters() {
+  ChartParameters p;
+  p.speed_low = 400.0;
+  p.speed_high = 2400.0;
+  p.speeds = 60;
+  p.entry = units::PI / 2;
+  p.exit = units::PI;
+  p.method = "zero_order";
+  p.use_modes = true;
+  p.frequency_std = p.gain_std = 0.0;
+  return p;
+}
+
+// Cantilever: the tip's compliance goes with the cube of the overhang, and so, against it, does the depth
+// that is stable at every speed (Altintas and Budak, eq. 2: in proportion to 1 / (Kt G)). The spindle's own
+// compliance keeps it below the cube, the damping of both directions is one.
+TEST(BulkCharts, aLongerToolBearsLess) {
+  std::mt19937_64 random(5);
+  ChartMachine machine = drawChartMachine(random);
+  std::vector<double> least, first;
+  for (const double diameters : {4.0, 6.0, 8.0}) {
+    machine.setOverhang(diameters * machine.x.shank_diameter);
+    std::mt19937_64 errors(1);
+    const BulkChart found = bulkChart(machine, parameters(), NO_DOUBT, errors);
+    least.push_back(found.chart.absolute_depth_limit);
+    first.push_back(found.first_mode);
+  }
+  for (std::size_t k = 1; k < least.size(); ++k) {
+    EXPECT_LT(least[k], 0.7 * least[k - 1]);
+    EXPECT_LE(first[k], first[k - 1]);
+  }
+  EXPECT_GT(least[2],
+            least[0] / 8.0 / 2.0);  // the cube from 4 to 8 diameters, and as much again for the flutes
+}
+
+// A machine that is known is cut where it is stable; one that is not chatters with the probability told.
+TEST(BulkCharts, whatIsKnownExactlyDoesNotChatter) {
+  for (unsigned seed = 1; seed <= 6; ++seed) {
+    std::mt19937_64 random(seed);
+    const ChartMachine machine = drawChartMachine(random);
+    const BulkChart found = bulkChart(machine, parameters(), NO_DOUBT, random);
+    ASSERT_FALSE(found.chart.recommended.empty()) << seed;
+    EXPECT_FALSE(found.chatters) << seed;
+  }
+}
+
+}  // namespace
+}  // namespace smartmill::stability
