@@ -250,9 +250,8 @@ std::string ofResonance(const FoundEffect& effect) {
 
 std::string ofRevolution(const FoundEffect& effect) {
   return formatted(
-      "at %.0f rpm and %.3g mm depth more comes again with each revolution than the model tells, straight "
-      "over "
-      "the feed: the table serves between the feeds that were cut, and its cause is not known",
+      "at %.0f rpm and %.3g mm depth more comes again with each revolution than the model tells: the table "
+      "serves between the feeds that were cut, and its cause is not known",
       valueOf(effect, "speed_rpm"), valueOf(effect, "depth_mm"));
 }
 
