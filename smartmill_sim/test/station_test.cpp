@@ -270,12 +270,17 @@ TEST(GapSensor, LowTeethEccentricityAndHousing) {
   StationTraits round;
   round.housing = 10e-3;
   round.rake_flank = round.relief_flank = 0.1;
-  const ToolSurface many(round, mill(10, 19e-3), 1e-3);
+  ToolGeometry straight = mill(10, 19e-3);
+  straight.helix = 0.0;
+  const ToolSurface many(round, straight, 1e-3);
   GapSensor between(round, station, 0.0);
   between.face(many, units::radFromDeg(18.0), 0.0, 0.0);
   const double edge = 9.5e-3 * (1.0 - std::cos(units::radFromDeg(18.0)));
   EXPECT_NEAR(between.clearance(0.0), edge, 60e-6);  // spots of 0.3 mm, steep there
   EXPECT_LT(between.voltage(250e-6), -7.0);
+  // The helix turns an edge by 17.4 degrees of these 18 before the housing's upper end.
+  between.face(ToolSurface(round, mill(10, 19e-3), 1e-3), units::radFromDeg(18.0), 0.0, 0.0);
+  EXPECT_NEAR(between.clearance(0.0), 0.0, 30e-6);
 }
 
 TEST(Solenoid, HalfSineBounceAndCurrent) {

@@ -6,7 +6,6 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/names.h"
-#include "smartmill_hammer/analysis/health.h"
 #include "smartmill_ros/node_main.h"
 #include "smartmill_ros/parameter_reader.h"
 #include "smartmill_ros/run_node.h"
@@ -40,7 +39,7 @@ HammerServer::HammerServer(ros::NodeHandle nh, ros::NodeHandle private_nh)
                  server_.restart();
                }}),
       idle_(parameters_.hold_back,
-            [this](const std::string& tool, const IdleRecord& seen) { compareIdle(tool, seen); }),
+            [this](const std::string& tool, const IdleRecord& seen) { health_.turned(tool, seen); }),
       streams_{sorted_, idle_},
       server_(nh, names::MEASURE_TOOL_FRF, "hammer",
               {[this](const MeasureFrfGoal& goal, std::function<bool(bool)> begin) {
@@ -58,21 +57,9 @@ HammerServer::HammerServer(ros::NodeHandle nh, ros::NodeHandle private_nh)
 }
 
 void HammerServer::finish(const MeasureFrfResult& result) {
-  if (result.code == FrfCode::ok) {
-    const std::string key = result.modes.tool + " " + result.modes.direction;
-    if (const auto before = last_good_.find(key); before != last_good_.end())
-      drift_ = driftOf(modeChanges(before->second, result.modes));
-    last_good_[key] = result.modes;
-  }
+  if (result.code == FrfCode::ok) health_.measured(result.modes);
   server_.finish({result.code, result.message, result.frf, result.modes, result.cross, result.sensitivity,
                   result.sensitivity_std, result.flute_sure, result.spindle_moves});
-}
-
-// At one speed a line and a load stand beside those of the first time; the sensor's dynamics are the same.
-void HammerServer::compareIdle(const std::string& tool, const IdleRecord& seen) {
-  IdleRecord& first = first_idle_[tool];
-  if (addSpeeds(first, seen)) return;
-  idle_drift_ = driftOf(idleChanges(first, seen, {}));
 }
 
 void HammerServer::watch() {
@@ -94,9 +81,7 @@ void HammerServer::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status)
   status.summary(Level::OK, sorted_.measuring() ? "measuring" : "ready");
   if (const InputHealth* dead = shell_.inputs().dead({names::HAMMER, names::CNC_STATE, names::SPINDLE_ANGLE}))
     status.mergeSummary(Level::WARN, dead->topic() + " is silent");
-  if (!drift_.empty()) status.mergeSummary(Level::WARN, "differs from the last good measurement: " + drift_);
-  if (!idle_drift_.empty())
-    status.mergeSummary(Level::WARN, "spindle in air differs from the first time: " + idle_drift_);
+  for (const std::string& warning : health_.warnings()) status.mergeSummary(Level::WARN, warning);
   status.add("late messages", sorted_.late());
   status.add("waiting for", sorted_.waitingFor());
   status.add("last measurement", server_.lastMessage());

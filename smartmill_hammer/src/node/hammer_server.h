@@ -1,13 +1,12 @@
 #pragma once
 
-#include <map>
 #include <optional>
-#include <string>
 
 #include <ros/node_handle.h>
 
 #include "machine_commands.h"
 #include "parameters.h"
+#include "smartmill_hammer/analysis/health_watch.h"
 #include "smartmill_hammer/analysis/idle_spindle.h"
 #include "smartmill_hammer/sequence/sorted_sequence.h"
 #include "smartmill_ros/frf_server.h"
@@ -39,7 +38,6 @@ class HammerServer {
 
  private:
   void finish(const MeasureFrfResult& result);
-  void compareIdle(const std::string& tool, const IdleRecord& seen);
   void watch();
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
@@ -50,10 +48,7 @@ class HammerServer {
   SortedIdle idle_;
   Streams streams_;
   FrfServer server_;
-  std::map<std::string, MeasuredModes> last_good_;  // by tool and direction
-  std::map<std::string, IdleRecord> first_idle_;    // by tool
-  std::string drift_;       // of the newest measurement against the one before; empty: none
-  std::string idle_drift_;  // of the newest air cuts against the first
+  HealthWatch health_;
 };
 
 }  // namespace hammer

@@ -15,6 +15,9 @@ constexpr int FACE_STEPS = 12;
 constexpr double TURN_STEP = 0.03, SAME_TURN = 1e-6;
 /// Of the gain over the voltage far off: no nearer to it is read.
 constexpr double LEAST_OVER = 0.02;
+/// [1] mean distance from a disc's diameter over its radius, 4 / (3 pi): by so much an edge across it reads
+/// off.
+constexpr double MEAN_ASIDE = 0.4244;
 /// [1] to which the approach tells the sensor's curve: its amplifier bends it.
 constexpr double SEEN_ERROR = 0.01;
 
@@ -80,7 +83,7 @@ void SensorApproach::forget() {
 
 void SensorApproach::readAnew() {
   profile_.clear();
-  const double wide = std::asin(std::min(0.9, 0.5 * options_.electrode / tool_.radius()));
+  const double wide = std::asin(std::min(0.9, 0.5 * MEAN_ASIDE * options_.electrode / tool_.radius()));
   for (const Reading& r : readings_) profile_.push_back({r.off + std::copysign(wide, r.off), retreatOf(r)});
 }
 

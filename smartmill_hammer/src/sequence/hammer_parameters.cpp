@@ -68,6 +68,8 @@ void declareCalibration(HammerParameters& p, ParameterTable& table) {
   table.number(
       "sensor_face", p.sensor_face, "m", Range::closed(0.0, 0.1),
       "diameter of the sensor's face, which the tool beside the sensor's middle must not touch either");
+  table.number("sensor_electrode", p.sensor_electrode, "m", Range::closed(0.0, 0.1),
+               "diameter of the part of it that sees");
   table.number(
       "curve_error", p.curve_error, "1", Range::closed(0.0, 0.5),
       "by which the sensor's voltage may stand off its nominal curve's before it is calibrated: what is "

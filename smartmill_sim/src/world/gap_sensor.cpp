@@ -84,7 +84,8 @@ void GapSensor::face(const ToolSurface& surface, double angle, double above, dou
   const double radius = surface.radius(), towards = surface.throwTo(angle, facing_);
   for (std::size_t i = 0; i < spots_.size(); ++i) {
     const double across = (spots_[i].lateral + beside) / radius;
-    if (std::abs(across) >= 1.0 || above + spots_[i].height < 0.0) {  // beside the tool, below its tip
+    const bool below = spots_[i].share == 0.0 && above + spots_[i].height < 0.0;  // the tool's tip
+    if (std::abs(across) >= 1.0 || below) {                                       // beside the tool
       behind_[i] = radius;
       continue;
     }

@@ -16,8 +16,8 @@ struct SensorApproachOptions {
   /// off, where the nominal curve is flat, a depth between flutes would else be told too deep.
   double curve_error = 0.15;
   double min_gap = 125e-6;  ///< [m] left before the face
-  /// [m] diameter of what sees: a reading is the mean over so much of a flank, and holds where that is
-  /// furthest from the flute.
+  /// [m] diameter of what sees: a reading is the mean over so much of a flank, and that of an edge across the
+  /// disc is off by what lies the mean distance of its places further from the flute.
   double electrode = 2e-3;
 };
 
