@@ -20,6 +20,7 @@ constexpr double LEAST_REVOLUTIONS = 11.0;  // the window's main lobe is +-4 of 
 constexpr int NEIGHBOURS = 8;               // places between harmonics whose mean is a line's noise
 constexpr double SAME_LINE = 5e-4;          // [1] of frequency
 constexpr double SAME_MODE = 0.1;           // [1] of frequency, at neighbouring speeds
+constexpr double SEEN = 3.0;                // [1] gain over its deviation
 constexpr int PASSES = 4;                   // of slopes and fits, each of which moves the other
 
 /// Four-term Blackman-Harris window, side lobes below -92 dB (Harris 1978).
@@ -216,6 +217,18 @@ double meanSpeed(const std::vector<CuttingLine>& lines) {
   return sum;
 }
 
+/// Takes out modes whose gain does not stand out of its own deviation: what the lines' misfit between groups
+/// of speeds may seem to ask for.
+void dropUnseen(ModalFit& fit, bool unit_static_gain) {
+  std::vector<Mode>& modes = fit.model.modes;
+  const auto unseen = [](const Mode& m) { return !(std::abs(m.gain) > SEEN * m.gain_std); };
+  if (std::none_of(modes.begin(), modes.end(), unseen)) return;
+  for (const Mode& mode : modes)
+    if (unit_static_gain && unseen(mode)) fit.model.direct += mode.gain;
+  modes.erase(std::remove_if(modes.begin(), modes.end(), unseen), modes.end());
+  fit.covariance.resize(0, 0);  // of other modes than these
+}
+
 /// Lines of one group, each as it would be at the group's mean speed.
 SpeedFrf fitted(std::vector<CuttingLine> lines, const std::vector<MovingMode>& moving,
                 const std::string& unit, const CuttingFrfOptions& options) {
@@ -239,6 +252,10 @@ SpeedFrf fitted(std::vector<CuttingLine> lines, const std::vector<MovingMode>& m
   fit.positive_gains = true;
   try {
     found.fit = fitModes(found.frf, fit);
+    dropUnseen(*found.fit, options.unit_static_gain);
+    if (!found.fit->model.modes.empty()) return found;
+    found.fit.reset();
+    found.reason = "no mode stands out of its deviation";
   } catch (const Error& e) {
     found.reason = e.what();
   }
