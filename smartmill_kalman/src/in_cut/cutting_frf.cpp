@@ -1,0 +1,408 @@
+#include "smartmill_kalman/in_cut/cutting_frf.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <Eigen/Dense>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
+#include "smartmill_core/signal/statistics.h"
+#include "smartmill_core/units.h"
+
+namespace smartmill::kalman {
+namespace {
+
+using Complex = std::complex<double>;
+
+constexpr double LEAST_REVOLUTIONS = 11.0;  // the window's main lobe is +-4 of their inverse
+constexpr int NEIGHBOURS = 8;               // places between harmonics whose mean is a line's noise
+constexpr double SAME_LINE = 5e-4;          // [1] of frequency
+constexpr double SAME_MODE = 0.1;           // [1] of frequency, at neighbouring speeds
+constexpr double SEEN = 3.0;                // [1] gain over its deviation
+constexpr int PASSES = 4;                   // of slopes and fits, each of which moves the other
+
+/// Four-term Blackman-Harris window, side lobes below -92 dB (Harris 1978).
+double window(std::size_t i, std::size_t size) {
+  const double turn = units::TWO_PI * (static_cast<double>(i) + 0.5) / static_cast<double>(size);
+  return 0.35875 - 0.48829 * std::cos(turn) + 0.14128 * std::cos(2.0 * turn) - 0.01168 * std::cos(3.0 * turn);
+}
+
+/// Angle of the spindle over a part: a parabola through what was measured, so that the reading's own noise
+/// does not stand in the lines. [rad]
+class Turning {
+ public:
+  Turning(const CutStretch& cut, std::size_t from, std::size_t size)
+      : middle_(0.5 * static_cast<double>(size - 1)), rate_(cut.sample_rate) {
+    if (cut.angle.empty()) {
+      speed_ = cut.speed;
+      return;
+    }
+    Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d right = Eigen::Vector3d::Zero();
+    double unwrapped = 0.0;
+    for (std::size_t i = 0; i < size; ++i) {
+      if (i > 0) unwrapped += std::remainder(cut.angle[from + i] - cut.angle[from + i - 1], units::TWO_PI);
+      const double t = (static_cast<double>(i) - middle_) / middle_;
+      const Eigen::Vector3d row(1.0, t, t * t);
+      normal += row * row.transpose();
+      right += row * unwrapped;
+    }
+    const Eigen::Vector3d found = normal.ldlt().solve(right);
+    speed_ = found[1] / middle_ * rate_;
+    bend_ = found[2] / (middle_ * middle_) * rate_ * rate_;
+  }
+  double speed() const { return speed_; }  // [rad/s] in the middle
+  double at(std::size_t i) const {
+    const double t = (static_cast<double>(i) - middle_) / rate_;
+    return (speed_ + bend_ * t) * t;
+  }
+
+ private:
+  double middle_, rate_, speed_ = 0.0, bend_ = 0.0;
+};
+
+/// Amplitudes at every half order of the spindle, 0, 1/2, 1, ...
+struct HalfOrders {
+  std::vector<Complex> force, response;
+
+  /// Power of what does not repeat at a line, from the places between the harmonics around it; one less than
+  /// there are, since few places make a ratio of Student's kind.
+  static double noise(const std::vector<Complex>& values, std::size_t order) {
+    double sum = 0.0;
+    int count = 0;
+    const auto last = static_cast<long>(values.size());
+    for (int n = 0; n < NEIGHBOURS; ++n) {
+      const long place = 2 * static_cast<long>(order) + 1 - NEIGHBOURS + 2 * n;
+      if (place < 1 || place >= last) continue;
+      sum += std::norm(values[static_cast<std::size_t>(place)]);
+      ++count;
+    }
+    return sum / (count - 1);
+  }
+};
+
+HalfOrders halfOrders(const CutStretch& cut, std::size_t from, std::size_t size, const Turning& turning,
+                      std::size_t orders) {
+  HalfOrders found;
+  found.force.resize(2 * orders + NEIGHBOURS);
+  found.response.resize(found.force.size());
+  double sum = 0.0, force_mean = 0.0, response_mean = 0.0;
+  for (std::size_t i = 0; i < size; ++i) {
+    const double w = window(i, size);
+    sum += w;
+    force_mean += w * cut.force[from + i];
+    response_mean += w * cut.response[from + i];
+  }
+  force_mean /= sum;
+  response_mean /= sum;
+  for (std::size_t i = 0; i < size; ++i) {
+    const double w = 2.0 * window(i, size) / sum;
+    const double force = w * (cut.force[from + i] - force_mean);
+    const double response = w * (cut.response[from + i] - response_mean);
+    const Complex turn = std::polar(1.0, -0.5 * turning.at(i));
+    Complex phase = 1.0;
+    for (std::size_t k = 0; k < found.force.size(); ++k, phase *= turn) {
+      found.force[k] += force * phase;
+      found.response[k] += response * phase;
+    }
+  }
+  return found;
+}
+
+/// Relative variance that the deviations of a sensor's modes leave in its response.
+double relativeVariance(const ModalModel& chain, double f) {
+  const Complex nominal = chain.response(f);
+  double sum = 0.0;
+  for (std::size_t m = 0; m < chain.modes.size(); ++m) {
+    const auto moved = [&](double Mode::*what, double by) {
+      if (!std::isfinite(by) || by == 0.0) return;
+      ModalModel other = chain;
+      other.modes[m].*what += by;
+      if (what == &Mode::gain) other.direct -= by;  // the static gain stays 1
+      sum += std::norm(other.response(f) / nominal - 1.0);
+    };
+    moved(&Mode::frequency, chain.modes[m].frequency_std);
+    moved(&Mode::damping_ratio, chain.modes[m].damping_ratio_std);
+    moved(&Mode::gain, chain.modes[m].gain_std);
+  }
+  return sum;
+}
+
+void linesOfPart(const CutStretch& cut, std::size_t from, std::size_t size, const CuttingFrfOptions& options,
+                 std::vector<CuttingLine>& lines) {
+  const Turning turning(cut, from, size);
+  const double step = turning.speed() / units::TWO_PI;  // [Hz]
+  if (!(step > 0.0) || static_cast<double>(size) / cut.sample_rate * step < LEAST_REVOLUTIONS) return;
+  const auto orders = static_cast<std::size_t>(options.high / step);
+  const HalfOrders found = halfOrders(cut, from, size, turning, orders);
+  for (auto k = static_cast<std::size_t>(cut.every); k <= orders; k += static_cast<std::size_t>(cut.every)) {
+    CuttingLine line;
+    line.frequency = static_cast<double>(k) * step;
+    if (line.frequency < options.low) continue;
+    line.speed = turning.speed();
+    const Complex shown = found.force[2 * k], chain = cut.chain.response(line.frequency);
+    const double force_noise = HalfOrders::noise(found.force, k),
+                 response_noise = HalfOrders::noise(found.response, k);
+    if (std::norm(shown) < options.least_signal * options.least_signal * force_noise) continue;
+    line.value = found.response[2 * k] / shown * chain;
+    line.force = std::abs(shown / chain);
+    const double relative = force_noise / std::norm(shown) + relativeVariance(cut.chain, line.frequency) +
+                            cut.relative_force_std * cut.relative_force_std;
+    line.std_dev = std::sqrt(response_noise / (line.force * line.force) + std::norm(line.value) * relative);
+    if (line.std_dev > 0.0) lines.push_back(line);
+  }
+}
+
+/// Lines at one frequency become one, the likelier the heavier; their scatter counts where it is larger.
+CuttingLine merged(const std::vector<CuttingLine>& lines) {
+  CuttingLine sum;
+  double weights = 0.0;
+  for (const CuttingLine& line : lines) {
+    const double weight = 1.0 / (line.std_dev * line.std_dev);
+    weights += weight;
+    sum.frequency += weight * line.frequency;
+    sum.value += weight * line.value;
+  }
+  sum.frequency /= weights;
+  sum.value /= weights;
+  double chi2 = 0.0;
+  for (const CuttingLine& line : lines)
+    chi2 += std::norm((line.value - sum.value) / line.std_dev) / static_cast<double>(lines.size());
+  sum.std_dev = std::sqrt(std::max(1.0, chi2) / weights);
+  return sum;
+}
+
+FrequencyResponse frfOf(std::vector<CuttingLine> lines, const std::string& unit) {
+  std::sort(lines.begin(), lines.end(),
+            [](const CuttingLine& a, const CuttingLine& b) { return a.frequency < b.frequency; });
+  FrequencyResponse frf;
+  frf.unit = unit;
+  frf.averages = 1;
+  for (std::size_t i = 0; i < lines.size();) {
+    std::vector<CuttingLine> same{lines[i]};
+    for (++i; i < lines.size() && lines[i].frequency < same.front().frequency * (1.0 + SAME_LINE); ++i)
+      same.push_back(lines[i]);
+    const CuttingLine line = merged(same);
+    frf.frequency.push_back(line.frequency);
+    frf.value.push_back(line.value);
+    frf.std_dev.push_back(line.std_dev);
+  }
+  return frf;
+}
+
+/// What of a mode goes with the speed.
+using Value = double Mode::*;
+constexpr Value VALUES[] = {&Mode::frequency, &Mode::damping_ratio, &Mode::gain};
+constexpr Value DEVIATIONS[] = {&Mode::frequency_std, &Mode::damping_ratio_std, &Mode::gain_std};
+constexpr std::size_t KINDS = 3;
+
+/// How a mode goes with the speed around a group of cuts: d ln value / d ln speed of each.
+struct MovingMode {
+  Mode mode;
+  double slope[KINDS] = {0.0, 0.0, 0.0}, std_dev[KINDS] = {0.0, 0.0, 0.0};
+
+  /// What its response at f loses when the speed is by this ratio another one. [unit]
+  Complex lost(double f, double ratio) const {
+    Mode there = mode;
+    for (std::size_t k = 0; k < KINDS; ++k) there.*VALUES[k] *= std::pow(ratio, slope[k]);
+    return mode.response(f) - there.response(f);
+  }
+};
+
+double meanSpeed(const std::vector<CuttingLine>& lines) {
+  double sum = 0.0;
+  for (const CuttingLine& line : lines) sum += line.speed / static_cast<double>(lines.size());
+  return sum;
+}
+
+/// Takes out modes whose gain does not stand out of its own deviation: what the lines' misfit between groups
+/// of speeds may seem to ask for.
+void dropUnseen(ModalFit& fit, bool unit_static_gain) {
+  std::vector<Mode>& modes = fit.model.modes;
+  const auto unseen = [](const Mode& m) { return !(std::abs(m.gain) > SEEN * m.gain_std); };
+  if (std::none_of(modes.begin(), modes.end(), unseen)) return;
+  for (const Mode& mode : modes)
+    if (unit_static_gain && unseen(mode)) fit.model.direct += mode.gain;
+  modes.erase(std::remove_if(modes.begin(), modes.end(), unseen), modes.end());
+  fit.covariance.resize(0, 0);  // of other modes than these
+}
+
+/// Lines of one group, each as it would be at the group's mean speed.
+SpeedFrf fitted(std::vector<CuttingLine> lines, const std::vector<MovingMode>& moving,
+                const std::string& unit, const CuttingFrfOptions& options) {
+  SpeedFrf found;
+  found.speed = meanSpeed(lines);
+  found.lowest = lines.front().speed;
+  found.highest = lines.back().speed;
+  for (CuttingLine& line : lines)
+    for (const MovingMode& mode : moving) line.value += mode.lost(line.frequency, line.speed / found.speed);
+  found.frf = frfOf(std::move(lines), unit);
+  const auto count = static_cast<int>(found.frf.size());
+  if (count < options.least_lines) {
+    found.reason = formatted("%d lines, %d are needed", count, options.least_lines);
+    return found;
+  }
+  ModalFitOptions fit;
+  fit.low = options.low;
+  fit.high = options.high;
+  fit.max_modes = options.max_modes;
+  fit.unit_static_gain = options.unit_static_gain;
+  fit.positive_gains = true;
+  try {
+    found.fit = fitModes(found.frf, fit);
+    dropUnseen(*found.fit, options.unit_static_gain);
+    if (!found.fit->model.modes.empty()) return found;
+    found.fit.reset();
+    found.reason = "no mode stands out of its deviation";
+  } catch (const Error& e) {
+    found.reason = e.what();
+  }
+  return found;
+}
+
+/// One of the modes that has this frequency, or none.
+const Mode* nearest(const SpeedFrf& frf, double frequency) {
+  const Mode* best = nullptr;
+  if (!frf.fit) return best;
+  for (const Mode& mode : frf.fit->model.modes) {
+    const double apart = std::abs(std::log(mode.frequency / frequency));
+    if (apart < SAME_MODE && (!best || apart < std::abs(std::log(best->frequency / frequency)))) best = &mode;
+  }
+  return best;
+}
+
+/// Slopes of one mode at a group: of the parabola through the values at the nearest three speeds, of the
+/// line through two; unknown beside no other group, and then taken for none.
+MovingMode movingMode(const std::vector<SpeedFrf>& all, std::size_t group, const Mode& mode,
+                      bool receptance) {
+  MovingMode moving;
+  moving.mode = mode;
+  std::vector<std::pair<double, const Mode*>> seen;  // speed over this one, less 1
+  for (const SpeedFrf& other : all) {
+    if (const Mode* same = nearest(other, mode.frequency))
+      seen.emplace_back(other.speed / all[group].speed - 1.0, same);
+  }
+  std::sort(seen.begin(), seen.end(),
+            [](const auto& a, const auto& b) { return std::abs(a.first) < std::abs(b.first); });
+  seen.resize(std::min<std::size_t>(seen.size(), 3));
+  const auto count = static_cast<Eigen::Index>(seen.size());
+  if (count < 2) return moving;
+  Eigen::MatrixXd powers(count, count);
+  for (Eigen::Index i = 0; i < count; ++i)
+    for (Eigen::Index j = 0; j < count; ++j)
+      powers(i, j) = std::pow(seen[static_cast<std::size_t>(i)].first, static_cast<double>(j));
+  const Eigen::RowVectorXd share = powers.inverse().row(1);
+  // The gains of a force sensor are shares of its static answer, which no speed changes.
+  for (std::size_t k = 0; k < (receptance ? KINDS : KINDS - 1); ++k) {
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const Mode& at = *seen[static_cast<std::size_t>(i)].second;
+      moving.slope[k] += share[i] * std::log(at.*VALUES[k]);
+      moving.std_dev[k] = std::hypot(moving.std_dev[k], share[i] * (at.*DEVIATIONS[k]) / (at.*VALUES[k]));
+    }
+  }
+  return moving;
+}
+
+/// How the modes may move in a group that does not tell it by itself: as those of the nearest one that does.
+std::vector<MovingMode> borrowed(const std::vector<SpeedFrf>& all,
+                                 const std::vector<std::vector<MovingMode>>& moving, std::size_t group) {
+  std::size_t best = all.size();
+  const auto apart = [&](std::size_t g) { return std::abs(std::log(all[g].speed / all[group].speed)); };
+  for (std::size_t g = 0; g < all.size(); ++g)
+    if (all[g].fit && (best == all.size() || apart(g) < apart(best))) best = g;
+  if (best == all.size()) return {};
+  std::vector<MovingMode> here = moving[best];
+  for (MovingMode& m : here)
+    for (std::size_t k = 0; k < KINDS; ++k)
+      m.mode.*VALUES[k] *= std::pow(all[group].speed / all[best].speed, m.slope[k]);
+  return here;
+}
+
+/// What slopes that are not known better do to the modes, as a further deviation.
+void addSlopes(const std::vector<CuttingLine>& lines, const std::vector<MovingMode>& moving,
+               const std::string& unit, const CuttingFrfOptions& options, SpeedFrf& found) {
+  if (!found.fit) return;
+  std::vector<Mode>& modes = found.fit->model.modes;
+  const std::vector<Mode> before = modes;
+  for (std::size_t n = 0; n < moving.size() * KINDS; ++n) {
+    std::vector<MovingMode> other = moving;
+    MovingMode& changed = other[n / KINDS];
+    if (changed.std_dev[n % KINDS] == 0.0) continue;
+    changed.slope[n % KINDS] += changed.std_dev[n % KINDS];
+    const SpeedFrf moved = fitted(lines, other, unit, options);
+    for (std::size_t m = 0; m < modes.size(); ++m) {
+      const Mode* there = nearest(moved, before[m].frequency);
+      for (std::size_t k = 0; there && k < KINDS; ++k)
+        modes[m].*DEVIATIONS[k] =
+            std::hypot(modes[m].*DEVIATIONS[k], there->*VALUES[k] - before[m].*VALUES[k]);
+    }
+  }
+}
+
+}  // namespace
+
+void CuttingFrfOptions::validate() const {
+  const auto check = [](bool good, const char* key, double value) {
+    if (!good) throw Error(formatted("%s: %g is out of range", key, value));
+  };
+  check(low >= 0.0, "low", low);
+  check(high > low, "high", high);
+  check(part > 0.0, "part", part);
+  check(least_signal >= 1.0, "least_signal", least_signal);
+  check(speed_width >= 0.0 && speed_width <= 1.0, "speed_width", speed_width);
+  check(least_lines >= 4, "least_lines", least_lines);
+  check(max_modes >= 1 && max_modes <= 20, "max_modes", max_modes);
+}
+
+std::vector<CuttingLine> cuttingLines(const CutStretch& cut, const CuttingFrfOptions& options) {
+  options.validate();
+  const std::size_t size = cut.force.size();
+  if (cut.response.size() != size || (!cut.angle.empty() && cut.angle.size() != size))
+    throw Error(cut.name + ": force, response and angle are not of one length");
+  for (const std::vector<double>* values : {&cut.force, &cut.response, &cut.angle})
+    if (firstNotFinite(*values) < values->size()) throw Error(cut.name + ": a value is not a finite number");
+  if (!(cut.sample_rate > 0.0) || !(cut.speed > 0.0)) throw Error(cut.name + ": no sample rate or no speed");
+  // Parts as long as asked, but of enough revolutions.
+  const double least = 1.02 * LEAST_REVOLUTIONS * units::TWO_PI / cut.speed;
+  const auto wanted = static_cast<std::size_t>(std::max(options.part, least) * cut.sample_rate);
+  const std::size_t parts = std::max<std::size_t>(1, size / std::max<std::size_t>(1, wanted));
+  std::vector<CuttingLine> lines;
+  for (std::size_t p = 0; p < parts; ++p) linesOfPart(cut, p * (size / parts), size / parts, options, lines);
+  return lines;
+}
+
+std::vector<SpeedFrf> cuttingFrfs(std::vector<CuttingLine> lines, const std::string& unit,
+                                  const CuttingFrfOptions& options) {
+  options.validate();
+  std::stable_sort(lines.begin(), lines.end(),
+                   [](const CuttingLine& a, const CuttingLine& b) { return a.speed < b.speed; });
+  std::vector<std::vector<CuttingLine>> groups;
+  for (auto begin = lines.begin(); begin != lines.end();) {
+    const double most = begin->speed * (1.0 + options.speed_width);
+    const auto end =
+        std::find_if(begin, lines.end(), [most](const CuttingLine& l) { return l.speed > most; });
+    groups.emplace_back(begin, end);
+    begin = end;
+  }
+  std::vector<SpeedFrf> found;
+  for (const auto& group : groups) found.push_back(fitted(group, {}, unit, options));
+  // Within a group the modes move, too: how, the groups beside it tell.
+  std::vector<std::vector<MovingMode>> moving(groups.size());
+  for (int pass = 0; pass < PASSES && groups.size() > 1; ++pass) {
+    for (std::size_t g = 0; g < groups.size(); ++g) {
+      if (!found[g].fit) continue;
+      moving[g].clear();
+      for (const Mode& mode : found[g].fit->model.modes)
+        moving[g].push_back(movingMode(found, g, mode, unit == "m/N"));
+    }
+    for (std::size_t g = 0; g < groups.size(); ++g)
+      if (!found[g].fit) moving[g] = borrowed(found, moving, g);
+    for (std::size_t g = 0; g < groups.size(); ++g) found[g] = fitted(groups[g], moving[g], unit, options);
+  }
+  for (std::size_t g = 0; g < groups.size(); ++g) addSlopes(groups[g], moving[g], unit, options, found[g]);
+  return found;
+}
+
+}  // namespace smartmill::kalman

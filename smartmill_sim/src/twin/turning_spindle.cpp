@@ -1,0 +1,46 @@
+#include "smartmill_sim/twin/turning_spindle.h"
+
+#include <cmath>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
+
+namespace smartmill::sim {
+
+ModalModel TurningSpindle::at(double speed, const ModalModel& standing) const {
+  if (!(reference_speed > 0.0))
+    throw Error(formatted("reference_speed: %g is not above zero", reference_speed));
+  const double share = speed / reference_speed;
+  const double stiffness = 1.0 - softening * share * share, damping = 1.0 + damping_rise * share;
+  if (!(stiffness > 0.0) || !(damping > 0.0) || !(gyroscopic >= 0.0))
+    throw Error(formatted("turning spindle: no stiffness or no damping is left at %g rad/s", speed));
+  ModalModel turning = standing;
+  for (Mode& mode : turning.modes) {
+    mode.frequency *= std::sqrt(stiffness);
+    mode.damping_ratio *= damping;
+    mode.gain /= stiffness;
+  }
+  const double apart = gyroscopic * share;
+  if (turning.modes.empty() || apart == 0.0) return turning;
+  const Mode whole = turning.modes.front();
+  const double middle = std::hypot(1.0, apart), backward = middle - apart, forward = middle + apart;
+  Mode parts[2] = {whole, whole};
+  for (int i = 0; i < 2; ++i) {
+    const double place = i == 0 ? backward : forward;
+    parts[i].frequency = whole.frequency * place;
+    parts[i].damping_ratio = whole.damping_ratio / middle;
+    parts[i].gain = whole.gain / (place * 2.0 * middle);
+  }
+  turning.modes.front() = parts[0];
+  turning.modes.insert(turning.modes.begin() + 1, parts[1]);
+  return turning;
+}
+
+MachineModel TurningSpindle::at(double speed, const MachineModel& standing) const {
+  MachineModel turning = standing;
+  turning.tool_tip.x = at(speed, standing.tool_tip.x);
+  turning.tool_tip.y = at(speed, standing.tool_tip.y);
+  return turning;
+}
+
+}  // namespace smartmill::sim
