@@ -6,6 +6,9 @@
 
 #include <gtest/gtest.h>
 
+#include "smartmill_core/testing/shared_data.h"
+#include "smartmill_core/testing/sound_campaign.h"
+#include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_core/units.h"
 #include "smartmill_kalman_testing/reference_case.h"
 
@@ -92,6 +95,24 @@ TEST_P(Measures, IdentifiedSensorGivesTheForceOnTheTool) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Sensor, Measures, testing::Bool());
+
+// Taps in WAV files, the hammer among their channels, tell the same sensor.
+TEST(SoundFiles, TapsTellTheSameSensor) {
+  SMARTMILL_SHARED_DATA(folder, "campaigns/none");
+  const Campaign campaign = readCampaign(folder);
+  const TemporaryFolder wav;
+  const Campaign sound =
+      asSoundFiles(campaign, wav.file(""), [](const CampaignTest& t) { return t.kind == TestKind::tap; });
+  const SensorFitParameters fit;
+  const auto due = identifySensor(campaign, fit), found = identifySensor(sound, fit);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    ASSERT_EQ(found[axis].modes.size(), due[axis].modes.size());
+    for (std::size_t m = 0; m < due[axis].modes.size(); ++m) {
+      EXPECT_NEAR(found[axis].modes[m].frequency, due[axis].modes[m].frequency, 0.1);
+      EXPECT_NEAR(found[axis].modes[m].gain, due[axis].modes[m].gain, 1e-3);
+    }
+  }
+}
 
 }  // namespace
 }  // namespace smartmill::kalman

@@ -107,7 +107,9 @@ class AdditiveModel {
     for (int i = 0; i < 2; ++i) scatter = solve(scatter);
     const auto a = static_cast<Eigen::Index>(t->second), b = static_cast<Eigen::Index>(m->second);
     const double variance = inverse_(a, a) + inverse_(b, b) + 2.0 * inverse_(a, b);
-    return std::pair{value_(a) + value_(b), std::sqrt(variance + scatter * scatter)};
+    // The scatter itself is known from few pairs: Student's distribution is that much wider.
+    const double wider = (freedom_ + BELIEF) / (freedom_ + BELIEF - 2.0);
+    return std::pair{value_(a) + value_(b), std::sqrt(wider * (variance + scatter * scatter))};
   }
 
  private:
@@ -141,25 +143,29 @@ class AdditiveModel {
     }
     inverse_ = linear::inverseSymmetric(normal);
     value_ = inverse_ * right;
+    // What the records' own scatter leaves of it: as much as the unknowns could not follow.
+    const double count = static_cast<double>(used_.size());
+    freedom_ = std::max(0.0, count - static_cast<double>(n) + 1.0);
     double squares = 0.0;
     for (const Pair* pair : used_) {
       const double model = value_(static_cast<Eigen::Index>(tools_[pair->tool])) +
                            value_(static_cast<Eigen::Index>(materials_[pair->material]));
       squares += std::pow(std::log(pair->set.value.*coefficient_) - model, 2) -
-                 0.5 * std::pow(shareOf(pair->set, coefficient_), 2);
+                 freedom_ / count * std::pow(shareOf(pair->set, coefficient_), 2);
     }
-    const auto freedom = static_cast<double>(used_.size()) - static_cast<double>(n) + 1.0;
     // With few degrees of freedom the belief counts as much as what was seen.
-    constexpr double BELIEF = 4.0;
     const double belief = 2.0 * PAIR_SCATTER;
-    return std::sqrt((std::max(0.0, squares) + BELIEF * belief * belief) / (std::max(0.0, freedom) + BELIEF));
+    return std::max(PAIR_SCATTER,
+                    std::sqrt((std::max(0.0, squares) + BELIEF * belief * belief) / (freedom_ + BELIEF)));
   }
 
+  static constexpr double BELIEF = 4.0;  // degrees of freedom
   double CuttingCoefficients::*coefficient_;
   std::vector<const Pair*> used_;
   std::map<std::string, std::size_t> tools_, materials_;
   Eigen::MatrixXd inverse_;
   Eigen::VectorXd value_;
+  double freedom_ = 0.0;
 };
 
 std::optional<WayAnswer> byStandardCuts(const std::vector<Pair>& pairs, const CoefficientQuery& query) {

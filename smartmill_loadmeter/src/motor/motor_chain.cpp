@@ -129,6 +129,37 @@ std::string MotorForce::text() const {
   return out;
 }
 
+namespace {
+
+/// Torque of the spindle's motor, or why there is none.
+void addTorque(const MotorReading& cut, const std::vector<MotorReading>& air,
+               const MotorCalibration& calibration, MotorForce* result) {
+  const MotorReading* nearest = nullptr;
+  double least = 0.1;
+  for (const MotorReading& one : air) {
+    if (!one.spindle_range) continue;
+    const double distance = std::abs(one.spindle_speed / cut.spindle_speed - 1.0);
+    if (distance <= least + 1e-3) nearest = &one, least = std::min(least, distance);
+  }
+  if (!calibration.spindle) {
+    result->reason[3] = "the spindle's current is not calibrated";
+  } else if (!nearest) {
+    result->reason[3] = "no air cut near this spindle speed";
+  } else {
+    try {
+      const double rpm = units::rpmFromRadPerSec(cut.spindle_speed),
+                   rise = *cut.spindle_range - *nearest->spindle_range;
+      const double torque = calibration.spindle->torque(rpm, rise);
+      const double noise = calibration.spindle->torque(rpm, rise + cut.short_std[3]) - torque;
+      result->torque = Estimate{torque, std::hypot(calibration.spindle->scatter(), noise)};
+    } catch (const Error& error) {
+      result->reason[3] = error.what();
+    }
+  }
+}
+
+}  // namespace
+
 MotorForce forceFromMotors(const MotorReading& cut, const std::vector<MotorReading>& air,
                            const MotorCalibration& calibration, const MotorParameters& parameters) {
   MotorForce result;
@@ -164,30 +195,7 @@ MotorForce forceFromMotors(const MotorReading& cut, const std::vector<MotorReadi
     result.force[a] = force;
     result.other[a] = other;
   }
-  if (cut.spindle_range) {
-    const MotorReading* nearest = nullptr;
-    double least = 0.1;
-    for (const MotorReading& one : air) {
-      if (!one.spindle_range) continue;
-      const double distance = std::abs(one.spindle_speed / cut.spindle_speed - 1.0);
-      if (distance <= least + 1e-3) nearest = &one, least = std::min(least, distance);
-    }
-    if (!calibration.spindle) {
-      result.reason[3] = "the spindle's current is not calibrated";
-    } else if (!nearest) {
-      result.reason[3] = "no air cut near this spindle speed";
-    } else {
-      try {
-        const double rpm = units::rpmFromRadPerSec(cut.spindle_speed),
-                     rise = *cut.spindle_range - *nearest->spindle_range;
-        const double torque = calibration.spindle->torque(rpm, rise);
-        const double noise = calibration.spindle->torque(rpm, rise + cut.short_std[3]) - torque;
-        result.torque = Estimate{torque, std::hypot(calibration.spindle->scatter(), noise)};
-      } catch (const Error& error) {
-        result.reason[3] = error.what();
-      }
-    }
-  }
+  if (cut.spindle_range) addTorque(cut, air, calibration, &result);
   return result;
 }
 

@@ -1,5 +1,6 @@
 #include "smartmill_loadmeter/identification/campaign_identification.h"
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -11,6 +12,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/testing/coverage.h"
 #include "smartmill_core/testing/shared_data.h"
+#include "smartmill_core/testing/sound_campaign.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_core/units.h"
 
@@ -239,6 +241,25 @@ TEST(ExampleCampaigns, hiddenFrictionWearAndRunoutAreFound) {
   const Campaign wear = readCampaign(folder + "/tool_wear_and_unbalance");
   const LoadRecordResult w = identifyFromLoadRecords(wear, readMachineModel(wear.modelPath()), {});
   EXPECT_NEAR(60.0 * w.edge_growth, 0.4194, 0.002);
+}
+
+// The same cuts in WAV files, channels and scales named: 24 bits round to a thousandth of the noise.
+TEST(ForceRecords, SoundFilesGiveTheSameCoefficients) {
+  SMARTMILL_SHARED_DATA(folder, "campaigns/none");
+  Campaign campaign = readCampaign(folder);
+  const auto few = [](const CampaignTest& t) {
+    return t.name == "slot_4500_030" || t.name == "slot_4500_060" || t.name == "slot_4500_100";
+  };
+  const TemporaryFolder wav;
+  const Campaign sound = asSoundFiles(campaign, wav.file(""), few);
+  campaign.tests.erase(std::remove_if(campaign.tests.begin(), campaign.tests.end(),
+                                      [&](const CampaignTest& t) { return !few(t); }),
+                       campaign.tests.end());
+  const MachineModel model = readMachineModel(campaign.modelPath());
+  const CuttingCoefficients due = identifyFromForceRecords(campaign, model, Means::all).value,
+                            found = identifyFromForceRecords(sound, model, Means::all).value;
+  for (const CuttingKey& k : cuttingKeys())
+    EXPECT_NEAR(found.*k.coefficient, due.*k.coefficient, 1e-4 * std::abs(due.*k.coefficient)) << k.key;
 }
 
 }  // namespace
