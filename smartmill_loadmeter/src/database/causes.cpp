@@ -13,10 +13,10 @@ namespace {
 // Squares over the noise that a record must lose: explain names from a gain of 100 on. A force has thousands
 // of samples a record, a load meter a mean or two.
 constexpr double FORCE_SQUARES = 0.05, LOAD_SQUARES = 100.0;
-constexpr double DIFFERENT = 0.05;    // [1] of machines show a cause otherwise than those that had it
-constexpr double SUBSETS = 16.0;      // outcomes there may be: of fx, fy, fz, load_meter
-const double ALONE = std::log(20.0);  // evidence against each rival
-constexpr double TELLS = 1e-3;        // [nat] below which a test is not worth making
+constexpr double SUBSETS = 16.0;       // outcomes there may be: of fx, fy, fz, load_meter
+constexpr double SILENT = 0.95;        // [1] of a machine's tests that show nothing where nothing is
+const double ALONE = std::log(100.0);  // evidence against each rival
+constexpr double TELLS = 1e-9;         // [nat] what rounding leaves
 
 double oddsOf(std::size_t have, std::size_t of) {
   return (static_cast<double>(have) + 0.5) / (static_cast<double>(of - have) + 0.5);
@@ -32,13 +32,6 @@ void count(const ModelImprovement& improvement, bool alone, Shown* shown) {
   if (shown->alone && !alone) return;
   if (alone && !shown->alone) *shown = {{}, true};
   for (const TestEvidence& t : evidenceOf(improvement)) shown->counts[t.test][outcomeOf(t)] += 1.0;
-}
-
-Outcomes sharesOf(Outcomes counts) {
-  double sum = 0.0;
-  for (const auto& [outcome, n] : counts) sum += n;
-  for (auto& [outcome, n] : counts) n /= sum;
-  return counts;
 }
 
 }  // namespace
@@ -76,7 +69,7 @@ FleetCauses fleetCauses(const std::vector<ModelImprovement>& improvements, const
   fleet.tests.assign(tests.begin(), tests.end());
   for (const auto& [name, who] : machines) {
     FleetCause cause{name, {who.begin(), who.end()}, oddsOf(who.size(), explained.size()), newest[name], {}};
-    for (const std::string& test : fleet.tests) cause.outcomes.push_back(sharesOf(shown[name].counts[test]));
+    for (const std::string& test : fleet.tests) cause.outcomes.push_back(shown[name].counts[test]);
     fleet.causes.push_back(cause);
   }
   std::stable_sort(fleet.causes.begin(), fleet.causes.end(),
@@ -97,12 +90,19 @@ CauseSearch::CauseSearch(const FleetCauses& fleet, const std::vector<double>& od
 
 double CauseSearch::likelihood(std::size_t hypothesis, std::size_t test, const Outcome& outcome) const {
   const std::size_t causes = fleet_.causes.size();
-  if (hypothesis == causes + 1) return 1.0 / SUBSETS;
-  if (hypothesis == causes) return outcome.empty() ? 1.0 - DIFFERENT : DIFFERENT / SUBSETS;
-  const Outcomes& shares = fleet_.causes[hypothesis].outcomes[test];
-  if (shares.empty()) return 1.0 / SUBSETS;
-  const auto at = shares.find(outcome);
-  return (1.0 - DIFFERENT) * (at == shares.end() ? 0.0 : at->second) + DIFFERENT / SUBSETS;
+  if (hypothesis == causes) return (outcome.empty() ? SILENT : 0.0) + (1.0 - SILENT) / SUBSETS;
+  // Perks' prior of a share; of few explanations little is known.
+  const auto of = [&](const Outcomes& counts) {
+    double sum = 0.0;
+    for (const auto& [o, n] : counts) sum += n;
+    const auto at = counts.find(outcome);
+    return ((at == counts.end() ? 0.0 : at->second) + 1.0 / SUBSETS) / (sum + 1.0);
+  };
+  if (hypothesis < causes) return of(fleet_.causes[hypothesis].outcomes[test]);
+  // One that nobody has met shows what the others do, each as likely, or anything.
+  double mean = 1.0 / SUBSETS;
+  for (const FleetCause& c : fleet_.causes) mean += of(c.outcomes[test]);
+  return mean / static_cast<double>(causes + 1);
 }
 
 double CauseSearch::information(std::size_t test) const {

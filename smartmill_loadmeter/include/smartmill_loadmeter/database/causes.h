@@ -15,7 +15,7 @@ namespace smartmill::loadmeter {
 
 /// Channels in which a test shows something, between blanks; empty: in none.
 using Outcome = std::string;
-/// [1] Share of each outcome of a test.
+/// How many explanations had each outcome of a test.
 using Outcomes = std::map<Outcome, double>;
 
 /// In which channels a test shows its cause: where the gap lost what would name it in a record alone.
@@ -44,9 +44,9 @@ struct FleetCauses {
 FleetCauses fleetCauses(const std::vector<ModelImprovement>& improvements, const std::string& except);
 
 /// Which test to make next: the one whose outcome is expected to tell most about the cause (Lindley 1956: the
-/// entropy that it takes away). One cause, none, or one that nobody has met, of which every outcome is as
-/// likely. The prior weighs the choice of tests only: a cause stands alone where the outcomes speak for it
-/// against each other one by 20 to 1, whatever was likely beforehand. Names are an explanation's to give.
+/// entropy that it takes away). One cause, none, or one that nobody has met, which shows what any other may.
+/// The prior weighs the choice of tests only: a cause stands alone where the outcomes speak for it
+/// against each other one by 100 to 1, whatever was likely beforehand. Names are an explanation's to give.
 class CauseSearch {
  public:
   CauseSearch(const FleetCauses& fleet, const std::vector<double>& odds);
