@@ -4,6 +4,7 @@
 #include <cmath>
 #include <complex>
 
+#include "plant/drawn_spindle.h"
 #include "smartmill_hammer/analysis/offset_factor.h"
 
 namespace smartmill::studies {
@@ -79,13 +80,7 @@ OffsetCase drawOffsetCase(std::mt19937_64& random) {
   t.flute_ratio = between(random, 0.76, 0.86);
   t.young = about(random, b.young.value, b.young.std);
   t.density = about(random, b.density.value, b.density.std);
-  t.spindle_mass = between(random, 8.0, 25.0);
-  t.mass_behind = between(random, 0.10, 0.22);
-  t.spindle_inertia = t.spindle_mass * std::pow(between(random, 0.07, 0.14), 2);
-  t.stiffness_across = between(random, 4e7, 1.5e8);
-  t.spring_behind = between(random, 0.06, 0.2);
-  t.stiffness_tilting = between(random, 5e5, 2.5e6);
-  t.damping_ratio = between(random, 0.012, 0.04);
+  plant::drawSpindle(random, t);
   c.offset = between(random, 10e-3, 18e-3);
   return c;
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "plant/drawn_spindle.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::stability {
@@ -87,13 +88,7 @@ ChartMachine drawChartMachine(std::mt19937_64& random) {
   t.flute_ratio = between(random, 0.76, 0.86);
   t.young = carbide ? 5.8e11 : 2.1e11;
   t.density = carbide ? 14300.0 : 7850.0;
-  t.spindle_mass = between(random, 8.0, 25.0);
-  t.mass_behind = between(random, 0.10, 0.22);
-  t.spindle_inertia = t.spindle_mass * std::pow(between(random, 0.07, 0.14), 2);
-  t.stiffness_across = between(random, 4e7, 1.5e8);
-  t.spring_behind = between(random, 0.06, 0.2);
-  t.stiffness_tilting = between(random, 5e5, 2.5e6);
-  t.damping_ratio = between(random, 0.012, 0.04);
+  plant::drawSpindle(random, t);
   m.y = m.x;
   m.y.stiffness_across *= between(random, 0.7, 1.4);
   m.y.stiffness_tilting *= between(random, 0.7, 1.4);
