@@ -9,14 +9,16 @@
 namespace smartmill::hammer {
 namespace {
 
-constexpr double RATE = 25600.0;       // [Hz]
-constexpr std::size_t BLOCK = 256;     // samples
-constexpr int STEPS = 8;               // a sample; a first-order hold of so many is 0.1 % low at 4 kHz
-constexpr double LATENCY = 0.05;       // [s]
-constexpr double RAPID = 0.4;          // [m/s]
-constexpr double TURNING = 12.0;       // [rad/s] of an orientation
-constexpr double HAMMER_DELAY = 0.03;  // [s]
-constexpr double LONGEST = 1200.0;     // [s] of a measurement
+constexpr double RATE = 25600.0;        // [Hz]
+constexpr std::size_t BLOCK = 256;      // samples
+constexpr int STEPS = 8;                // a sample; a first-order hold of so many is 0.1 % low at 4 kHz
+constexpr double LATENCY = 0.05;        // [s]
+constexpr double RAPID = 0.4;           // [m/s]
+constexpr double TURNING = 12.0;        // [rad/s] of an orientation
+constexpr double HAMMER_DELAY = 0.03;   // [s]
+constexpr double LONGEST = 1200.0;      // [s] of a measurement
+constexpr double FIT_HIGH = 8000.0;     // [Hz] a mode above the band that counts bends its upper end
+constexpr double HEIGHT_STEP = 0.5e-3;  // [m] to which the sensor's height is told
 
 double stamp(double time) {
   return std::round(time * 1e9) * 1e-9;
@@ -144,6 +146,28 @@ void StationMachine::block(Streams& streams) {
     state.position.push_back(std::round(position_[i] * 1e7) * 1e-7);
     state.distance_to_go.push_back(path_.empty() ? 0.0 : std::abs(path_.front().position[i] - position_[i]));
   }
+}
+
+StationTask taskOf(const DrawnStation& drawn, int hits) {
+  StationTask task;
+  HammerParameters& p = task.parameters;
+  p.frf_high = p.fit_high = FIT_HIGH;
+  p.max_modes = 12;
+  p.sensor_face = drawn.traits.housing;
+  p.sensor_electrode = drawn.traits.electrode;
+  p.max_bad_hits = 2 * hits;
+  p.tool_material = drawn.traits.young > 4e11 ? "carbide" : "steel";
+  p.tool_fluted_length = drawn.traits.flute_length + drawn.fluted_error;
+  p.read_height = std::round(drawn.traits.read_height / HEIGHT_STEP) * HEIGHT_STEP;
+  MeasureFrfGoal& goal = task.goal;
+  goal.stamp = 1000.0;
+  goal.tool = "drawn";
+  goal.point = POINT_TOOL_TIP;
+  goal.direction = drawn.direction;
+  goal.hits = hits;
+  goal.teeth = drawn.believed.tool->teeth;
+  goal.stickout = *drawn.believed.stickout + drawn.stickout_error;
+  return task;
 }
 
 MeasureFrfResult measure(StationMachine& machine, const HammerParameters& parameters,

@@ -58,6 +58,14 @@ class StationMachine {
   double rest_volt_ = 0.0, volt_ = 0.0;
 };
 
+/// What the sequence is told, and what it is asked for: the tool as the operator and the catalogue tell it,
+/// the sensor as whoever set it up.
+struct StationTask {
+  HammerParameters parameters;
+  MeasureFrfGoal goal;
+};
+StationTask taskOf(const DrawnStation& drawn, int hits);
+
 /// A whole measurement. @param seconds [s] of machine time it took
 MeasureFrfResult measure(StationMachine& machine, const HammerParameters& parameters,
                          const MachineModel& believed, const MeasureFrfGoal& goal, double& seconds);

@@ -16,11 +16,8 @@ namespace {
 
 using nlohmann::json;
 
-constexpr double BAND_LOW = 250.0, BAND_HIGH = 4900.0;  // [Hz] of the modes that count
-constexpr double FIT_HIGH = 8000.0;     // [Hz] a mode above the band that counts bends its upper end
-constexpr double SAME_MODE = 0.015;     // [1] of the frequency
-constexpr double HEIGHT_STEP = 0.5e-3;  // [m] to which the sensor's height is told
-constexpr double SHOWS = 0.05;          // [1] of the largest peak: a mode that counts
+constexpr double SAME_MODE = 0.015;  // [1] of the frequency
+constexpr double SHOWS = 0.05;       // [1] of the largest peak: a mode that counts
 
 struct Truth {
   ModalModel tip, measured;  // the same modes
@@ -207,24 +204,9 @@ StationFrfs figuresOf(const Truth& truth, const MeasureFrfResult& result, double
 json runStation(const StationStudy& study, int number, StationFrfs* frfs) {
   const auto begun = std::chrono::steady_clock::now();
   const DrawnStation drawn = drawStation(study.seed, number);
-  HammerParameters parameters;
-  parameters.frf_high = parameters.fit_high = FIT_HIGH;
-  parameters.max_modes = 12;
-  parameters.sensor_face = drawn.traits.housing;  // whoever set the sensor up knows it
-  parameters.sensor_electrode = drawn.traits.electrode;
-  parameters.max_bad_hits = 2 * study.hits;
-  MeasureFrfGoal goal;
-  goal.stamp = 1000.0;
-  goal.tool = "drawn";
-  goal.point = POINT_TOOL_TIP;
-  goal.direction = drawn.direction;
-  goal.hits = study.hits;
-  goal.teeth = drawn.believed.tool->teeth;
-  goal.stickout = *drawn.believed.stickout + drawn.stickout_error;
-  // Of the tool the catalogue tells, of the sensor's height whoever set it up.
-  parameters.tool_material = drawn.traits.young > 4e11 ? "carbide" : "steel";
-  parameters.tool_fluted_length = drawn.traits.flute_length + drawn.fluted_error;
-  parameters.read_height = std::round(drawn.traits.read_height / HEIGHT_STEP) * HEIGHT_STEP;
+  const StationTask task = taskOf(drawn, study.hits);
+  const HammerParameters& parameters = task.parameters;
+  const MeasureFrfGoal& goal = task.goal;
   StationMachine machine(drawn, study.seed + 7919u * static_cast<std::uint64_t>(number));
   double seconds = 0.0;
   const MeasureFrfResult result = measure(machine, parameters, drawn.believed, goal, seconds);

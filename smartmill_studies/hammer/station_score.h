@@ -10,6 +10,8 @@
 
 namespace smartmill::hammer {
 
+constexpr double BAND_LOW = 250.0, BAND_HIGH = 4900.0;  ///< [Hz] of the modes and lines that count
+
 /// How the study measures; a run is of one of them.
 struct StationStudy {
   std::uint64_t seed = 1;

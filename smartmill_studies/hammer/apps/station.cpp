@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "hammer/station_score.h"
+#include "hammer/tap_scatter.h"
 #include "hammer/tip_figures.h"
 #include "smartmill_core/program.h"
 #include "study_case.h"
@@ -23,7 +24,7 @@ struct Options {
   std::string out = "hammer_station";
   StudyCase one;
   std::string figures;
-  int machines = 500;
+  int machines = 500, repeats = 0;
 };
 
 /// One machine's figures 4.5 to 4.8 of the thesis.
@@ -39,12 +40,22 @@ void draw(const hammer::StationFrfs& f, const std::string& folder) {
   studies::drawSlotLimits({direct, measured, thesis, tip}, folder + "/figure_4_8.png");
 }
 
+/// Each machine, or one, measured again and again.
+void repeat(const Options& o) {
+  for (int number = o.one.one() ? o.one.number : 0; number < o.machines; ++number) {
+    o.one.print(hammer::tapScatter(o.study, number, o.repeats));
+    std::fflush(stdout);
+    if (o.one.one()) return;
+  }
+}
+
 void run(const Options& o) {
   if (o.one.scores()) {
     std::printf("%s\n", hammer::scoreStations(readJsonLines(o.one.lines)).dump(1).c_str());
     return;
   }
   o.one.check(o.machines);
+  if (o.repeats > 0) return repeat(o);
   if (o.one.one()) {
     hammer::StationFrfs frfs;
     o.one.print(hammer::runStation(o.study, o.one.number, &frfs));
@@ -85,6 +96,10 @@ int main(int argc, char** argv) {
   line.option("--seed", o.study.seed, "of everything drawn").showDefault();
   line.option("--hits", o.study.hits, "a measurement").within(1, 100).showDefault();
   line.option("--figures", o.figures, "with --case: folder for the thesis's figures 4.5 to 4.8 of it");
+  line.option("--repeats", o.repeats,
+              "each machine so often, what the runs differ by against what they state: a line a machine on "
+              "standard output, nothing else is done")
+      .within(3, 1000);
   line.option("-o,--out", o.out, "folder of the lines").showDefault();
   return runProgram(line, argc, argv, [&] { run(o); });
 }

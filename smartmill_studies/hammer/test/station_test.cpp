@@ -12,6 +12,7 @@
 
 #include "hammer/station_draw.h"
 #include "hammer/station_machine.h"
+#include "hammer/tap_scatter.h"
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_sim/world/hammer_station.h"
 
@@ -68,6 +69,15 @@ TEST(Station, MeasuresDrawnMachinesWithoutTouching) {
     }
   }
   EXPECT_LT(median(tip), 0.03);
+}
+
+// What the lines state is what they scatter by when one machine is measured again: within the task's 1.5, from
+// both sides.
+TEST(Station, LinesScatterFromRunToRunAsTheyState) {
+  const nlohmann::json line = tapScatter({SEED, 8}, 0, 5);
+  ASSERT_EQ(line["runs"], 5);
+  EXPECT_LT(line["scatter"], 1.5);
+  EXPECT_GT(line["scatter"], 1.0 / 1.5);
 }
 
 // Of this one's five uneven teeth the flute that was found is not the first: where the others stand is not
