@@ -85,7 +85,7 @@ Lines simulated(const MachineModel& model, CampaignTest test, double chip, std::
     for (std::size_t k = 0; k < count; ++k) {
       Complex sum;
       for (std::size_t i = force.size() - SAMPLES; i < force.size(); ++i)
-        sum += std::polar(force[i], -static_cast<double>(k * teeth) * angle[i]);
+        sum += force[i] * std::polar(1.0, -static_cast<double>(k * teeth) * angle[i]);
       lines[axis].push_back(sum * (k == 0 ? 1.0 : 2.0) / static_cast<double>(SAMPLES));
     }
   }

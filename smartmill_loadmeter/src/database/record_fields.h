@@ -52,8 +52,8 @@ const RecordKind& healthKind();
 
 /// @{ Between a record and its row. @throws Error when its stamp is not a number.
 Row rowOf(CoefficientRecord record);
-Row rowOf(ModelImprovement improvement);
-Row rowOf(HealthRecord health);
+Row rowOf(const ModelImprovement& improvement);
+Row rowOf(const HealthRecord& health);
 void take(const Row& row, CoefficientRecord* record);
 void take(const Row& row, ModelImprovement* improvement);
 void take(const Row& row, HealthRecord* health);

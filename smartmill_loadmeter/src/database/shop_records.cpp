@@ -24,14 +24,14 @@ using Json = nlohmann::ordered_json;
 
 template <typename R>
 struct Word {
-  const char* name;
-  std::string R::*at;
+  const char* name = nullptr;
+  std::string R::*at = nullptr;
   bool told = true;  ///< part of what makes the record itself
 };
 template <typename R>
 struct Number {
-  const char* name;
-  double R::*at;
+  const char* name = nullptr;
+  double R::*at = nullptr;
   bool told = true;
 };
 
@@ -150,10 +150,10 @@ const RecordKind& healthKind() {
   return kind;
 }
 
-Row rowOf(ModelImprovement improvement) {
+Row rowOf(const ModelImprovement& improvement) {
   return rowFrom(improvement, IMPROVEMENT_WORDS, IMPROVEMENT_NUMBERS);
 }
-Row rowOf(HealthRecord health) {
+Row rowOf(const HealthRecord& health) {
   return rowFrom(health, HEALTH_WORDS, HEALTH_NUMBERS);
 }
 void take(const Row& row, ModelImprovement* improvement) {
