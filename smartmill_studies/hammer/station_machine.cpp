@@ -148,6 +148,17 @@ void StationMachine::block(Streams& streams) {
   }
 }
 
+MeasureFrfGoal goalOf(const DrawnStation& drawn, int hits) {
+  MeasureFrfGoal goal;
+  goal.stamp = 1000.0;
+  goal.tool = "drawn";
+  goal.point = POINT_TOOL_TIP;
+  goal.direction = drawn.direction;
+  goal.hits = hits;
+  goal.teeth = drawn.believed.tool->teeth;
+  return goal;
+}
+
 StationTask taskOf(const DrawnStation& drawn, int hits) {
   StationTask task;
   HammerParameters& p = task.parameters;
@@ -159,14 +170,8 @@ StationTask taskOf(const DrawnStation& drawn, int hits) {
   p.tool_material = drawn.traits.young > 4e11 ? "carbide" : "steel";
   p.tool_fluted_length = drawn.traits.flute_length + drawn.fluted_error;
   p.read_height = std::round(drawn.traits.read_height / HEIGHT_STEP) * HEIGHT_STEP;
-  MeasureFrfGoal& goal = task.goal;
-  goal.stamp = 1000.0;
-  goal.tool = "drawn";
-  goal.point = POINT_TOOL_TIP;
-  goal.direction = drawn.direction;
-  goal.hits = hits;
-  goal.teeth = drawn.believed.tool->teeth;
-  goal.stickout = *drawn.believed.stickout + drawn.stickout_error;
+  task.goal = goalOf(drawn, hits);
+  task.goal.stickout = *drawn.believed.stickout + drawn.stickout_error;
   return task;
 }
 

@@ -64,6 +64,8 @@ struct StationTask {
   HammerParameters parameters;
   MeasureFrfGoal goal;
 };
+/// What is asked for, without the stick-out.
+MeasureFrfGoal goalOf(const DrawnStation& drawn, int hits);
 StationTask taskOf(const DrawnStation& drawn, int hits);
 
 /// A whole measurement. @param seconds [s] of machine time it took

@@ -8,6 +8,7 @@
 #include "hammer/station_draw.h"
 #include "hammer/station_machine.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/signal/statistics.h"
 #include "study_case.h"
 
 namespace smartmill::hammer {
@@ -70,12 +71,7 @@ std::vector<double> lineRatios(const Runs& runs, const std::vector<std::size_t>&
 
 /// [1] deviation of the values over the root of their mean stated variance.
 double ratioOf(const std::vector<double>& values, const std::vector<double>& stated) {
-  const auto count = static_cast<double>(values.size());
-  double mean = 0.0, seen = 0.0, variance = 0.0;
-  for (const double v : values) mean += v / count;
-  for (const double v : values) seen += (v - mean) * (v - mean) / (count - 1.0);
-  for (const double s : stated) variance += s * s / count;
-  return std::sqrt(seen / variance);
+  return standardDeviation(values) / rms(stated);
 }
 
 json modeRatios(const Runs& runs) {

@@ -23,7 +23,7 @@ std::string rowsOf(const Explained::Effect* found, const EffectEntry* hidden) {
     for (const auto& [key, truth] : truths) row(key, "-", formatted("%.5g", truth), "not named");
     return rows;
   }
-  for (const Explained::Parameter& p : found->parameters) {
+  for (const ReportedParameter& p : found->parameters) {
     const auto at = std::find_if(truths.begin(), truths.end(),
                                  [&](const std::pair<std::string, double>& t) { return t.first == p.key; });
     if (!p.word.empty()) {

@@ -2,12 +2,12 @@
 
 #include <cmath>
 #include <fstream>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 
 #include "session/shown.h"
 #include "smartmill_core/error.h"
-#include "smartmill_core/formatted.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::discovery {
@@ -19,10 +19,6 @@ constexpr double SHOWS_NOTHING = 1.05;  // [1] gap; by chance it varies by some 
 constexpr double BETTER = 0.98;         // [1] of the gap, from which on another model is worth having
 constexpr double SAME_ANGLE = 1e-3;     // [rad]
 
-std::string withDeviation(double value, double std_dev) {
-  return formatted("%.5g +- %.2g", value, std_dev);
-}
-
 Explained::Effect effectOf(const Json& json) {
   Explained::Effect effect;
   effect.name = json.at("name");
@@ -30,17 +26,8 @@ Explained::Effect effectOf(const Json& json) {
   for (const char* key : {"stage", "form"}) {
     if (json.contains(key)) effect.parameters.push_back({key, 0.0, 0.0, json.at(key)});
   }
-  for (const auto& [key, content] : json.at("parameters").items()) {
-    Explained::Parameter p;
-    p.key = key;
-    if (content.at("value").is_string()) {
-      p.word = content.at("value");
-    } else {
-      p.value = content.at("value");
-      p.std_dev = content.value("std", 0.0);
-    }
-    effect.parameters.push_back(p);
-  }
+  for (ReportedParameter& p : reportedParameters(json.at("parameters")))
+    effect.parameters.push_back(std::move(p));
   return effect;
 }
 
@@ -84,12 +71,7 @@ Explained explainedOf(const Json& report) {
 }  // namespace
 
 std::string Explained::Effect::text() const {
-  std::string line = name + ":";
-  for (const Parameter& p : parameters) {
-    line += (&p == &parameters.front() ? " " : ", ") + p.key + " " +
-            (p.word.empty() ? withDeviation(p.value, p.std_dev) : p.word);
-  }
-  return line;
+  return name + ":" + (parameters.empty() ? "" : " " + textOf(parameters));
 }
 
 Explained readExplained(const std::string& file) {

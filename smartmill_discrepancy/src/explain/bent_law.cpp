@@ -17,6 +17,7 @@ using Lines = std::array<std::vector<Complex>, 3>;  // of each force: level, the
 
 // Laws that are tried. Onsets in shares of the largest feed: what comes on far below the least feed is
 // always there, what comes on beyond the largest is a chip force.
+// The first exponent is that of the straight law.
 constexpr std::array<double, 7> EXPONENTS{{0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6}};
 constexpr std::array<double, 7> ONSETS{{0.0, 0.04, 0.08, 0.12, 0.16, 0.24, 0.32}};
 constexpr std::array<double, 15> EDGES{
@@ -114,10 +115,11 @@ class Law {
           effectEntry("size_effect", {{"exponent", exponent}, {"reference_chip_um", middle_ / units::UM}}));
     return simulated(model, test_, chip, count_);
   }
-  Lines edges(double onset, double chip) const {
+  /// @param straight chips() of no exponent at that chip: what the cut is without edges
+  Lines edges(double onset, double chip, const Lines& straight) const {
     MachineModel model = base_;
     if (onset > 0.0) model.effects.push_back(effectEntry("edge_buildup", {{"chip_um", onset / units::UM}}));
-    return sum(simulated(model, test_, chip, count_), -1.0, simulated(bare_, test_, chip, count_));
+    return sum(simulated(model, test_, chip, count_), -1.0, straight);
   }
   Lines own(const MachineModel& model, double chip) const { return simulated(model, test_, chip, count_); }
 
@@ -212,7 +214,8 @@ Seen chosenLaw(const std::vector<Cut>& cuts, const Law& law, double largest, std
   }
   for (const double onset : ONSETS) {
     edges.emplace_back();
-    for (const Cut& c : cuts) edges.back().push_back(law.edges(onset * largest, c.chip()));
+    for (std::size_t i = 0; i < cuts.size(); ++i)
+      edges.back().push_back(law.edges(onset * largest, cuts[i].chip(), chips.front()[i]));
   }
   Seen best;
   std::vector<double> phase(cuts.size(), 0.0);
@@ -245,7 +248,8 @@ Bend bendOf(const Law& law, const MachineModel& model, const BentLaw& found, con
   for (std::size_t n = 0; n < NODES; ++n) {
     const double chip = least + (largest - least) * static_cast<double>(n) / (NODES - 1);
     bend.chips.push_back(chip);
-    Lines lines = sum(law.chips(found.exponent, chip), found.edge_share, law.edges(found.onset, chip));
+    Lines lines = sum(law.chips(found.exponent, chip), found.edge_share,
+                      law.edges(found.onset, chip, law.chips(0.0, chip)));
     for (std::size_t axis = 0; axis < 3; ++axis) {
       for (std::size_t k = 0; k < lines[axis].size(); ++k) lines[axis][k] *= gains[axis][k];
     }

@@ -9,6 +9,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/signal/statistics.h"
+#include "smartmill_core/signal/window.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::kalman {
@@ -23,10 +24,11 @@ constexpr double SAME_MODE = 0.1;           // [1] of frequency, at neighbouring
 constexpr double SEEN = 3.0;                // [1] gain over its deviation
 constexpr int PASSES = 4;                   // of slopes and fits, each of which moves the other
 
-/// Four-term Blackman-Harris window, side lobes below -92 dB (Harris 1978).
-double window(std::size_t i, std::size_t size) {
-  const double turn = units::TWO_PI * (static_cast<double>(i) + 0.5) / static_cast<double>(size);
-  return 0.35875 - 0.48829 * std::cos(turn) + 0.14128 * std::cos(2.0 * turn) - 0.01168 * std::cos(3.0 * turn);
+std::vector<double> taper(std::size_t size) {
+  std::vector<double> window(size);
+  for (std::size_t i = 0; i < size; ++i)
+    window[i] = blackmanHarris(units::TWO_PI * (static_cast<double>(i) + 0.5) / static_cast<double>(size));
+  return window;
 }
 
 /// Angle of the spindle over a part: a parabola through what was measured, so that the reading's own noise
@@ -88,9 +90,10 @@ HalfOrders halfOrders(const CutStretch& cut, std::size_t from, std::size_t size,
   HalfOrders found;
   found.force.resize(2 * orders + NEIGHBOURS);
   found.response.resize(found.force.size());
+  const std::vector<double> window = taper(size);
   double sum = 0.0, force_mean = 0.0, response_mean = 0.0;
   for (std::size_t i = 0; i < size; ++i) {
-    const double w = window(i, size);
+    const double w = window[i];
     sum += w;
     force_mean += w * cut.force[from + i];
     response_mean += w * cut.response[from + i];
@@ -98,7 +101,7 @@ HalfOrders halfOrders(const CutStretch& cut, std::size_t from, std::size_t size,
   force_mean /= sum;
   response_mean /= sum;
   for (std::size_t i = 0; i < size; ++i) {
-    const double w = 2.0 * window(i, size) / sum;
+    const double w = 2.0 * window[i] / sum;
     const double force = w * (cut.force[from + i] - force_mean);
     const double response = w * (cut.response[from + i] - response_mean);
     const Complex turn = std::polar(1.0, -0.5 * turning.at(i));

@@ -194,29 +194,14 @@ FoundCause causeOf(const Json& effect) {
   cause.name = effect.at("name");
   cause.delta_bic = effect.at("delta_bic");
   cause.confidence = effect.at("confidence");
-  for (const auto& [key, content] : effect.at("parameters").items()) {
-    FoundCause::Parameter p;
-    p.key = key;
-    if (content.at("value").is_string()) {
-      p.word = content.at("value");
-    } else {
-      p.value = content.at("value");
-      p.std_dev = content.value("std", 0.0);
-    }
-    cause.parameters.push_back(p);
-  }
+  cause.parameters = reportedParameters(effect.at("parameters"));
   return cause;
 }
 
 }  // namespace
 
 std::string FoundCause::text() const {
-  std::string line = name;
-  for (const Parameter& p : parameters) {
-    line += (&p == &parameters.front() ? ": " : ", ") + p.key + " " +
-            (p.word.empty() ? formatted("%.5g +- %.2g", p.value, p.std_dev) : p.word);
-  }
-  return line;
+  return name + (parameters.empty() ? "" : ": " + textOf(parameters));
 }
 
 std::vector<FoundCause> causesOf(const ModelImprovement& improvement) {

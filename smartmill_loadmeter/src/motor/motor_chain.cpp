@@ -66,10 +66,14 @@ void MotorRecord::dropAfter(double stamp) {
 }
 
 MotorRecord MotorRecord::last(double duration) const {
-  MotorRecord part = *this;
+  MotorRecord part;
+  part.rate_ = rate_;
+  part.start_ = start_;
+  part.next_ = next_;
   const auto count = static_cast<std::size_t>(duration * rate_);
-  for (auto& s : part.samples_) {
-    if (s.size() > count) s.erase(s.begin(), s.end() - static_cast<std::ptrdiff_t>(count));
+  for (std::size_t c = 0; c < samples_.size(); ++c) {
+    const std::vector<double>& all = samples_[c];
+    part.samples_[c].assign(all.end() - static_cast<std::ptrdiff_t>(std::min(count, all.size())), all.end());
   }
   return part;
 }

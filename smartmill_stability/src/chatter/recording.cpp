@@ -8,6 +8,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/signal/fourier.h"
+#include "smartmill_core/signal/window.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::stability {
@@ -35,14 +36,11 @@ double decibel(double ratio) {
   return 10.0 * std::log10(std::max(1e-30, ratio));
 }
 
-/// Four terms of Blackman and Harris: side lobes 92 dB down, so that no strong harmonic makes lines beside
-/// itself.
+/// So that no strong harmonic makes lines beside itself.
 std::vector<double> taper(std::size_t n) {
   std::vector<double> window(n);
-  for (std::size_t i = 0; i < n; ++i) {
-    const double a = units::TWO_PI * static_cast<double>(i) / static_cast<double>(n);
-    window[i] = 0.35875 - 0.48829 * std::cos(a) + 0.14128 * std::cos(2.0 * a) - 0.01168 * std::cos(3.0 * a);
-  }
+  for (std::size_t i = 0; i < n; ++i)
+    window[i] = blackmanHarris(units::TWO_PI * static_cast<double>(i) / static_cast<double>(n));
   return window;
 }
 

@@ -21,17 +21,6 @@ namespace {
 
 constexpr std::uint64_t SEED = 3;
 
-MeasureFrfGoal goalOf(const DrawnStation& drawn, int hits) {
-  MeasureFrfGoal goal;
-  goal.stamp = 1000.0;
-  goal.tool = "drawn";
-  goal.point = POINT_TOOL_TIP;
-  goal.direction = drawn.direction;
-  goal.hits = hits;
-  goal.teeth = drawn.believed.tool->teeth;
-  return goal;
-}
-
 /// The first drawn machine that fulfils a condition.
 template <class Condition>
 DrawnStation firstWith(Condition condition) {
@@ -71,8 +60,8 @@ TEST(Station, MeasuresDrawnMachinesWithoutTouching) {
   EXPECT_LT(median(tip), 0.03);
 }
 
-// What the lines state is what they scatter by when one machine is measured again: within the task's 1.5, from
-// both sides.
+// What the lines state is what they scatter by when one machine is measured again: within the task's 1.5,
+// from both sides.
 TEST(Station, LinesScatterFromRunToRunAsTheyState) {
   const nlohmann::json line = tapScatter({SEED, 8}, 0, 5);
   ASSERT_EQ(line["runs"], 5);

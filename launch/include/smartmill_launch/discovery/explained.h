@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "smartmill_core/model/reported_parameter.h"
 #include "smartmill_core/signal/streams.h"
 #include "smartmill_launch/session/cut_planner.h"
 
@@ -11,14 +12,9 @@ namespace smartmill::discovery {
 
 /// What a report.json of `explain` says (formats.md, smartmill-report/1), as far as a discovery needs it.
 struct Explained {
-  struct Parameter {
-    std::string key;
-    double value = 0.0, std_dev = 0.0;
-    std::string word;  ///< instead of a number
-  };
   struct Effect {
     std::string name;
-    std::vector<Parameter> parameters;
+    std::vector<ReportedParameter> parameters;
     std::string text() const;  ///< "runout: offset_um 9.02 +- 0.02, angle_deg 41 +- 1"
   };
   /// A test that would tell rivals apart.

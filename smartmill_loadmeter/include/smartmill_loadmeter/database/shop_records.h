@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "smartmill_core/model/reported_parameter.h"
+
 namespace smartmill::loadmeter {
 
 /// What a machine's database keeps beside coefficients and cuts (database.h). NaN (and an empty word): not
@@ -45,12 +47,8 @@ struct HealthRecord {
 
 /// A cause that an explanation named.
 struct FoundCause {
-  struct Parameter {
-    std::string key, word;  ///< word: in the place of a number
-    double value = 0.0, std_dev = 0.0;
-  };
   std::string name;  ///< as in the catalogue of effects
-  std::vector<Parameter> parameters;
+  std::vector<ReportedParameter> parameters;
   double delta_bic = 0.0, confidence = 0.0;  ///< [1] as in the report
 
   std::string text() const;  ///< "runout: offset_um 9.02 +- 0.02, angle_deg 41 +- 1"

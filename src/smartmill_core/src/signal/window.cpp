@@ -47,6 +47,10 @@ double taper(double distance, double shoulder) {
 
 }  // namespace
 
+double blackmanHarris(double turn) {
+  return 0.35875 - 0.48829 * std::cos(turn) + 0.14128 * std::cos(2.0 * turn) - 0.01168 * std::cos(3.0 * turn);
+}
+
 std::vector<double> hannWindow(std::size_t n) {
   std::vector<double> window(n);
   for (std::size_t i = 0; i < n; ++i) {

@@ -8,6 +8,10 @@ namespace smartmill {
 /// Hann window of n samples (periodic form).
 std::vector<double> hannWindow(std::size_t n);
 
+/// Four terms of Blackman and Harris, side lobes below -92 dB (Harris 1978). @param turn [rad] 0..2 pi over
+/// the window
+double blackmanHarris(double turn);
+
 /// Force window of Dunwoody eq. 4.17..4.19: one where the hammer touches, cosine tapers beside, zero
 /// elsewhere. Shoulders from the 10 % points around the largest force. Same length as force [N].
 /// @throws Error when there is no positive peak.
