@@ -66,6 +66,63 @@ def faults(document, folders, known_tests):
         yield f"{number}: a reader cannot open it"
 
 
+# What is numbered in the five documents: equations by chapter (0: without chapters), figures, tables, and from which
+# chapter on the figures carry it. Burzoni's list of figures is counted, not his captions.
+NUMBERED = {
+    "Dunwoody": {"equations": {2: 4, 3: 23, 4: 44, 5: 68, 6: 14, 7: 1},
+                 "figures": {2: 1, 3: 5, 4: 8, 5: 9, 6: 3}, "tables": {}},
+    "Kim": {"equations": {0: 16}, "figures": {0: 7}, "tables": {}},
+    "Burzoni": {"equations": {1: 2, 2: 7, 3: 7, 4: 55, 5: 55, 6: 4}, "figures": {0: 57}, "tables": {0: 15}},
+    "Bachrathy": {"equations": {2: 7}, "figures": {0: 5}, "tables": {1: 1}},
+    "Cheng": {"equations": {0: 3}, "figures": {0: 6}, "tables": {0: 2}},
+}
+
+
+def spread(text):
+    """The numbers of "3.6..3.8, 3.11" or "4-1..4-27" as (chapter, number); chapter 0 where there is none."""
+    found = set()
+    for first, last in re.findall(r"(\d+(?:[.-]\d+)?)(?:\.\.(\d+(?:[.-]\d+)?))?(?![\d.-])", text):
+        low = [int(n) for n in re.split("[.-]", first)]
+        high = [int(n) for n in re.split("[.-]", last)] if last else low
+        found |= {(low[0] if len(low) > 1 else 0, n) for n in range(low[-1], high[-1] + 1)}
+    return found
+
+
+def told(section):
+    """What the first column of a document's table names, kind by kind."""
+    found = {"equations": set(), "figures": set(), "tables": set()}
+    for cell in re.findall(r"^\| ([^|]*) \|", section, re.M):
+        kind = "equations"
+        for part in re.split(r"\b(figures?|tables?)\b", re.sub(r"\([^)]*\)", "", cell)):
+            if re.fullmatch(r"figures?|tables?", part):
+                kind = part.rstrip("s") + "s"
+            else:
+                found[kind] |= spread(part)
+    return found
+
+
+def seed_faults(folders):
+    """docs/seeds.md names every number of the documents, and nothing that is not there."""
+    text = (ROOT / "docs/seeds.md").read_text()
+    for section in re.split(r"\n## ", text)[1:]:
+        name = re.match(r"\w+", section).group(0)
+        found = told(section)
+        for kind, chapters in NUMBERED[name].items():
+            due = {(chapter, n) for chapter, last in chapters.items() for n in range(1, last + 1)}
+            for chapter, n in sorted(due - found[kind]):
+                yield f"{name}: {kind[:-1]} {f'{chapter}.{n}' if chapter else n} is missing"
+    gallery = "".join(p.read_text() for p in sorted((ROOT / "smartmill_studies/gallery").glob("*.cpp")))
+    figures = set(re.findall(r'"((?:dunwoody|kim|burzoni|bachrathy|cheng)_\w+)"', gallery))
+    for names in re.findall(r"gallery --only ((?:[a-z]+_\w+ ?)+)", text):
+        for name in set(names.split()) - figures:
+            if not (name.startswith("burzoni_table_") and 8 <= int(name.rsplit("_", 1)[1]) <= 15):
+                yield f"gallery --only {name}: there is no such figure"
+    roots = [f for f in folders["smartmill_studies"].glob("**/*.h")]
+    for header in set(re.findall(r"`(\w+\.h)`", text)):
+        if not any(path.name == header for path in roots) and not list(ROOT.glob(f"*/test/**/{header}")):
+            yield f"{header}: there is no such file"
+
+
 def main():
     folders = packages()
     known_tests = tests(folders)
@@ -75,6 +132,9 @@ def main():
         for fault in faults(ROOT / name, folders, known_tests):
             print(f"{name}: {fault}")
             count += 1
+    for fault in seed_faults(folders):
+        print(f"docs/seeds.md: {fault}")
+        count += 1
     print(f"documents: {len(names.stdout.split())} read, {count} faults")
     return 1 if count else 0
 

@@ -9,6 +9,7 @@
 #include <smartmill_msgs/ChatterState.h>
 #include <smartmill_msgs/CuttingCoefficients.h>
 #include <smartmill_msgs/ForceBlock.h>
+#include <smartmill_msgs/ForceCurve.h>
 #include <smartmill_msgs/Frf.h>
 #include <smartmill_msgs/ModalModel.h>
 #include <smartmill_msgs/StabilityChart.h>
@@ -81,6 +82,15 @@ ResultRecord recordOf(const smartmill_msgs::CuttingCoefficients& m) {
   return record;
 }
 
+ResultRecord recordOf(const smartmill_msgs::ForceCurve& m) {
+  ResultRecord record = begin(m.header, m.tool + " in " + m.material);
+  record.words.insert(record.words.end(), m.cuts.begin(), m.cuts.end());
+  for (const std::vector<double>* v : {&m.chip, &m.tangential, &m.radial, &m.tangential_std, &m.radial_std})
+    add(record, *v);
+  add(record, {m.rms, m.scatter});
+  return record;
+}
+
 ResultRecord recordOf(const smartmill_msgs::StabilityChart& m) {
   ResultRecord record = begin(m.header, m.tool + " in " + m.material);
   record.words.push_back(m.method);
@@ -132,6 +142,7 @@ int run(const std::string& first, const std::string& second, double slack, doubl
   topics.push_back(topic<smartmill_msgs::Frf>(names::TOOL_FRF, 0.0));
   topics.push_back(topic<smartmill_msgs::ModalModel>(names::TOOL_MODES, 0.0));
   topics.push_back(topic<smartmill_msgs::CuttingCoefficients>(names::COEFFICIENTS, 0.0));
+  topics.push_back(topic<smartmill_msgs::ForceCurve>(names::FORCE_CURVE, 0.0));
   topics.push_back(topic<smartmill_msgs::StabilityChart>(names::STABILITY_CHART, 0.0));
   topics.push_back(topic<smartmill_msgs::ForceBlock>(names::FORCE_MEASURED, slack));
   topics.push_back(topic<smartmill_msgs::ForceBlock>(names::FORCE_COMPENSATED, slack));

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/io/text_file.h"
 #include "smartmill_core/program.h"
 #include "smartmill_launch/discovery/discovery_report.h"
 
@@ -18,10 +19,9 @@ using namespace smartmill::discovery;
 
 // @return exit status
 int run(const std::string& file, const std::string& hidden, const std::string& out) {
-  std::ifstream in(file);
-  if (!in) throw Error(file + ": cannot be read");
-  const nlohmann::json result = nlohmann::json::parse(in, nullptr, false);
-  if (result.is_discarded() || !result.contains("report")) throw Error(file + ": no result of a discovery");
+  const nlohmann::json result = nlohmann::json::parse(readText(file), nullptr, false);
+  for (const char* key : {"code", "message", "report", "tests"})
+    if (!result.is_object() || !result.contains(key)) throw Error(file + ": no result of a discovery");
   if (result["code"] != 0) throw Error(file + ": " + result["message"].get<std::string>());
   const Explained explained = readExplained(result["report"].get<std::string>() + "/report.json");
   const std::vector<EffectEntry> effects =

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <string>
 
+#include "smartmill_core/error.h"
 #include "smartmill_core/io/report_page.h"
 #include "smartmill_core/io/text_file.h"
 #include "smartmill_core/program.h"
@@ -15,7 +16,9 @@ int main(int argc, char** argv) {
   line.option("-o,--out", out, "HTML file").required();
   return smartmill::runProgram(line, argc, argv, [&] {
     smartmill::ReportPage page(std::filesystem::path(file).stem().string());
-    page.markdown(smartmill::readText(file), std::filesystem::absolute(file).parent_path().string());
+    const std::string text = smartmill::readText(file);
+    if (text.empty()) throw smartmill::Error(file + ": is empty");
+    page.markdown(text, std::filesystem::absolute(file).parent_path().string());
     page.write(out);
     return 0;
   });

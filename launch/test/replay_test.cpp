@@ -1,6 +1,7 @@
 // A short session is recorded from the simulated machine; its replay must give the same results to the last
 // digit. A browser looks at both.
 
+#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <optional>
@@ -60,23 +61,32 @@ TEST(Replay, OfAShortSessionIsTheSameToTheLastDigit) {
                      "tool/frf panel/revolution panel/spectrum panel/strip session/state cnc/load");
   // A roslaunch that the launch test framework has not started needs a master of its own.
   run("roslaunch -p " + freePort() + " " SHORT_SESSION " port:=" + freePort() + " bag:=" + live +
-          " summary:=" + summary + shown,
+          " summary:=" + summary + " motor_currents:=true" + shown,
       log);
   if (onlooker) page_live = onlooker->verdict();
   onlooker.reset();
   ASSERT_NE(contentOf(summary).find("\"completed\": true"), std::string::npos) << contentOf(log);
+  // No calibration was given: the session's moves in air and its slots along X made it, and it says so.
+  const std::string told = contentOf(summary);
+  const std::size_t motors = told.find("motors: X ");
+  ASSERT_NE(motors, std::string::npos) << told;
+  double constant = 0.0, deviation = 0.0;
+  ASSERT_EQ(std::sscanf(told.c_str() + motors, "motors: X %lf +- %lf N/A", &constant, &deviation), 2) << told;
+  EXPECT_NEAR(constant, 200.0, 3.0 * deviation);
+  EXPECT_LT(deviation, 0.15 * constant);
+  EXPECT_NE(told.find("follows to", motors), std::string::npos) << told;
   if (look)
     onlooker.emplace(page, "replayed", "tool/frf panel/revolution panel/spectrum panel/strip cnc/load");
-  run("roslaunch -p " + freePort() + " smartmill_launch replay.launch rate:=0 bag:=" + live +
-          " out:=" + again + shown,
+  run("roslaunch -p " + freePort() + " smartmill_launch replay.launch rate:=0 motor_currents:=true bag:=" +
+          live + " out:=" + again + shown,
       log);
   if (onlooker) page_replayed = onlooker->verdict();
   const std::string replayed = contentOf(log);
   const int code = run("rosrun smartmill_launch compare_bags " + live + " " + again, log);
   const std::string verdict = contentOf(log);
   EXPECT_EQ(code, 0) << verdict << replayed;
-  for (const char* topic :
-       {"tool/frf", "tool/modes", "material/coefficients", "force/measured", "force/compensated"}) {
+  for (const char* topic : {"tool/frf", "tool/modes", "material/coefficients", "material/force_curve",
+                            "force/measured", "force/compensated"}) {
     const std::size_t line = verdict.find(topic);
     ASSERT_NE(line, std::string::npos) << verdict;
     EXPECT_EQ(verdict.substr(line, 80).find(" 0 common"), std::string::npos) << verdict;

@@ -17,7 +17,6 @@
 #include <smartmill_msgs/PanelKey.h>
 
 #include "smartmill_core/names.h"
-#include "smartmill_core/signal/force_channels.h"
 #include "smartmill_core/testing/temporary_folder.h"
 
 namespace {

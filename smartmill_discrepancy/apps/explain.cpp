@@ -39,7 +39,7 @@ void interrupt(int) {
 }
 
 struct Arguments {
-  std::string campaign, model, out;
+  std::string campaign, model, prior, out;
   int threads = 2;
 };
 
@@ -58,6 +58,7 @@ int run(const Arguments& arguments) {
   const auto begin = std::chrono::steady_clock::now();
   ExplainOptions options;
   options.bench.threads = arguments.threads;
+  if (!arguments.prior.empty()) options.search.prior = readCauseOdds(arguments.prior);
   options.bench.cancelled = [] { return interrupted.load(); };
   const auto elapsed = [&] {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
@@ -91,6 +92,8 @@ int main(int argc, char** argv) {
   CommandLine line{"Finds where twin and records of a campaign part and which effects the model lacks."};
   line.option("campaign", arguments.campaign, "campaign folder, or a bag").required();
   line.option("--model", arguments.model, "machine model file (default: the campaign's)");
+  line.option("--prior", arguments.prior,
+              "odds of each effect by other machines (coefficients_db proposals --prior)");
   line.option("-o,--out", arguments.out, "folder of the report").required();
   line.option("--threads", arguments.threads, "threads").within(1, 64);
   return runProgram(line, argc, argv, [&] { return run(arguments); });

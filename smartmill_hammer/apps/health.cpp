@@ -55,13 +55,6 @@ struct History {
 constexpr double DAY = 86400.0;     // [s]
 constexpr double HOLD_BACK = 0.05;  // [s] see StreamSorter
 
-/// [s] of the last stretch
-double endOf(const IdleRecord& record) {
-  double end = record.loads.empty() ? 0.0 : record.loads.back().stamp;
-  for (const auto& [channel, lines] : record.lines) end = std::max(end, lines.back().stamp);
-  return end;
-}
-
 History read(const std::vector<std::string>& bags) {
   History history;
   for (const std::string& bag : bags) {

@@ -1,5 +1,5 @@
-// rosrun smartmill_kalman cutting_frf CAMPAIGN -o OUT: FRFs of the tool or of the force sensor from its cuts,
-// as a function of the spindle's speed.
+// rosrun smartmill_kalman cutting_frf CAMPAIGN|BAG -o OUT: FRFs of the tool or of the force sensor from its
+// cuts, as a function of the spindle's speed.
 
 #include <array>
 #include <cstdio>
@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "node/bag_cuts.h"
 #include "smartmill_core/campaign/campaign.h"
 #include "smartmill_core/campaign/record.h"
 #include "smartmill_core/error.h"
@@ -14,6 +15,7 @@
 #include "smartmill_core/io/csv.h"
 #include "smartmill_core/io/gnuplot.h"
 #include "smartmill_core/modal/frf_files.h"
+#include "smartmill_core/names.h"
 #include "smartmill_core/program.h"
 #include "smartmill_core/units.h"
 #include "smartmill_kalman/compensation/campaign_compensation.h"
@@ -26,7 +28,9 @@ using namespace smartmill;
 constexpr std::array<const char*, 3> AXES{{"x", "y", "z"}};
 
 struct Request {
-  std::string campaign, out, model, of = "tool";
+  std::string campaign, out, model, of = "tool", response, spindle_sensor;
+  double length = 0.139;     // [m]
+  double force_error = 1.0;  // [%]
   bool identify = false, no_picture = false;
   kalman::CuttingFrfOptions options;
 };
@@ -66,6 +70,60 @@ Axis linesOf(const Campaign& campaign, const MachineModel& model, std::size_t ax
     found.lines.insert(found.lines.end(), lines.begin(), lines.end());
   }
   return found;
+}
+
+/// Of a bag: what was recorded beside force/compensated, and its own taps.
+std::vector<Axis> fromBag(const Request& request) {
+  if (request.identify || !request.model.empty())
+    throw Error("--identify and --model are for campaigns: a bag has its force/compensated and its taps");
+  kalman::BagCutsRequest asked;
+  asked.path = request.campaign;
+  asked.tool = request.of == "tool";
+  asked.response = !request.response.empty() ? request.response
+                   : asked.tool              ? names::DISPLACEMENT
+                                             : names::SPINDLE_FORCE;
+  asked.spindle_sensor = request.spindle_sensor;
+  asked.length = request.length;
+  asked.force_error = 0.01 * request.force_error;
+  const kalman::BagCuts cuts = kalman::cutsOfBag(asked);
+  std::vector<Axis> axes;
+  for (std::size_t a = 0; a < (asked.tool ? 2U : 3U); ++a) {
+    Axis axis;
+    axis.axis = a;
+    axis.rest = cuts.rest[a];
+    for (const kalman::CutStretch& cut : cuts.axis[a]) {
+      const auto lines = kalman::cuttingLines(cut, request.options);
+      if (lines.empty())
+        std::fprintf(stderr, "%s: no line of %s stands out (eleven revolutions are needed)\n",
+                     cut.name.c_str(), AXES[a]);
+      axis.lines.insert(axis.lines.end(), lines.begin(), lines.end());
+    }
+    axes.push_back(std::move(axis));
+  }
+  return axes;
+}
+
+std::vector<Axis> axesOf(const Request& request) {
+  if (std::filesystem::path(request.campaign).extension() == ".bag") return fromBag(request);
+  if (!request.response.empty() || !request.spindle_sensor.empty())
+    throw Error("--response and --spindle-sensor are for bags");
+  const Campaign campaign = readCampaign(request.campaign);
+  const MachineModel model = readMachineModel(request.model.empty() ? campaign.modelPath() : request.model);
+  const std::array<ModalModel, 3> sensors = sensorsOf(campaign, model, request);
+  std::vector<Axis> axes;
+  for (std::size_t a = 0; a < (request.of == "tool" ? 2U : 3U); ++a)
+    axes.push_back(linesOf(campaign, model, a, sensors, request));
+  return axes;
+}
+
+/// The tap beside: what it shows at rest.
+void tellRest(const Axis& axis, bool receptance) {
+  for (const Mode& m : axis.rest.modes) {
+    const double gain = receptance ? 1.0 / m.gain / units::N_PER_UM : m.gain;
+    std::printf("%s, tap at rest: %9.2f +- %.2f Hz, damping %.5f +- %.5f, %s %.4g%s\n", AXES[axis.axis],
+                m.frequency, m.frequency_std, m.damping_ratio, m.damping_ratio_std,
+                receptance ? "stiffness" : "gain", gain, receptance ? " N/um" : "");
+  }
 }
 
 std::string nameOf(const Axis& axis, const kalman::SpeedFrf& frf) {
@@ -130,9 +188,6 @@ void draw(const Axis& axis, const Request& request) {
 void run(const Request& request) {
   kalman::CuttingFrfOptions options = request.options;
   options.validate();
-  const Campaign campaign = readCampaign(request.campaign);
-  const MachineModel model = readMachineModel(request.model.empty() ? campaign.modelPath() : request.model);
-  const std::array<ModalModel, 3> sensors = sensorsOf(campaign, model, request);
   const bool tool = request.of == "tool";
   const std::string unit = tool ? "m/N" : "1";
   options.unit_static_gain = !tool;
@@ -142,9 +197,9 @@ void run(const Request& request) {
           (tool ? "stiffness_n_per_um,stiffness_n_per_um_std" : "gain,gain_std"),
       8);
   std::size_t told = 0;
-  for (std::size_t axis = 0; axis < (tool ? 2U : 3U); ++axis) {
-    Axis found = linesOf(campaign, model, axis, sensors, request);
+  for (Axis& found : axesOf(request)) {
     if (found.lines.empty()) continue;
+    tellRest(found, tool);
     found.found = kalman::cuttingFrfs(found.lines, unit, options);
     for (const kalman::SpeedFrf& frf : found.found) {
       tell(found, frf, tool, table);
@@ -173,11 +228,24 @@ int main(int argc, char** argv) {
   CommandLine line{
       "FRF and modes from cuts, as a function of the spindle's speed: of the tool (displacement against the "
       "force sensor's force) or of the force sensor (against the force that the model's coefficients tell)."};
-  line.option("CAMPAIGN", request.campaign, "campaign folder").required();
+  line.option(
+          "SOURCE", request.campaign,
+          "campaign folder, or a bag: its steady cuts by force/compensated and spindle/angle, the taps at "
+          "rest by its tool/modes")
+      .required();
   line.option("-o,--out", request.out, "folder for frf_*.csv, modes_*.yaml, modes.csv and pictures")
       .required();
   line.option("--of", request.of, "what is identified").oneOf({"tool", "sensor"}).showDefault();
   line.option("--model", request.model, "model file (default: the campaign's)");
+  line.option("--response", request.response,
+              "of a bag: topic of what answers (default: tool daq/displacement, channels x, y; sensor "
+              "daq/spindle_force)");
+  line.option("--spindle-sensor", request.spindle_sensor,
+              "of a bag: calibration of the six sensors in the spindle, where they answer");
+  line.option("--spindle-sensor-length-m", request.length, "of tool and holder, for it").showDefault();
+  line.option("--force-error-percent", request.force_error, "of a bag: deviation of force/compensated")
+      .within(0.0, 50.0)
+      .showDefault();
   line.flag("--identify", request.identify, "the force sensor as the campaign's own taps show it");
   line.option("--low-hz", request.options.low, "band of lines and fit").showDefault();
   line.option("--high-hz", request.options.high, "").showDefault();

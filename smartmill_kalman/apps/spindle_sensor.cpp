@@ -88,6 +88,7 @@ void verify(const Request& request) {
 void apply(const Request& request) {
   const SpindleSensorCalibration c = kalman::readSpindleSensor(request.calibration);
   const kalman::StaticReadings record = kalman::readStaticReadings(request.table);
+  kalman::needLengths(record, c);
   std::array<std::vector<double>, 3> force;
   std::size_t unloaded = 0;
   for (std::size_t i = 0; i < record.size(); ++i) {

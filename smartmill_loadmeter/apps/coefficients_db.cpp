@@ -23,7 +23,7 @@ using namespace smartmill;             // NOLINT
 using namespace smartmill::loadmeter;  // NOLINT
 
 struct Options {
-  std::string file, tool, material, other, shop, login, password_file, machine, campaign;
+  std::string file, tool, material, other, shop, login, password_file, machine, campaign, prior;
   bool all = false;
   double cutting_speed = NAN, feed = NAN, diameter = NAN, helix = NAN, rake = NAN, age = NAN;
 };
@@ -216,6 +216,7 @@ void proposals(const Options& o) {
     for (const std::string& reason : p.reasons) std::printf("     %s\n", reason.c_str());
   }
   if (number == 0) std::printf("nothing to check: this machine has what the others were found to have\n");
+  if (!o.prior.empty()) writeCauseOdds(oddsOf(fleet), o.prior);
 }
 
 /// Commands about what is kept beside coefficients.
@@ -227,6 +228,7 @@ class EvidenceCommands {
         improvements_(line.command("improvements", "what explanations found, with the evidence")),
         proposals_(line.command("proposals", "what a machine should check, as others have it")) {
     proposals_.option("MACHINE", o.machine, "whose model is believed until now").required();
+    proposals_.option("--prior", o.prior, "FILE to write: odds of each effect, for `explain --prior`");
     keep_.option("FILE", o.other, "folder of the report or report.json; or a .csv of health").required();
     keep_.option("--machine", o.machine, "whose it is").required();
     keep_.option("--campaign", o.campaign, "folder that was explained: tells the tests' conditions");

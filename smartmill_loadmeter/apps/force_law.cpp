@@ -3,13 +3,16 @@
 #include <string>
 #include <vector>
 
+#include "node/bag_identification.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/io/gnuplot.h"
 #include "smartmill_core/program.h"
 #include "smartmill_core/units.h"
+#include "smartmill_loadmeter/identification/curve_finder.h"
 #include "smartmill_loadmeter/identification/force_curve.h"
 #include "smartmill_loadmeter/identification/force_law.h"
+#include "smartmill_ros/parameter_options.h"
 
 namespace {
 
@@ -36,8 +39,9 @@ void laws(const char* name, const std::vector<double>& chip, const std::vector<d
 }
 
 struct Options {
-  std::string campaign, curve, compensated;
-  int pieces = 8;
+  std::string campaign, curve, compensated, tool, material;
+  int pieces = 0;
+  NodeParameters parameters;
 };
 
 /// Steady samples of a campaign's cuts, the forces as `compensate` has left them where a folder is named.
@@ -49,9 +53,9 @@ std::vector<AngleRecord> angleRecords(const Options& o, const Campaign& campaign
     if (test.kind != TestKind::cut) continue;
     const std::size_t number = cut++;
     Record record = readRecord(campaign, test, model);
-    const bool angle = record.has("spindle_angle");
-    AngleRecord one;
-    one.engagement = *test.engagement;
+    const std::vector<double>* angle =
+        record.has("spindle_angle") ? &record.column("spindle_angle") : nullptr;
+    MeanRevolution revolution;
     const auto first = static_cast<std::size_t>(test.engage_time.value_or(0.0) * test.sample_rate);
     Record force = o.compensated.empty()
                        ? record
@@ -59,13 +63,15 @@ std::vector<AngleRecord> angleRecords(const Options& o, const Campaign& campaign
     if (force.size() != record.size())
       throw Error(
           formatted("%s: %zu samples, the record has %zu", force.file.c_str(), force.size(), record.size()));
+    const std::vector<double>&fx = force.column("fx"), &fy = force.column("fy");
     for (std::size_t i = first; i < record.size(); ++i) {
-      one.angle.push_back(angle ? record.column("spindle_angle")[i]
-                                : test.spindle_speed * static_cast<double>(i - first) / test.sample_rate +
-                                      fit.phase[number]);
-      one.fx.push_back(force.column("fx")[i]);
-      one.fy.push_back(force.column("fy")[i]);
+      revolution.add(
+          angle ? (*angle)[i]
+                : test.spindle_speed * static_cast<double>(i - first) / test.sample_rate + fit.phase[number],
+          fx[i], fy[i]);
     }
+    AngleRecord one = revolution.record();
+    one.engagement = *test.engagement;
     records.push_back(std::move(one));
   }
   return records;
@@ -92,13 +98,13 @@ void draw(const ForceCurves& curves, const std::string& file) {
   plot.draw();
 }
 
-void writeCurve(const Options& o, const Campaign& campaign, const MachineModel& model, const SlotFit& fit) {
-  const ForceCurves curves =
-      fitForceCurves(angleRecords(o, campaign, model, fit), model.needTool("fit a force curve"), o.pieces);
-  writeForceCurves(curves, o.curve);
-  draw(curves, o.curve);
-  std::printf("%s: monotone splines of %d pieces, any number of teeth in cut, %.2f N left (RMS)\n",
-              o.curve.c_str(), o.pieces, curves.rms);
+/// Writes, draws and tells curves.
+void write(const ForceCurves& curves, const std::string& file) {
+  writeForceCurves(curves, file);
+  draw(curves, file);
+  std::printf("%s: monotone splines of %zu pieces, any number of teeth in cut, %.2f N left (RMS)",
+              file.c_str(), curves.tangential.knots.size() - 1, curves.rms);
+  std::printf(curves.scatter > 0.0 ? ", cuts differ by %.1f %%\n" : "\n", 100.0 * curves.scatter);
   for (const double share : {0.1, 0.25, 0.5, 0.75, 1.0}) {
     const double h = share * curves.tangential.knots.back();
     std::printf("  h %.4f mm: tangential %8.2f +- %6.2f, radial %8.2f +- %6.2f N/mm\n", h / units::MM,
@@ -107,7 +113,36 @@ void writeCurve(const Options& o, const Campaign& campaign, const MachineModel& 
   }
 }
 
+/// What loadmeter_node makes of a recording.
+void fromBag(const Options& o) {
+  if (o.curve.empty()) throw Error(o.campaign + ": of a bag comes the curve (--curve)");
+  if (!o.compensated.empty()) throw Error("--compensated: a bag has its force/compensated");
+  NodeParameters parameters = o.parameters;
+  if (o.pieces > 0) parameters.curve.pieces = o.pieces;
+  parameters.validate();
+  for (const FoundCurves& found : curvesFromBag(o.campaign, parameters)) {
+    if ((!o.tool.empty() && found.tool != o.tool) || (!o.material.empty() && found.material != o.material))
+      continue;
+    std::string cuts;
+    for (const std::string& name : found.cuts) cuts += (cuts.empty() ? "" : ", ") + name;
+    std::printf("%s in %s: %s\n", found.tool.c_str(), found.material.c_str(), cuts.c_str());
+    write(found.curves, o.curve);
+  }
+}
+
+void writeCurve(const Options& o, const Campaign& campaign, const MachineModel& model, const SlotFit& fit) {
+  ForceCurves curves =
+      fitForceCurves(angleRecords(o, campaign, model, fit), model.needTool("fit a force curve"),
+                     o.pieces > 0 ? o.pieces : o.parameters.curve.pieces);
+  widen(curves, o.parameters.curve.gain_error);
+  write(curves, o.curve);
+}
+
 void run(const Options& o) {
+  if (std::filesystem::path(o.campaign).extension() == ".bag") {
+    fromBag(o);
+    return;
+  }
   if (o.curve.empty() && !o.compensated.empty()) throw Error("--compensated: goes with --curve");
   const Campaign campaign = readCampaign(o.campaign);
   const MachineModel model = readMachineModel(campaign.modelPath());
@@ -153,13 +188,25 @@ int main(int argc, char** argv) {
       "thickness, "
       "size effect, runout.");
   Options o;
-  line.option("CAMPAIGN", o.campaign, "campaign folder").required();
+  line.option(
+          "SOURCE", o.campaign,
+          "campaign folder, or a bag with force/compensated and spindle/angle (--curve: what loadmeter_node "
+          "makes of it)")
+      .required();
   line.option("--curve", o.curve,
               "YAML of force over chip thickness as monotone splines with deviations, for any number of "
               "teeth in cut (lobes --force-curve takes it); a picture of the same name with .png beside it");
   line.option("--compensated", o.compensated,
               "folder that `compensate CAMPAIGN -o` wrote: fx, fy come from there (a sensor's own modes are "
               "no law of cutting)");
-  line.option("--pieces", o.pieces, "of a spline").within(2, 30).showDefault();
-  return runProgram(line, argc, argv, [&] { run(o); });
+  line.option("--pieces", o.pieces, "of a spline (default: 8, of a bag the parameter curve_pieces)")
+      .within(2, 30);
+  line.option("--tool", o.tool, "of a bag with several: name of the tool");
+  line.option("--material", o.material, "and of the material");
+  const ParameterTable table = tableOf(o.parameters);
+  ParameterOptions parameters(line, table, "launch/config/loadmeter.yaml, for a bag");
+  return runProgram(line, argc, argv, [&] {
+    parameters.apply();
+    run(o);
+  });
 }

@@ -21,7 +21,7 @@ using namespace smartmill;             // NOLINT
 using namespace smartmill::stability;  // NOLINT
 
 struct Options {
-  std::string bag, model, output, states;
+  std::string bag, model, output, states, bistable;
   NodeParameters parameters;
 };
 
@@ -49,6 +49,20 @@ void write(const std::vector<ChatterState>& states, const std::string& file) {
   csv.save(file);
 }
 
+/// Small and large vibrations by the force curve.
+void write(const BistableChart& chart, const std::string& file) {
+  CsvWriter csv("rpm,limit_mm,large_limit_mm,secant_limit_mm", DIGITS);
+  for (const BistableLimit& b : chart.limits)
+    csv.row(units::rpmFromRadPerSec(b.speed), b.small.depth / units::MM, b.large.depth / units::MM,
+            b.secant.depth / units::MM);
+  csv.save(file);
+  drawBeside(file,
+             "set xlabel 'Spindle speed [rpm]'\nset ylabel 'Axial depth [mm]'\nset yrange [0:]\n"
+             "plot %FILE skip 1 using 1:3:2 with filledcurves lc 'gold' title 'still or chatter', "
+             "%FILE skip 1 using 1:2 with lines lw 2 lc 'black' title 'the least vibration grows', "
+             "%FILE skip 1 using 1:3 with lines lw 2 lc 'red' title 'a large vibration stays'");
+}
+
 void print(const char* title, const std::vector<StabilityPoint>& points) {
   std::printf("%s\n", title);
   for (const StabilityPoint& p : points) {
@@ -70,6 +84,16 @@ void run(const Options& o) {
   };
   const BagCharts found = chartsFromBag(o.bag, readMachineModel(parameters.model), parameters, progress);
   if (!o.states.empty()) write(found.states, o.states);
+  if (found.bistable) {
+    std::printf("by the force curve, feed %.4f mm (mean chip %.4f mm): tangential slope %.1f N/mm2\n",
+                found.bistable->feed / units::MM, found.bistable->mean_chip / units::MM,
+                found.bistable->slope / units::N_PER_MM2);
+    if (!o.bistable.empty()) write(*found.bistable, o.bistable);
+  } else if (!o.bistable.empty()) {
+    throw Error(o.bag +
+                ": no limits by a force curve: material/force_curve (or the parameter force_curve), "
+                "modes of x and y or coefficients are missing");
+  }
   int valid = 0, chatter = 0;
   for (const ChatterState& s : found.states) {
     valid += s.valid;
@@ -97,6 +121,8 @@ int main(int argc, char** argv) {
   line.option("BAG", o.bag, "recording with tool/frf, material/coefficients, cuts").required();
   line.option("--model", o.model, "machine model file: tool and spindle limits (default: the parameter)");
   line.option("-o,--out", o.output, "CSV of the chart; a picture of the same name with .png beside it");
+  line.option("--bistable", o.bistable,
+              "CSV of the limits of small and large vibrations by the force curve; a picture beside it");
   line.option("--states", o.states, "CSV of the chatter verdicts");
   const ParameterTable table = tableOf(o.parameters);
   ParameterOptions parameters(line, table, "launch/config/stability.yaml");

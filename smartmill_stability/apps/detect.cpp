@@ -65,6 +65,7 @@ Recording fromTable(const Options& o) {
   Recording recording;
   recording.sample_rate = static_cast<double>(t.size() - 1) / (t.back() - t.front());
   for (std::size_t i = 1; i < t.size(); ++i) {
+    if (!std::isfinite(t[i])) throw Error(o.file + formatted(": no time behind %.6f s", t[i - 1]));
     if (std::abs((t[i] - t[i - 1]) * recording.sample_rate - 1.0) > 0.1)
       throw Error(o.file + formatted(": uneven time at %.6f s", t[i]));
   }
@@ -73,8 +74,9 @@ Recording fromTable(const Options& o) {
     if (o.channels.empty() && !isTime(name) && name.rfind("spindle_angle", 0) != 0) names.push_back(name);
   for (const std::string& name : names) {
     recording.channels.push_back(table.column(name));
-    for (const double v : recording.channels.back())
-      if (!std::isfinite(v)) throw Error(o.file + ": column " + name + " has empty cells");
+    for (std::size_t i = 0; i < t.size(); ++i)
+      if (!std::isfinite(recording.channels.back()[i]))
+        throw Error(o.file + ": column " + name + formatted(" has no number at %.6f s", t[i]));
   }
   return recording;
 }
@@ -216,7 +218,15 @@ void run(Options o) {
   request.speed_error = 0.01 * o.speed_error;
   request.modes = modesOf(o.model);
   if (o.picture.empty()) o.picture = std::filesystem::path(o.file).stem().string() + "_spectrogram.png";
-  const RecordingVerdict verdict = judgeRecording(load(o), request);
+  request.validate();
+  const Recording recording = load(o);
+  const RecordingVerdict verdict = [&] {
+    try {
+      return judgeRecording(recording, request);
+    } catch (const Error& error) {
+      throw Error(o.file + ": " + error.what());
+    }
+  }();
   draw(verdict, o);
   std::printf("%s\n", verdict.text().c_str());
 }

@@ -120,7 +120,8 @@ void fit(const Dataset& data, const std::vector<double>& off, json* line) {
   WorkbenchOptions options;
   options.threads = 1;
   Workbench bench(data, options);
-  out["chattering"] = data.chattering.size();
+  out["chattering"] = std::count_if(data.tests.begin(), data.tests.end(),
+                                    [](const TestData& t) { return t.chatter.has_value(); });
   out["gap_before"] = remainsOf(bench, data.nominal).gap.fit;
   const SearchOptions searched;
   const std::vector<Hypothesis> hypotheses = catalogueHypotheses(data, nullptr);

@@ -55,13 +55,14 @@ void draw(const std::string& png, const std::vector<StabilityLimit>& limits,
     rows.push_back({units::rpmFromRadPerSec(limits[0].spindle_speed[i])});
     for (const StabilityLimit& limit : limits) rows.back().push_back(1e3 * limit.depth[i]);
   }
-  const char* colours[] = {"#909090", "#2060c0", "#c02020"};
-  Gnuplot plot(png, 1000, 500);
+  const char* looks[] = {"lw 4 lc rgb '#b0b0b0'", "lw 1.5 lc rgb '#c08040'", "lw 1.5 lc rgb '#2060c0'"};
+  Gnuplot plot(png, 900, 500, 12);
   plot.block("rows", rows);
-  plot << "set grid\nset xlabel 'spindle speed [rpm]'\nset ylabel 'limit of a slot [mm]'\nset yrange [0:*]\n";
+  plot << "set grid\nset key above horizontal samplen 2\nset xlabel 'spindle speed [rpm]'\nset ylabel 'limit "
+          "of a slot [mm]'\nset yrange [0:*]\n";
   for (std::size_t k = 0; k < limits.size(); ++k)
-    plot << (k == 0 ? "plot" : ",") << " $rows using 1:" << k + 2 << " with lines lw 2 lc rgb '" << colours[k]
-         << "' title " << Gnuplot::quoted(names[k]);
+    plot << (k == 0 ? "plot" : ",") << " $rows using 1:" << k + 2 << " with lines " << looks[k] << " title "
+         << Gnuplot::quoted(names[k]);
   plot << "\n";
   plot.draw();
 }

@@ -120,20 +120,20 @@ Drawn transferFunctions(const std::string& folder, unsigned) {
       if (std::abs(lines[i] - 930.0) < 0.5 * lines[1]) at_tooth = gains.back()[2];
     }
     const std::string png = folder + "/dunwoody_5_2_" + AXES[axis] + ".png";
-    Gnuplot plot(png, 1100, 800);
+    Gnuplot plot(png, 900, 800, 12);
     plot.block("frf", rows);
     plot.block("gains", gains);
-    plot
-        << "set multiplot layout 2,1\nset grid\nset lmargin 10\nset logscale y\nset xlabel 'frequency [Hz]'\n"
-           "set ylabel '|measured / applied|'\nplot $frf using 1:2 with lines lw 3 lc rgb '#b0b0b0' title "
-           "'nine "
-           "taps, "
-        << AXES[axis]
-        << "', $frf using 1:3 with lines lw 1.5 lc rgb '#2060c0' title 'model'\nset ylabel '|gain|'\nset "
-           "yrange "
-           "[0.01:20]\nplot $gains using 1:2 with lines lw 1 lc rgb '#2060c0' title 'filter at 930 Hz tooth "
-           "passing', $gains using 1:3 with lines lw 1 lc rgb '#c02020' title 'sensor and filter'\nunset "
-           "multiplot\n";
+    plot << "set multiplot layout 2,1\nset grid\nset key above horizontal samplen 2\nset lmargin 10\nset "
+            "logscale y\nset xlabel 'frequency [Hz]'\n"
+            "set ylabel '|measured / applied|'\nplot $frf using 1:2 with lines lw 3 lc rgb '#b0b0b0' title "
+            "'nine "
+            "taps, "
+         << AXES[axis]
+         << "', $frf using 1:3 with lines lw 1.5 lc rgb '#2060c0' title 'model'\nset ylabel '|gain|'\nset "
+            "yrange "
+            "[0.01:20]\nplot $gains using 1:2 with lines lw 1 lc rgb '#2060c0' title 'filter at 930 Hz tooth "
+            "passing', $gains using 1:3 with lines lw 1 lc rgb '#c02020' title 'sensor and filter'\nunset "
+            "multiplot\n";
     plot.draw();
     drawn.pictures.push_back(png);
     drawn.rows.push_back(
@@ -167,15 +167,22 @@ Drawn atResonance(const std::string& folder, unsigned seed) {
       return rows;
     };
     const std::string png = folder + "/dunwoody_5_6_" + AXES[axis] + ".png";
-    Gnuplot plot(png, 1100, 500);
+    Gnuplot plot(png, 900, 500, 12);
     plot.block("fast", rowsOf(fast));
     plot.block("slow", rowsOf(slow));
-    plot << "set grid\nset xlabel 'spindle angle [deg]'\nset xrange [0:360]\nset ylabel 'force " << AXES[axis]
-         << " [N]'\nplot $slow using 1:2 with dots lc rgb '#909090' title '750 rpm, measured', $fast using "
-            "1:2 with "
-            "points pt 7 ps 0.4 lc rgb '#c08040' title '13,950 rpm, measured', $fast using 1:3 with points "
-            "pt 7 ps "
-            "0.4 lc rgb '#2060c0' title '13,950 rpm, compensated'\n";
+    plot << "set grid\nset key above horizontal samplen 2\nset xlabel 'spindle angle [deg]'\nset xrange "
+            "[0:360]\nset xtics 45\nset ylabel 'force "
+         << AXES[axis] << " [N]'\nplot ";
+    const auto points = [&](const char* block, int column, const char* colour, const char* title) {
+      plot << "$" << block << " using 1:" << column << " with points pt 7 ps 0.4 lc rgb '" << colour
+           << "' notitle, NaN with points pt 7 ps 1.2 lc rgb '" << colour << "' title '" << title << "'";
+    };
+    points("slow", 2, "#909090", "750 rpm, measured");
+    plot << ", ";
+    points("fast", 2, "#c08040", "13,950 rpm, measured");
+    plot << ", ";
+    points("fast", 3, "#2060c0", "13,950 rpm, compensated");
+    plot << "\n";
     plot.draw();
     drawn.pictures.push_back(png);
     const double error = waveformError(fast, fast.compensated);
@@ -209,13 +216,15 @@ Drawn ranges(const std::string& folder, unsigned seed) {
       worst_raw = std::max(worst_raw, std::abs(span(cut.measured) / span(cut.truth) - 1.0));
     }
     const std::string png = folder + "/dunwoody_5_8_" + AXES[axis] + ".png";
-    Gnuplot plot(png, 1000, 500);
+    Gnuplot plot(png, 900, 500, 12);
     plot.block("rows", rows);
-    plot << "set grid\nset key left top\nset xlabel 'tooth-passing frequency [Hz]'\nset ylabel 'force "
+    plot << "set grid\nset key above horizontal samplen 2\nset xlabel 'tooth-passing frequency [Hz]'\nset "
+            "ylabel 'force "
          << AXES[axis]
          << ", 10 to 90 % [N]'\nplot for [k=6:7] $rows using 1:k with lines lw 4 lc rgb '#b0b0b0' title (k "
             "== 6 ? "
-            "'applied' : ''), for [k=2:3] $rows using 1:k with linespoints dt 2 lc rgb '#c08040' title (k == "
+            "'applied' : ''), for [k=2:3] $rows using 1:k with linespoints dt 2 pt 6 lc rgb '#c08040' title "
+            "(k == "
             "2 ? "
             "'measured' : ''), for [k=4:5] $rows using 1:k with linespoints pt 7 lc rgb '#2060c0' title (k "
             "== 4 ? "

@@ -29,6 +29,15 @@ Drawn turning(const std::string& folder, unsigned) {
                                                                                      : Verdict::differs,
          "spectra are compared with those of the model's own answer, so the window's leakage is in both"});
   }
+  drawn.rows.push_back(
+      {"K / K_m as learnt after period 1, section 4 (true 0.1)", "0.15",
+       formatted("%.4f", f.ours.learnt.front().machine.gain),
+       std::abs(f.ours.learnt.front().machine.gain - 0.1) < 0.05 ? Verdict::better : Verdict::differs, ""});
+  const stability::SecondOrder& read = f.kim.segments.at(1).read;
+  drawn.rows.push_back({"the machine by his update after period 2 (he estimates 332, 0.11 before it)",
+                        "335 rad/s, 0.06", formatted("%.0f rad/s, %.2f", read.frequency, read.damping_ratio),
+                        std::abs(read.frequency / 335.0 - 1.0) < 0.05 ? Verdict::agrees : Verdict::differs,
+                        "eq. 16 as printed, run here, read off its peak and half-power width"});
   const double free = stability::lastVibration(f.free), ours = stability::lastVibration(f.ours),
                kim = stability::lastVibration(f.kim.trace);
   drawn.rows.push_back(

@@ -97,11 +97,12 @@ Drawn airCutting(const std::string& folder, unsigned seed) {
                     meter.friction(w)});
   }
   const std::string png = folder + "/dunwoody_3_1.png";
-  Gnuplot plot(png, 1100, 900);
+  Gnuplot plot(png, 900, 900, 12);
   plot.block("volts", volts);
   plot.block("torques", torques);
   plot.block("fits", fits);
-  plot << "set multiplot layout 2,1\nset grid\nset lmargin 12\nset key left top\nset xlabel 'spindle speed "
+  plot << "set multiplot layout 2,1\nset grid\nset key above horizontal samplen 2\nset lmargin 12\nset "
+          "xlabel 'spindle speed "
           "[rpm]'\nset ylabel 'load meter in air [V]'\n"
           "plot $fits using 1:3 with lines lw 4 lc rgb '#b0b0b0' title 'thesis, eq. 3.6 with 3.11', "
           "$fits using 1:2 with lines lw 1.5 lc rgb '#2060c0' title 'fitted here', "
@@ -146,10 +147,11 @@ Drawn sensitivity(const std::string& folder, unsigned seed) {
     lines.push_back({rpm, slope * w, K * w});
   }
   const std::string png = folder + "/dunwoody_3_2.png";
-  Gnuplot plot(png, 1000, 500);
+  Gnuplot plot(png, 900, 500, 12);
   plot.block("points", points);
   plot.block("lines", lines);
-  plot << "set grid\nset key left top\nset xlabel 'spindle speed [rpm]'\nset ylabel '(V - Vf) / Tc [V/(N "
+  plot << "set grid\nset key above horizontal samplen 2\nset xlabel 'spindle speed [rpm]'\nset ylabel '(V - "
+          "Vf) / Tc [V/(N "
           "m)]'\n"
           "plot $lines using 1:3 with lines lw 4 lc rgb '#b0b0b0' title 'thesis, 3.88e-4 V/W', "
           "$lines using 1:2 with lines lw 1.5 lc rgb '#2060c0' title 'fitted here', "
@@ -193,9 +195,10 @@ Drawn exitOfTheCut(const std::string& folder, unsigned seed) {
   }
   const double bandwidth = -(n * sty - st * sy) / (n * stt - st * st) / units::TWO_PI;
   const std::string png = folder + "/dunwoody_3_3.png";
-  Gnuplot plot(png, 1000, 450);
+  Gnuplot plot(png, 900, 450, 12);
   plot.block("torque", rows);
-  plot << "set grid\nset xlabel 'time [s]'\nset ylabel 'torque [N m]'\nplot $torque using 1:2 with lines lw "
+  plot << "set grid\nset key above horizontal samplen 2\nset xlabel 'time [s]'\nset ylabel 'torque [N "
+          "m]'\nplot $torque using 1:2 with lines lw "
           "3 lc "
           "rgb '#b0b0b0' title 'cutting torque: the tool leaves', $torque using 1:3 with lines lw 1.5 lc rgb "
           "'#2060c0' title 'told by the load meter'\n";
@@ -239,9 +242,10 @@ Drawn coefficients(const std::string& folder, unsigned seed) {
   const double scale = RADIUS * TEETH * DEPTH;  // eq. 3.19
   const double ktc = line.slope * units::PI / scale, kte = line.level * 2.0 / scale;
   const std::string png = folder + "/dunwoody_3_5.png";
-  Gnuplot plot(png, 1000, 500);
+  Gnuplot plot(png, 900, 500, 12);
   plot.block("points", points);
-  plot << "set grid\nset key left top\nset xlabel 'feed per tooth [mm]'\nset ylabel 'mean cutting torque [N "
+  plot << "set grid\nset key above horizontal samplen 2\nset xlabel 'feed per tooth [mm]'\nset ylabel 'mean "
+          "cutting torque [N "
           "m]'\n"
           "plot $points using 1:2 with linespoints lw 3 lc rgb '#b0b0b0' title 'dynamometer', $points using "
           "1:3 "
@@ -275,10 +279,11 @@ Drawn manyMachines(const std::string& folder, unsigned seed) {
   for (unsigned i = 0; i < MACHINES; ++i)
     rows.push_back({(i + 0.5) / MACHINES, thesis[i], ours[i], thesis_edge[i], ours_edge[i]});
   const std::string png = folder + "/dunwoody_3_5_machines.png";
-  Gnuplot plot(png, 1000, 500);
+  Gnuplot plot(png, 900, 500, 12);
   plot.block("rows", rows);
   plot
-      << "set grid\nset key right bottom\nset logscale x\nset xlabel '|error| [%]'\nset ylabel 'share of "
+      << "set grid\nset key above horizontal samplen 2\nset logscale x\nset xlabel '|error| [%]'\nset ylabel "
+         "'share of "
          "machines'\n"
          "plot $rows using 2:1 with lines lw 2 lc rgb '#c08040' title 'Ktc, thesis to the letter', $rows "
          "using "

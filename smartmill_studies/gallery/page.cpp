@@ -1,6 +1,7 @@
 #include "gallery/page.h"
 
 #include <sstream>
+#include <tuple>
 
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/io/report_page.h"
@@ -8,22 +9,39 @@
 namespace smartmill::studies {
 namespace {
 
-std::string cell(const std::string& text) {
-  return "<td>" + escapedHtml(text) + "</td>";
+/// On a phone a row stands as a block, each cell after its column's name.
+constexpr const char* STYLE = R"(<style>
+main a { color: var(--x); }
+@media (max-width: 640px) {
+  .table table, .table tbody, .table tr, .table td { display: block; }
+  .table th { display: none; }
+  .table td { border-top: 0; padding: 1px 0; }
+  .table td:empty { display: none; }
+  .table tr + tr { border-top: 1px solid var(--grid); padding: 8px 0; }
+  .table td[data-name]::before { content: attr(data-name) ": "; color: var(--dim); }
+}
+</style>
+)";
+
+std::string cell(const std::string& text, const std::string& name = "") {
+  return (name.empty() ? "<td>" : "<td data-name=\"" + name + "\">") + escapedHtml(text) + "</td>";
 }
 
 /// A row, and the figure whose it is.
 using Told = std::pair<const Figure*, const Compared*>;
 
-void table(ReportPage& page, const std::vector<Told>& rows) {
+/// @param linked each row with a link to its figure
+void table(ReportPage& page, const std::vector<Told>& rows, bool linked) {
   if (rows.empty()) return;
-  page.html() << "<table><tr><th>figure</th><th>number</th><th>document</th><th>here</th><th></th><th>why</"
-                 "th></tr>\n";
+  page.html() << "<table><tr>" << (linked ? "<th>figure</th>" : "")
+              << "<th>number</th><th>document</th><th>here</th><th></th><th>why</th></tr>\n";
   for (const auto& [figure, row] : rows) {
     const char* look = row->verdict == Verdict::differs ? "bad" : "good";
-    page.html() << "<tr><td><a href=\"#" << figure->name << "\">" << figure->name << "</a></td>"
-                << cell(row->what) << cell(row->seed) << cell(row->ours) << "<td class=\"" << look << "\">"
-                << nameOf(row->verdict) << "</td>" << cell(row->why) << "</tr>\n";
+    page.html() << "<tr>";
+    if (linked) page.html() << "<td><a href=\"#" << figure->name << "\">" << figure->name << "</a></td>";
+    page.html() << cell(row->what) << cell(row->seed, "document") << cell(row->ours, "here") << "<td class=\""
+                << look << "\">" << nameOf(row->verdict) << "</td>"
+                << (row->why.empty() ? "<td></td>" : cell(row->why, "why")) << "</tr>\n";
   }
   page.html() << "</table>\n";
 }
@@ -42,17 +60,21 @@ void writePage(const std::vector<Shown>& shown, unsigned seed, const std::string
   ReportPage page("The documents' figures and tables, redrawn");
   const auto agrees = rowsOf(shown, Verdict::agrees), better = rowsOf(shown, Verdict::better),
              differs = rowsOf(shown, Verdict::differs);
-  page.html() << "<p class=\"verdict\">"
+  page.html() << STYLE << "<p class=\"verdict\">"
               << formatted("%zu numbers agree, %zu are better here, %zu do not agree; %zu figures, seed %u.",
                            agrees.size(), better.size(), differs.size(), shown.size(), seed)
-              << "</p>\n";
-  const std::pair<const char*, const std::vector<Told>*> parts[] = {
-      {"What agrees", &agrees}, {"What is better", &better}, {"What does not agree", &differs}};
-  for (const auto& [title, rows] : parts) {
-    page.html() << "<h2>" << title << "</h2>\n";
+              << "</p>\n<p><a href=\"#agrees\">what agrees</a>, <a href=\"#better\">what is better</a>, <a "
+                 "href=\"#differs\">what does not agree</a>, <a href=\"#figures\">the figures</a></p>\n";
+  const std::tuple<Verdict, const char*, const std::vector<Told>*> parts[] = {
+      {Verdict::agrees, "What agrees", &agrees},
+      {Verdict::better, "What is better", &better},
+      {Verdict::differs, "What does not agree", &differs}};
+  for (const auto& [verdict, title, rows] : parts) {
+    page.html() << "<h2 id=\"" << nameOf(verdict) << "\">" << title << "</h2>\n";
     if (rows->empty()) page.html() << "<p>Nothing.</p>\n";
-    table(page, *rows);
+    table(page, *rows, true);
   }
+  page.html() << "<span id=\"figures\"></span>\n";
   for (const Shown& one : shown) {
     page.html() << "<h2 id=\"" << one.figure.name << "\">" << escapedHtml(one.figure.title)
                 << "</h2>\n<p><code>rosrun "
@@ -61,7 +83,7 @@ void writePage(const std::vector<Shown>& shown, unsigned seed, const std::string
     for (const std::string& picture : one.drawn.pictures) page.picture(picture, one.figure.title);
     std::vector<Told> rows;
     for (const Compared& row : one.drawn.rows) rows.emplace_back(&one.figure, &row);
-    table(page, rows);
+    table(page, rows, false);
   }
   page.write(file);
 }

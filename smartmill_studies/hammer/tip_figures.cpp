@@ -33,13 +33,14 @@ void plotCurves(Gnuplot& plot, const std::vector<TipCurve>& curves, const char* 
 }
 
 constexpr const char* FRAME =
-    "set multiplot layout 2,1\nset grid\nset lmargin 10\nset xlabel 'frequency [Hz]'\nset xrange "
+    "set multiplot layout 2,1\nset grid\nset key above horizontal samplen 2\nset lmargin 10\nset xlabel "
+    "'frequency [Hz]'\nset xrange "
     "[100:5000]\n";
 
 }  // namespace
 
 void drawParts(const std::vector<TipCurve>& curves, const std::string& png) {
-  Gnuplot plot(png, 1100, 900);
+  Gnuplot plot(png, 900, 900, 12);
   plot.block("real", rowsOf(curves, [](std::complex<double> h) { return h.real(); }));
   plot.block("imag", rowsOf(curves, [](std::complex<double> h) { return h.imag(); }));
   plot << FRAME << "set ylabel 'Re H [um/N]'\n";
@@ -50,7 +51,7 @@ void drawParts(const std::vector<TipCurve>& curves, const std::string& png) {
   plot.draw();
 }
 
-void drawSlotLimits(const std::vector<TipCurve>& curves, const std::string& png) {
+std::vector<StabilityLimit> drawSlotLimits(const std::vector<TipCurve>& curves, const std::string& png) {
   constexpr double KT = 796e6, RADIAL = 0.21, SLOWEST = 3000.0, FASTEST = 20000.0;
   const stability::RegenerativeProcess slot{4, 0.0, units::PI, KT, RADIAL};
   std::vector<double> speeds;
@@ -63,7 +64,7 @@ void drawSlotLimits(const std::vector<TipCurve>& curves, const std::string& png)
     depths.push_back({units::rpmFromRadPerSec(speeds[i])});
     for (const StabilityLimit& limit : limits) depths.back().push_back(1e3 * limit.depth[i]);
   }
-  Gnuplot plot(png, 1100, 900);
+  Gnuplot plot(png, 900, 900, 12);
   plot.block("sizes", rowsOf(curves, [](std::complex<double> h) { return std::abs(h); }));
   plot.block("depths", depths);
   plot << FRAME << "set logscale y\nset ylabel '|H| [um/N]'\n";
@@ -74,6 +75,7 @@ void drawSlotLimits(const std::vector<TipCurve>& curves, const std::string& png)
   plotCurves(plot, curves, "depths");
   plot << "unset multiplot\n";
   plot.draw();
+  return limits;
 }
 
 }  // namespace smartmill::studies

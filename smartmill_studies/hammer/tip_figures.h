@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "smartmill_core/signal/frequency_response.h"
+#include "smartmill_stability/solvers/zero_order.h"
 
 namespace smartmill::studies {
 
@@ -17,7 +18,7 @@ struct TipCurve {
 void drawParts(const std::vector<TipCurve>& curves, const std::string& png);
 
 /// Figure 4.8: the limit of a slot, of four teeth in aluminium, by each FRF; above it their sizes. x and y
-/// are alike. @throws Error of gnuplot
-void drawSlotLimits(const std::vector<TipCurve>& curves, const std::string& png);
+/// are alike. @return the limits, curve by curve. @throws Error of gnuplot
+std::vector<StabilityLimit> drawSlotLimits(const std::vector<TipCurve>& curves, const std::string& png);
 
 }  // namespace smartmill::studies

@@ -1,7 +1,9 @@
 #include "kalman/burzoni_tables.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <memory>
 
 #include "kalman/expanded_disturbance.h"
 #include "smartmill_core/signal/statistics.h"
@@ -111,9 +113,7 @@ double noiseOf(const BurzoniData& data, std::size_t axis, double printed) {
   return printed > 5.0 ? data.r_air[axis] : 0.2 * data.r_air[axis];
 }
 
-}  // namespace
-
-BurzoniData gatherBurzoni(const MachineModel& model, std::uint64_t seed, double band) {
+std::unique_ptr<SpindleRig> rigOf(const MachineModel& model, std::uint64_t seed, double band) {
   sim::WorldOptions world;
   world.seed = seed;
   world.spindle_sensor.present = true;
@@ -122,13 +122,121 @@ BurzoniData gatherBurzoni(const MachineModel& model, std::uint64_t seed, double 
   filter.filter.max_harmonics = 150;
   TapParameters taps;
   taps.fit_high = band;
-  SpindleRig rig(model, world, filter, taps, false);
-  rig.sorted().setSpindleSensorLength(LENGTH);
-  rig.tell(CuttingCondition::Kind::none);
+  auto rig = std::make_unique<SpindleRig>(model, world, filter, taps, false);
+  rig->sorted().setSpindleSensorLength(LENGTH);
+  rig->tell(CuttingCondition::Kind::none);
+  return rig;
+}
+
+CalibrationGoal step(CalibrationGoal::Step which) {
+  CalibrationGoal goal;
+  goal.step = which;
+  return goal;
+}
+
+/// [N] of the six sensors as calibrated statically: with zero, drift and unbalance in it.
+std::vector<double> shownForce(const SpindleRig::Record& record, const SpindleSensorCalibration& calibration,
+                               std::size_t axis) {
+  std::vector<double> force;
+  for (std::size_t i = 0; i < record.sensors[5].size(); ++i) {
+    std::array<double, 6> six{};
+    for (std::size_t k = 0; k < six.size(); ++k) six[k] = record.sensors[k][i];
+    force.push_back(staticForce(calibration, LENGTH, pairMeans(six))[axis]);
+  }
+  return force;
+}
+
+/// Record of a load that stands for some time; it is still on afterwards.
+SpindleRig::Record pulled(SpindleRig& rig, std::size_t axis, double load, bool on_table) {
+  std::array<double, 3> force{};
+  force[axis] = load;
+  rig.world().pull(force, on_table);
+  rig.run(0.15);
+  rig.start();
+  rig.run(0.25);
+  return rig.take();
+}
+
+std::vector<double> weights() {
+  std::vector<double> loads;
+  for (const int hung : {0, 1, 2, 3, 4, 5, 6, 7, 0}) loads.push_back(44.5 * hung);  // 10 lbs each
+  return loads;
+}
+
+/// His weights at the tool's length; zero and drift are those of the readings without load, first and last.
+void hang(SpindleRig& rig, BurzoniStatics& found) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    std::vector<double>& told = found.told[axis];
+    for (const double load : weights()) {
+      found.hung[axis].push_back(load);
+      told.push_back(mean(shownForce(pulled(rig, axis, load, false), found.calibration, axis)));
+    }
+    const double first = told.front(), last = told.back();
+    for (std::size_t i = 0; i < told.size(); ++i)
+      told[i] -= first + (last - first) * static_cast<double>(i) / static_cast<double>(told.size() - 1);
+    rig.world().pull({}, false);
+  }
+}
+
+/// The tool against the workpiece in small steps, told by the sensor and by the dynamometer below.
+void press(SpindleRig& rig, BurzoniStatics& found) {
+  for (std::size_t axis = 0; axis < 2; ++axis) {
+    for (const double load : {0.0, 50.0, 100.0, 150.0, 200.0, 250.0, 300.0, 0.0}) {
+      const SpindleRig::Record held = pulled(rig, axis, load, true);
+      const std::vector<double> told = shownForce(held, found.calibration, axis),
+                                &below = held.dynamometer[axis];
+      found.pressed[axis].insert(found.pressed[axis].end(), told.begin(), told.end());
+      found.on_table[axis].insert(found.on_table[axis].end(), below.begin(), below.end());
+    }
+    rig.world().pull({}, false);
+  }
+}
+
+/// A second along x at each speed cutting air, with the unbalance that earlier speeds have told taken off.
+void turn(SpindleRig& rig, BurzoniStatics& found) {
+  for (const double rpm : found.turning) {
+    rig.spin(units::radPerSecFromRpm(rpm));
+    for (int k = 0; k < 2; ++k) {
+      rig.tell(CuttingCondition::Kind::air);
+      rig.run(1.0);
+    }
+    rig.start();
+    rig.run(1.0);
+    const SpindleRig::Record turning = rig.take();
+    found.unbalanced.push_back(shownForce(turning, found.calibration, 0));
+    found.balanced.push_back(turning.measured[0]);
+    found.unbalanced.back().resize(found.balanced.back().size());
+  }
+}
+
+}  // namespace
+
+BurzoniStatics gatherStatics(const MachineModel& model, std::uint64_t seed) {
+  constexpr double BAND = 2500.0, VERIFIED = 0.120;  // [Hz], [m]
+  const auto made = rigOf(model, seed, BAND);
+  SpindleRig& rig = *made;
+  BurzoniStatics found;
+  std::fprintf(stderr, "weights at three lengths\n");
+  rig.readStatic({0.100, LENGTH, 0.180}, weights(), false);
+  rig.ask(step(CalibrationGoal::Step::fit));
+  rig.readStatic({VERIFIED}, {0.0, 100.0, 200.0, 300.0, 0.0}, true);
+  found.verified = rig.ask(step(CalibrationGoal::Step::verify)).error;
+  rig.world().setToolLength(LENGTH);
+  rig.run(0.5);
+  for (const char* direction : {"x", "y"}) rig.tap(direction, 9);
+  found.calibration = rig.ask(step(CalibrationGoal::Step::fit)).calibration.value();
+  hang(rig, found);
+  press(rig, found);
+  found.turning = {1000.0, 4500.0, 10000.0, 17600.0};
+  turn(rig, found);
+  return found;
+}
+
+BurzoniData gatherBurzoni(const MachineModel& model, std::uint64_t seed, double band) {
+  const auto made = rigOf(model, seed, band);
+  SpindleRig& rig = *made;
   rig.readStatic({0.100, 0.139, 0.180}, {0.0, 100.0, 200.0, 300.0, 0.0}, false);
-  CalibrationGoal fit;
-  fit.step = CalibrationGoal::Step::fit;
-  rig.ask(fit);
+  rig.ask(step(CalibrationGoal::Step::fit));
   rig.world().setToolLength(LENGTH);
   rig.run(0.5);
   BurzoniData data;
@@ -141,7 +249,7 @@ BurzoniData gatherBurzoni(const MachineModel& model, std::uint64_t seed, double 
     data.taps[axis] = blowsOf(rig.take(), axis);
     data.r_tap[axis] = noiseBefore(data.taps[axis], RATE, 0.005);
   }
-  rig.ask(fit);
+  rig.ask(step(CalibrationGoal::Step::fit));
   for (std::size_t axis = 0; axis < 2; ++axis) data.sensor[axis] = rig.sorted().sensor(axis);
   rig.run(0.5);
   rig.start();
@@ -206,6 +314,7 @@ BurzoniTable burzoniTable(const BurzoniData& data, std::size_t number, double ba
     row.cut_wave =
         wave(expandedDisturbanceForce(measured, data.sensor[axis], RATE, data.flutes * RPM[k] / 60.0,
                                       std::pow(2.0, best.exponent), table.r_cut));
+    row.curve = best.all;
     row.walk =
         score(randomWalkForce(measured, data.sensor[axis], RATE, std::pow(2.0, row.exponent), table.r_cut));
     row.harmonics = score(cut.compensated[axis]);

@@ -8,6 +8,7 @@
 
 #include "kalman/spindle_rig.h"
 #include "smartmill_core/testing/reference_case.h"
+#include "smartmill_kalman/sensor/spindle_sensor_calibration.h"
 
 namespace smartmill::kalman {
 
@@ -39,6 +40,7 @@ struct BurzoniRow {
   double cut_rmse = 0.0, cut_wave = 0.0;         ///< [N], [%] with it
   double walk = 0.0;                             ///< [N] force as a random walk, same Q
   double harmonics = 0.0, harmonics_wave = 0.0;  ///< [N], [%] of this package's filter
+  std::vector<double> curve;                     ///< [N] of the cut over the exponents of Q
 };
 struct BurzoniTable {
   std::string name;
@@ -49,5 +51,18 @@ struct BurzoniTable {
 /// Table 8 + number, number 0..7. @throws Error
 BurzoniTable burzoniTable(const BurzoniData& data, std::size_t number, double band);
 constexpr std::size_t BURZONI_TABLES = 8;
+
+/// Static loads and unbalance (sections 3.2, 3.3) on the same machine, its sensor calibrated with his
+/// weights.
+struct BurzoniStatics {
+  SpindleSensorCalibration calibration;
+  std::array<double, 3> verified{};                       ///< [1] error against the dynamometer at 120 mm
+  std::array<std::vector<double>, 3> hung, told;          ///< [N] weights at 139 mm, what the sensor tells
+  std::array<std::vector<double>, 2> pressed, on_table;   ///< [N] tool against the workpiece along x, y
+  std::vector<double> turning;                            ///< [rpm] in air
+  std::vector<std::vector<double>> unbalanced, balanced;  ///< [N] along x at each, with and without
+};
+/// @throws Error
+BurzoniStatics gatherStatics(const MachineModel& model, std::uint64_t seed);
 
 }  // namespace smartmill::kalman

@@ -5,6 +5,7 @@
 #include <complex>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/io/gnuplot.h"
 #include "smartmill_core/signal/fourier.h"
 #include "smartmill_core/units.h"
@@ -211,35 +212,35 @@ BandTuning tuneBands(const std::vector<double>& measured, const ModalModel& sens
   return best;
 }
 
-void drawMaps(const std::vector<std::pair<std::string, TuningMap>>& maps,
-              const std::vector<std::pair<double, int>>& cuts, const std::string& png) {
-  Gnuplot script(png, 1300, 380 * static_cast<int>((maps.size() + 1) / 2), 10);
+void drawMaps(const std::vector<NamedMap>& maps, const std::string& png) {
+  const std::size_t lines = (maps.size() + 1) / 2;
+  Gnuplot script(png, 1100, 400 * static_cast<int>(lines));
   for (std::size_t m = 0; m < maps.size(); ++m) {
-    const TuningMap& map = maps[m].second;
-    script << "$map" << m << " << EOD\n";
+    const TuningMap& map = maps[m].map;
+    std::vector<std::vector<double>> rows, best, cuts;
     for (std::size_t k = 0; k < map.speed.size(); ++k) {
       for (std::size_t i = 0; i < map.rmse.size(); ++i)
-        script << units::rpmFromRadPerSec(map.speed[k]) << " " << LEAST_EXPONENT + static_cast<int>(i) << " "
-               << map.rmse[i][k] << "\n";
-      script << "\n";
+        rows.push_back(
+            {units::rpmFromRadPerSec(map.speed[k]), LEAST_EXPONENT + static_cast<double>(i), map.rmse[i][k]});
+      best.push_back({units::rpmFromRadPerSec(map.speed[k]), static_cast<double>(map.best(map.speed[k]))});
     }
-    script << "EOD\n$line" << m << " << EOD\n";
-    for (const double speed : map.speed)
-      script << units::rpmFromRadPerSec(speed) << " " << map.best(speed) << "\n";
-    script << "EOD\n";
+    for (const auto& [speed, exponent] : maps[m].cuts)
+      cuts.push_back({units::rpmFromRadPerSec(speed), static_cast<double>(exponent)});
+    script.block(formatted("map%zu", m), rows);
+    script.block(formatted("best%zu", m), best);
+    script.block(formatted("cuts%zu", m), cuts);
   }
-  script << "$cuts << EOD\n";
-  for (const auto& [speed, exponent] : cuts)
-    script << units::rpmFromRadPerSec(speed) << " " << exponent << "\n";
-  script << "EOD\nset multiplot layout " << (maps.size() + 1) / 2
-         << ",2\nset view map\nset logscale cb\nset xlabel 'spindle speed [rpm]'\nset ylabel 'n of q = 2^n "
-            "N2/s'\nset cblabel 'RMSE [N s]'\nset key outside above\n";
-  for (std::size_t m = 0; m < maps.size(); ++m) {
-    script << "set title '" << maps[m].first << "'\nplot $map" << m
-           << " using 1:2:3 with image notitle, $line" << m
-           << " with lines lw 2 lc 'white' t 'best of the taps', $cuts with points pt 7 lc 'red' t 'best of "
-              "the cut'\n";
-  }
+  script
+      << "set multiplot layout " << lines
+      << ",2\nset logscale cb\nset xlabel 'spindle speed [rpm]'\nset ylabel 'n of q = 2^n N2/s'\nset cblabel "
+         "'RMSE [N s]'\nset key outside above horizontal samplen 2 opaque\nset xtics 4000\n";
+  for (std::size_t m = 0; m < maps.size(); ++m)
+    script << "set title " << Gnuplot::quoted(maps[m].name) << "\nplot ["
+           << units::rpmFromRadPerSec(maps[m].map.speed.front()) << ":"
+           << units::rpmFromRadPerSec(maps[m].map.speed.back()) << "] [" << LEAST_EXPONENT << ":"
+           << MOST_EXPONENT << "] $map" << m << " using 1:2:3 with image notitle, $best" << m
+           << " using 1:2 with lines lw 3 lc rgb '#20c0e0' title 'best of the taps', $cuts" << m
+           << " using 1:2 with points pt 7 lc 'red' title 'best of the cut'\n";
   script << "unset multiplot\n";
   script.draw();
 }

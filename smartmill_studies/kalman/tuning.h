@@ -64,9 +64,14 @@ std::vector<double> bandForce(const std::vector<double>& measured, const ModalMo
                               const std::vector<double>& edges, const std::vector<double>& memory,
                               int max_harmonics, double* log_likelihood = nullptr);
 
-/// Draws maps (name, map) side by side with gnuplot, each with the optimum of the taps as a line and the
-/// optima of cuts as dots. @param cuts [rad/s], exponent @throws Error.
-void drawMaps(const std::vector<std::pair<std::string, TuningMap>>& maps,
-              const std::vector<std::pair<double, int>>& cuts, const std::string& png);
+/// A map, and the best exponents of cuts [rad/s] to lay over it.
+struct NamedMap {
+  std::string name;
+  TuningMap map;
+  std::vector<std::pair<double, int>> cuts;
+};
+/// Side by side with gnuplot, each with the optimum of the taps as a line and the cuts as dots. @throws
+/// Error.
+void drawMaps(const std::vector<NamedMap>& maps, const std::string& png);
 
 }  // namespace smartmill::kalman

@@ -8,6 +8,7 @@
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/units.h"
+#include "smartmill_sim/controller/path_move.h"
 #include "smartmill_sim/world/world.h"
 
 namespace smartmill::loadmeter {
@@ -23,7 +24,8 @@ const std::vector<CuttingCoefficients> METALS{{796e6, 168e6, 222e6, 27.7e3, 30.8
                                               {1319e6, 789e6, 251e6, 23.5e3, 25.0e3, 2.0e3}};
 constexpr double BASE_SPEED = 165.0;  // [rad/s], MotorTraits
 constexpr double STATE_PERIOD = 0.02;
-constexpr int GROUP = 8;  // slots with one set of air cuts
+constexpr int FEED_BLOCK = 100;  // N word of the pass
+constexpr int GROUP = 8;         // slots with one set of air cuts
 
 MachineModel millModel() {
   MachineModel m;
@@ -70,13 +72,7 @@ class Shop {
   /// @return mean and variation of the true force over the second half of the pass, and the mean torque.
   MotorCut run(const Pass& pass, const CuttingCoefficients& metal, unsigned seed) {
     model_.cutting = metal;
-    sim::WorldOptions options;
-    options.seed = seed;
-    options.substeps = 1;
-    options.motor.currents = true;
-    options.motor.temperature = day_.temperature;
-    options.motor.warm_up_time = 1e6;  // a pass is short: the machine is as warm as the day has made it
-    sim::World world(model_, options);
+    sim::World world(model_, worldOptions(seed));
     announce(pass);
     begin_ = time_;
     const auto blocks = static_cast<std::size_t>(day_.duration * sim::World::SAMPLE_RATE / sim::World::BLOCK);
@@ -106,6 +102,35 @@ class Shop {
     return cut;
   }
 
+  /// Rapid traverse along an axis, from rest to rest.
+  void rapid(std::size_t axis, unsigned seed) {
+    constexpr double WAY = 0.08, BEFORE = 0.15, AFTER = 0.25;  // [m], [s]
+    model_.cutting = METALS.front();                           // nothing is cut
+    sim::World world(model_, worldOptions(seed));
+    sim::PathMove move = sim::PathMove::line(
+        {}, axis == 0 ? sim::PathMove::Point{WAY, 0.0, 0.0} : sim::PathMove::Point{0.0, WAY, 0.0});
+    move.plan(BEFORE, model_.axes->rapid, model_.axes->acceleration);
+    begin_ = time_;
+    const auto blocks =
+        static_cast<std::size_t>((move.end() + AFTER) * sim::World::SAMPLE_RATE / sim::World::BLOCK);
+    for (std::size_t b = 0; b < blocks; ++b) {
+      std::vector<sim::MotionState> states(sim::World::BLOCK);
+      for (std::size_t i = 0; i < states.size(); ++i) {
+        const double t = std::max(
+            BEFORE, (static_cast<double>(b * sim::World::BLOCK + i) + 0.5) / sim::World::SAMPLE_RATE);
+        states[i].position = move.position(t);
+        states[i].position[2] = 5e-3;
+        states[i].velocity = move.velocity(t);
+      }
+      sim::World::Block block;
+      world.advance(block, states);
+      time_ = begin_ + block.dynamometer.timeOf(sim::World::BLOCK);
+      tellState(states.back().position, 0.0, block);
+      tellCurrents(block);
+    }
+    end();
+  }
+
   void end() {
     CuttingCondition none;
     none.stamp = time_ += 0.01;
@@ -114,6 +139,17 @@ class Shop {
   }
 
  private:
+  sim::WorldOptions worldOptions(unsigned seed) const {
+    sim::WorldOptions options;
+    options.seed = seed;
+    options.substeps = 1;
+    options.servo_trigger = FEED_BLOCK;
+    options.motor.currents = true;
+    options.motor.temperature = day_.temperature;
+    options.motor.warm_up_time = 1e6;  // a pass is short: the machine is as warm as the day has made it
+    return options;
+  }
+
   double velocity(const Pass& pass) const { return pass.speed / TWO_PI * model_.tool->teeth * pass.feed; }
 
   std::vector<sim::MotionState> statesOf(const Pass& pass, std::size_t b) const {
@@ -129,6 +165,7 @@ class Shop {
       // The spindle turns before the tool is in.
       s.position = {s.velocity[0] * t, s.velocity[1] * t, pass.air || b == 0 ? 5e-3 : -pass.depth};
       s.spindle_speed = pass.speed;
+      s.sequence = b == 0 ? 1 : FEED_BLOCK;
       s.spindle_angle = std::fmod(pass.speed * t, TWO_PI);
     }
     return states;
@@ -155,26 +192,9 @@ class Shop {
     // A block later, so that what it holds has been measured.
     time_ = begin_ + block.dynamometer.timeOf(sim::World::BLOCK);
     const double t = time_ - begin_, way = std::min(length_, velocity(pass) * t);
-    CncState state;
-    state.stamp = time_;
-    state.connected = state.motion = true;
-    state.axes = {"X", "Y", "Z"};
-    state.position = {way * std::cos(pass.heading), way * std::sin(pass.heading),
-                      pass.air ? 5e-3 : -pass.depth};
-    state.distance_to_go = {0.0, 0.0, 0.0};
-    state.spindle_speed = pass.speed;
-    LoadSample load;
-    load.stamp = time_;
-    load.spindle_load = block.spindle_load;
-    load.spindle_speed = pass.speed;
-    if (time_ - told_ > STATE_PERIOD - 1e-9) {
-      estimator_.handle(state);
-      estimator_.handle(load);
-      told_ = time_;
-    }
-    SampleBlock currents = block.motor_current;
-    currents.stamp += begin_;
-    estimator_.handle(currents);
+    tellState({way * std::cos(pass.heading), way * std::sin(pass.heading), pass.air ? 5e-3 : -pass.depth},
+              pass.speed, block);
+    tellCurrents(block);
     if (!day_.force_sensor) return;
     ForceBlock force;
     force.stamp = begin_ + block.dynamometer.stamp;
@@ -184,6 +204,30 @@ class Shop {
       for (std::size_t a = 0; a < 3; ++a) force.force[a].push_back(block.dynamometer.at(i, a));
     }
     estimator_.handle(force);
+  }
+
+  void tellState(const std::array<double, 3>& position, double speed, const sim::World::Block& block) {
+    if (time_ - told_ <= STATE_PERIOD - 1e-9) return;
+    CncState state;
+    state.stamp = time_;
+    state.connected = state.motion = true;
+    state.axes = {"X", "Y", "Z"};
+    state.position = {position[0], position[1], position[2]};
+    state.distance_to_go = {0.0, 0.0, 0.0};
+    state.spindle_speed = speed;
+    estimator_.handle(state);
+    LoadSample load;
+    load.stamp = time_;
+    load.spindle_load = block.spindle_load;
+    load.spindle_speed = speed;
+    estimator_.handle(load);
+    told_ = time_;
+  }
+
+  void tellCurrents(const sim::World::Block& block) {
+    SampleBlock currents = day_.servo ? block.servo : block.motor_current;
+    currents.stamp += begin_;
+    estimator_.handle(currents);
   }
 
   MotorDay day_;
@@ -222,10 +266,12 @@ std::vector<MotorCut> runDay(const MotorDay& day, const std::optional<MotorCalib
   for (int i = 0; i < day.cuts; ++i) {
     if (i % GROUP == 0) {
       estimator.emplace(model, estimatorParameters());
-      estimator->setMotors(calibration.value_or(MotorCalibration()));
+      day.learn ? estimator->learnMotors() : estimator->setMotors(calibration.value_or(MotorCalibration()));
       estimator->onForce([&](const ForceEstimate& e) { newest = e; });
       estimator->onForceWindow([&](const ForceEstimate& e) { windows.push_back(e); });
       shop.emplace(day, model, *estimator);
+      for (std::size_t a = 0; a < 2 && day.rapid_moves; ++a)
+        shop->rapid(a, day.seed + static_cast<unsigned>(2 * i + static_cast<int>(a)));
     }
     Pass pass;
     // Whole revolutions of the block's clock do not matter: means are over half a pass.
@@ -255,6 +301,8 @@ std::vector<MotorCut> runDay(const MotorDay& day, const std::optional<MotorCalib
     cut.torque = MechanisticForce(*model.tool, metal, {0.0, units::PI, pass.depth, pass.feed}).mean().torque;
     cut.estimate = newest;
     cut.windows = windows;
+    for (std::size_t a = 0; a < 3; ++a) cut.bandwidth[a] = estimator->driveBandwidth(a);
+    cut.learnt = estimator->learntMotors();
     all.push_back(cut);
     if (progress) progress(static_cast<double>(i + 1) / day.cuts);
   }
@@ -340,6 +388,31 @@ void judgeEstimates(const std::vector<MotorCut>& cuts, DayErrors* errors) {
   for (double& e : errors->window) e = std::sqrt(e);
 }
 
+void judgeVariations(const std::vector<MotorCut>& cuts, DayErrors* errors) {
+  for (DayErrors::Variation* all : {&errors->variation, &errors->variation_window}) {
+    double count = 0.0;
+    const auto add = [&](const ForceEstimate& one, const MotorCut& cut) {
+      ++count;
+      for (std::size_t a = 0; a < 3; ++a) {
+        const double off = one.rms[a].value - cut.rms[a];
+        all->error[a] += off * off;
+        all->stated[a] += std::pow(one.rms[a].std_dev, 2);
+        all->half[a] += std::abs(off) < 0.6745 * one.rms[a].std_dev;
+      }
+    };
+    for (const MotorCut& cut : cuts) {
+      if (all == &errors->variation && cut.estimate) add(*cut.estimate, cut);
+      if (all == &errors->variation) continue;
+      for (const ForceEstimate& one : cut.windows) add(one, cut);
+    }
+    for (std::size_t a = 0; a < 3; ++a) {
+      all->error[a] = std::sqrt(all->error[a] / count);
+      all->stated[a] = std::sqrt(all->stated[a] / count);
+      all->half[a] /= count;
+    }
+  }
+}
+
 }  // namespace
 
 DayErrors judgeDay(const std::vector<MotorCut>& learnt, const MotorCalibration& calibration,
@@ -377,6 +450,7 @@ DayErrors judgeDay(const std::vector<MotorCut>& learnt, const MotorCalibration& 
       (*e)[which] = std::sqrt((*e)[which] / std::max<double>(1.0, static_cast<double>(k)));
   }
   judgeEstimates(cuts, &errors);
+  judgeVariations(cuts, &errors);
   return errors;
 }
 

@@ -19,6 +19,9 @@ struct MotorDay {
   double duration = 1.4;      ///< [s] of each pass
   bool diagonal = true;       ///< slots along both axes too, where the cut may pull one on
   bool force_sensor = false;  ///< the twin's dynamometer takes part as force/compensated
+  bool rapid_moves = true;    ///< each group of cuts begins with moves in rapid traverse, which tell the lags
+  bool servo = false;         ///< the record of Servo Guide in the place of the Hall sensors
+  bool learn = false;         ///< no calibration is given: the session's own cuts make it
 };
 
 /// A slot as the twin made it and as the product's estimator saw it.
@@ -30,7 +33,9 @@ struct MotorCut {
   MotorReading cut, air;                                      ///< ranges out of the signal chain
   std::optional<MotorForce> motors;                           ///< where a calibration is given
   std::optional<ForceEstimate> estimate;
-  std::vector<ForceEstimate> windows;  ///< while it was steady
+  std::vector<ForceEstimate> windows;                ///< while it was steady
+  std::array<std::optional<Estimate>, 3> bandwidth;  ///< [Hz] of the drives, as known by then
+  std::optional<MotorCalibration> learnt;            ///< by the session itself, where it learns
 };
 
 /// Every sample goes through the product's estimator as the node feeds it. @param calibration empty: currents
@@ -52,6 +57,12 @@ struct DayErrors {
   /// The same of the windows while a cut is steady.
   std::array<double, 3> window{}, inside_window{}, inside_window_rms{};
   int windows = 0;
+  /// Of the variations X, Y, Z, of cuts and of windows: error [N], root mean square of the stated deviation
+  /// [N], share within 0.674 standard deviations (half, where they are what they are stated to be).
+  struct Variation {
+    std::array<double, 3> error{}, stated{}, half{};
+  };
+  Variation variation, variation_window;
 };
 /// @param learnt the cuts of the first day, of which regression and ANFIS were made.
 DayErrors judgeDay(const std::vector<MotorCut>& learnt, const MotorCalibration& calibration,

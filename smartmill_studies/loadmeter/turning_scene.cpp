@@ -52,20 +52,24 @@ TurningCentre::TurningCentre(unsigned seed, const TurningVariances& variances)
     : random_(seed), variances_(variances) {
 }
 
-double TurningCentre::measured(double range, double frequency) {
-  std::vector<double> signal(SAMPLES);
+std::vector<double> TurningCentre::phaseCurrent(const std::vector<double>& range, double frequency) {
+  std::vector<double> signal(range.size());
   std::uniform_real_distribution<double> uniform(0.0, TWO_PI);
   const double phase = uniform(random_), other = uniform(random_);
-  for (std::size_t i = 0; i < SAMPLES; ++i) {
+  for (std::size_t i = 0; i < signal.size(); ++i) {
     const double t = static_cast<double>(i) / RATE;
     // Inverter: fifth and seventh harmonic, and its switching folded down.
-    signal[i] = 0.5 * range *
+    signal[i] = 0.5 * range[i] *
                     (std::sin(TWO_PI * frequency * t + phase) +
                      0.06 * std::sin(5.0 * TWO_PI * frequency * t + other) +
                      0.04 * std::sin(7.0 * TWO_PI * frequency * t + phase)) +
                 0.1 * std::sin(TWO_PI * 333.0 * t + other) + HALL_NOISE * normal_(random_);
   }
-  return phaseRange(signal, RATE, frequency);
+  return signal;
+}
+
+double TurningCentre::measured(double range, double frequency) {
+  return phaseRange(phaseCurrent(std::vector<double>(SAMPLES, range), frequency), RATE, frequency);
 }
 
 TurningCut TurningCentre::cut(double kc, bool x, bool z, double speed_rpm, double feed, double depth,
@@ -305,6 +309,8 @@ void compare(const Calibration& calibration, const std::vector<TurningCut>& test
     tally(truth[a], regression[a], a, &result->regression);
     tally(truth[a], anfis[a], a, &result->anfis);
   }
+  result->truth = truth;
+  result->told = regression;
 }
 
 void compareVariances(const Calibration& calibration, const std::vector<TurningCut>& replications,

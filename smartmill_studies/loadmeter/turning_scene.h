@@ -37,6 +37,10 @@ class TurningCentre {
   /// The cut of Table 2: 1000 rpm, 2 mm, 0.2 mm/rev, again and again.
   std::vector<TurningCut> replications(std::size_t count);
 
+  /// [A] Phase current at 1000 Hz of a range [A] over time, with the inverter's harmonics and the sensor's
+  /// noise. @param frequency [Hz] of the phase
+  std::vector<double> phaseCurrent(const std::vector<double>& range, double frequency);
+
   static constexpr double BASE_SPEED = 1570.0;  ///< [rpm]
 
  private:
@@ -78,12 +82,13 @@ struct Agreement {
 /// RMSE is that of the two thirds of the prediction tests that took no part in a choice.
 /// Everything the paper does with one calibration and one prediction set.
 struct TurningResult {
-  Line x, z;                                     ///< F = m I + c
-  Agreement regression;                          ///< of the prediction tests
-  Agreement anfis;                               ///< Fy and Fz (0, 1, 2 as above; Fx: the line)
-  std::string fy_inputs, fz_inputs;              ///< the arrays that a third of the prediction tests chose
-  double fit_x = 0.0, fit_y = 0.0, fit_z = 0.0;  ///< R2 of the calibration
-  VarianceSplit fy, fz;                          ///< of the replications
+  Line x, z;                                       ///< F = m I + c
+  Agreement regression;                            ///< of the prediction tests
+  Agreement anfis;                                 ///< Fy and Fz (0, 1, 2 as above; Fx: the line)
+  std::string fy_inputs, fz_inputs;                ///< the arrays that a third of the prediction tests chose
+  double fit_x = 0.0, fit_y = 0.0, fit_z = 0.0;    ///< R2 of the calibration
+  VarianceSplit fy, fz;                            ///< of the replications
+  std::array<std::vector<double>, 3> truth, told;  ///< [N] of the prediction tests, by regression
 };
 TurningResult studyTurning(unsigned seed, const TurningVariances& variances, std::size_t replications);
 

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <utility>
 
 #include "smartmill_core/io/gnuplot.h"
 
@@ -15,17 +16,20 @@ std::vector<std::vector<double>> history(const TurningTrace& trace) {
   return rows;
 }
 
-/// Figures 4 and 5: motion of the tool against the work.
-void drawHistory(const std::string& png, const std::string& title, const TurningTrace& ours,
-                 const TurningTrace* kim) {
-  Gnuplot plot(png, 1100, 500, 12);
-  plot.block("ours", history(ours));
-  if (kim) plot.block("kim", history(*kim));
-  plot << "set grid\nset title " << Gnuplot::quoted(title)
-       << "\nset xlabel 'Time [s]'\nset ylabel 'Tool against work [um]'\nset xrange [0:6.144]\nplot ";
-  if (kim) plot << "$kim using 1:2 with lines lc 'gray' title 'his own update, line by line', ";
-  plot << "$ours using 1:2 with lines lc rgb '#0060ad' title '" << (kim ? "this package" : "no control")
-       << "'\n";
+/// Figures 4 and 5: motion of the tool against the work, one panel a run.
+void drawHistory(const std::string& png,
+                 const std::vector<std::pair<std::string, const TurningTrace*>>& runs) {
+  Gnuplot plot(png, 900, 80 + 370 * static_cast<int>(runs.size()), 12);
+  for (std::size_t k = 0; k < runs.size(); ++k)
+    plot.block("run" + std::to_string(k), history(*runs[k].second));
+  plot << "set multiplot layout " << runs.size()
+       << ",1\nset grid\nset lmargin 10\nunset key\nset xlabel 'time [s]'\nset ylabel 'tool against work "
+          "[um]'\nset "
+          "xrange [0:6.144]\n";
+  for (std::size_t k = 0; k < runs.size(); ++k)
+    plot << "set title " << Gnuplot::quoted(runs[k].first) << "\nplot $run" << k
+         << " using 1:2 with lines lc rgb '#2060c0'\n";
+  plot << "unset multiplot\n";
   plot.draw();
 }
 
@@ -39,11 +43,11 @@ void drawTransfer(const std::string& png, const std::string& title, const KimRun
   for (double w = 200.0; w <= 500.0; w += 0.5)
     curves.push_back(
         {w, std::abs(learnt.response(w)), std::abs(truth.response(w)), std::abs(printed.response(w))});
-  Gnuplot plot(png, 1100, 600, 12);
+  Gnuplot plot(png, 900, 600, 12);
   plot.block("lines", lines);
   plot.block("curves", curves);
-  plot << "set grid\nset logscale y\nset title " << Gnuplot::quoted(title)
-       << "\nset xlabel 'Frequency [rad/s]'\nset ylabel 'Deflection over chip [1]'\nset xrange [200:500]\n"
+  plot << "set grid\nset key above horizontal samplen 2\nset logscale y\nset title " << Gnuplot::quoted(title)
+       << "\nset xlabel 'frequency [rad/s]'\nset ylabel 'deflection over chip [1]'\nset xrange [200:500]\n"
           "plot $lines using 1:2 with linespoints pt 6 lc 'gray' title 'ratio of spectra', "
           "$lines using 1:3 with linespoints pt 7 lc rgb '#dd8800' title 'eq. 16, line by line', "
           "$curves using 1:4 with lines dt 3 lw 2 lc rgb '#aa0000' title 'as Kim prints it', "
@@ -67,8 +71,9 @@ KimFigures kimFigures(double growth, const std::string& folder) {
   f.kim = runKim(ideal);
   for (const char* number : {"4", "5", "6", "7"})
     f.pictures.push_back(folder + "/kim_figure_" + number + ".png");
-  drawHistory(f.pictures[0], "Kim figure 4: uncontrolled", f.free, nullptr);
-  drawHistory(f.pictures[1], "Kim figure 5: controlled", f.ours, &f.kim.trace);
+  drawHistory(f.pictures[0], {{"Kim figure 4: uncontrolled", &f.free}});
+  drawHistory(f.pictures[1], {{"Kim figure 5: controlled, this package", &f.ours},
+                              {"his own update, line by line", &f.kim.trace}});
   drawTransfer(f.pictures[2], "Kim figure 6: second period, 2.049 to 4.096 s", f.kim, 1,
                f.ours.learnt.at(1).machine, f.truth, {0.15, 335.0, 0.06});
   drawTransfer(f.pictures[3], "Kim figure 7: third period, 4.097 to 6.144 s", f.kim, 2,

@@ -13,6 +13,9 @@ void DiscoveryParameters::declare(ParameterTable& table) {
       "path of a smartmill-model/1 file: what is believed, with coefficients, noise, axes and workpiece");
   table.atLaunch("record_folder", record_folder, "where the monitor keeps its stretches, all of them");
   table.atLaunch("folder", folder, "for reports and models");
+  table.atLaunch(
+      "prior", prior,
+      "path of a smartmill-causes/1 file: odds of each effect by the shop's other machines; empty: none");
   table.section(
       "What is cut and watched first: full slots, each in a lane of its own, and the spindle in air.");
   table.list("watch_speeds", watch_speeds, "rad/s", Range::positive(),

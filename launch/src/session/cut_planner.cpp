@@ -42,6 +42,8 @@ void PathParameters::declarePaths(ParameterTable& table) {
   table.number("plunge_feed", plunge_feed, "m/s", Range::positive(), "down into the material");
   table.number("spin_up_time", spin_up_time, "s", Range::positive(),
                "to any speed, where the model has no spindle acceleration");
+  table.number("feed_block", feed_block, "1", Range::closed(0, 99999),
+               "N word of the block that feeds along, at which a record of Servo Guide may begin; 0: none");
 }
 
 CutPlanner::CutPlanner(const MachineModel& model, const PathParameters& parameters)
@@ -130,14 +132,6 @@ PlannedCut CutPlanner::slot(const SlotWish& wish) const {
                 " s are due (slower feed or longer stock)");
   }
   planned.to = {steady_to + run_out, y, z};
-  for (const std::array<double, 3>& place : {planned.from, planned.to}) {
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      if (place[axis] < axes_.travel[axis][0] || place[axis] > axes_.travel[axis][1]) {
-        throw Error(wish.name + ": " + "xyz"[axis] + " = " + mm(place[axis]) +
-                    " is beyond the machine's travel");
-      }
-    }
-  }
   CuttingCondition& condition = planned.condition;
   condition.kind = CuttingCondition::Kind::cut;
   condition.name = wish.name;
@@ -149,6 +143,36 @@ PlannedCut CutPlanner::slot(const SlotWish& wish) const {
   condition.spindle_speed = units::radPerSecFromRpm(rpm);
   condition.steady_from = {steady_from, y, z};
   condition.steady_to = {steady_to, y, z};
+  checkTravel(planned);
+  return planned;
+}
+
+void CutPlanner::checkTravel(const PlannedCut& cut) const {
+  for (const std::array<double, 3>& place : {cut.from, cut.to}) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      if (place[axis] < axes_.travel[axis][0] || place[axis] > axes_.travel[axis][1]) {
+        throw Error(cut.condition.name + ": " + "xyz"[axis] + " = " + mm(place[axis]) +
+                    " is beyond the machine's travel");
+      }
+    }
+  }
+}
+
+PlannedCut CutPlanner::airMove(double speed, double feed, double time, double way) const {
+  PlannedCut planned = air(speed, 0.0);
+  CuttingCondition& condition = planned.condition;
+  condition.name = "air_x_" + shown(feed / units::MM * 60.0, 0);
+  if (feed > axes_.rapid) {
+    throw Error(condition.name + ": a feed of " + shown(feed / units::MM * 60.0) + " mm/min, the axes of " +
+                file_ + " do at most " + shown(axes_.rapid / units::MM * 60.0) + " mm/min");
+  }
+  planned.feed = feed;
+  const double run_in = feed * RUN_OUT_TIME, y = laneY(0), z = stock_.high[2] + parameters_.safe_height;
+  condition.steady_from = {stock_.low[0] + run_in, y, z};
+  condition.steady_to = {condition.steady_from[0] + std::max(way, feed * time), y, z};
+  planned.from = {stock_.low[0], y, z};
+  planned.to = {condition.steady_to[0] + run_in, y, z};
+  checkTravel(planned);
   return planned;
 }
 
@@ -186,6 +210,7 @@ std::string CutPlanner::program(const PlannedCut& cut, const std::array<double, 
   text += "S" + speed + " M3\n";
   dwell(cut.spin_up);
   go({std::nullopt, std::nullopt, cut.from[2]}, parameters_.plunge_feed);
+  if (parameters_.feed_block > 0) text += "N" + std::to_string(parameters_.feed_block) + " ";
   go({cut.to[0], std::nullopt, std::nullopt}, cut.feed);
   go({std::nullopt, std::nullopt, safe}, 0.0);
   return text + "M5\n";

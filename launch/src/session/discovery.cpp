@@ -12,6 +12,7 @@
 #include "session/child.h"
 #include "smartmill_core/cutting/coefficient_set.h"
 #include "smartmill_core/modal/results.h"
+#include "smartmill_core/model/cause_odds.h"
 #include "smartmill_core/names.h"
 #include "smartmill_ros/conversions.h"
 #include "smartmill_ros/parameter_reader.h"
@@ -40,6 +41,7 @@ Discovery::Discovery(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
       coefficients_(nh_.advertise<smartmill_msgs::CuttingCoefficients>(names::COEFFICIENTS, 10, true)),
       modes_(nh_, names::TOOL_MODES) {
   parameters_.watched(planner_, "", 0);
+  if (!parameters_.prior.empty()) readCauseOdds(parameters_.prior);
   states_ = nh_.subscribe<smartmill_msgs::DiscrepancyState>(
       names::DISCREPANCY_STATE, 100,
       boost::function<void(const smartmill_msgs::DiscrepancyState&)>([this](const auto& m) {
@@ -228,9 +230,13 @@ Explained Discovery::explain(Result& result) {
   const std::string log = out + "/explain.log";
   int code = 0;
   try {
-    code = runChild({"rosrun", "smartmill_discrepancy", "explain", parameters_.record_folder, "--model",
-                     place_.inUse(), "-o", out, "--threads", std::to_string(parameters_.threads)},
-                    log, [&] { return cancel_ || ros::WallTime::now() > end; });
+    std::vector<std::string> command{"rosrun",    "smartmill_discrepancy",
+                                     "explain",   parameters_.record_folder,
+                                     "--model",   place_.inUse(),
+                                     "-o",        out,
+                                     "--threads", std::to_string(parameters_.threads)};
+    if (!parameters_.prior.empty()) command.insert(command.end(), {"--prior", parameters_.prior});
+    code = runChild(command, log, [&] { return cancel_ || ros::WallTime::now() > end; });
   } catch (const Error& error) {
     throw Failure{Result::EXPLAIN_FAILED, error.what()};
   }

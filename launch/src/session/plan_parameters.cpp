@@ -9,6 +9,12 @@ void declareTests(PlanParameters& p, ParameterTable& table) {
   table.list("air_speeds", p.air_speeds, "rad/s", Range::positive(),
              "3000, 6000, 9000, 12000 rpm; four or more");
   table.number("air_time", p.air_time, "s", Range::positive(), "at speed");
+  table.list(
+      "air_feeds", p.air_feeds, "m/s", Range::positive(),
+      "moves in air along +x, for the feed drives' friction where motor currents are read; empty: none");
+  table.number("air_move_time", p.air_move_time, "s", Range::positive(), "of such a move");
+  table.number("air_way", p.air_way, "m", Range::positive(),
+               "that it goes at least: three periods of a motor's current");
   table.section("Slot tests: the cutting coefficients. Each in a lane of its own.");
   table.number("slot_speed", p.slot_speed, "rad/s", Range::positive(), "4000 rpm");
   table.number("slot_depth", p.slot_depth, "m", Range::positive(), "shallow: no chatter is wanted");

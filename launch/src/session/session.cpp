@@ -145,6 +145,9 @@ void Session::job() {
   for (const PlannedCut& air : plan_.airCuts()) {
     step("air cut " + air.condition.name, [&] { return runCut(air); });
   }
+  for (const PlannedCut& air : plan_.airMoves()) {
+    step("move in air " + air.condition.name, [&] { return runCut(air); });
+  }
   for (const PlannedCut& slot : plan_.slots()) {
     step("slot test " + slot.condition.name, [&] { return runCut(slot); });
   }

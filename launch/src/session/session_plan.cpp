@@ -27,6 +27,9 @@ SessionPlan::SessionPlan(const MachineModel& model, const PlanParameters& parame
   planner_.needLanes(
       needed, std::to_string(verify) + " slot tests, " + std::to_string(needed - verify) + " verifying cuts");
   for (double speed : parameters_.air_speeds) air_cuts_.push_back(planner_.air(speed, parameters_.air_time));
+  for (double feed : parameters_.air_feeds)
+    air_moves_.push_back(
+        planner_.airMove(parameters_.slot_speed, feed, parameters_.air_move_time, parameters_.air_way));
   for (std::size_t i = 0; i < verify; ++i) {
     slots_.push_back(
         planner_.slot({"slot_" + std::to_string(i + 1), i, parameters_.slot_speed, parameters_.slot_depth,

@@ -12,7 +12,6 @@
 namespace smartmill::discrepancy {
 namespace {
 
-constexpr double LEAST_SHARE = 0.25;
 constexpr double LEAST_FREQUENCY = 80.0;  // [Hz] below it drift, hum and slow trends live
 constexpr std::size_t LEAST_SAMPLES = 128;
 
@@ -70,7 +69,7 @@ std::optional<Chatter> findChatter(const Record& record, const CampaignTest& tes
       chatter.frequency = frequency;
     }
   }
-  if (chatter.share < LEAST_SHARE) return {};
+  if (chatter.share < CHATTER_SHARE) return {};
   return chatter;
 }
 

@@ -11,6 +11,7 @@
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/units.h"
 #include "smartmill_discrepancy/data/phase.h"
+#include "smartmill_sim/twin/guide.h"
 
 namespace smartmill::discrepancy {
 namespace {
@@ -172,8 +173,8 @@ void addSlowNoise(Dataset& data) {
   data.noise.insert(least.begin(), least.end());
 }
 
-// No model follows the phase of chatter: such cuts say that there is some, and are not compared.
-void setChatterAside(Dataset& data) {
+// No model that runs freely follows the phase of chatter: such cuts are predicted step by step, or set aside.
+void markChatter(Dataset& data) {
   for (std::size_t k = 0; k < data.tests.size();) {
     TestData& t = data.tests[k];
     const auto chatter = findChatter(t.record, t.test, t.first_cut);
@@ -181,16 +182,31 @@ void setChatterAside(Dataset& data) {
       ++k;
       continue;
     }
-    data.notes.push_back("test " + t.test.name + " chatters at " + number(std::round(chatter->frequency)) +
-                         " Hz and is not compared sample by sample");
+    const std::string note =
+        "test " + t.test.name + " chatters at " + number(std::round(chatter->frequency)) + " Hz and is ";
+    // Where the record does not tell its phase nothing else does in a cut that chatters.
+    if (canBeLed(t, data.nominal) && !t.phase_estimated) {
+      data.notes.push_back(note + "compared by what is predicted from one step to the next");
+      t.chatter = chatter;
+      t.guided = true;
+      ++k;
+      continue;
+    }
+    data.notes.push_back(note + "not compared sample by sample");
     data.chattering.push_back({std::move(t), *chatter});
     data.tests.erase(data.tests.begin() + static_cast<std::ptrdiff_t>(k));
   }
-  if (data.tests.empty())
+  if (std::all_of(data.tests.begin(), data.tests.end(), [](const TestData& t) { return t.chatter; }))
     throw Error(data.campaign.folder + ": every test chatters, nothing can be compared");
 }
 
 }  // namespace
+
+bool canBeLed(const TestData& test, const MachineModel& model) {
+  const bool modes = !model.tool_tip.x.modes.empty() || !model.tool_tip.y.modes.empty();
+  return modes && test.test.kind == TestKind::cut && !test.test.running_before &&
+         sim::Guide::canBe(test.record) && !sim::Guide::byForce(test.record);
+}
 
 std::size_t Dataset::samples() const {
   std::size_t sum = 0;
@@ -250,7 +266,7 @@ void chooseHeldout(std::vector<TestData>& tests) {
   std::vector<TestData*> cuts, air;
   for (TestData& t : tests) {
     t.heldout = false;
-    if (t.test.kind == TestKind::cut) cuts.push_back(&t);
+    if (t.test.kind == TestKind::cut && !t.chatter) cuts.push_back(&t);
     if (t.test.kind == TestKind::air) air.push_back(&t);
   }
   // Conditions of a cut. A test alone at the end of any range stays for the fit.
@@ -330,7 +346,7 @@ Dataset loadDataset(const Campaign& campaign, const MachineModel& nominal) {
   data.noise = noiseOf(data);
   addSlowNoise(data);
   for (const std::string& note : estimatePhases(data)) data.notes.push_back(note);
-  setChatterAside(data);
+  markChatter(data);
   chooseHeldout(data.tests);
   return data;
 }

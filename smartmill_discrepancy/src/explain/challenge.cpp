@@ -19,12 +19,14 @@ Resemblance resemblanceOf(const Member& member, const Standing& standing) {
           standing.confidence()};
 }
 
-// An effect of fewer values that explains as much, as far as the tests can tell: the simpler name.
+// An effect of fewer values that explains as much, as far as the tests can tell, and holds itself: the
+// simpler name.
 const Rival* simplerRival(const Workbench& bench, const SearchResult& found) {
   const FitState& best = found.best.state;
   const auto simpler = std::find_if(found.rivals.begin(), found.rivals.end(), [&](const Rival& r) {
     return r.state.members.back().values.size() < best.members[r.member].values.size() &&
-           !standingOf(bench, best, r.state).holds();
+           !standingOf(bench, best, r.state).holds() &&
+           standingOf(bench, r.state, found.lacking[r.member]).holds();
   });
   return simpler == found.rivals.end() ? nullptr : &*simpler;
 }

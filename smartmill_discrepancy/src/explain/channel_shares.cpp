@@ -31,11 +31,24 @@ std::optional<Repeatability> steadyPart(const TestData& test, const std::vector<
 
 void add(const TwinRunner& runner, const std::vector<double>& before, const std::vector<double>& after,
          std::map<std::string, Sums>* sums) {
-  for (const Block& b : runner.blocks()) {
-    const TestData& test = runner.data().tests[b.test];
-    if (test.test.kind != TestKind::cut) continue;
+  const std::vector<Block>& blocks = runner.blocks();
+  const auto valuesOf = [&](const Block& b) {
     const auto at = runner.measured().begin() + static_cast<std::ptrdiff_t>(b.offset);
-    const std::vector<double> values(at, at + static_cast<std::ptrdiff_t>(b.size));
+    return std::vector<double>(at, at + static_cast<std::ptrdiff_t>(b.size));
+  };
+  const auto isCut = [&](const Block& b) {
+    return b.judged && runner.data().tests[b.test].test.kind == TestKind::cut;
+  };
+  std::vector<std::optional<Repeatability>> repeat(blocks.size());
+  runParallel(blocks.size(), runner.threads(), [&](std::size_t k) {
+    // The load meter settles for longer than a record.
+    if (isCut(blocks[k]) && blocks[k].channel != "load_meter")
+      repeat[k] = steadyPart(runner.data().tests[blocks[k].test], valuesOf(blocks[k]));
+  });
+  for (std::size_t k = 0; k < blocks.size(); ++k) {
+    const Block& b = blocks[k];
+    if (!isCut(b)) continue;
+    const std::vector<double> values = valuesOf(b);
     const double level = mean(values);
     Sums& s = (*sums)[b.channel];
     s.noise = b.noise;
@@ -44,9 +57,7 @@ void add(const TwinRunner& runner, const std::vector<double>& before, const std:
       s.before += before[b.offset + i] * before[b.offset + i];
       s.after += after[b.offset + i] * after[b.offset + i];
     }
-    // The load meter settles for longer than a record.
-    const auto r = b.channel == "load_meter" ? std::nullopt : steadyPart(test, values);
-    if (r) {
+    if (const std::optional<Repeatability>& r = repeat[k]) {
       const auto samples = static_cast<double>(r->samples);
       s.steady += samples;
       s.periodic_squares += samples * r->variance;

@@ -49,7 +49,7 @@ void addCurves(const TwinRunner& runner, const std::vector<double>& before, cons
   for (const char* channel : {"fx", "fy", "fz", "load_meter", "tool_x", "tool_y"}) {
     const Block *worst = nullptr, *worst_cut = nullptr;
     for (const Block& b : runner.blocks()) {
-      if (b.channel != channel || b.slow) continue;
+      if (b.channel != channel || b.slow || !b.judged) continue;
       const TestData& test = runner.data().tests[b.test];
       if (!worst || squaresOf(before, b) > squaresOf(before, *worst)) worst = &b;
       if (test.test.kind == TestKind::cut && test.record.has("spindle_angle") &&

@@ -7,12 +7,13 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_discrepancy/data/labels.h"
-#include "smartmill_discrepancy/explain/challenge.h"
 #include "smartmill_discrepancy/explain/judge.h"
 #include "smartmill_discrepancy/explain/nameless.h"
 #include "smartmill_discrepancy/explain/outcome.h"
 #include "smartmill_discrepancy/explain/sentence.h"
+#include "smartmill_discrepancy/explain/weighed.h"
 #include "smartmill_discrepancy/search/refinement.h"
+#include "smartmill_discrepancy/search/standing.h"
 #include "smartmill_sim/twin/twin.h"
 
 namespace smartmill::discrepancy {
@@ -35,24 +36,35 @@ void refuseWithoutNumbers(const TwinRunner& runner, const std::vector<double>& r
   }
 }
 
-// Cuts that chatter speak for a model that chatters in them.
+Finding chatterFinding(const std::string& test, double frequency, double amplitude) {
+  Finding f;
+  f.channel = "fx";
+  f.tests = {test};
+  f.domain = "frequency";
+  f.location["frequency_hz"] = frequency;
+  f.depends_on = {"cutting"};
+  f.amplitude = amplitude;
+  f.p_value = 1e-300;
+  return f;
+}
+
+// A cut that chatters is followed by a model whose prediction leaves less of it than chatter is told by. One
+// that nothing guides speaks for a model that chatters in it.
 void addChatter(const Dataset& data, Explanation* result) {
   sim::SimulationOptions options;
   options.noise = false;
+  for (const ChatteringCut& c : result->chattering) {
+    const Finding f = chatterFinding(c.test, c.frequency, c.amplitude);
+    if (c.before > CHATTER_SHARE) result->where.push_back(f);
+    if (c.after > CHATTER_SHARE) result->unexplained.push_back(f);
+  }
   for (const ChatteringTest& c : data.chattering) {
     const auto chatters = [&](const MachineModel& model) {
       const Record simulated = sim::simulateTest(model, c.data.test, c.data.record, options);
       return findChatter(simulated, c.data.test, c.data.first_cut).has_value();
     };
     if (chatters(data.nominal)) continue;
-    Finding f;
-    f.channel = "fx";
-    f.tests = {c.data.test.name};
-    f.domain = "frequency";
-    f.location["frequency_hz"] = c.chatter.frequency;
-    f.depends_on = {"cutting"};
-    f.amplitude = c.chatter.amplitude;
-    f.p_value = 1e-300;
+    const Finding f = chatterFinding(c.data.test.name, c.chatter.frequency, c.chatter.amplitude);
     result->where.push_back(f);
     if (!chatters(result->model)) result->unexplained.push_back(f);
   }
@@ -79,6 +91,17 @@ void withdraw(const SearchResult& found, Explanation* result) {
   result->effects.clear();
   result->not_separable.clear();
   result->suggested_test.reset();
+}
+
+// Names by weight; the gap is told of all samples alike, which stays.
+MachineModel namedBy(Workbench& bench, const SearchOptions& options, const SearchResult& found,
+                     Explanation* result) {
+  for (const Rung& r : found.ladder) result->ladder.push_back(r.tried);
+  MachineModel improved = nameEffects(bench, options, found, result);
+  bench.weighAlike();
+  for (std::size_t m = 0; m < result->effects.size(); ++m)
+    result->effects[m].heldout_gap_reduction = heldoutReduction(bench, found.best.state, found.lacking[m]);
+  return improved;
 }
 
 void sayVerdict(const SearchOptions& options, const Explanation& e) {
@@ -113,7 +136,7 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
   structure.squares_of_gap = std::max(found.null.chi2 - bench.samples(), 1.0);
   result.where = findStructure(bench.fitted(), found.null.residual, structure);
   options.search.tell(0.65);
-  challenge(bench, searched, &found, &result.resembles);
+  SearchResult weighed = challengeWeighed(bench, searched, &found, &result.resembles);
   options.search.tell(0.75);
   result.unexplained = findStructure(bench.fitted(), found.best.residual, structure);
   Nameless nameless(bench, options, structure);
@@ -122,12 +145,12 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
   options.search.tell(0.9);
   tellFallen(named, found.best.state, &result.resembles);
   result.interrupted = bench.cancelled();
+  found = settledByWeight(bench, std::move(weighed), found);
   found.best.covariance = settledCovariance(bench, found.best);
   bench.guide(false);
   bench.turnTo(found.best.state);
 
-  for (const Rung& r : found.ladder) result.ladder.push_back(r.tried);
-  MachineModel improved = nameEffects(bench, searched, found, &result);
+  MachineModel improved = namedBy(bench, searched, found, &result);
   const GapPair after = remainsOf(bench, improved).gap;
   if (after.fit <= before.gap.fit && after.heldout <= before.gap.heldout) {
     result.sentence = sentenceOf(result);

@@ -2,12 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
+#include <string>
 #include <utility>
 
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_core/model/effect_catalogue.h"
-#include "smartmill_discrepancy/search/separating_test.h"
+#include "smartmill_discrepancy/search/screening.h"
 #include "smartmill_discrepancy/search/standing.h"
+#include "smartmill_discrepancy/search/unparted.h"
 
 namespace smartmill::discrepancy {
 namespace {
@@ -71,9 +75,31 @@ void writeStdDevs(EffectEntry& entry, const std::vector<FoundParameter>& paramet
   setModes("y", entry.flexibility.y);
 }
 
+// How many of the directions in which a member's values can move change anything: of a two-tooth tool's
+// runout one.
+std::size_t toldValues(const Fitter& fitter, const FitState& state, std::size_t member) {
+  constexpr double TOLD = 1.0;  // squares over the noise, a standard deviation of the prior away
+  const std::vector<Coordinate>& coordinates = state.members[member].hypothesis->coordinates;
+  Eigen::VectorXd prior(static_cast<Eigen::Index>(coordinates.size()));
+  for (std::size_t c = 0; c < coordinates.size(); ++c)
+    prior[static_cast<Eigen::Index>(c)] = coordinates[c].prior_std;
+  SimulatedBlocks base;
+  const Eigen::MatrixXd gram =
+      prior.asDiagonal() * memberTangents(fitter, state, {member}, &base).gram() * prior.asDiagonal();
+  return static_cast<std::size_t>((linear::symmetricEigensystem(gram).values.array() > TOLD).count());
+}
+
+// Of two that do the same in every cut: what tells them apart by hand, empty where nothing is known.
+std::string apartByHand(const std::string& one, const std::string& other) {
+  const std::set<std::string> both{one, other};
+  if (both != std::set<std::string>{"runout", "tooth_radius"}) return "";
+  return "the same cuts with the tool turned in its holder: the offset stays with the holder, the radii with "
+         "the teeth; no cut with the tool as it is clamped tells them apart";
+}
+
 // Other effects in the place of a member.
 void addAlternatives(const Workbench& bench, const SearchOptions& options, const SearchResult& found,
-                     std::size_t member, FoundEffect* effect, Explanation* result) {
+                     std::size_t member, FoundEffect* effect, std::vector<Unparted>* unparted) {
   constexpr double SAME = 0.3;  // of the noise, by which predictions of one thing under two names may differ
   const Fitter& exact = bench.exact();
   const FitState& best = found.best.state;
@@ -83,15 +109,39 @@ void addAlternatives(const Workbench& bench, const SearchOptions& options, const
     effect->alternatives.emplace_back(rival.effect, rival.delta_bic);
     // What would not be enough to name an effect is not enough to tell it from another.
     const double alike = std::min(options.least_gain, 0.5 * effect->delta_bic);
-    if (rival.delta_bic <= effect->delta_bic - alike) continue;
+    const double gain = effect->delta_bic - rival.delta_bic;
+    if (gain >= alike) continue;
     const auto test = separatingTest(bench.data(), exact.model(best), exact.model(rival.state));
     const bool differs = test && test->difference > SAME;
     // With more freedom and no other prediction anywhere it is but a wider name.
-    if (!differs && rival.state.members.back().values.size() > best.members[member].values.size()) continue;
-    result->not_separable.push_back({effect->name, rival.effect});
-    if (!differs || result->suggested_test) continue;
-    result->suggested_test = test->text;
-    result->suggested_cut = test->test;
+    if (!differs && toldValues(bench.quick(), rival.state, rival.state.members.size() - 1) >
+                        toldValues(bench.quick(), best, member))
+      continue;
+    unparted->push_back({effect->name, rival.effect, gain / alike, {}});
+    if (differs) unparted->back().test = test;
+    if (options.prior)
+      effect->confidence = std::min(effect->confidence, sureOf(unparted->back(), *options.prior));
+  }
+}
+
+// What stays open, and the test that tells most of it.
+void tellUnparted(const std::vector<Unparted>& unparted, const std::optional<CauseOdds>& prior,
+                  Explanation* result) {
+  for (const Unparted& pair : unparted) {
+    result->not_separable.push_back({pair.name, pair.rival});
+    if (prior)
+      result->notes.push_back(formatted("beforehand, by %zu other machines: odds of %s %.3g, of %s %.3g",
+                                        prior->machines, pair.name.c_str(), prior->of(pair.name),
+                                        pair.rival.c_str(), prior->of(pair.rival)));
+  }
+  if (const Unparted* const telling = mostTelling(unparted, prior)) {
+    result->suggested_test = telling->test->text;
+    result->suggested_cut = telling->test->test;
+    return;
+  }
+  for (const Unparted& pair : unparted) {
+    const std::string by_hand = apartByHand(pair.name, pair.rival);
+    if (!by_hand.empty()) result->suggested_test = by_hand;
   }
 }
 
@@ -103,6 +153,7 @@ MachineModel nameEffects(const Workbench& bench, const SearchOptions& options, c
   MachineModel model = bench.exact().model(best.state);
   const Eigen::MatrixXd& covariance = best.covariance;
   std::vector<double> nominal_std;
+  std::vector<Unparted> unparted;
   auto first = static_cast<Eigen::Index>(best.state.nominal.size());
   for (Eigen::Index i = 0; i < first; ++i) nominal_std.push_back(std::sqrt(covariance(i, i)));
   bench.freedom().writeStdDevs(model, nominal_std);
@@ -118,11 +169,11 @@ MachineModel nameEffects(const Workbench& bench, const SearchOptions& options, c
     first += own;
     writeStdDevs(entry, effect.parameters);
     effect.delta_bic = found.contribution[m];
-    effect.heldout_gap_reduction = heldoutReduction(bench, best.state, found.lacking[m]);
     effect.confidence = standingOf(bench, best.state, found.lacking[m]).confidence();
-    addAlternatives(bench, options, found, m, &effect, result);
+    addAlternatives(bench, options, found, m, &effect, &unparted);
     result->effects.push_back(std::move(effect));
   }
+  tellUnparted(unparted, options.prior, result);
   return model;
 }
 

@@ -61,6 +61,7 @@ std::vector<Said> saidBy(const TwinRunner& runner, const std::vector<double>& be
   std::map<std::size_t, Said> tests;
   std::map<std::size_t, std::vector<double>> pieces;
   for (const Block& b : runner.blocks()) {
+    if (!b.judged) continue;
     const CampaignTest& test = runner.data().tests[b.test].test;
     std::size_t turn = LEAST_PIECE;
     if (test.spindle_speed > 0.0)

@@ -1,6 +1,10 @@
 #include "smartmill_discrepancy/explain/outcome.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+
+#include "smartmill_core/signal/statistics.h"
 
 namespace smartmill::discrepancy {
 namespace {
@@ -17,6 +21,34 @@ double rmsOf(const std::vector<double>& v, std::size_t from, std::size_t size) {
   return size ? std::sqrt(squares / static_cast<double>(size)) : 0.0;
 }
 
+// Over the noise, of all that is judged.
+double gapOf(const TwinRunner& runner, const std::vector<double>& left) {
+  double squares = 0.0;
+  std::size_t samples = 0;
+  for (const Block& b : runner.blocks()) {
+    if (!b.judged) continue;
+    squares += std::pow(rmsOf(left, b.offset, b.size), 2) * static_cast<double>(b.size);
+    samples += b.size;
+  }
+  return samples ? std::sqrt(squares / static_cast<double>(samples)) : 0.0;
+}
+
+// By cuts that chatter.
+std::map<std::string, double> predictionErrors(const TwinRunner& runner, const std::vector<double>& left) {
+  const std::array<const char*, 4> shown{{"fx", "fy", "tool_x", "tool_y"}};
+  std::map<std::string, double> errors;
+  for (const Block& b : runner.blocks()) {
+    if (b.judged || b.slow || std::find(shown.begin(), shown.end(), b.channel) == shown.end()) continue;
+    const TestData& test = runner.data().tests[b.test];
+    const auto from = static_cast<std::ptrdiff_t>(b.offset + test.first_cut),
+               to = static_cast<std::ptrdiff_t>(b.offset + b.size);
+    const double all = standardDeviation({runner.measured().begin() + from, runner.measured().begin() + to});
+    double& error = errors[test.test.name];
+    error = std::max(error, rmsOf(left, b.offset + test.first_cut, b.size - test.first_cut) / all);
+  }
+  return errors;
+}
+
 // Chi-square statistic of noise alone varies by sqrt(2 / n).
 double floorDeviation(std::size_t samples) {
   return samples ? std::sqrt(0.5 / static_cast<double>(samples)) : 0.0;
@@ -25,6 +57,7 @@ double floorDeviation(std::size_t samples) {
 void addGaps(const TwinRunner& runner, const std::vector<double>& before, const std::vector<double>& after,
              bool heldout, std::vector<BlockGap>* gaps) {
   for (const Block& b : runner.blocks()) {
+    if (!b.judged) continue;
     gaps->push_back({runner.data().tests[b.test].test.name, b.channel, heldout,
                      rmsOf(before, b.offset, b.size), rmsOf(after, b.offset, b.size),
                      floorDeviation(b.size)});
@@ -34,8 +67,9 @@ void addGaps(const TwinRunner& runner, const std::vector<double>& before, const 
 }  // namespace
 
 Remains remainsOf(const Workbench& bench, const MachineModel& model) {
-  Remains r{residualOf(bench.fitted(), model), residualOf(bench.heldout(), model), {}};
-  r.gap = {rmsOf(r.fit, 0, r.fit.size()), rmsOf(r.heldout, 0, r.heldout.size())};
+  Remains r{residualOf(bench.fitted(), model), residualOf(bench.heldout(), model), {}, {}};
+  r.gap = {gapOf(bench.fitted(), r.fit), gapOf(bench.heldout(), r.heldout)};
+  r.chattering = predictionErrors(bench.fitted(), r.fit);
   return r;
 }
 
@@ -46,6 +80,11 @@ void writeOutcome(const Workbench& bench, const Remains& before, const MachineMo
   result->model = readMachineModel(file);
   const Remains after = remainsOf(bench, result->model);
   result->after = after.gap;
+  for (const TestData& t : bench.data().tests) {
+    if (t.chatter)
+      result->chattering.push_back({t.test.name, t.chatter->frequency, t.chatter->amplitude,
+                                    before.chattering.at(t.test.name), after.chattering.at(t.test.name)});
+  }
   addGaps(bench.fitted(), before.fit, after.fit, false, &result->gaps);
   addGaps(bench.heldout(), before.heldout, after.heldout, true, &result->gaps);
   addChannelShares(bench, before, after, result);

@@ -75,7 +75,7 @@ std::map<std::string, std::vector<Left>> leftByChannel(const TwinRunner& runner,
                                                        const std::vector<double>& residual) {
   std::map<std::string, std::vector<Left>> channels;
   for (const Block& b : runner.blocks()) {
-    if (b.slow) continue;
+    if (b.slow || !b.judged) continue;
     const auto from = residual.begin() + static_cast<std::ptrdiff_t>(b.offset);
     Left left{&runner.data().tests[b.test], {from, from + static_cast<std::ptrdiff_t>(b.size)}, 0.0, b.noise};
     left.mean = mean(left.values);
@@ -316,7 +316,7 @@ std::map<std::string, std::map<std::size_t, Shown>> forcesShown(const TwinRunner
                                                                 const std::vector<double>& residual) {
   std::map<std::string, std::map<std::size_t, Shown>> shown;
   for (const Block& b : runner.blocks()) {
-    if (std::find(FORCES.begin(), FORCES.end(), b.channel) == FORCES.end() || b.slow) continue;
+    if (std::find(FORCES.begin(), FORCES.end(), b.channel) == FORCES.end() || b.slow || !b.judged) continue;
     Shown& s = shown[b.channel][b.test];
     s.rate = runner.data().tests[b.test].test.sample_rate;
     s.noise = b.noise;

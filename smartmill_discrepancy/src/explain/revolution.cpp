@@ -185,7 +185,7 @@ std::vector<std::size_t> cutsOfOneKind(const TwinRunner& runner) {
   std::vector<double> feeds;
   for (const std::size_t t : runner.tests()) {
     const TestData& data = runner.data().tests[t];
-    if (data.test.kind != TestKind::cut) continue;
+    if (data.test.kind != TestKind::cut || data.chatter) continue;
     if (!data.record.has("spindle_angle")) return {};
     if (!cuts.empty() && !sameButFeed(data.test, runner.data().tests[cuts.front()].test)) return {};
     cuts.push_back(t);

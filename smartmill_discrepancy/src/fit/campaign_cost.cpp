@@ -102,15 +102,15 @@ void CampaignCost::compare(SimulatedBlocks simulated) const {
     block_squares_.resize(count);
     block_along_.resize(frozen, count);
   }
-  for (Index b = 0; b < count; ++b) {
-    const auto block = static_cast<std::size_t>(b);
-    if (!first && simulated[block] == simulated_[block]) continue;
+  runParallel(blocks.size(), runner.threads(), [&](std::size_t block) {
+    if (!first && simulated[block] == simulated_[block]) return;
+    const auto b = static_cast<Index>(block);
     auto segment =
         apart_.segment(static_cast<Index>(blocks[block].offset), static_cast<Index>(blocks[block].size));
     runner.compare(simulated, block, segment.data());
     block_squares_[b] = segment.squaredNorm();
     if (frozen > 0) block_along_.col(b) = frozen_->columns.along(block, apart_);
-  }
+  });
   simulated_ = std::move(simulated);
   apart_squares_ = block_squares_.sum();
   if (frozen > 0) frozen_along_ = block_along_.rowwise().sum();

@@ -177,7 +177,7 @@ NominalTangents Fitter::nominalTangents(const FitState& state) const {
 
 Fit Fitter::fit(const FitState& start, const NominalTangents* frozen, const FitOptions& options) const {
   const CampaignCost cost(*this, start, frozen, options);
-  const auto samples = static_cast<double>(runner_.size());
+  const double samples = runner_.counts();
   Fit fit;
   const std::optional<Eigen::VectorXd> at = solve(cost, options, samples, cancelled_);
   fit.converged = at && describe(cost, *at, samples, fit);
@@ -200,9 +200,12 @@ MatrixXd Fitter::sandwichCovariance(const FitState& state, const NominalTangents
   if (!point) return {};
   const MatrixXd inverse = inverseAt(cost, point->information);
   const Eigen::VectorXd residual = cost.residual(at);
-  std::vector<Values> power;
-  for (const Block& b : runner_.blocks()) power.push_back(powerOf(residual.data() + b.offset, b.size));
-  for (Index c = 0; c < at.size(); ++c) {
+  const std::vector<Block>& blocks = runner_.blocks();
+  std::vector<Values> power(blocks.size());
+  runParallel(blocks.size(), runner_.threads(),
+              [&](std::size_t b) { power[b] = powerOf(residual.data() + blocks[b].offset, blocks[b].size); });
+  runParallel(parameters.size(), runner_.threads(), [&](std::size_t coordinate) {
+    const auto c = static_cast<Index>(coordinate);
     double variance = pulledVariance(runner_, cost.influence(inverse.col(c)), residual, power);
     // What is stated lies off by its own deviation.
     for (Index k = 0; k < at.size(); ++k) {
@@ -210,7 +213,7 @@ MatrixXd Fitter::sandwichCovariance(const FitState& state, const NominalTangents
       variance += std::pow(inverse(k, c), 2) * prior_weight * precision;
     }
     std_dev[c] = std::sqrt(variance / inverse(c, c));
-  }
+  });
   return std_dev.asDiagonal() * inverse * std_dev.asDiagonal();
 }
 

@@ -1,7 +1,6 @@
 #include "smartmill_discrepancy/gap/gap.h"
 
 #include <cmath>
-#include <numeric>
 
 #include "smartmill_discrepancy/gap/twin_runner.h"
 
@@ -9,8 +8,10 @@ namespace smartmill::discrepancy {
 
 CampaignGap campaignGap(const Dataset& data, const MachineModel& model, int threads) {
   constexpr int SUBSTEPS = 8;
-  std::vector<std::size_t> all(data.tests.size());
-  std::iota(all.begin(), all.end(), 0);
+  std::vector<std::size_t> all;
+  for (std::size_t t = 0; t < data.tests.size(); ++t) {
+    if (!data.tests[t].chatter) all.push_back(t);
+  }
   const TwinRunner runner(data, all, threads, SUBSTEPS);
   const std::vector<double> simulated = runner.simulate(model);
   CampaignGap result;

@@ -2,15 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <complex>
 
+#include "gap/orders.h"
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::discrepancy {
 namespace {
-
-using Complex = std::complex<double>;
 
 constexpr int MOST_STEPS = 30;   // of conjugate gradients: the columns are nearly orthogonal
 constexpr double CLOSE = 1e-10;  // of the first gradient's squares
@@ -23,44 +21,6 @@ double turnedOver(const std::vector<double>& angle) {
   return std::abs(turned) / units::TWO_PI;
 }
 
-// Mean and orders 1..K of the angle as columns: cos(k a), sin(k a).
-class Orders {
- public:
-  Orders(const std::vector<double>& angle, std::size_t count) : count_(count) {
-    for (const double a : angle) unit_.push_back(std::polar(1.0, a));
-  }
-  std::vector<double> times(const std::vector<double>& x) const {
-    std::vector<double> y(unit_.size());
-    for (std::size_t i = 0; i < y.size(); ++i) {
-      Complex power = 1.0;
-      double sum = x[0];
-      for (std::size_t k = 1; k <= count_; ++k) {
-        power *= unit_[i];
-        sum += x[2 * k - 1] * power.real() + x[2 * k] * power.imag();
-      }
-      y[i] = sum;
-    }
-    return y;
-  }
-  std::vector<double> transposed(const std::vector<double>& y) const {
-    std::vector<double> x(2 * count_ + 1, 0.0);
-    for (std::size_t i = 0; i < y.size(); ++i) {
-      Complex power = 1.0;
-      x[0] += y[i];
-      for (std::size_t k = 1; k <= count_; ++k) {
-        power *= unit_[i];
-        x[2 * k - 1] += y[i] * power.real();
-        x[2 * k] += y[i] * power.imag();
-      }
-    }
-    return x;
-  }
-
- private:
-  std::vector<Complex> unit_;
-  std::size_t count_;
-};
-
 double dot(const std::vector<double>& a, const std::vector<double>& b) {
   double sum = 0.0;
   for (std::size_t i = 0; i < a.size(); ++i) sum += a[i] * b[i];
@@ -69,17 +29,18 @@ double dot(const std::vector<double>& a, const std::vector<double>& b) {
 
 // Squares that the orders leave: conjugate gradients on the normal equations (Hestenes & Stiefel 1952, CGLS).
 // @param lines receives level and orders
-double squaresLeft(const Orders& orders, std::vector<double> left, std::vector<double>* lines) {
-  std::vector<double> s = orders.transposed(left), p = s;
+double squaresLeft(const Orders& orders, std::size_t count, std::vector<double> left,
+                   std::vector<double>* lines) {
+  std::vector<double> s = orders.along(left, count), p = s;
   double gamma = dot(s, s);
   const double first = gamma;
   lines->assign(s.size(), 0.0);
   for (int step = 0; step < MOST_STEPS && gamma > CLOSE * first; ++step) {
-    const std::vector<double> q = orders.times(p);
+    const std::vector<double> q = orders.sumOf(p);
     const double alpha = gamma / dot(q, q);
     for (std::size_t i = 0; i < left.size(); ++i) left[i] -= alpha * q[i];
     for (std::size_t i = 0; i < p.size(); ++i) (*lines)[i] += alpha * p[i];
-    s = orders.transposed(left);
+    s = orders.along(left, count);
     const double next = dot(s, s);
     for (std::size_t i = 0; i < p.size(); ++i) p[i] = s[i] + next / gamma * p[i];
     gamma = next;
@@ -101,7 +62,7 @@ std::optional<Repeatability> repeatability(const std::vector<double>& values,
   result.samples = values.size();
   result.variance = dot(about, about) / samples;
   const double free = samples - 2.0 * static_cast<double>(orders) - 1.0;
-  result.floor = std::sqrt(squaresLeft(Orders(angle, orders), std::move(about), &result.lines) / free);
+  result.floor = std::sqrt(squaresLeft(Orders(angle), orders, std::move(about), &result.lines) / free);
   result.lines[0] += level;
   return result;
 }

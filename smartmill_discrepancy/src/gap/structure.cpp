@@ -10,6 +10,7 @@
 #include <string>
 #include <utility>
 
+#include "gap/orders.h"
 #include "smartmill_core/signal/fourier.h"
 #include "smartmill_core/units.h"
 #include "smartmill_discrepancy/gap/dependence.h"
@@ -21,28 +22,6 @@ namespace {
 constexpr std::size_t ORDERS = 36;
 constexpr std::size_t HALF_ORDERS = 4;  // 0.5, 1.5, ..
 constexpr std::size_t PADDED = 1 << 16;
-
-using Turn = std::complex<double>;
-
-// The part of a block in which one kind of thing goes on: the cut of a cut, all of the rest.
-struct Stretch {
-  const TestData* test;
-  double noise;
-  std::vector<double> values;
-  std::vector<double> angle;  // unwrapped; empty without spindle angle
-  std::vector<Turn> turns;    // exp(i angle)
-  double rate;
-};
-
-std::vector<double> unwrapped(const std::vector<double>& angle, std::size_t from) {
-  std::vector<double> out;
-  double turns = 0.0;
-  for (std::size_t i = from; i < angle.size(); ++i) {
-    if (i > from && angle[i] < angle[i - 1] - 3.0) turns += units::TWO_PI;
-    out.push_back(angle[i] + turns);
-  }
-  return out;
-}
 
 // Squares that a sine of these phases takes from the values, and its amplitude.
 struct Line {
@@ -70,26 +49,79 @@ struct LineSums {
   }
 };
 
+// Lines at orders of the spindle, each by itself. What of them does not depend on the values is summed once.
+class SpindleLines {
+ public:
+  explicit SpindleLines(const std::vector<double>& angle) : whole_(angle), half_(halved(angle)) {
+    const std::vector<double> twice = whole_.along(std::vector<double>(angle.size(), 1.0), 2 * ORDERS);
+    const auto of = [&](std::size_t doubled) {  // twice the order
+      LineSums sums;
+      sums.ss = 0.5 * (twice[0] - twice[2 * doubled - 1]);
+      sums.cc = 0.5 * (twice[0] + twice[2 * doubled - 1]);
+      sums.sc = 0.5 * twice[2 * doubled];
+      return sums;
+    };
+    for (std::size_t k = 1; k <= ORDERS; ++k) wholes_[k - 1] = of(2 * k);
+    for (std::size_t k = 0; k < HALF_ORDERS; ++k) halves_[k] = of(2 * k + 1);
+  }
+
+  /// Of orders 1..ORDERS.
+  std::array<Line, ORDERS> wholes(const std::vector<double>& values) const {
+    return solved(wholes_, whole_.along(values, ORDERS), 1);
+  }
+  /// Of 0.5, 1.5, ...
+  std::array<Line, HALF_ORDERS> halves(const std::vector<double>& values) const {
+    return solved(halves_, half_.along(values, 2 * HALF_ORDERS - 1), 2);
+  }
+
+ private:
+  static std::vector<double> halved(std::vector<double> angle) {
+    for (double& a : angle) a *= 0.5;
+    return angle;
+  }
+  template <std::size_t N>
+  static std::array<Line, N> solved(std::array<LineSums, N> sums, const std::vector<double>& along,
+                                    std::size_t every) {
+    std::array<Line, N> lines;
+    for (std::size_t k = 0; k < N; ++k) {
+      const std::size_t order = 1 + every * k;
+      sums[k].c = along[2 * order - 1];
+      sums[k].s = along[2 * order];
+      lines[k] = sums[k].solve();
+    }
+    return lines;
+  }
+
+  Orders whole_, half_;
+  std::array<LineSums, ORDERS> wholes_;
+  std::array<LineSums, HALF_ORDERS> halves_;
+};
+
+// The part of a block in which one kind of thing goes on: the cut of a cut, all of the rest.
+struct Stretch {
+  const TestData* test;
+  double noise;
+  std::vector<double> values;
+  std::vector<double> angle;  // unwrapped; empty without spindle angle
+  double rate;
+  std::optional<SpindleLines> lines;  // with spindle angle
+};
+
+std::vector<double> unwrapped(const std::vector<double>& angle, std::size_t from) {
+  std::vector<double> out;
+  double turns = 0.0;
+  for (std::size_t i = from; i < angle.size(); ++i) {
+    if (i > from && angle[i] < angle[i - 1] - 3.0) turns += units::TWO_PI;
+    out.push_back(angle[i] + turns);
+  }
+  return out;
+}
+
 template <class Phase>
 Line lineOf(const std::vector<double>& values, const Phase& phase) {
   LineSums sums;
   for (std::size_t i = 0; i < values.size(); ++i) sums.add(std::sin(phase(i)), std::cos(phase(i)), values[i]);
   return sums.solve();
-}
-
-// Lines at orders 1..ORDERS of the spindle, each by itself.
-std::array<Line, ORDERS> orderLines(const std::vector<double>& values, const std::vector<Turn>& turns) {
-  std::array<LineSums, ORDERS> sums;
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    Turn at{1.0, 0.0};
-    for (LineSums& order : sums) {
-      at *= turns[i];
-      order.add(at.imag(), at.real(), values[i]);
-    }
-  }
-  std::array<Line, ORDERS> lines;
-  for (std::size_t k = 0; k < ORDERS; ++k) lines[k] = sums[k].solve();
-  return lines;
 }
 
 template <class Phase>
@@ -133,20 +165,22 @@ double settled(double time_constant, const Stretch& s, std::size_t i) {
 
 // Size of it and squares that it takes.
 std::pair<double, double> settlingOf(double time_constant, const Stretch& s) {
-  double xy = 0.0, xx = 0.0;
-  for (std::size_t i = 0; i < s.values.size(); ++i) {
-    const double shape = settled(time_constant, s, i);
-    xy += shape * s.values[i];
+  const double share = settled(time_constant, s, 1);  // from one sample to the next
+  double xy = 0.0, xx = 0.0, shape = 1.0;
+  for (const double value : s.values) {
+    xy += shape * value;
     xx += shape * shape;
+    shape *= share;
   }
   return {xy / xx, xy * xy / xx};
 }
 
 void countOrders(const Stretch& s, std::vector<Candidate>& halves, std::vector<Candidate>& orders) {
-  const std::array<Line, ORDERS> lines = orderLines(s.values, s.turns);
-  for (Candidate& o : halves) {
-    o.squares += lineOf(s.values, [&](std::size_t i) { return o.place * s.angle[i]; }).squares;
-    o.freedom += 2;
+  const std::array<Line, ORDERS> lines = s.lines->wholes(s.values);
+  const std::array<Line, HALF_ORDERS> between = s.lines->halves(s.values);
+  for (std::size_t k = 0; k < HALF_ORDERS; ++k) {
+    halves[k].squares += between[k].squares;
+    halves[k].freedom += 2;
   }
   for (std::size_t k = 0; k < ORDERS; ++k) {
     Candidate& o = orders[k];
@@ -305,16 +339,16 @@ Channel channelOf(const TwinRunner& runner, const std::vector<double>& residual,
   constexpr std::size_t LEAST_SAMPLES = 32;
   Channel channel;
   for (const Block& block : runner.blocks()) {
-    if (block.channel != name || block.slow) continue;
+    if (block.channel != name || block.slow || !block.judged) continue;
     const TestData& test = runner.data().tests[block.test];
     const std::size_t from = test.test.kind == TestKind::cut ? test.first_cut : 0;
     if (block.size < from + LEAST_SAMPLES) continue;
-    Stretch s{&test, block.noise, {}, {}, {}, test.test.sample_rate};
+    Stretch s{&test, block.noise, {}, {}, test.test.sample_rate, {}};
     s.values.assign(residual.begin() + static_cast<std::ptrdiff_t>(block.offset + from),
                     residual.begin() + static_cast<std::ptrdiff_t>(block.offset + block.size));
     if (test.test.kind != TestKind::tap && test.record.has("spindle_angle"))
       s.angle = unwrapped(test.record.column("spindle_angle"), from);
-    for (const double a : s.angle) s.turns.push_back(std::polar(1.0, a));
+    if (!s.angle.empty()) s.lines.emplace(s.angle);
     channel.samples += static_cast<double>(s.values.size());
     for (std::size_t i = block.offset; i < block.offset + block.size; ++i) {
       const double trust = twin_accuracy * runner.measured()[i];
@@ -375,7 +409,7 @@ void lookAtMeans(const TwinRunner& runner, const std::vector<double>& residual, 
   std::size_t count = 0;
   double floor = 0.0;
   for (const Block& b : runner.blocks()) {
-    if (b.channel != name || !b.slow) continue;
+    if (b.channel != name || !b.slow || !b.judged) continue;
     const TestData& test = runner.data().tests[b.test];
     double sum = 0.0, squares = 0.0;
     for (std::size_t i = b.offset; i < b.offset + b.size; ++i) {
@@ -413,14 +447,25 @@ std::vector<Finding> findStructure(const TwinRunner& runner, const std::vector<d
   }
   std::set<std::string> channels;
   for (const Block& b : runner.blocks()) channels.insert(b.channel);
+  struct Looked {
+    std::vector<Finding> found;
+    std::vector<double> looks;  // p-values of those that found nothing, for the control of false discovery
+  };
+  const std::vector<std::string> names(channels.begin(), channels.end());
+  std::vector<Looked> looked(names.size());
+  runParallel(names.size(), runner.threads(), [&](std::size_t k) {
+    Looked& of = looked[k];
+    Channel channel = channelOf(runner, residual, names[k], options.twin_accuracy);
+    lookAtMeans(runner, residual, names[k], options, all_excess, of.found, of.looks);
+    if (channel.stretches.empty()) return;
+    const std::vector<double> last = takeApart(names[k], std::move(channel), options, all_excess, of.found);
+    of.looks.insert(of.looks.end(), last.begin(), last.end());
+  });
   std::vector<Finding> found;
-  std::vector<double> looks;  // p-values of every look that found nothing, for the control of false discovery
-  for (const std::string& name : channels) {
-    Channel channel = channelOf(runner, residual, name, options.twin_accuracy);
-    lookAtMeans(runner, residual, name, options, all_excess, found, looks);
-    if (channel.stretches.empty()) continue;
-    const std::vector<double> last = takeApart(name, std::move(channel), options, all_excess, found);
-    looks.insert(looks.end(), last.begin(), last.end());
+  std::vector<double> looks;
+  for (const Looked& of : looked) {
+    found.insert(found.end(), of.found.begin(), of.found.end());
+    looks.insert(looks.end(), of.looks.begin(), of.looks.end());
   }
   keepSignificant(looks, options, found);
   return found;

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cmath>
 #include <exception>
+#include <numeric>
 #include <string>
 #include <thread>
 #include <utility>
@@ -42,9 +43,12 @@ std::vector<double> readAt(const SlowMeans& slow, const std::vector<double>& val
 }  // namespace
 
 void runParallel(std::size_t count, int threads, const std::function<void(std::size_t)>& job) {
+  thread_local bool inside = false;
+  threads = inside ? 1 : std::min(threads, static_cast<int>(count));
   std::atomic<std::size_t> next{0};
   std::vector<std::exception_ptr> failed(count);
   const auto work = [&] {
+    const bool before = std::exchange(inside, inside || threads > 1);
     for (std::size_t i = next++; i < count; i = next++) {
       try {
         job(i);
@@ -52,6 +56,7 @@ void runParallel(std::size_t count, int threads, const std::function<void(std::s
         failed[i] = std::current_exception();
       }
     }
+    inside = before;
   };
   std::vector<std::thread> others;
   for (int k = 1; k < threads; ++k) others.emplace_back(work);
@@ -77,12 +82,12 @@ TwinRunner::TwinRunner(const Dataset& data, std::vector<std::size_t> tests, int 
     first_block_.push_back(blocks_.size());
     for (const std::string& channel : test.channels) {
       const double noise = data_.noise.at(channel);
-      blocks_.push_back({t, channel, size_, test.record.size(), noise});
+      blocks_.push_back({t, channel, size_, test.record.size(), noise, nullptr, !test.chatter});
       size_ += test.record.size();
       for (const double v : test.record.column(channel)) measured_.push_back(v / noise);
     }
     for (const SlowMeans& slow : test.slow) {
-      blocks_.push_back({t, slow.channel, size_, slow.mean.size(), slow.noise, &slow});
+      blocks_.push_back({t, slow.channel, size_, slow.mean.size(), slow.noise, &slow, !test.chatter});
       size_ += slow.mean.size();
       for (const double v : slow.mean) measured_.push_back(v / slow.noise);
       kept.record.add(slow.channel).assign(test.record.size(), 0.0);
@@ -90,6 +95,7 @@ TwinRunner::TwinRunner(const Dataset& data, std::vector<std::size_t> tests, int 
   }
   first_block_.push_back(blocks_.size());
   readPhases();
+  readGuidance();
 }
 
 void TwinRunner::Kept::forget() {
@@ -112,6 +118,35 @@ void TwinRunner::readPhases() {
   }
 }
 
+// @return whether it is what it was
+bool TwinRunner::readTrust(std::size_t b) {
+  Block& block = blocks_[b];
+  const TestData& test = data_.tests[block.test];
+  const auto told = test.trust.find(block.channel);
+  const Trust trust = test.guided && told != test.trust.end() ? told->second : Trust{};
+  block.counts = trust.samples * static_cast<double>(block.size);
+  const double noise = trust.noise * (block.slow ? block.slow->noise : data_.noise.at(block.channel));
+  if (noise == block.noise) return true;
+  for (std::size_t i = block.offset; i < block.offset + block.size; ++i) measured_[i] *= block.noise / noise;
+  block.noise = noise;
+  return false;
+}
+
+void TwinRunner::readGuidance() {
+  for (std::size_t k = 0; k < tests_.size(); ++k) {
+    const TestData& test = data_.tests[tests_[k]];
+    Kept& kept = kept_[k];
+    const std::lock_guard<std::mutex> lock(kept.mutex);
+    bool same = kept.guided == test.guided;
+    kept.guided = test.guided;
+    for (std::size_t b = first_block_[k]; b < first_block_[k + 1]; ++b) same = readTrust(b) && same;
+    if (same) continue;
+    correction_.clear();
+    kept.forget();
+  }
+  whitenRecords();
+}
+
 void TwinRunner::setGuided(bool guided) {
   if (guided == guided_) return;
   guided_ = guided;
@@ -120,6 +155,26 @@ void TwinRunner::setGuided(bool guided) {
     const std::lock_guard<std::mutex> lock(kept.mutex);
     kept.forget();
   }
+}
+
+// What the tool did stays known.
+void TwinRunner::setWhitening(std::vector<Whitening> of_blocks) {
+  if (of_blocks.empty() && whitening_.empty()) return;
+  whitening_ = std::move(of_blocks);
+  correction_.clear();
+  for (Kept& kept : kept_) {
+    const std::lock_guard<std::mutex> lock(kept.mutex);
+    for (Shown& of_channel : kept.shown) of_channel.clear();
+  }
+  whitenRecords();
+}
+
+void TwinRunner::whitenRecords() {
+  whitened_.clear();
+  if (whitening_.empty()) return;
+  whitened_ = measured_;
+  for (std::size_t b = 0; b < blocks_.size(); ++b)
+    whitening_[b].apply(whitened_.data() + blocks_[b].offset, blocks_[b].size);
 }
 
 void TwinRunner::setSubsteps(int substeps) {
@@ -143,6 +198,7 @@ SimulatedBlocks TwinRunner::blocksOf(const MachineModel& model, std::size_t chos
     std::vector<double> values = record.column(blocks_[b].channel);
     if (blocks_[b].slow) values = readAt(*blocks_[b].slow, values, test.sample_rate);
     for (double& v : values) v /= blocks_[b].noise;
+    if (!whitening_.empty()) whitening_[b].apply(values.data(), values.size());
     result.back() = std::make_shared<const std::vector<double>>(std::move(values));
   }
   return result;
@@ -153,7 +209,7 @@ SimulatedBlocks TwinRunner::simulateOne(const MachineModel& model, std::size_t c
   const std::size_t first = first_block_[chosen], count = first_block_[chosen + 1] - first;
   // Channels that are not apart are as much as the record; forces that guide the tool lead from one to the
   // next.
-  const bool apart = sim::channelsApart(model) && !(guided_ && sim::Guide::byForce(kept.record));
+  const bool apart = sim::channelsApart(model) && !(guides(chosen) && sim::Guide::byForce(kept.record));
   SimulatedBlocks result(count);
   std::vector<std::vector<double>> keys;
   std::vector<std::string> missing;
@@ -171,7 +227,7 @@ SimulatedBlocks TwinRunner::simulateOne(const MachineModel& model, std::size_t c
   sim::SimulationOptions options;
   options.noise = false;
   options.substeps = substeps_;
-  options.guided = guided_;
+  options.guided = guides(chosen);
   options.phase = kept.phase;
   options.early_entry = kept.early_entry;
   options.traces = kept.traces.get();
@@ -195,7 +251,7 @@ SimulatedBlocks TwinRunner::turned(const MachineModel& model, const SimulatedBlo
   sim::SimulationOptions options;
   options.noise = false;
   options.substeps = substeps_;
-  options.guided = guided_;
+  options.guided = guides(chosen);
   options.phase = turnedPhase(kept.phase, by);
   options.early_entry = kept.early_entry + by.entry;
   SimulatedBlocks of_test = blocksOf(model, chosen, test, options), all = base;
@@ -224,8 +280,8 @@ std::vector<double> TwinRunner::joined(const SimulatedBlocks& blocks) const {
 
 void TwinRunner::compare(const SimulatedBlocks& simulated, std::size_t block, double* apart) const {
   const Block& b = blocks_[block];
-  const std::vector<double>& values = *simulated[block];
-  for (std::size_t i = 0; i < b.size; ++i) apart[i] = values[i] - measured_[b.offset + i];
+  const std::vector<double>&values = *simulated[block], &records = measured();
+  for (std::size_t i = 0; i < b.size; ++i) apart[i] = values[i] - records[b.offset + i];
   for (std::size_t i = 0; i < b.size && !correction_.empty(); ++i) apart[i] += correction_[b.offset + i];
 }
 
@@ -244,6 +300,11 @@ void TwinRunner::correctTo(const MachineModel& reference, const std::vector<doub
 
 std::vector<double> TwinRunner::simulate(const MachineModel& model) const {
   return std::move(simulate(std::vector<MachineModel>{model}).front());
+}
+
+double TwinRunner::counts() const {
+  return std::accumulate(blocks_.begin(), blocks_.end(), 0.0,
+                         [](double sum, const Block& b) { return sum + b.counts; });
 }
 
 double squaresLeft(const TwinRunner& runner, const std::vector<double>& simulated) {

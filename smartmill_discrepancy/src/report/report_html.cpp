@@ -106,6 +106,20 @@ void shares(std::ostream& out, const std::vector<ChannelShare>& channels) {
   out << "</table>\n";
 }
 
+void chattering(std::ostream& out, const std::vector<ChatteringCut>& cuts) {
+  if (cuts.empty()) return;
+  out << "<h2>Cuts that chatter</h2>\n<p>Predicted from one step to the next, never as the model runs "
+         "freely; "
+         "no part of the gaps.</p>\n<table><tr><th>test<th>frequency [Hz]<th>amplitude [N]<th>left by the "
+         "prediction before<th>after</tr>\n";
+  for (const ChatteringCut& c : cuts) {
+    out << "<tr><td>" << escapedHtml(c.test) << "<td>" << number(c.frequency) << "<td>" << number(c.amplitude)
+        << "<td>" << number(100.0 * c.before, "%.1f %%") << "<td>" << number(100.0 * c.after, "%.1f %%")
+        << "</tr>\n";
+  }
+  out << "</table>\n";
+}
+
 void images(ReportPage& page, const std::vector<std::string>& pictures, const std::string& folder) {
   for (const std::string& name : pictures) {
     const auto caption = CAPTIONS.find(name);
@@ -142,6 +156,7 @@ void writeHtml(const Explanation& e, const std::string& campaign, const std::vec
   verdict(out, e);
   effects(out, e);
   shares(out, e.channels);
+  chattering(out, e.chattering);
   images(page, pictures, folder);
   findings(out, "What remains unexplained", e.unexplained);
   findings(out, "Where the nominal model differs", e.where);

@@ -127,6 +127,13 @@ void writeReport(const Explanation& e, const std::string& folder) {
     if (c.explained_heldout) report["explained_share"][c.channel] = rounded(*c.explained_heldout);
     if (c.repeats) report["repeatability_floor"][c.channel] = rounded(c.floor);
   }
+  for (const ChatteringCut& c : e.chattering) {
+    report["chattering"].push_back(
+        {{"test", c.test},
+         {"frequency_hz", rounded(c.frequency)},
+         {"amplitude", rounded(c.amplitude)},
+         {"prediction_error", {{"before", rounded(c.before)}, {"after", rounded(c.after)}}}});
+  }
   report["candidates"] = Json::array();
   for (const TriedEffect& t : e.ladder) {
     report["candidates"].push_back({{"round", t.round + 1},

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/modal/modal_filter.h"
@@ -31,9 +32,41 @@ ModalModel oneMode(double frequency, double damping_ratio, double gain) {
   return m;
 }
 
+// Filters side by side: each waits for its own last step only.
+class Filters {
+ public:
+  Filters(const std::vector<double>& frequencies, double damping_ratio, double rate) {
+    for (const double f : frequencies)
+      filters_.emplace_back(oneMode(f, damping_ratio, 1.0), rate, Hold::first_order);
+  }
+  Filters(const ModalModel& all, std::size_t count, double rate)
+      : filters_(count, ModalFilter(all, rate, Hold::first_order)) {}
+
+  /// The same input for all of them.
+  void step(double input, double* output) {
+    for (std::size_t k = 0; k < filters_.size(); ++k) output[k] = filters_[k].step(input);
+  }
+  /// To each its own, in its place.
+  void step(double* values) {
+    for (std::size_t k = 0; k < filters_.size(); ++k) values[k] = filters_[k].step(values[k]);
+  }
+
+ private:
+  std::vector<ModalFilter> filters_;
+};
+
 }  // namespace
 
-ModeProbes::ModeProbes(const TwinRunner& runner, const MachineModel& model) : runner_(runner), model_(model) {
+// Of the tip in one test: rows of samples, a value a frequency.
+struct ModeProbes::Displaced {
+  std::size_t count = 0;
+  std::vector<double> at;
+
+  const double* row(std::size_t i) const { return at.data() + i * count; }
+};
+
+ModeProbes::ModeProbes(const TwinRunner& runner, const MachineModel& model, std::vector<Eigen::Index> samples)
+    : runner_(runner), model_(model), samples_(std::move(samples)) {
   MachineModel ideal = model;
   for (ModalModel& axis : ideal.force_sensor.axis) {
     axis = ModalModel{};
@@ -78,68 +111,109 @@ std::vector<ModeProbes::Stiffness> ModeProbes::cuttingStiffness(const MachineMod
   return table;
 }
 
-std::vector<double> ModeProbes::sensorMode(std::size_t axis, double frequency, double damping_ratio) const {
-  std::vector<double> column(runner_.size(), 0.0);
-  for (const Block& b : runner_.blocks()) {
-    if (b.channel != FORCES[axis]) continue;
-    ModalFilter filter(oneMode(frequency, damping_ratio, 1.0), runner_.data().tests[b.test].test.sample_rate,
-                       Hold::first_order);
-    for (std::size_t i = b.offset; i < b.offset + b.size; ++i)
-      column[i] = filter.step(applied_[i]) - applied_[i];
-  }
-  return column;
+template <class Put>
+void ModeProbes::forEachIn(const Block& block, const Put& put) const {
+  const auto begin = static_cast<Eigen::Index>(block.offset);
+  auto next = std::lower_bound(samples_.begin(), samples_.end(), begin);
+  for (; next != samples_.end() && *next < begin + static_cast<Eigen::Index>(block.size); ++next)
+    put(static_cast<std::size_t>(*next - begin), next - samples_.begin());
 }
 
-std::vector<double> ModeProbes::tipMode(std::size_t axis, double frequency, double damping_ratio) const {
-  std::vector<double> column(runner_.size(), 0.0);
-  const std::vector<Block>& blocks = runner_.blocks();
-  for (std::size_t first = 0; first < blocks.size();) {
-    std::size_t end = first;
-    while (end < blocks.size() && blocks[end].test == blocks[first].test) ++end;
-    const TestData& data = runner_.data().tests[blocks[first].test];
-    const double rate = data.test.sample_rate;
-    ModalFilter tip(oneMode(frequency, damping_ratio, 1.0), rate, Hold::first_order);
-    std::vector<double> displacement;
-    if (data.test.kind == TestKind::tap && data.record.has(TIP[axis]) &&
-        data.test.direction == (axis == 0 ? "x" : "y")) {
-      for (const double f : data.record.column("hammer")) displacement.push_back(tip.step(f));
-    }
-    for (std::size_t b = first; b < end && data.test.kind == TestKind::cut; ++b) {
-      if (blocks[b].channel != FORCES[axis]) continue;
-      for (std::size_t i = 0; i < blocks[b].size; ++i)
-        displacement.push_back(tip.step(applied_[blocks[b].offset + i] * blocks[b].noise));
-    }
-    for (std::size_t b = first; b < end && !displacement.empty(); ++b) {
-      if (blocks[b].channel != TIP[axis]) continue;
-      for (std::size_t i = 0; i < blocks[b].size; ++i)
-        column[blocks[b].offset + i] = displacement[i] / blocks[b].noise;
-    }
-    if (data.test.kind == TestKind::cut && !displacement.empty() && data.record.has("spindle_angle")) {
-      const std::vector<Stiffness>& table = stiffness_.at(blocks[first].test);
-      const double period = units::TWO_PI / model_.tool->teeth / data.test.spindle_speed * rate;  // [samples]
-      const std::vector<double>& angle = data.record.column("spindle_angle");
-      for (std::size_t b = first; b < end; ++b) {
-        const auto a = static_cast<std::size_t>(std::find(FORCES.begin(), FORCES.end(), blocks[b].channel) -
-                                                FORCES.begin());
-        if (a >= 3) continue;
-        ModalFilter sensor(model_.force_sensor.axis[a], rate, Hold::first_order);
-        for (std::size_t i = 0; i < blocks[b].size; ++i) {
-          const double before = static_cast<double>(i) - period;
-          double past = 0.0;
-          if (before > 0.0) {
-            const auto n = static_cast<std::size_t>(before);
-            const double share = before - static_cast<double>(n);
-            past = (1.0 - share) * displacement[n] + share * displacement[n + 1];
-          }
-          const auto p = static_cast<std::size_t>(angle[i] / units::TWO_PI * POINTS) % POINTS;
-          const double force = i < data.first_cut ? 0.0 : table[p][a][axis] * (displacement[i] - past);
-          column[blocks[b].offset + i] = sensor.step(force) / blocks[b].noise;
-        }
-      }
-    }
-    first = end;
+Eigen::MatrixXd ModeProbes::sensorModes(std::size_t axis, const std::vector<double>& frequencies,
+                                        double damping_ratio) const {
+  const auto count = static_cast<Eigen::Index>(frequencies.size());
+  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(samples_.size()), count);
+  Eigen::RowVectorXd shown(count);
+  for (const Block& b : runner_.blocks()) {
+    if (b.channel != FORCES[axis]) continue;
+    Filters filters(frequencies, damping_ratio, runner_.data().tests[b.test].test.sample_rate);
+    std::size_t at = 0;
+    forEachIn(b, [&](std::size_t i, Eigen::Index row) {
+      for (; at <= i; ++at) filters.step(applied_[b.offset + at], shown.data());
+      columns.row(row) = shown.array() - applied_[b.offset + i];
+    });
   }
-  return column;
+  return columns;
+}
+
+// Blocks first..end are those of one test. Empty where nothing tells of the tip.
+ModeProbes::Displaced ModeProbes::displaced(std::size_t first, std::size_t end, std::size_t axis,
+                                            const std::vector<double>& frequencies,
+                                            double damping_ratio) const {
+  const std::vector<Block>& blocks = runner_.blocks();
+  const TestData& data = runner_.data().tests[blocks[first].test];
+  Filters tip(frequencies, damping_ratio, data.test.sample_rate);
+  Displaced result{frequencies.size(), {}};
+  const auto push = [&](double force) {
+    result.at.resize(result.at.size() + result.count);
+    tip.step(force, result.at.data() + result.at.size() - result.count);
+  };
+  if (data.test.kind == TestKind::tap && data.record.has(TIP[axis]) &&
+      data.test.direction == (axis == 0 ? "x" : "y")) {
+    for (const double f : data.record.column("hammer")) push(f);
+  }
+  for (std::size_t b = first; b < end && data.test.kind == TestKind::cut; ++b) {
+    if (blocks[b].channel != FORCES[axis]) continue;
+    for (std::size_t i = 0; i < blocks[b].size; ++i) push(applied_[blocks[b].offset + i] * blocks[b].noise);
+  }
+  return result;
+}
+
+// Forces of the chips that the tip's displacement and that of the tooth before make.
+void ModeProbes::addRegeneration(std::size_t first, std::size_t end, std::size_t axis, const Displaced& tip,
+                                 Eigen::MatrixXd* columns) const {
+  const std::vector<Block>& blocks = runner_.blocks();
+  const TestData& data = runner_.data().tests[blocks[first].test];
+  const double rate = data.test.sample_rate;
+  const std::vector<Stiffness>& table = stiffness_.at(blocks[first].test);
+  const double period = units::TWO_PI / model_.tool->teeth / data.test.spindle_speed * rate;  // [samples]
+  const std::vector<double>& angle = data.record.column("spindle_angle");
+  Eigen::RowVectorXd force(columns->cols());
+  for (std::size_t b = first; b < end; ++b) {
+    const auto a =
+        static_cast<std::size_t>(std::find(FORCES.begin(), FORCES.end(), blocks[b].channel) - FORCES.begin());
+    if (a >= 3) continue;
+    Filters sensor(model_.force_sensor.axis[a], tip.count, rate);
+    const auto step = [&](std::size_t i) {
+      force.setZero();
+      const double before = static_cast<double>(i) - period;
+      const auto n = static_cast<std::size_t>(std::max(before, 0.0));
+      const double share = before - static_cast<double>(n);
+      const auto p = static_cast<std::size_t>(angle[i] / units::TWO_PI * POINTS) % POINTS;
+      for (std::size_t k = 0; k < tip.count && i >= data.first_cut; ++k) {
+        const double past = before > 0.0 ? (1.0 - share) * tip.row(n)[k] + share * tip.row(n + 1)[k] : 0.0;
+        force[static_cast<Eigen::Index>(k)] = table[p][a][axis] * (tip.row(i)[k] - past);
+      }
+      sensor.step(force.data());
+    };
+    std::size_t at = 0;
+    forEachIn(blocks[b], [&](std::size_t i, Eigen::Index row) {
+      for (; at <= i; ++at) step(at);
+      columns->row(row) = force / blocks[b].noise;
+    });
+  }
+}
+
+Eigen::MatrixXd ModeProbes::tipModes(std::size_t axis, const std::vector<double>& frequencies,
+                                     double damping_ratio) const {
+  const auto count = static_cast<Eigen::Index>(frequencies.size());
+  Eigen::MatrixXd columns = Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(samples_.size()), count);
+  const std::vector<Block>& blocks = runner_.blocks();
+  for (std::size_t first = 0, end = 0; first < blocks.size(); first = end) {
+    while (end < blocks.size() && blocks[end].test == blocks[first].test) ++end;
+    const Displaced tip = displaced(first, end, axis, frequencies, damping_ratio);
+    if (tip.at.empty()) continue;
+    for (std::size_t b = first; b < end; ++b) {
+      if (blocks[b].channel != TIP[axis]) continue;
+      forEachIn(blocks[b], [&](std::size_t i, Eigen::Index row) {
+        columns.row(row) = Eigen::Map<const Eigen::RowVectorXd>(tip.row(i), count) / blocks[b].noise;
+      });
+    }
+    const TestData& data = runner_.data().tests[blocks[first].test];
+    if (data.test.kind == TestKind::cut && data.record.has("spindle_angle"))
+      addRegeneration(first, end, axis, tip, &columns);
+  }
+  return columns;
 }
 
 std::vector<double> ModeProbes::grid(double low, double high, double ratio) {

@@ -42,7 +42,8 @@ std::vector<Spectrum> spectraOf(const TwinRunner& runner, const std::vector<doub
   std::vector<Spectrum> spectra;
   for (const Block& b : runner.blocks()) {
     const TestData& t = runner.data().tests[b.test];
-    if (b.channel.size() != 2 || b.channel.front() != 'f' || t.test.kind == TestKind::tap) continue;
+    if (!b.judged || b.channel.size() != 2 || b.channel.front() != 'f' || t.test.kind == TestKind::tap)
+      continue;
     Spectrum s;
     s.axis = static_cast<std::size_t>(b.channel[1] - 'x');
     s.rate = t.test.sample_rate;

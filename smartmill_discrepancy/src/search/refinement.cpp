@@ -97,7 +97,32 @@ std::vector<const Rung*> rivalsOf(const FitState& state, std::size_t member,
   return rivals;
 }
 
+// A rival does at least half of what the member does: what acts elsewhere may be there beside it.
+bool standsFor(const Fit& rival, const Fit& member, const Fit& lacking) {
+  double both = 0.0, own = 0.0;
+  for (std::size_t i = 0; i < lacking.residual.size(); ++i) {
+    const double d = lacking.residual[i] - member.residual[i];
+    both += d * (lacking.residual[i] - rival.residual[i]);
+    own += d * d;
+  }
+  return both > 0.5 * own;
+}
+
 }  // namespace
+
+void followSimpler(const Fitter& fitter, const Fit& now, const NominalTangents& tangents,
+                   std::vector<Rung>* ladder) {
+  for (std::size_t m = 0; m < now.state.members.size(); ++m) {
+    for (const Rung* rival : rivalsOf(now.state, m, *ladder)) {
+      Rung& simpler = (*ladder)[static_cast<std::size_t>(rival - ladder->data())];
+      if (simpler.values.size() >= now.state.members[m].values.size()) continue;
+      FitState with = without(now.state, m);
+      with.members.push_back({simpler.hypothesis, simpler.values});
+      const Fit fit = fitter.fit(with, &tangents, {8, 1e-5, true});
+      if (fit.converged) simpler.values = fit.state.members.back().values;
+    }
+  }
+}
 
 bool refine(Workbench& bench, const FitState& state, const SearchOptions& options, SearchResult* result) {
   const Settled settled = settle(bench, state, &result->best);
@@ -119,7 +144,8 @@ bool refine(Workbench& bench, const FitState& state, const SearchOptions& option
       FitState with = less;
       with.members.push_back({rival->hypothesis, rival->values});
       const Fit fit = bench.quick().fit(with, &settled.tangents, compared);
-      if (fit.converged) result->rivals.push_back({m, rival->tried.effect, rest.bic - fit.bic, fit.state});
+      if (fit.converged && rest.converged && standsFor(fit, result->best, rest))
+        result->rivals.push_back({m, rival->tried.effect, rest.bic - fit.bic, fit.state});
     }
   }
   return true;

@@ -102,11 +102,13 @@ class Search {
     double least = 0.0;     // gain of BIC that an effect must bring
     std::size_t hints = 0;  // fitted on a hint
     bool strained = false;  // next to nothing is left but nominal values far off
+    bool better = false;    // best is one of its fits
     std::vector<Rung> rungs;
   };
 
   void fitNominal();
   void beginFrom(const Search& brief);
+  void takePromises(const Search& brief);
   void tellCourse() const;
   void rounds();
   void keepStatedWhereBetter();
@@ -115,10 +117,14 @@ class Search {
                       double hopeless = std::numeric_limits<double>::infinity());
   bool addEffect(std::size_t number);
   Round fitPromises(std::size_t number);
+  void fitStanding(Round& round);
+  bool isRefused(const Hypothesis* hypothesis) const {
+    return std::find(refused_.begin(), refused_.end(), hypothesis) != refused_.end();
+  }
   bool isHint(const Round& round, const Promise& promise) const;
   bool worthFitting(const Round& round, const Promise& promise, double largest) const;
   void fitPromise(const Promise& promise, Round& round);
-  bool isBetter(const Round& round) const;
+  bool isBetter(const Round& round, const Fit& tried) const;
   void settle(Fit best);
   void dropNeedless();
   bool helpsElsewhere(const Fit& before, const Hypothesis& newest);
@@ -206,6 +212,7 @@ void Search::fitNominalHere(const std::vector<double>& from, double hopeless) {
       bench_.phasesEstimated() ? 1e-6 : 1e-3;  // of the cost, by which the last pass may gain
   bool settled = false;
   for (int pass = 0; pass < passes; ++pass) {
+    bench_.trustAt(near(now_.state));
     // Where the first passes went the tangents are much alike.
     tangents_ =
         pass < FRESH ? linearise(now_.state) : bench_.lineariseBy(std::move(tangents_), near(now_.state));
@@ -303,9 +310,10 @@ void Search::fitPromise(const Promise& promise, Round& round) {
                          newest.values});
   options_.say(formatted("  promise %.4g, gain %.4g  ", promise.gain, now_.bic - tried.bic) +
                describe(newest));
-  if (tried.bic < round.best.bic) {
+  if (tried.bic < round.best.bic && isBetter(round, tried)) {
     round.best = tried;
     round.best_promise = promise.gain;
+    round.better = true;
   }
 }
 
@@ -322,19 +330,40 @@ Search::Round Search::fitPromises(std::size_t number) {
   if (!stepped_back_) promises_ = screen(quick_, now_, tangents_, hypotheses_, due, &screened_);
   stepped_back_ = false;
   for (const Promise& p : promises_) {
-    if (std::find(refused_.begin(), refused_.end(), p.hypothesis) != refused_.end()) continue;
+    if (isRefused(p.hypothesis)) continue;
     if (bench_.cancelled()) break;
     if (!worthFitting(round, p, promises_.front().gain)) continue;
     if (isHint(round, p)) ++round.hints;
     fitPromise(p, round);
   }
+  if (all_ && !round.better) fitStanding(round);
   return round;
 }
 
-bool Search::isBetter(const Round& round) const {
-  return now_.bic - round.best.bic >
-             std::max(round.least, leastGain(quick_.runner(), now_, round.best, options_)) ||
-         (excess(now_) < 0.01 * bench_.samples() && relieves(now_, round.best, options_));
+// What takes little of all that is left may take all of it where it acts: the fit tests say so.
+void Search::fitStanding(Round& round) {
+  constexpr std::size_t MOST = 2;
+  screenRough(quick_, now_, tangents_, options_.least_gain, &screened_, &promises_);
+  std::size_t fitted = 0;
+  for (const Promise& p : promises_) {
+    if (fitted >= MOST || p.gain < options_.least_gain || bench_.cancelled()) return;
+    const bool tried = std::any_of(round.rungs.begin(), round.rungs.end(),
+                                   [&](const Rung& r) { return r.hypothesis == p.hypothesis; });
+    if (tried || isRefused(p.hypothesis) || p.start.empty() ||
+        !Standing::holdsInFitted(fittedShare(quick_, p)))
+      continue;
+    fitPromise(p, round);
+    ++fitted;
+  }
+}
+
+// It takes much of what is left, or the fit tests ask for it as they must where it is named.
+bool Search::isBetter(const Round& round, const Fit& tried) const {
+  if (!tried.converged) return false;
+  const double gain = now_.bic - tried.bic;
+  if (excess(now_) < 0.01 * bench_.samples() && relieves(now_, tried, options_)) return true;
+  if (gain <= leastGain(quick_.runner(), now_, tried, options_)) return false;
+  return gain > round.least || Standing::holdsInFitted(fittedShare(quick_, tried, now_));
 }
 
 // Takes a round's best fit in and fits everything anew beside it.
@@ -374,7 +403,7 @@ void Search::dropNeedless() {
 bool Search::helpsElsewhere(const Fit& before, const Hypothesis& newest) {
   bench_.turnTo(now_.state);
   const AskedShare asked = standingOf(bench_, now_.state, before.state).heldout;
-  if (!std::isfinite(asked.std_dev) || asked.share > 0.5) return true;
+  if (!Standing::isDenied(asked)) return true;
   options_.say(
       formatted("held-out tests ask for %.2g +- %.2g of it, not taken: ", asked.share, asked.std_dev) +
       newest.title());
@@ -402,7 +431,7 @@ void Search::refuse(Begin begin, const Hypothesis* newest) {
 bool Search::addEffect(std::size_t number) {
   constexpr std::size_t MOST_IN_VAIN = 3;
   Round round = fitPromises(number);
-  const bool better = isBetter(round) && !bench_.cancelled();
+  const bool better = round.better && !bench_.cancelled();
   const Hypothesis* const newest = better ? round.best.state.members.back().hypothesis : nullptr;
   const std::size_t first = result_.ladder.size();
   result_.ladder.insert(result_.ladder.end(), round.rungs.begin(), round.rungs.end());
@@ -424,11 +453,15 @@ bool Search::addEffect(std::size_t number) {
     return true;
   }
   if (!helpsElsewhere(before.fit, *newest)) {
-    result_.refused.push_back(newest);
+    if (std::find(result_.refused.begin(), result_.refused.end(), newest) == result_.refused.end())
+      result_.refused.push_back(newest);
     refuse(std::move(before), newest);
     return in_vain_ < MOST_IN_VAIN;
   }
   in_vain_ = 0;
+  refused_.clear();  // they were so without it
+  auto& denied = result_.refused;
+  denied.erase(std::remove(denied.begin(), denied.end(), newest), denied.end());
   for (std::size_t k = first; k < result_.ladder.size(); ++k)
     result_.ladder[k].tried.taken = result_.ladder[k].hypothesis == newest;
   exact_now_ = exact_squares;
@@ -437,6 +470,8 @@ bool Search::addEffect(std::size_t number) {
 }
 
 void Search::finish() {
+  bench_.guideNearLimit(now_.state);
+  bench_.trustAt(now_.state);
   result_.best = now_;
   bool refined = refine(bench_, now_.state, options_, &result_);
   // With everything settled an effect may turn out to be needed no more.
@@ -474,6 +509,7 @@ bool Search::takeBetterRivals() {
 // The free simulation judges, where it can follow the records at all.
 void Search::letGo() {
   constexpr double FOLLOWS = 2.0;  // times the squares of the guided one
+  followSimpler(quick_, now_, tangents_, &result_.ladder);
   const double guided = bench_.exactSquares(now_.state), free = bench_.freeSquares(now_.state);
   options_.say("guided by the tool's displacement " + gapText(guided) + ", simulated freely " +
                gapText(free));
@@ -506,7 +542,10 @@ void Search::beginFrom(const Search& brief) {
   refused_ = brief.refused_;
   rounds_ = brief.rounds_;
   repeated_ = brief.repeated_ + 1;  // a round to see that nothing more is there
-  if (brief.now_.state.members.empty()) return;
+  if (brief.now_.state.members.empty()) {
+    takePromises(brief);
+    return;
+  }
   const Fit null = now_;
   Fit begin = null;
   begin.state = brief.now_.state;
@@ -514,10 +553,24 @@ void Search::beginFrom(const Search& brief) {
   const double exact_squares = bench_.exactSquares(now_.state);
   if (exact_squares < exact_now_) {
     exact_now_ = exact_squares;
+    takePromises(brief);
     return;
   }
   now_ = null;
   tangents_ = linearise(now_.state);
+}
+
+// Where next to nothing is left, the most that hypotheses may promise on the longer records by the last
+// screening of the brief ones, which found nothing: squares grow with the samples, or, of what grows in time
+// itself, with their third power.
+void Search::takePromises(const Search& brief) {
+  constexpr double NEXT_TO_NOTHING = 0.02;  // [1] of the noise's squares
+  constexpr double SHARE_OF_DUE = 0.25;     // that is worth a look
+  const auto quiet = [&](const Search& s) { return s.excess(s.now_) < NEXT_TO_NOTHING * s.bench_.samples(); };
+  if (!quiet(brief) || !quiet(*this)) return;
+  const double longer = bench_.samples() / brief.bench_.samples();
+  for (const Promise& p : brief.promises_)
+    screened_.at_most[p.hypothesis] = p.gain * std::max(std::pow(longer, 3), longer / SHARE_OF_DUE);
 }
 
 void Search::look() {

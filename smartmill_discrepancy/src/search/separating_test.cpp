@@ -35,7 +35,7 @@ std::optional<SeparatingTest> separatingTest(const Dataset& data, const MachineM
                                              const MachineModel& b) {
   std::optional<SeparatingTest> best;
   for (const TestData& t : data.tests) {
-    if (t.test.kind == TestKind::tap) continue;
+    if (t.test.kind == TestKind::tap || t.chatter) continue;
     for (const double speed : {0.4, 1.0, 1.8}) {
       for (const double feed : {0.4, 1.0, 2.0}) {
         for (const double depth : {0.5, 1.0, 2.0}) {

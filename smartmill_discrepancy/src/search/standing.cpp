@@ -18,11 +18,7 @@ std::vector<AskedTest> askedBy(const TwinRunner& runner, const MachineModel& bet
     between[i] = simulated[0][i] - simulated[1][i];
     left[i] = runner.measured()[i] - simulated[0][i];
   }
-  std::map<std::size_t, AskedTest> by_test;
-  for (const Block& b : runner.blocks()) by_test[b.test].add(&between[b.offset], &left[b.offset], b.size);
-  std::vector<AskedTest> all;
-  for (const auto& [test, asked] : by_test) all.push_back(asked);
-  return all;
+  return askedIn(runner, between.data(), left.data());
 }
 
 // Where structure is left, stated values are pulled by it too: its variance is that of the residuals.
@@ -51,6 +47,23 @@ AskedShare sharedBy(const std::vector<AskedTest>& tests) {
   return {1.0 + product / squares, std::sqrt(varianceOfProducts(tests)) / squares};
 }
 
+std::vector<AskedTest> askedIn(const TwinRunner& runner, const double* between, const double* left) {
+  std::map<std::size_t, AskedTest> by_test;
+  for (const Block& b : runner.blocks()) by_test[b.test].add(between + b.offset, left + b.offset, b.size);
+  std::vector<AskedTest> all;
+  for (const auto& [test, asked] : by_test) all.push_back(asked);
+  return all;
+}
+
+AskedShare fittedShare(const Fitter& fitter, const Fit& better, const Fit& other) {
+  std::vector<double> between(better.residual.size());
+  for (std::size_t i = 0; i < between.size(); ++i) between[i] = other.residual[i] - better.residual[i];
+  std::vector<AskedTest> tests = askedIn(fitter.runner(), between.data(), better.residual.data());
+  const double variance = std::max(1.0, better.chi2 / static_cast<double>(fitter.runner().size()));
+  tests.push_back(askedByStated(fitter.freedom(), better.state, other.state, variance));
+  return sharedBy(tests);
+}
+
 const AskedShare& Standing::weaker() const {
   if (!std::isfinite(heldout.std_dev)) return fitted;
   return heldout.beyond() / HELDOUT_BEYOND < fitted.beyond() / FITTED_BEYOND ? heldout : fitted;
@@ -64,7 +77,7 @@ double Standing::confidence() const {
 
 bool Standing::holds() const {
   const bool told = std::isfinite(heldout.std_dev);
-  return fitted.beyond() > FITTED_BEYOND && (!told || heldout.beyond() > HELDOUT_BEYOND);
+  return holdsInFitted(fitted) && (!told || heldout.beyond() > HELDOUT_BEYOND);
 }
 
 Standing standingOf(const Workbench& bench, const FitState& better, const FitState& other) {

@@ -1,9 +1,12 @@
 #include "smartmill_discrepancy/search/workbench.h"
 
 #include <algorithm>
+#include <cmath>
+#include <map>
 
 #include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_discrepancy/data/phase.h"
+#include "smartmill_discrepancy/gap/asked.h"
 #include "smartmill_sim/twin/guide.h"
 
 namespace smartmill::discrepancy {
@@ -21,6 +24,33 @@ bool guides(const TestData& test, const MachineModel& nominal) {
   const bool modes = !nominal.tool_tip.x.modes.empty() || !nominal.tool_tip.y.modes.empty();
   return modes && test.test.kind == TestKind::cut && !test.heldout && !test.test.running_before &&
          sim::Guide::canBe(test.record);
+}
+
+// Of each block, by what a model leaves.
+std::vector<Whitening> whiteningOf(const TwinRunner& runner, const MachineModel& model) {
+  std::vector<double> left = runner.simulate(model);
+  for (std::size_t i = 0; i < left.size(); ++i) left[i] = runner.measured()[i] - left[i];
+  std::vector<Whitening> of_blocks;
+  for (const Block& b : runner.blocks()) of_blocks.emplace_back(&left[b.offset], b.size);
+  return of_blocks;
+}
+
+// A value that is moved by u.r has the variance of lines of random phase, which is largest where u lies at
+// the lines of what is left: as that of independent samples of so much more noise, of which so many count.
+Trust trustOf(const std::vector<double>& left) {
+  double sum = 0.0, squares = 0.0, all = 0.0;
+  for (const double r : left) all += r * r;
+  const std::vector<double> power = powerOf(left.data(), left.size());
+  for (const double p : power) {
+    sum += p;
+    squares += p * p;
+  }
+  const double mean_square = all / static_cast<double>(left.size());
+  if (!(sum > 0.0) || !std::isfinite(sum)) return {};
+  // Of white noise the mean of squares is twice the square of the mean.
+  const double gathered = std::max(1.0, 0.5 * static_cast<double>(power.size()) * squares / (sum * sum));
+  const double noise = std::sqrt(std::max(1.0, gathered * mean_square));
+  return {noise, std::min(1.0, mean_square / (noise * noise))};
 }
 
 // One step of Gauss and Newton of where each record lies. @return the largest turn [rad]
@@ -81,6 +111,63 @@ Workbench::Workbench(const Dataset& data, const WorkbenchOptions& options)
       exact_(exact_runner_, freedom_, options.cancelled) {
   guided_runner_.setGuided(true);
   for (const std::size_t t : exact_runner_.tests()) loaded_.push_back(data_.tests[t]);
+  FitState stated;
+  stated.nominal.assign(freedom_.coordinates().size(), 0.0);
+  trustAt(stated);
+}
+
+void Workbench::readGuidance() {
+  for (TwinRunner* runner : {&quick_runner_, &exact_runner_, &guided_runner_, &heldout_runner_})
+    runner->readGuidance();
+}
+
+void Workbench::trustAt(const FitState& state) {
+  const auto& tests = exact_runner_.tests();
+  if (std::none_of(tests.begin(), tests.end(), [&](std::size_t t) { return data_.tests[t].guided; })) return;
+  turnFitted(state);
+  const TwinRunner& runner = exact_runner_;
+  const std::vector<double> simulated = runner.simulate(quick_.model(state));
+  for (const Block& b : runner.blocks()) {
+    TestData& test = data_.tests[b.test];
+    if (!test.guided) continue;
+    std::vector<double> left(b.size);
+    const double scale = b.noise / (b.slow ? b.slow->noise : data_.noise.at(b.channel));
+    for (std::size_t i = 0; i < b.size; ++i)
+      left[i] = scale * (simulated[b.offset + i] - runner.measured()[b.offset + i]);
+    test.trust[b.channel] = trustOf(left);
+  }
+  readGuidance();
+}
+
+void Workbench::guideNearLimit(const FitState& state) {
+  if (!can_guide_ || guided_) return;
+  turnFitted(state);
+  const MachineModel model = quick_.model(state);
+  bool any = false;
+  const auto look = [&](const TwinRunner& free, const std::vector<double>& freely, const TwinRunner& led,
+                        const std::vector<double>& guided) {
+    constexpr double CLEARLY = 4.0;  // deviations of squares of noise
+    std::map<std::size_t, double> gain, samples;
+    for (const Block& b : free.blocks()) {
+      for (std::size_t i = b.offset; i < b.offset + b.size; ++i)
+        gain[b.test] +=
+            std::pow(freely[i] - free.measured()[i], 2) - std::pow(guided[i] - led.measured()[i], 2);
+      samples[b.test] += static_cast<double>(b.size);
+    }
+    for (const auto& [t, gained] : gain) {
+      TestData& test = data_.tests[t];
+      if (test.guided || !canBeLed(test, data_.nominal) || !(gained > CLEARLY * std::sqrt(2.0 * samples[t])))
+        continue;
+      test.guided = any = true;
+    }
+  };
+  look(exact_runner_, exact_runner_.simulate(model), guided_runner_, guided_runner_.simulate(model));
+  const std::vector<double> freely = heldout_runner_.simulate(model);
+  heldout_runner_.setGuided(true);
+  const std::vector<double> guided = heldout_runner_.simulate(model);
+  heldout_runner_.setGuided(false);
+  look(heldout_runner_, freely, heldout_runner_, guided);
+  if (any) readGuidance();
 }
 
 // The records and the exact twin; the quick one stays where its tangents were taken.
@@ -111,7 +198,12 @@ void Workbench::correctAt(const FitState& state, double* exact_squares) {
 
 NominalTangents Workbench::linearise(const FitState& state, double* exact_squares) {
   correctAt(state, exact_squares);
-  return quick_.nominalTangents(state);
+  const SimulatedBlocks said = quick_runner_.simulateBlocks({quick_.model(state)}).front();
+  const bool hold = taken_ && taken_->state == state &&
+                    std::equal(said.begin(), said.end(), taken_->said.begin(), taken_->said.end(),
+                               [](const auto& a, const auto& b) { return a == b || *a == *b; });
+  if (!hold) taken_ = Taken{state, said, quick_.nominalTangents(state)};
+  return taken_->tangents;
 }
 
 NominalTangents Workbench::lineariseBy(NominalTangents tangents, const FitState& state,
@@ -135,8 +227,30 @@ double Workbench::freeSquares(const FitState& state) {
 
 void Workbench::guide(bool guided) {
   guided_ = guided && can_guide_;
+  for (TestData& t : data_.tests) t.guided = t.chatter.has_value();
+  readGuidance();
   quick_runner_.setGuided(guided_);
   heldout_runner_.setGuided(guided_);
+}
+
+bool Workbench::weighBy(const FitState& state) {
+  weighAlike();
+  if (guided_) return false;
+  turnTo(state);
+  const MachineModel model = quick_.model(state);
+  const std::vector<Whitening> of_fitted = whiteningOf(fitted(), model),
+                               of_heldout = whiteningOf(heldout_runner_, model);
+  const auto changes = [](const Whitening& w) { return w.changes(); };
+  if (std::none_of(of_fitted.begin(), of_fitted.end(), changes)) return false;
+  for (TwinRunner* runner : {&quick_runner_, &exact_runner_, &guided_runner_})
+    runner->setWhitening(of_fitted);
+  heldout_runner_.setWhitening(of_heldout);
+  return true;
+}
+
+void Workbench::weighAlike() {
+  for (TwinRunner* runner : {&quick_runner_, &exact_runner_, &guided_runner_, &heldout_runner_})
+    runner->setWhitening({});
 }
 
 double Workbench::exactSquaresHere(const FitState& state) const {

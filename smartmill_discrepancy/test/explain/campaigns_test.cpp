@@ -165,6 +165,7 @@ INSTANTIATE_TEST_SUITE_P(Shared, ExampleCampaign,
                                          Example{"stribeck_friction", Verdict::explained},
                                          Example{"cross_talk", Verdict::explained},
                                          Example{"runout", Verdict::explained},
+                                         Example{"vibrating_runout", Verdict::explained},
                                          Example{"tool_wear_and_unbalance", Verdict::explained}),
                          [](const auto& example) { return example.param.name; });
 

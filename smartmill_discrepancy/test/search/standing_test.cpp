@@ -89,6 +89,15 @@ TEST(AskedShare, AShapeOfSomethingElseIsDenied) {
   EXPECT_GE(denied, 95);
 }
 
+// What is denied during a search is as far from what is named as that is from a half.
+TEST(Standing, WhatTestsCannotTellIsNotDenied) {
+  EXPECT_TRUE(Standing::isDenied({-0.4, 0.55}));
+  EXPECT_FALSE(Standing::isDenied({0.2, 0.58}));
+  EXPECT_FALSE(Standing::isDenied(sharedBy({})));
+  for (double share = -1.0; share < 2.0; share += 0.1)
+    EXPECT_FALSE(Standing::isDenied({share, 0.2}) && Standing({{share, 0.2}, {1.0, 0.01}}).holds());
+}
+
 TEST(AskedShare, NothingToldIsNothingKnown) {
   const AskedShare asked = sharedBy({});
   EXPECT_EQ(asked.beyond(), 0.0);

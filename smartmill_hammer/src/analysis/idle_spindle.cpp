@@ -243,6 +243,12 @@ std::optional<IdleFriction> frictionOf(const std::vector<IdleLoad>& loads) {
   return f;
 }
 
+double endOf(const IdleRecord& record) {
+  double end = record.loads.empty() ? 0.0 : record.loads.back().stamp;
+  for (const auto& [channel, lines] : record.lines) end = std::max(end, lines.back().stamp);
+  return end;
+}
+
 bool addSpeeds(IdleRecord& record, const IdleRecord& more) {
   bool any = false;
   for (const auto& [channel, lines] : more.lines) {

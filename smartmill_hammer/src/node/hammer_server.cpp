@@ -1,11 +1,15 @@
 #include "hammer_server.h"
 
+#include <cmath>
 #include <string>
 #include <utility>
+
+#include <smartmill_msgs/SpindleHealth.h>
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/names.h"
+#include "smartmill_core/signal/streams.h"
 #include "smartmill_ros/node_main.h"
 #include "smartmill_ros/parameter_reader.h"
 #include "smartmill_ros/run_node.h"
@@ -39,7 +43,7 @@ HammerServer::HammerServer(ros::NodeHandle nh, ros::NodeHandle private_nh)
                  server_.restart();
                }}),
       idle_(parameters_.hold_back,
-            [this](const std::string& tool, const IdleRecord& seen) { health_.turned(tool, seen); }),
+            [this](const std::string& tool, const IdleRecord& seen) { tell(health_.turned(tool, seen)); }),
       streams_{sorted_, idle_},
       server_(nh, names::MEASURE_TOOL_FRF, "hammer",
               {[this](const MeasureFrfGoal& goal, std::function<bool(bool)> begin) {
@@ -50,6 +54,7 @@ HammerServer::HammerServer(ros::NodeHandle nh, ros::NodeHandle private_nh)
   // node's subscribers before it publishes one.
   if (parameters_.command_machine)
     machine_.emplace(nh, [this](const std::string& text) { sorted_.commandFailed(text); });
+  health_publisher_ = nh.advertise<smartmill_msgs::SpindleHealth>(names::SPINDLE_HEALTH, 10);
   connect(shell_.inputs(), streams_);
   connectIdle(shell_.inputs(), idle_);
   shell_.diagnose("automatic hammer", [this](auto& status) { diagnose(status); });
@@ -57,9 +62,27 @@ HammerServer::HammerServer(ros::NodeHandle nh, ros::NodeHandle private_nh)
 }
 
 void HammerServer::finish(const MeasureFrfResult& result) {
-  if (result.code == FrfCode::ok) health_.measured(result.modes);
+  if (result.code == FrfCode::ok) tell(health_.measured(result.modes));
   server_.finish({result.code, result.message, result.frf, result.modes, result.cross, result.sensitivity,
                   result.sensitivity_std, result.flute_sure, result.spindle_moves});
+}
+
+void HammerServer::tell(const std::optional<HealthReport>& report) {
+  if (!report) return;
+  smartmill_msgs::SpindleHealth message;
+  message.header.stamp = fromSec(report->stamp);
+  message.measured = report->measured;
+  message.days = report->days;
+  for (const HealthChange& c : report->changes) {
+    smartmill_msgs::HealthChange change;
+    change.quantity = c.what;
+    change.first = c.before;
+    change.now = c.now;
+    change.deviations = std::isfinite(c.sigmas) ? c.sigmas : NOT_A_NUMBER;
+    change.drifted = c.drifted();
+    message.changes.push_back(change);
+  }
+  health_publisher_.publish(message);
 }
 
 void HammerServer::watch() {

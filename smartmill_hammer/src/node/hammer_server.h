@@ -38,6 +38,7 @@ class HammerServer {
 
  private:
   void finish(const MeasureFrfResult& result);
+  void tell(const std::optional<HealthReport>& report);
   void watch();
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
@@ -49,6 +50,7 @@ class HammerServer {
   Streams streams_;
   FrfServer server_;
   HealthWatch health_;
+  ros::Publisher health_publisher_;
 };
 
 }  // namespace hammer

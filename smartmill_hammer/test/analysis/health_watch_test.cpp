@@ -51,6 +51,51 @@ TEST(HealthWatch, ComparesLikeWithLike) {
   EXPECT_THAT(watch.warnings()[0], HasSubstr("T1 tool_tip x"));
 }
 
+// Told against the first of its kind, however slowly it goes.
+TEST(HealthWatch, TellsEachMeasurementAgainstTheFirst) {
+  HealthWatch watch;
+  MeasuredModes m = modes("T1", "x", 1000.0);
+  m.stamp = 1000.0;
+  EXPECT_FALSE(watch.measured(m)) << "the first";
+  for (const double frequency : {1004.0, 1008.0, 1012.0}) {
+    m.stamp += 86400.0;
+    m.model.modes[0].frequency = frequency;
+    const auto told = watch.measured(m);
+    ASSERT_TRUE(told);
+    EXPECT_EQ(told->measured, "T1 tool_tip x");
+    EXPECT_EQ(told->stamp, m.stamp);
+    EXPECT_NEAR(told->days, (m.stamp - 1000.0) / 86400.0, 1e-12);
+    ASSERT_EQ(told->changes.size(), 6u) << "frequency, damping and gain of two modes";
+    EXPECT_EQ(told->changes[0].what, "frequency of the mode at 1000 Hz");
+    EXPECT_EQ(told->changes[0].before, 1000.0);
+    EXPECT_EQ(told->changes[0].now, frequency);
+    EXPECT_EQ(told->changes[0].drifted(), frequency > 1010.0);
+  }
+  EXPECT_TRUE(watch.warnings().empty()) << "none differs from the one before";
+}
+
+// Cuts in air come by the hundred: what tells nothing new is told once an hour.
+TEST(HealthWatch, TellsCutsInAirWhereADriftBeginsOrEndsAndOnceAnHour) {
+  HealthWatch watch;
+  const auto at = [&](double stamp, double load) {
+    IdleRecord r = air(600.0, load);
+    r.loads[0].stamp = stamp;
+    return watch.turned("T1", r);
+  };
+  EXPECT_FALSE(at(0.0, 0.010)) << "the first";
+  const auto again = at(60.0, 0.0101);
+  ASSERT_TRUE(again);
+  EXPECT_EQ(again->measured, "spindle in air, T1");
+  ASSERT_EQ(again->changes.size(), 1u);
+  EXPECT_NEAR(again->changes[0].before, 0.010, 1e-12);
+  EXPECT_FALSE(at(120.0, 0.0101));
+  EXPECT_TRUE(at(180.0, 0.015)) << "a drift begins";
+  EXPECT_FALSE(at(240.0, 0.015));
+  EXPECT_TRUE(at(300.0, 0.010)) << "and ends";
+  EXPECT_FALSE(at(3800.0, 0.010));
+  EXPECT_TRUE(at(3901.0, 0.010)) << "an hour later";
+}
+
 // 5 % of a load is allowed from day to day: four deviations of it are 20 %. Another speed is compared with
 // none.
 TEST(HealthWatch, WarnsOfLoadInAirAtTheSameSpeed) {

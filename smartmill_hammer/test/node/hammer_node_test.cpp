@@ -20,6 +20,7 @@
 #include <smartmill_msgs/ModalModel.h>
 #include <smartmill_msgs/SampleBlock.h>
 #include <smartmill_msgs/SpindleAngle.h>
+#include <smartmill_msgs/SpindleHealth.h>
 
 #include "../../src/node/bag_replay.h"
 #include "../closed_form_machine.h"
@@ -131,12 +132,34 @@ TEST_F(HammerNode, MeasuresRecordsAndReplaysToTheLastDigit) {
   EXPECT_EQ(frf->real, result->frf.real);
   EXPECT_EQ(modes->direction, "x");
 
-  // The bag through the offline class: every digit.
+  // Measured again, it is told against the first.
+  smartmill_msgs::SpindleHealthConstPtr health;
+  const boost::function<void(const smartmill_msgs::SpindleHealthConstPtr&)> take = [&](const auto& m) {
+    const std::lock_guard<std::mutex> lock(mutex);
+    health = m;
+  };
+  const auto told = nh.subscribe<smartmill_msgs::SpindleHealth>(names::SPINDLE_HEALTH, 10, take);
+  ASSERT_TRUE(eventually([&] { return told.getNumPublishers() > 0; }));
   ASSERT_TRUE(eventually([&, now = ros::Time::now()] { return recordedUpTo(now); }));
   {
     const std::lock_guard<std::mutex> lock(mutex);
     bag.close();
   }
+  client.sendGoal(goal());
+  ASSERT_TRUE(client.waitForResult(PATIENCE));
+  ASSERT_EQ(client.getResult()->code, smartmill_msgs::MeasureFrfResult::OK) << client.getResult()->message;
+  ASSERT_TRUE(eventually([&] {
+    const std::lock_guard<std::mutex> lock(mutex);
+    return health != nullptr;
+  }));
+  EXPECT_EQ(health->measured, "mill tool_tip x");
+  EXPECT_EQ(health->header.stamp, client.getResult()->modes.header.stamp);
+  ASSERT_EQ(health->changes.size(), 6u);
+  EXPECT_EQ(health->changes[0].first, modes->modes[0].frequency);
+  EXPECT_EQ(health->changes[0].now, client.getResult()->modes.modes[0].frequency);
+  for (const auto& change : health->changes) EXPECT_FALSE(change.drifted) << change.quantity;
+
+  // The bag through the offline class: every digit.
   std::string model;
   ASSERT_TRUE(nh.getParam("hammer/model", model));
   const std::vector<MeasureFrfResult> results = replayBag(bag_file, model, {});

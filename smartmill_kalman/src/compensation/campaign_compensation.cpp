@@ -6,6 +6,7 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/machine_model.h"
+#include "smartmill_core/signal/force_channels.h"
 #include "smartmill_core/signal/frequency_response.h"
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/signal/window.h"
@@ -13,7 +14,6 @@
 namespace smartmill::kalman {
 namespace {
 
-const std::array<const char*, 3> FORCES{{"fx", "fy", "fz"}};
 const std::array<const char*, 3> DIRECTIONS{{"x", "y", "z"}};
 
 }  // namespace
@@ -81,7 +81,7 @@ Taps tapsAlong(const Campaign& campaign, std::size_t axis) {
     }
     taps.rate = test.sample_rate;
     taps.hammer.push_back(record.column("hammer"));
-    for (std::size_t i = 0; i < 3; ++i) taps.response[i].push_back(record.column(FORCES[i]));
+    for (std::size_t i = 0; i < 3; ++i) taps.response[i].push_back(record.column(FORCE_CHANNELS[i]));
   }
   return taps;
 }
@@ -126,7 +126,8 @@ bool measuresWorkpiece(const Campaign& campaign, const std::string& model_file) 
 
 void turnForces(Record& record) {
   for (std::size_t i = 0; i < record.names.size(); ++i) {
-    if (std::find(FORCES.begin(), FORCES.end(), record.names[i]) == FORCES.end()) continue;
+    if (std::find(FORCE_CHANNELS.begin(), FORCE_CHANNELS.end(), record.names[i]) == FORCE_CHANNELS.end())
+      continue;
     for (double& sample : record.columns[i]) sample = -sample;
   }
 }
@@ -137,7 +138,7 @@ std::array<std::vector<double>, 3> compensate(const Record& record, const std::a
                                               Method method, double lag) {
   std::array<std::vector<double>, 3> force;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    std::vector<double> measured = record.column(FORCES[axis]);
+    std::vector<double> measured = record.column(FORCE_CHANNELS[axis]);
     if (measures_workpiece) {
       for (double& sample : measured) sample = -sample;
     }

@@ -7,12 +7,12 @@
 #include <utility>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/signal/force_channels.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::kalman {
 namespace {
 
-const std::array<const char*, 3> CHANNELS{{"fx", "fy", "fz"}};
 /// Gains are laid out at speeds this share apart and serve this far from their own (in points of that grid).
 constexpr double SPEED_GRID = 0.01, GRID_HYSTERESIS = 0.7;
 constexpr double ZERO_TIME = 2.0;  // [s] over which the sensor's zero is told
@@ -240,9 +240,9 @@ void ForceCompensation::watchZero(const ForceBlock& measured) {
 ForceBlock ForceCompensation::measuredIn(const SampleBlock& block) {
   std::array<std::size_t, 3> column{};
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    column[axis] = block.channel(CHANNELS[axis]);
+    column[axis] = block.channel(FORCE_CHANNELS[axis]);
     if (block.units.at(column[axis]) != "N") {
-      throw Error("force block: channel " + std::string(CHANNELS[axis]) + " is in " +
+      throw Error("force block: channel " + std::string(FORCE_CHANNELS[axis]) + " is in " +
                   block.units[column[axis]] + ", N is due");
     }
   }

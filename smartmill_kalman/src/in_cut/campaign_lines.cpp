@@ -4,12 +4,12 @@
 
 #include "smartmill_core/cutting/rigid_cut.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/signal/force_channels.h"
 
 namespace smartmill::kalman {
 namespace {
 
 constexpr double SETTLING = 0.03;  // [s] after the entry: tool, sensor and the first marks on the surface
-constexpr const char* FORCE[] = {"fx", "fy", "fz"};
 constexpr const char* TOOL[] = {"tool_x", "tool_y"};
 
 /// What of a record is steady, without force and response.
@@ -36,7 +36,7 @@ CutStretch toolStretch(const Record& record, const CampaignTest& test, std::size
   std::size_t from = 0;
   CutStretch cut = steady(record, test, &from);
   if (record.has("spindle_angle")) cut.angle = behind(record.column("spindle_angle"), from);
-  cut.force = behind(record.column(FORCE[axis]), from);
+  cut.force = behind(record.column(FORCE_CHANNELS[axis]), from);
   cut.response = behind(record.column(TOOL[axis]), from);
   cut.chain = sensor;
   return cut;
@@ -47,7 +47,7 @@ CutStretch sensorStretch(const Record& record, const CampaignTest& test, std::si
   std::size_t from = 0;
   CutStretch cut = steady(record, test, &from);
   cut.angle = behind(record.column("spindle_angle"), from);
-  cut.response = behind(record.column(FORCE[axis]), from);
+  cut.response = behind(record.column(FORCE_CHANNELS[axis]), from);
   if (!model.tool_tip.x.modes.empty() || !model.tool_tip.y.modes.empty())
     throw Error(model.file + ": tool_tip: the force of a tool that vibrates is not told by its coefficients");
   const ToolGeometry& tool = model.needTool("tell the force of a cut");

@@ -1,6 +1,7 @@
 #include "smartmill_kalman/in_cut/cutting_frf.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -22,6 +23,8 @@ constexpr int NEIGHBOURS = 8;               // places between harmonics whose me
 constexpr double SAME_LINE = 5e-4;          // [1] of frequency
 constexpr double SAME_MODE = 0.1;           // [1] of frequency, at neighbouring speeds
 constexpr double SEEN = 3.0;                // [1] gain over its deviation
+constexpr double ANOTHER_CUT = 3e-3;        // [1] of speed
+constexpr std::size_t FEWEST_CUTS = 5;      // that tell by leaving one out
 constexpr int PASSES = 4;                   // of slopes and fits, each of which moves the other
 
 std::vector<double> taper(std::size_t size) {
@@ -232,11 +235,11 @@ void dropUnseen(ModalFit& fit, bool unit_static_gain) {
   fit.covariance.resize(0, 0);  // of other modes than these
 }
 
-/// Lines of one group, each as it would be at the group's mean speed.
+/// Lines of one group, each as it would be at the group's mean speed, or at the one given.
 SpeedFrf fitted(std::vector<CuttingLine> lines, const std::vector<MovingMode>& moving,
-                const std::string& unit, const CuttingFrfOptions& options) {
+                const std::string& unit, const CuttingFrfOptions& options, std::optional<double> speed = {}) {
   SpeedFrf found;
-  found.speed = meanSpeed(lines);
+  found.speed = speed.value_or(meanSpeed(lines));
   found.lowest = lines.front().speed;
   found.highest = lines.back().speed;
   for (CuttingLine& line : lines)
@@ -344,6 +347,47 @@ void addSlopes(const std::vector<CuttingLine>& lines, const std::vector<MovingMo
   }
 }
 
+/// Cuts of a group, by their speeds: lines from .. to.
+std::vector<std::pair<std::size_t, std::size_t>> cutsOf(const std::vector<CuttingLine>& lines) {
+  std::vector<std::pair<std::size_t, std::size_t>> cuts;
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    if (i == 0 || lines[i].speed > lines[i - 1].speed * (1.0 + ANOTHER_CUT)) cuts.emplace_back(i, i);
+    cuts.back().second = i + 1;
+  }
+  return cuts;
+}
+
+/// Deviations by leaving out each cut in turn (jackknife), where they are larger: few lines lie in a mode's
+/// band, those of one cut side by side, and what is left of their fit hardly shows how they scatter.
+void widenByCuts(const std::vector<CuttingLine>& lines, const std::vector<MovingMode>& moving,
+                 const std::string& unit, const CuttingFrfOptions& options, SpeedFrf& found) {
+  if (!found.fit) return;
+  const auto cuts = cutsOf(lines);
+  std::vector<Mode>& modes = found.fit->model.modes;
+  if (cuts.size() < FEWEST_CUTS) return;
+  std::vector<std::array<std::vector<double>, KINDS>> seen(modes.size());
+  for (const auto& [from, to] : cuts) {
+    std::vector<CuttingLine> others;
+    for (std::size_t i = 0; i < lines.size(); ++i)
+      if (i < from || i >= to) others.push_back(lines[i]);
+    // At the group's speed, not at that of those left.
+    const SpeedFrf left = fitted(std::move(others), moving, unit, options, found.speed);
+    for (std::size_t m = 0; m < modes.size(); ++m) {
+      const Mode* there = nearest(left, modes[m].frequency);
+      for (std::size_t k = 0; there && k < KINDS; ++k) seen[m][k].push_back(there->*VALUES[k]);
+    }
+  }
+  for (std::size_t m = 0; m < modes.size(); ++m) {
+    for (std::size_t k = 0; k < KINDS; ++k) {
+      const std::vector<double>& values = seen[m][k];
+      if (values.size() < FEWEST_CUTS) continue;
+      const auto n = static_cast<double>(values.size());
+      const double deviation = (n - 1.0) / std::sqrt(n) * standardDeviation(values);
+      modes[m].*DEVIATIONS[k] = std::max(modes[m].*DEVIATIONS[k], deviation);
+    }
+  }
+}
+
 }  // namespace
 
 void CuttingFrfOptions::validate() const {
@@ -404,7 +448,10 @@ std::vector<SpeedFrf> cuttingFrfs(std::vector<CuttingLine> lines, const std::str
       if (!found[g].fit) moving[g] = borrowed(found, moving, g);
     for (std::size_t g = 0; g < groups.size(); ++g) found[g] = fitted(groups[g], moving[g], unit, options);
   }
-  for (std::size_t g = 0; g < groups.size(); ++g) addSlopes(groups[g], moving[g], unit, options, found[g]);
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    widenByCuts(groups[g], moving[g], unit, options, found[g]);
+    addSlopes(groups[g], moving[g], unit, options, found[g]);
+  }
   return found;
 }
 

@@ -11,7 +11,7 @@
 #include <boost/function.hpp>
 
 #include "smartmill_core/error.h"
-#include "smartmill_core/signal/force_channels.h"
+#include "smartmill_core/names.h"
 #include "smartmill_kalman/sensor/tap_file.h"
 #include "smartmill_ros/conversions.h"
 

@@ -5,7 +5,6 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/names.h"
 #include "smartmill_core/parameters/parameter_table.h"
-#include "smartmill_core/signal/force_channels.h"
 #include "smartmill_kalman/compensation/sorted_compensation.h"
 
 namespace smartmill::kalman {

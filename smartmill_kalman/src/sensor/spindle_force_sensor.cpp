@@ -8,7 +8,6 @@
 #include <Eigen/Core>
 
 #include "smartmill_core/error.h"
-#include "smartmill_core/formatted.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::kalman {
@@ -33,10 +32,10 @@ ModalModel ideal() {
 SpindleForceSensor::SpindleForceSensor(const SpindleSensorCalibration& calibration, double length)
     : calibration_(calibration), length_(length) {
   calibration.validate();
-  if (length < calibration.lengths[0] || length > calibration.lengths[1]) {
-    throw Error(formatted(
-        "spindle_sensor_length: %.1f mm of tool and holder is outside the calibrated %.1f .. %.1f mm",
-        length / units::MM, calibration.lengths[0] / units::MM, calibration.lengths[1] / units::MM));
+  try {
+    calibration.needLength(length);
+  } catch (const Error& error) {
+    throw Error(std::string("spindle_sensor_length: ") + error.what());
   }
   constant_ = {calibration.x.at(length), calibration.y.at(length), calibration.z.at(length)};
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -312,7 +311,7 @@ SampleBlock SpindleForceSensor::handle(const SampleBlock& block) {
   forces.stamp = block.stamp;
   forces.sample_rate = block.sample_rate;
   forces.first_index = block.first_index;
-  forces.channels = {"fx", "fy", "fz"};
+  forces.channels.assign(FORCE_CHANNELS.begin(), FORCE_CHANNELS.end());
   forces.units = {"N", "N", "N"};
   forces.samples.reserve(3 * block.size());
   invalid_.assign(block.size(), false);

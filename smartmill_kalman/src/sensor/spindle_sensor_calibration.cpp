@@ -9,6 +9,7 @@
 #include <Eigen/Core>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
 #include "smartmill_core/io/csv.h"
 #include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_core/modal/modal_fit.h"
@@ -236,6 +237,12 @@ void SpindleSensorCalibration::validate() const {
   require("drift_std_n_per_s", drift_std, Range::positive());
 }
 
+void SpindleSensorCalibration::needLength(double length) const {
+  if (length >= lengths[0] && length <= lengths[1]) return;
+  throw Error(formatted("%.1f mm of tool and holder is outside the calibrated %.1f .. %.1f mm",
+                        length / units::MM, lengths[0] / units::MM, lengths[1] / units::MM));
+}
+
 std::array<double, 3> pairMeans(const std::array<double, 6>& s) {
   return {0.5 * (s[0] - s[1]), -0.5 * (s[2] - s[3]), 0.5 * (s[4] + s[5])};
 }
@@ -381,8 +388,17 @@ StaticCalibration calibrateStatic(const StaticReadings& readings, const SpindleS
   return result;
 }
 
+void needLengths(const StaticReadings& readings, const SpindleSensorCalibration& calibration) {
+  try {
+    for (const double length : readings.length) calibration.needLength(length);
+  } catch (const Error& error) {
+    throw Error(readings.file + ": " + error.what());
+  }
+}
+
 std::array<double, 3> verifyStatic(const StaticReadings& readings,
                                    const SpindleSensorCalibration& calibration) {
+  needLengths(readings, calibration);
   std::array<double, 3> worst{}, largest{};
   const std::set<int> tests(readings.test.begin(), readings.test.end());
   for (const int test : tests) {

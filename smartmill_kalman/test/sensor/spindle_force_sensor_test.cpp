@@ -119,6 +119,17 @@ TEST(CalibrateStatic, VerificationTellsAWrongConstant) {
   EXPECT_LT(error[1], 0.01);
 }
 
+TEST(CalibrateStatic, ALengthThatNoWeightWasHungAtIsRefused) {
+  SpindleSensorCalibration known = SpindleSensorCalibration::table3();
+  known.lengths = {0.1, 0.18};
+  StaticReadings readings = weights({139.0, 250.0}, 0.001, 5);
+  readings.file = "weights.csv";
+  EXPECT_EQ(errorOf([&] { verifyStatic(readings, known); }),
+            "weights.csv: 250.0 mm of tool and holder is outside the calibrated 100.0 .. 180.0 mm");
+  EXPECT_EQ(errorOf([&] { SpindleForceSensor(known, 0.25); }),
+            "spindle_sensor_length: 250.0 mm of tool and holder is outside the calibrated 100.0 .. 180.0 mm");
+}
+
 TEST(CalibrateStatic, StandardDeviationsAreHonest) {
   Coverage x, y, z;
   for (std::uint32_t run = 0; run < Coverage::RUNS; ++run) {

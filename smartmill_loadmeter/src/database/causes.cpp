@@ -2,9 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <numeric>
 #include <set>
 
+#include "cause_table.h"
 #include "smartmill_core/formatted.h"
+#include "smartmill_core/model/effect_catalogue.h"
 
 namespace smartmill::loadmeter {
 
@@ -13,25 +17,40 @@ namespace {
 // Squares over the noise that a record must lose: explain names from a gain of 100 on. A force has thousands
 // of samples a record, a load meter a mean or two.
 constexpr double FORCE_SQUARES = 0.05, LOAD_SQUARES = 100.0;
-constexpr double SUBSETS = 16.0;       // outcomes there may be: of fx, fy, fz, load_meter
-constexpr double SILENT = 0.95;        // [1] of a machine's tests that show nothing where nothing is
 const double ALONE = std::log(100.0);  // evidence against each rival
 constexpr double TELLS = 1e-9;         // [nat] what rounding leaves
+constexpr std::size_t NEWEST = 8;      // explanations of a cause that are looked at
 
-double oddsOf(std::size_t have, std::size_t of) {
+double dueOf(const std::string& channel) {
+  return channel == "load_meter" ? LOAD_SQUARES : FORCE_SQUARES;
+}
+
+double jeffreys(std::size_t have, std::size_t of) {
   return (static_cast<double>(have) + 0.5) / (static_cast<double>(of - have) + 0.5);
 }
 
-/// What tests showed of a cause.
+/// Explanations of a cause, the newest last.
 struct Shown {
-  std::map<std::string, Outcomes> counts;  // by test
-  bool alone = false;                      // from explanations that named it only
+  std::vector<const ModelImprovement*> by;
+  bool alone = false;  // those that named it only
+
+  void add(const ModelImprovement& improvement, bool is_alone) {
+    if (alone && !is_alone) return;
+    if (is_alone && !alone) *this = {{}, true};
+    by.push_back(&improvement);
+    if (by.size() > NEWEST) by.erase(by.begin());
+  }
 };
 
-void count(const ModelImprovement& improvement, bool alone, Shown* shown) {
-  if (shown->alone && !alone) return;
-  if (alone && !shown->alone) *shown = {{}, true};
-  for (const TestEvidence& t : evidenceOf(improvement)) shown->counts[t.test][outcomeOf(t)] += 1.0;
+Showing showingOf(const ModelImprovement& improvement, const std::vector<std::string>& tests) {
+  Showing showing(tests.size());
+  for (const TestEvidence& t : evidenceOf(improvement)) {
+    const auto at = std::lower_bound(tests.begin(), tests.end(), t.test) - tests.begin();
+    for (const TestEvidence::Gap& g : t.gaps)
+      showing[static_cast<std::size_t>(at)][g.channel] =
+          std::max(0.0, g.before * g.before - g.after * g.after) / dueOf(g.channel);
+  }
+  return showing;
 }
 
 }  // namespace
@@ -39,8 +58,8 @@ void count(const ModelImprovement& improvement, bool alone, Shown* shown) {
 Outcome outcomeOf(const TestEvidence& test) {
   Outcome outcome;
   for (const TestEvidence::Gap& g : test.gaps) {
-    const double due = g.channel == "load_meter" ? LOAD_SQUARES : FORCE_SQUARES;
-    if (g.before * g.before - g.after * g.after >= due) outcome += (outcome.empty() ? "" : " ") + g.channel;
+    if (g.before * g.before - g.after * g.after >= dueOf(g.channel))
+      outcome += (outcome.empty() ? "" : " ") + g.channel;
   }
   return outcome;
 }
@@ -57,19 +76,22 @@ FleetCauses fleetCauses(const std::vector<ModelImprovement>& improvements, const
     for (const FoundCause& cause : causes) {
       machines[cause.name].insert(i.machine);
       newest[cause.name] = cause;
-      count(i, causes.size() == 1, &shown[cause.name]);
+      shown[cause.name].add(i, causes.size() == 1);
     }
   }
   FleetCauses fleet;
   fleet.explained = explained.size();
-  fleet.other_odds = oddsOf(0, explained.size());
+  fleet.other_odds = jeffreys(0, explained.size());
   for (const auto& [name, s] : shown) {
-    for (const auto& [test, counts] : s.counts) tests.insert(test);
+    for (const ModelImprovement* i : s.by) {
+      for (const TestEvidence& t : evidenceOf(*i)) tests.insert(t.test);
+    }
   }
   fleet.tests.assign(tests.begin(), tests.end());
   for (const auto& [name, who] : machines) {
-    FleetCause cause{name, {who.begin(), who.end()}, oddsOf(who.size(), explained.size()), newest[name], {}};
-    for (const std::string& test : fleet.tests) cause.outcomes.push_back(shown[name].counts[test]);
+    FleetCause cause{
+        name, {who.begin(), who.end()}, jeffreys(who.size(), explained.size()), newest[name], {}};
+    for (const ModelImprovement* i : shown[name].by) cause.shown.push_back(showingOf(*i, fleet.tests));
     fleet.causes.push_back(cause);
   }
   std::stable_sort(fleet.causes.begin(), fleet.causes.end(),
@@ -77,46 +99,66 @@ FleetCauses fleetCauses(const std::vector<ModelImprovement>& improvements, const
   return fleet;
 }
 
-CauseSearch::CauseSearch(const FleetCauses& fleet, const std::vector<double>& odds)
-    : fleet_(fleet), probability_(odds), made_(fleet.tests.size(), false) {
-  // Each beside none: probabilities in the ratio of their odds, and none as 1.
-  probability_.push_back(1.0);
-  probability_.push_back(fleet.other_odds);
-  double sum = 0.0;
-  for (const double p : probability_) sum += p;
-  for (double& p : probability_) p /= sum;
-  evidence_.assign(probability_.size(), 0.0);
+CauseOdds oddsOf(const FleetCauses& fleet) {
+  CauseOdds odds;
+  odds.machines = fleet.explained;
+  odds.other = fleet.other_odds;
+  for (const FleetCause& c : fleet.causes) {
+    if (findEffect(c.name)) odds.listed[c.name] = c.odds;
+  }
+  return odds;
 }
 
-double CauseSearch::likelihood(std::size_t hypothesis, std::size_t test, const Outcome& outcome) const {
-  const std::size_t causes = fleet_.causes.size();
-  if (hypothesis == causes) return (outcome.empty() ? SILENT : 0.0) + (1.0 - SILENT) / SUBSETS;
-  // Perks' prior of a share; of few explanations little is known.
-  const auto of = [&](const Outcomes& counts) {
-    double sum = 0.0;
-    for (const auto& [o, n] : counts) sum += n;
-    const auto at = counts.find(outcome);
-    return ((at == counts.end() ? 0.0 : at->second) + 1.0 / SUBSETS) / (sum + 1.0);
-  };
-  if (hypothesis < causes) return of(fleet_.causes[hypothesis].outcomes[test]);
-  // One that nobody has met shows what the others do, each as likely, or anything.
-  double mean = 1.0 / SUBSETS;
-  for (const FleetCause& c : fleet_.causes) mean += of(c.outcomes[test]);
-  return mean / static_cast<double>(causes + 1);
+CauseSearch::CauseSearch(const FleetCauses& fleet, const std::vector<double>& odds)
+    : table_(std::make_shared<CauseTable>(fleet)), prior_(odds), made_(fleet.tests.size(), false) {
+  // Each beside none: probabilities in the ratio of their odds, and none as 1.
+  prior_.push_back(1.0);
+  prior_.push_back(fleet.other_odds);
+  const double sum = std::accumulate(prior_.begin(), prior_.end(), 0.0);
+  for (double& p : prior_) p /= sum;
+  for (const CauseTable::Part& part : table_->parts) parts_.push_back(std::log(part.weight));
+  weigh();
+}
+
+// From the parts' likelihoods: of the hypotheses, and what is probable now.
+void CauseSearch::weigh() {
+  evidence_.assign(prior_.size(), -std::numeric_limits<double>::infinity());
+  std::vector<double> most = evidence_;
+  for (std::size_t p = 0; p < parts_.size(); ++p) {
+    double& m = most[table_->parts[p].hypothesis];
+    m = std::max(m, parts_[p]);
+  }
+  std::vector<double> sums(prior_.size(), 0.0);
+  for (std::size_t p = 0; p < parts_.size(); ++p) {
+    const std::size_t h = table_->parts[p].hypothesis;
+    sums[h] += std::exp(parts_[p] - most[h]);
+  }
+  for (std::size_t h = 0; h < sums.size(); ++h) evidence_[h] = most[h] + std::log(sums[h]);
+  const double largest = *std::max_element(evidence_.begin(), evidence_.end());
+  probability_.clear();
+  double sum = 0.0;
+  for (std::size_t h = 0; h < sums.size(); ++h) {
+    probability_.push_back(prior_[h] * std::exp(evidence_[h] - largest));
+    sum += probability_.back();
+  }
+  for (double& p : probability_) p /= sum;
+  now_.clear();
+  for (std::size_t p = 0; p < parts_.size(); ++p) {
+    const std::size_t h = table_->parts[p].hypothesis;
+    now_.push_back(probability_[h] * std::exp(parts_[p] - evidence_[h]));
+  }
 }
 
 double CauseSearch::information(std::size_t test) const {
-  std::set<Outcome> outcomes{""};
-  for (const FleetCause& c : fleet_.causes) {
-    for (const auto& [outcome, share] : c.outcomes[test]) outcomes.insert(outcome);
-  }
+  const CauseTable::Test& of = table_->tests[test];
   double gained = 0.0;
-  for (const Outcome& o : outcomes) {
-    double mixed = 0.0;
-    for (std::size_t h = 0; h < probability_.size(); ++h) mixed += probability_[h] * likelihood(h, test, o);
-    for (std::size_t h = 0; h < probability_.size(); ++h) {
-      const double l = likelihood(h, test, o);
-      if (probability_[h] > 0.0) gained += probability_[h] * l * std::log(l / mixed);
+  for (const std::vector<double>& likelihoods : of.likelihood) {
+    std::vector<double> joint(probability_.size(), 0.0);
+    for (std::size_t p = 0; p < now_.size(); ++p)
+      joint[table_->parts[p].hypothesis] += now_[p] * likelihoods[p];
+    const double mixed = std::accumulate(joint.begin(), joint.end(), 0.0);
+    for (std::size_t h = 0; h < joint.size(); ++h) {
+      if (joint[h] > 0.0) gained += joint[h] * std::log(joint[h] / (mixed * probability_[h]));
     }
   }
   return gained;
@@ -137,24 +179,38 @@ std::optional<std::size_t> CauseSearch::next() const {
 
 void CauseSearch::saw(std::size_t test, const Outcome& outcome) {
   made_[test] = true;
-  double sum = 0.0;
-  for (std::size_t h = 0; h < probability_.size(); ++h) {
-    const double l = likelihood(h, test, outcome);
-    evidence_[h] += std::log(l);
-    sum += probability_[h] *= l;
-  }
-  for (double& p : probability_) p /= sum;
+  const std::vector<bool> shows = table_->channelsOf(outcome);
+  for (std::size_t p = 0; p < parts_.size(); ++p)
+    parts_[p] += std::log(table_->likelihood(table_->parts[p], test, shows));
+  weigh();
 }
 
 std::optional<std::size_t> CauseSearch::alone() const {
   const auto best =
       static_cast<std::size_t>(std::max_element(evidence_.begin(), evidence_.end()) - evidence_.begin());
-  if (best > fleet_.causes.size()) return std::nullopt;
+  if (best + 1 == evidence_.size()) return std::nullopt;
   for (std::size_t h = 0; h < evidence_.size(); ++h) {
     if (h != best && evidence_[best] - evidence_[h] < ALONE) return std::nullopt;
   }
   return best;
 }
+
+namespace {
+
+// What its explanations showed in a test, each once; not where they showed nothing.
+std::set<Outcome> outcomesOf(const FleetCause& cause, std::size_t test) {
+  std::set<Outcome> all;
+  for (const Showing& showing : cause.shown) {
+    Outcome outcome;
+    for (const auto& [channel, squares] : showing[test]) {
+      if (squares >= 1.0) outcome += (outcome.empty() ? "" : " ") + channel;
+    }
+    if (!outcome.empty()) all.insert(outcome);
+  }
+  return all;
+}
+
+}  // namespace
 
 std::vector<Proposal> proposalsFor(const std::string& machine,
                                    const std::vector<ModelImprovement>& improvements) {
@@ -175,8 +231,7 @@ std::vector<Proposal> proposalsFor(const std::string& machine,
   while (const auto test = search.alone() ? std::nullopt : search.next()) {
     Proposal p{fleet.tests[*test], search.information(*test), {}};
     for (std::size_t c = 0; c < causes.size(); ++c) {
-      for (const auto& [outcome, share] : causes[c].outcomes[*test]) {
-        if (outcome.empty()) continue;
+      for (const Outcome& outcome : outcomesOf(causes[c], *test)) {
         p.reasons.push_back(formatted("%s would show in %s (probability %.3f; %zu of %zu machines have it)",
                                       causes[c].newest.text().c_str(), outcome.c_str(),
                                       search.probabilities()[c], causes[c].machines.size(), fleet.explained));

@@ -197,6 +197,61 @@ std::optional<WayAnswer> byEstimate(const CoefficientDatabase& database, const C
   return answer;
 }
 
+/// Ktc by all ways. What the pair's own records say and what the other pairs say of it are two observations;
+/// shear zone and standard cuts rest on the same records and count as one, no surer than they are on the
+/// mean. None is left out because it states more: who takes the surest takes the one that errs low in its
+/// deviation.
+struct Together {
+  const WayAnswer* surest = nullptr;
+  double ktc = 0.0, share = 0.0;  // [N/m2], [1] its standard deviation
+  double surprise = CoefficientRecord::UNKNOWN;
+};
+
+Together together(const std::vector<WayAnswer>& ways) {
+  constexpr auto KTC = &CuttingCoefficients::ktc;
+  Together all;
+  const auto take = [&](const WayAnswer& way) {
+    const double share = shareOf(way.set, KTC);
+    if (!all.surest || share < shareOf(all.surest->set, KTC)) all.surest = &way;
+  };
+  double weight = 0.0, sum = 0.0, shares = 0.0;
+  const WayAnswer* own = nullptr;
+  for (const WayAnswer& way : ways) {
+    // Other tools are a last resort: nothing contradicts them, they are other tools.
+    if (way.way == AnswerWay::other_tool) continue;
+    take(way);
+    if (way.way == AnswerWay::pair) {
+      own = &way;
+      continue;
+    }
+    const double share = shareOf(way.set, KTC), one = 1.0 / (share * share);
+    weight += one, sum += one * std::log(way.set.value.ktc), shares += one * share;
+  }
+  if (!all.surest) take(ways.front());
+  if (!(weight > 0.0)) {
+    all.ktc = all.surest->set.value.ktc, all.share = shareOf(all.surest->set, KTC);
+    return all;
+  }
+  double log = sum / weight;
+  all.share = shares / weight;
+  for (const WayAnswer& way : ways) {
+    if (&way == all.surest || way.way == AnswerWay::other_tool) continue;
+    const double off = std::abs(std::log(way.set.value.ktc / all.surest->set.value.ktc)) /
+                       std::hypot(shareOf(way.set, KTC), shareOf(all.surest->set, KTC));
+    if (!(off <= all.surprise)) all.surprise = off;
+  }
+  if (own) {
+    const double share = shareOf(own->set, KTC), one = 1.0 / (share * share),
+                 others = 1.0 / (all.share * all.share);
+    log = (one * std::log(own->set.value.ktc) + others * log) / (one + others);
+    all.share = 1.0 / std::sqrt(one + others);
+  }
+  all.ktc = std::exp(log);
+  // Beyond what chance allows they contradict, and it is as unsure as they are apart.
+  if (all.surprise > NORMAL_95) all.share *= std::min(all.surprise, 1.0 + 2.0 * (all.surprise - NORMAL_95));
+  return all;
+}
+
 }  // namespace
 
 const char* nameOf(AnswerWay way) {
@@ -221,31 +276,19 @@ std::optional<CutAnswer> recommendCut(const CoefficientDatabase& database, const
        {byEstimate(database, query), byShearZone(pairs, query), byStandardCuts(pairs, query)})
     if (way) answer.ways.push_back(*way);
   if (answer.ways.empty()) return std::nullopt;
-  const auto best =
-      std::min_element(answer.ways.begin(), answer.ways.end(), [](const WayAnswer& a, const WayAnswer& b) {
-        return shareOf(a.set, &CuttingCoefficients::ktc) < shareOf(b.set, &CuttingCoefficients::ktc);
-      });
-  answer.way = best->way;
-  answer.set = best->set;
+  const Together all = together(answer.ways);
+  answer.way = all.surest->way;
+  answer.set = all.surest->set;
   answer.set.tool = query.tool;
   answer.set.material = query.material;
-  double share = shareOf(best->set, &CuttingCoefficients::ktc);
-  for (const WayAnswer& way : answer.ways) {
-    // Of other tools nothing contradicts: they are other tools.
-    if (&way == &*best || way.way == AnswerWay::other_tool) continue;
-    const double off = std::abs(std::log(way.set.value.ktc / best->set.value.ktc)) /
-                       std::hypot(share, shareOf(way.set, &CuttingCoefficients::ktc));
-    if (!(off <= answer.surprise)) answer.surprise = off;
-  }
-  if (answer.surprise > 1.0) {
-    share *= answer.surprise;
-    answer.set.std_dev.ktc *= answer.surprise;
-  }
-  answer.ktc_lower = answer.set.value.ktc * std::exp(-NORMAL_95 * share);
-  answer.ktc_upper = answer.set.value.ktc * std::exp(NORMAL_95 * share);
+  answer.set.value.ktc = all.ktc;
+  answer.set.std_dev.ktc = answer.set.value.ktc * all.share;
+  answer.surprise = all.surprise;
+  answer.ktc_lower = answer.set.value.ktc * std::exp(-NORMAL_95 * all.share);
+  answer.ktc_upper = answer.set.value.ktc * std::exp(NORMAL_95 * all.share);
   answer.message = formatted("Ktc %.0f N/mm2, with 95 %% between %.0f and %.0f: %s, %d records",
                              answer.set.value.ktc / units::N_PER_MM2, answer.ktc_lower / units::N_PER_MM2,
-                             answer.ktc_upper / units::N_PER_MM2, nameOf(answer.way), best->records);
+                             answer.ktc_upper / units::N_PER_MM2, nameOf(answer.way), all.surest->records);
   if (std::isfinite(answer.surprise))
     answer.message += formatted("; other ways differ by up to %.1f standard deviations", answer.surprise);
   return answer;

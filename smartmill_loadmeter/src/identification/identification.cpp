@@ -26,6 +26,15 @@ double headingOf(const CuttingCondition& condition) {
   return std::atan2(to[1] - from[1], to[0] - from[0]);
 }
 
+/// [m2] from one point to another, along the steady path: its sign.
+double wayAlong(const CuttingCondition& condition, const std::array<double, 3>& a,
+                const std::array<double, 3>& b) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < 3; ++i)
+    sum += (b[i] - a[i]) * (condition.steady_to[i] - condition.steady_from[i]);
+  return sum;
+}
+
 }  // namespace
 
 void IdentificationParameters::validate() const {
@@ -39,7 +48,8 @@ LoadMeterIdentification::LoadMeterIdentification(const MachineModel& model,
     : file_(model.file),
       spindle_(model.needSpindle("read the load meter")),
       spindle_uncertainty_(model.uncertainty.spindle),
-      parameters_(parameters) {
+      parameters_(parameters),
+      moves_(parameters.motor, model.axes) {
   parameters.validate();
   if (!spindle_.load_meter_full_scale) {
     throw Error(model.file + ": spindle.load_meter_full_scale_v is missing (needed to read the load meter)");
@@ -61,6 +71,12 @@ void LoadMeterIdentification::reset() {
   dropped_.clear();
   bad_data_.clear();
   production_.reset();
+  moves_.clear();
+  if (learnt_) learnt_->clear();
+}
+
+std::optional<MotorCalibration> LoadMeterIdentification::learntMotors() const {
+  return learnt_ ? learnt_->calibration() : std::nullopt;
 }
 
 bool LoadMeterIdentification::onPath(const CncState& state) const {
@@ -71,6 +87,7 @@ bool LoadMeterIdentification::onPath(const CncState& state) const {
 void LoadMeterIdentification::handle(const CncState& state) {
   const bool gap = state.stamp - last_state_ > parameters_.maximum_gap;
   last_state_ = state.stamp;
+  moves_.handle(state);
   if (!condition_ || condition_->kind == CuttingCondition::Kind::none) return;
   // In air the tool need not move; where it does the feed drives show their friction.
   const bool on_path = onPath(state);
@@ -81,20 +98,25 @@ void LoadMeterIdentification::handle(const CncState& state) {
     path_since_.reset();
   }
   if (!on_path) return;
-  if (!path_since_) {
-    path_since_ = state.stamp;
-    if (!path_first_) {  // standing still before it
-      motor_record_.clear();
-      force_record_.clear();
-    }
-  }
   PathPoint point{state.stamp, {}};
   const std::array<const char*, 3> names{"X", "Y", "Z"};
   for (std::size_t a = 0; a < 3; ++a) {
     const auto axis = std::find(state.axes.begin(), state.axes.end(), names[a]);
     point.position[a] = state.position[static_cast<std::size_t>(axis - state.axes.begin())];
   }
-  if (!path_first_) path_first_ = point;
+  // The way back to its beginning may lead along the path too, and standing still comes before it.
+  const bool entered = !path_since_;
+  if (path_first_ && (wayAlong(*condition_, path_last_->position, point.position) < 0.0 ||
+                      (entered && path_first_->stamp == path_last_->stamp)))
+    path_first_.reset();
+  if (!path_first_) {
+    if (condition_->kind == CuttingCondition::Kind::cut) readings_.clear();
+    motor_record_.clear();
+    force_record_.clear();
+    path_first_ = point;
+    path_since_ = state.stamp;
+  }
+  if (entered) path_since_ = state.stamp;
   path_last_ = point;
 }
 
@@ -110,7 +132,9 @@ bool LoadMeterIdentification::counts(double stamp) const {
 }
 
 void LoadMeterIdentification::handle(const SampleBlock& block) {
-  if (motors_ && counts(block.stamp)) motor_record_.add(block);
+  if (!readsMotors()) return;
+  if (!isServoRecord(block)) moves_.handle(block);
+  if (counts(block.stamp)) motor_record_.add(block);
 }
 
 void LoadMeterIdentification::handle(const ForceBlock& block) {
@@ -118,7 +142,7 @@ void LoadMeterIdentification::handle(const ForceBlock& block) {
 }
 
 void LoadMeterIdentification::readMotorsOf(LoadTest* test, const MotorRecord& record, bool is_short) const {
-  if (!motors_ || record.empty()) return;
+  if (!readsMotors() || record.empty()) return;
   std::array<double, 3> velocity{{0.0, 0.0, 0.0}};
   if (path_first_ && path_last_ && path_last_->stamp > path_first_->stamp) {
     for (std::size_t a = 0; a < 3; ++a) {
@@ -126,13 +150,18 @@ void LoadMeterIdentification::readMotorsOf(LoadTest* test, const MotorRecord& re
           (path_last_->position[a] - path_first_->position[a]) / (path_last_->stamp - path_first_->stamp);
     }
   }
-  test->motor = readMotors(record, parameters_.motor, velocity, test->speed, is_short);
-  if (test->condition.kind != CuttingCondition::Kind::cut) return;
+  const bool cut = test->condition.kind == CuttingCondition::Kind::cut;
+  test->motor = readMotors(record, parameters_.motor, velocity, test->speed, is_short,
+                           cut ? test->condition.tool.teeth : 0);
+  if (!cut) return;
   std::vector<MotorReading> air;
   for (const LoadTest& one : air_cuts_) {
     if (one.motor) air.push_back(*one.motor);
   }
-  test->force = forceFromMotors(*test->motor, air, *motors_, parameters_.motor);
+  if (learnt_) air = learnt_->airFor(*test->motor);
+  const auto& calibration = motors_ ? motors_ : learnt_->calibration();
+  if (!calibration) return;  // not learnt yet
+  test->force = forceFromMotors(*test->motor, air, *calibration, parameters_.motor);
   test->force->stamp = test->stamp;
   test->force->name = test->condition.name;
 }
@@ -244,6 +273,10 @@ void LoadMeterIdentification::keep(LoadTest test) {
   const bool cut = test.condition.kind == CuttingCondition::Kind::cut;
   (cut ? cuts_ : air_cuts_).push_back(test);
   if (cut) follow(test);
+  if (learnt_ && test.motor && !cut) learnt_->air(*test.motor, test.stamp);
+  if (learnt_ && test.motor && cut) {
+    if (const auto seen = estimate(test, true)) learnt_->cut(*test.motor, *seen);
+  }
   if (test_) test_(test);
   if (motor_force_ && test.force) motor_force_(*test.force);
   if (!cut || !force_) return;
@@ -252,7 +285,8 @@ void LoadMeterIdentification::keep(LoadTest test) {
 
 // All three components by all that was measured of the cut; a sensor's zero and noise are those of the last
 // air cut.
-std::optional<ForceEstimate> LoadMeterIdentification::estimate(const LoadTest& cut) const {
+std::optional<ForceEstimate> LoadMeterIdentification::estimate(const LoadTest& cut,
+                                                               bool without_motors) const {
   ForceReadings readings;
   readings.stamp = cut.stamp;
   readings.name = cut.condition.name;
@@ -260,7 +294,10 @@ std::optional<ForceEstimate> LoadMeterIdentification::estimate(const LoadTest& c
   readings.engagement = cut.condition.engagement;
   readings.heading = headingOf(cut.condition);
   readings.load_torque = cuttingTorque(cut);
-  if (cut.force) {
+  readings.spindle_speed = cut.speed;
+  if (cut.force && !without_motors) {
+    readings.motor_lines = cut.force->lines;
+    for (std::size_t a = 0; a < 3; ++a) readings.bandwidth[a] = moves_.bandwidth(a);
     readings.motor_torque = cut.force->torque;
     readings.motor_force = cut.force->force;
     readings.motor_other = cut.force->other;
@@ -358,6 +395,7 @@ void LoadMeterIdentification::handle(const IdentifyGoal& goal) {
     force_record_.clear();
     air_cuts_.clear();
     cuts_.clear();
+    if (learnt_) learnt_->clear();
     dropped_.clear();
     bad_data_.clear();
     IdentifyResult result;
@@ -414,8 +452,16 @@ IdentifyResult LoadMeterIdentification::identify(const IdentifyGoal& goal) const
                              k.value.ktc / units::N_PER_MM2, k.std_dev.ktc / units::N_PER_MM2,
                              k.value.kte / units::N_PER_MM, k.std_dev.kte / units::N_PER_MM, air_cuts_.size(),
                              cuts.size()) +
-                   aside;
+                   aside + motorsText();
   return result;
+}
+
+std::string LoadMeterIdentification::motorsText() const {
+  if (!readsMotors()) return "";
+  const std::array<std::optional<Estimate>, 3> bandwidth{moves_.bandwidth(0), moves_.bandwidth(1),
+                                                         moves_.bandwidth(2)};
+  const std::string text = learnt_.value_or(SelfCalibration(parameters_.motor)).text(bandwidth);
+  return text.empty() ? "; motors: nothing learnt" : "; motors: " + text;
 }
 
 // Radial and axial coefficients; Ktc and Kte stay those of the torque, which know the friction they share.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 
 #include <Eigen/Core>
 
@@ -24,6 +25,15 @@ using Matrix6 = Eigen::Matrix<double, 6, 6>;
 // Tangential coefficients of any metal: nothing is said but their size (N/m2, N/m).
 constexpr double KTC = 1.5e9, KTC_STD = 1.5e9, KTE = 2.5e4, KTE_STD = 2.5e4;
 constexpr int ANGLES = 64;  // over a tooth
+// What the mechanics tell: mean force X, Y, Z, torque, root mean square of X, Y, Z, then the squared
+// amplitudes of tooth passing and its harmonics, axis by axis.
+constexpr int RMS = 4, LINES = 7, QUANTITIES = LINES + 3 * TOOTH_LINES;
+constexpr Eigen::Index COEFFICIENTS = 6;
+constexpr Estimate NOBODY{std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::quiet_NaN()};
+
+int lineOf(int axis, int tooth) {
+  return LINES + axis * TOOTH_LINES + tooth - 1;
+}
 
 /// What a cut's coefficients make: linear in the mean, quadratic in the variance over a tooth.
 class Mechanics {
@@ -39,7 +49,7 @@ class Mechanics {
         std::cos(r.heading);
     mean_.topRows<3>() = turn * own.topRows<3>();
     mean_.row(3) = own.row(3);
-    for (Matrix6& q : variance_) q.setZero();
+    for (Matrix6& q : squares_) q.setZero();
     std::vector<MechanisticForce> units;
     for (const CuttingKey& key : cuttingKeys()) {
       CuttingCoefficients one{0, 0, 0, 0, 0, 0};
@@ -58,41 +68,85 @@ class Mechanics {
       all.push_back(turn * at);
       own_mean += all.back() / ANGLES;
     }
-    for (const auto& at : all) {
-      for (int a = 0; a < 3; ++a) {
-        const Vector6 away = (at - own_mean).row(a).transpose();
-        variance_[static_cast<std::size_t>(a)] += away * away.transpose() / ANGLES;
-      }
-    }
+    for (int a = 0; a < 3; ++a) addSquares(all, own_mean, a);
   }
 
-  /// Mean force X, Y, Z [N], torque [N m], root mean square of X, Y, Z [N].
-  Eigen::Matrix<double, 7, 1> of(const Eigen::VectorXd& at) const {
+  /// [N], [N m], [N2]
+  Eigen::VectorXd of(const Eigen::VectorXd& at) const {
     Vector6 k;
     k << at[0] * KTC, at[0] * KTC * at[1], at[0] * KTC * at[2], at[3] * KTE, at[3] * KTE * at[4],
         at[3] * KTE * at[5];
-    Eigen::Matrix<double, 7, 1> all;
+    Eigen::VectorXd all(QUANTITIES);
     all.head<4>() = mean_ * k;
-    for (int a = 0; a < 3; ++a)
-      all[4 + a] = std::sqrt(std::max(1e-12, k.dot(variance_[static_cast<std::size_t>(a)] * k)));
+    for (int q = RMS; q < QUANTITIES; ++q) {
+      const double square = std::max(1e-12, k.dot(squares_[static_cast<std::size_t>(q - RMS)] * k));
+      all[q] = q < LINES ? std::sqrt(square) : square;
+    }
     return all;
   }
 
  private:
+  using Unit = Eigen::Matrix<double, 3, 6>;  // force by each coefficient
+
+  // Variance of an axis over a tooth, and the squared amplitudes of its harmonics.
+  void addSquares(const std::vector<Unit>& all, const Unit& mean, int axis) {
+    const auto square = [this](int quantity) -> Matrix6& {
+      return squares_[static_cast<std::size_t>(quantity - RMS)];
+    };
+    std::array<Vector6, 2 * TOOTH_LINES> parts;
+    for (Vector6& part : parts) part.setZero();
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      const Vector6 away = (all[i] - mean).row(axis).transpose();
+      square(RMS + axis) += away * away.transpose() / ANGLES;
+      for (std::size_t k = 0; k < TOOTH_LINES; ++k) {
+        const double turned = units::TWO_PI * static_cast<double>((k + 1) * i) / ANGLES;
+        parts[2 * k] += 2.0 / ANGLES * std::cos(turned) * away;
+        parts[2 * k + 1] += 2.0 / ANGLES * std::sin(turned) * away;
+      }
+    }
+    for (int k = 0; k < 2 * TOOTH_LINES; ++k) {
+      const Vector6& part = parts[static_cast<std::size_t>(k)];
+      square(lineOf(axis, 1 + k / 2)) += part * part.transpose();
+    }
+  }
+
   Eigen::Matrix<double, 4, 6> mean_;
-  std::array<Matrix6, 3> variance_;
+  std::array<Matrix6, QUANTITIES - RMS> squares_;  // of the variations, of the coefficients
 };
 
-/// Readings as rows: which of Mechanics' seven, its value and its whole standard deviation.
+/// Readings as rows: which of Mechanics' quantities, its value and its whole standard deviation.
 struct Row {
   int quantity;
   double value, std_dev;
+  int drive = -1;  // axis whose motor's constant and lag are unknowns; -1: neither
+  Following following{};
+
+  bool isLine() const { return quantity >= LINES; }
+};
+
+/// Unknowns beside the coefficients: of each drive with lines the logarithms of its constant and of its
+/// bandwidth, over their standard deviations.
+struct Drives {
+  std::array<Eigen::Index, 3> at{{-1, -1, -1}};
+  std::array<double, 3> gain_std{}, lag_std{};
+  Eigen::Index count = 0;
+
+  double predicted(const Row& row, const Eigen::VectorXd& due, const Eigen::VectorXd& unknowns) const {
+    const double value = due[row.quantity];
+    if (row.drive < 0) return value;
+    const auto axis = static_cast<std::size_t>(row.drive);
+    const double gain = gain_std[axis] * unknowns[at[axis]];
+    if (!row.isLine()) return value * std::exp(gain);
+    const double lag = row.following.slope * lag_std[axis] * unknowns[at[axis] + 1];
+    return value * std::pow(row.following.gain, 2) * std::exp(2.0 * (gain + lag));
+  }
 };
 
 class Rows {
  public:
   std::vector<Row> rows;
   std::vector<std::string> sources;
+  Drives drives;
 
   /// @param share of the value that the sensor may be wrong by @param size [N, N m] that such a share is of
   void add(const std::string& source, int quantity, const std::optional<Estimate>& e, double share,
@@ -103,8 +157,26 @@ class Rows {
     }
     const double all = std::hypot(std::hypot(e->std_dev, share * size), zero);
     if (!(all > 0.0)) throw Error("force of a cut: the reading of " + source + " has no standard deviation");
-    rows.push_back({quantity, e->value, all});
+    rows.push_back({quantity, e->value, all, -1, {}});
     if (sources.empty() || sources.back() != source) sources.push_back(source);
+  }
+
+  /// Lines of the drive whose mean was added last.
+  void addLines(int axis, const std::vector<VariationLine>& lines, const Estimate& bandwidth,
+                const ForceEstimateParameters& p) {
+    const auto i = static_cast<std::size_t>(axis);
+    drives.at[i] = COEFFICIENTS + drives.count;
+    drives.count += 2;
+    drives.gain_std[i] = std::max(1e-4, p.motor_error);
+    drives.lag_std[i] = std::max(1e-4, bandwidth.std_dev / bandwidth.value);
+    rows.back().drive = axis;
+    for (const VariationLine& line : lines) {
+      if (line.tooth < 1 || line.tooth > TOOTH_LINES) continue;
+      const double all = std::hypot(line.power_std, 2.0 * p.model_error * std::max(0.0, line.power));
+      if (!(all > 0.0) || !std::isfinite(line.power)) continue;
+      rows.push_back(
+          {lineOf(axis, line.tooth), line.power, all, axis, following(line.frequency, bandwidth.value)});
+    }
   }
 };
 
@@ -123,7 +195,10 @@ Rows rowsOf(const ForceReadings& r, const ForceEstimateParameters& p) {
   rows.add("motor_spindle", 3, r.motor_torque, motor, own(r.motor_torque));
   for (int a = 0; a < 3; ++a) {
     const auto i = static_cast<std::size_t>(a);
-    rows.add(std::string("motor_") + "xyz"[i], a, r.motor_force[i], motor, own(r.motor_force[i]));
+    const bool varies = r.motor_force[i] && r.bandwidth[i] && !r.motor_lines[i].empty();
+    rows.add(std::string("motor_") + "xyz"[i], a, r.motor_force[i], varies ? model : motor,
+             own(r.motor_force[i]));
+    if (varies) rows.addLines(a, r.motor_lines[i], *r.bandwidth[i], p);
   }
   // Cross-talk leaves shares of the largest component in the others.
   for (int a = 0; a < 3; ++a) {
@@ -135,28 +210,37 @@ Rows rowsOf(const ForceReadings& r, const ForceEstimateParameters& p) {
   return rows;
 }
 
-/// The coefficients (Ktc, ratios, Kte, ratios; in units of the prior's sizes) that readings and prior like
-/// best.
-Eigen::VectorXd solve(const Mechanics& mechanics, const std::vector<Row>& rows,
-                      const std::array<double, 6>& prior, const std::array<double, 6>& scatter,
-                      double* squares) {
-  const auto count = static_cast<Eigen::Index>(rows.size());
-  const fit::FunctionResiduals residuals(count + 6, [&](const Eigen::VectorXd& at, Eigen::VectorXd& out) {
-    const auto due = mechanics.of(at);
-    for (Eigen::Index i = 0; i < count; ++i) {
-      const Row& row = rows[static_cast<std::size_t>(i)];
-      out[i] = (due[row.quantity] - row.value) / row.std_dev;
-    }
-    for (Eigen::Index c = 0; c < 6; ++c) {
-      const auto j = static_cast<std::size_t>(c);
-      out[count + c] = (at[c] - prior[j]) / scatter[j];
-    }
-  });
+/// What is known beforehand of the unknowns: the coefficients (Ktc, ratios, Kte, ratios; in units of the
+/// prior's sizes) and the drives'.
+struct Prior {
+  Eigen::VectorXd value, scatter;
+
+  Prior(const ForceEstimateParameters& p, const Drives& drives)
+      : value(Eigen::VectorXd::Zero(COEFFICIENTS + drives.count)),
+        scatter(Eigen::VectorXd::Ones(COEFFICIENTS + drives.count)) {
+    value.head<6>() << 1.0, p.radial_ratio, p.axial_ratio, 1.0, p.radial_edge_ratio, p.axial_edge_ratio;
+    scatter.head<6>() << KTC_STD / KTC, p.radial_ratio_std, p.axial_ratio_std, KTE_STD / KTE,
+        p.radial_edge_ratio_std, p.axial_edge_ratio_std;
+  }
+};
+
+/// The unknowns that readings and prior like best.
+Eigen::VectorXd solve(const Mechanics& mechanics, const Rows& rows, const Prior& prior, double* squares) {
+  const auto count = static_cast<Eigen::Index>(rows.rows.size()), unknowns = prior.value.size();
+  const fit::FunctionResiduals residuals(
+      count + unknowns, [&](const Eigen::VectorXd& at, Eigen::VectorXd& out) {
+        const Eigen::VectorXd due = mechanics.of(at);
+        for (Eigen::Index i = 0; i < count; ++i) {
+          const Row& row = rows.rows[static_cast<std::size_t>(i)];
+          out[i] = (rows.drives.predicted(row, due, at) - row.value) / row.std_dev;
+        }
+        out.tail(unknowns) = (at - prior.value).cwiseQuotient(prior.scatter);
+      });
   std::vector<fit::Parameter> start;
-  for (std::size_t c = 0; c < 6; ++c) {
+  for (Eigen::Index c = 0; c < unknowns; ++c) {
     fit::Parameter one;
-    one.start = prior[c];
-    one.scale = scatter[c];
+    one.start = prior.value[c];
+    one.scale = prior.scatter[c];
     if (c == 0 || c == 3) one.low = 1e-3;
     start.push_back(one);
   }
@@ -205,48 +289,93 @@ std::string ForceEstimate::text() const {
 
 namespace {
 
+/// Squared amplitude to amplitude.
+Estimate amplitudeOf(double square, double std_dev) {
+  const double amplitude = std::sqrt(std::max(0.0, square));
+  return {amplitude, std_dev / (2.0 * std::max(amplitude, std::sqrt(0.5 * std_dev + 1e-12)))};
+}
+
+/// What the drives show at the revolution is no part of the mechanics: only turned back through their lag.
+std::optional<ForceLine> revolutionOf(const ForceReadings& r, const ForceEstimateParameters& p) {
+  std::optional<ForceLine> found;
+  for (std::size_t a = 0; a < 3; ++a) {
+    if (!r.bandwidth[a]) continue;
+    for (const VariationLine& line : r.motor_lines[a]) {
+      if (line.tooth != 0) continue;
+      if (!found) found.emplace(ForceLine{line.frequency, {NOBODY, NOBODY, NOBODY}});
+      const Following h = following(line.frequency, r.bandwidth[a]->value);
+      Estimate& e = found->amplitude[a] = amplitudeOf(line.power, line.power_std);
+      const double share =
+          std::hypot(p.motor_error, h.slope * r.bandwidth[a]->std_dev / r.bandwidth[a]->value);
+      e = {e.value / h.gain, std::hypot(e.std_dev, share * e.value) / h.gain};
+    }
+  }
+  return found;
+}
+
+void addLines(const ForceReadings& r, const ForceEstimateParameters& p, const Eigen::VectorXd& best,
+              const Eigen::MatrixXd& spread, ForceEstimate* found) {
+  if (!(r.spindle_speed > 0.0)) return;
+  if (const auto revolution = revolutionOf(r, p)) found->lines.push_back(*revolution);
+  for (const VariationLine& known : linesOfCut(r.spindle_speed, r.tool.teeth)) {
+    if (known.tooth == 0) continue;
+    ForceLine line;
+    line.frequency = known.frequency;
+    for (int a = 0; a < 3; ++a) {
+      const Eigen::Index q = lineOf(a, known.tooth);
+      line.amplitude[static_cast<std::size_t>(a)] =
+          amplitudeOf(best[q], std::sqrt(std::max(0.0, spread(q, q))));
+    }
+    found->lines.push_back(line);
+  }
+}
+
 /// One reading of each drive. @param squares becomes its distance from prior and mechanics
 ForceEstimate estimateOne(const ForceReadings& readings, const ForceEstimateParameters& p, double* squares) {
   const Rows rows = rowsOf(readings, p);
   const Mechanics mechanics(readings);
-  const std::array<double, 6> prior{
-      {1.0, p.radial_ratio, p.axial_ratio, 1.0, p.radial_edge_ratio, p.axial_edge_ratio}};
-  const std::array<double, 6> scatter{{KTC_STD / KTC, p.radial_ratio_std, p.axial_ratio_std, KTE_STD / KTE,
-                                       p.radial_edge_ratio_std, p.axial_edge_ratio_std}};
-  const auto count = static_cast<Eigen::Index>(rows.rows.size());
-  const Eigen::VectorXd at = solve(mechanics, rows.rows, prior, scatter, squares);
+  const Prior prior(p, rows.drives);
+  const auto count = static_cast<Eigen::Index>(rows.rows.size()), unknowns = prior.value.size();
+  const Eigen::VectorXd at = solve(mechanics, rows, prior, squares);
   ForceEstimate found;
   found.stamp = readings.stamp;
   found.name = readings.name;
   found.sources = rows.sources;
-  const auto best = mechanics.of(at);
-  Eigen::Matrix<double, 7, 6> slope;
-  for (Eigen::Index c = 0; c < 6; ++c) {
-    const double step = 1e-4 * scatter[static_cast<std::size_t>(c)];
+  const auto shown = [&](const Eigen::VectorXd& u) {
+    const Eigen::VectorXd due = mechanics.of(u);
+    Eigen::VectorXd all(count);
+    for (Eigen::Index i = 0; i < count; ++i)
+      all[i] = rows.drives.predicted(rows.rows[static_cast<std::size_t>(i)], due, u);
+    return all;
+  };
+  const Eigen::VectorXd best = mechanics.of(at), readings_due = shown(at);
+  Eigen::MatrixXd slope(QUANTITIES, unknowns), of_rows(count, unknowns);
+  for (Eigen::Index c = 0; c < unknowns; ++c) {
+    const double step = 1e-4 * prior.scatter[c];
     Eigen::VectorXd up = at, down = at;
     up[c] += step;
     down[c] -= step;
     slope.col(c) = (mechanics.of(up) - mechanics.of(down)) / (2.0 * step);
+    of_rows.col(c) = (shown(up) - shown(down)) / (2.0 * step);
   }
   // What readings and prior tell together; a bound says nothing.
-  Matrix6 information = Matrix6::Zero();
-  for (Eigen::Index c = 0; c < 6; ++c) information(c, c) = std::pow(scatter[static_cast<std::size_t>(c)], -2);
-  for (const Row& row : rows.rows)
-    information +=
-        slope.row(row.quantity).transpose() * slope.row(row.quantity) / (row.std_dev * row.std_dev);
-  const Matrix6 covariance = linear::inverseSymmetric(Eigen::MatrixXd(information));
-  const Eigen::Matrix<double, 7, 7> spread = slope * covariance * slope.transpose();
+  Eigen::MatrixXd information = prior.scatter.cwiseAbs2().cwiseInverse().asDiagonal();
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const Row& row = rows.rows[static_cast<std::size_t>(i)];
+    information += of_rows.row(i).transpose() * of_rows.row(i) / (row.std_dev * row.std_dev);
+    found.surprise += std::pow((readings_due[i] - row.value) / row.std_dev, 2) / static_cast<double>(count);
+  }
+  const Eigen::MatrixXd covariance = linear::inverseSymmetric(information);
+  const Eigen::MatrixXd spread = slope * covariance * slope.transpose();
   const auto estimate = [&](Eigen::Index i) {
     return Estimate{best[i], std::sqrt(std::max(0.0, spread(i, i)))};
   };
   for (Eigen::Index a = 0; a < 3; ++a) {
     found.mean[static_cast<std::size_t>(a)] = estimate(a);
-    found.rms[static_cast<std::size_t>(a)] = estimate(4 + a);
+    found.rms[static_cast<std::size_t>(a)] = estimate(RMS + a);
   }
   found.torque = estimate(3);
-  for (const Row& row : rows.rows)
-    found.surprise +=
-        std::pow((best[row.quantity] - row.value) / row.std_dev, 2) / static_cast<double>(count);
+  addLines(readings, p, best, spread, &found);
   return found;
 }
 

@@ -6,12 +6,14 @@
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
+#include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill::loadmeter {
 
 namespace {
 
+const std::string TRIGGER = "trigger";
 const std::array<const char*, 4> CHANNELS{"x", "y", "z", "spindle"};
 const char* const AT_REST = "the axis stands still";
 const char* const NOT_MEASURED = "no current of this motor";
@@ -34,7 +36,13 @@ void MotorRecord::clear() {
   *this = MotorRecord();
 }
 
+bool isServoRecord(const SampleBlock& block) {
+  return std::find(block.channels.begin(), block.channels.end(), TRIGGER) != block.channels.end();
+}
+
 void MotorRecord::add(const SampleBlock& block) {
+  const bool servo = isServoRecord(block);
+  if (servo && (block.size() == 0 || !(block.at(0, block.channel(TRIGGER)) > 0.5))) return;
   std::size_t longest = 0;
   for (const auto& s : samples_) longest = std::max(longest, s.size());
   if (rate_ > 0.0 && (block.first_index != next_ || block.sample_rate != rate_)) {
@@ -47,10 +55,12 @@ void MotorRecord::add(const SampleBlock& block) {
   if (rate_ == 0.0) {
     rate_ = block.sample_rate;
     start_ = block.stamp;
+    signed_ = servo;
   }
   next_ = block.first_index + block.size();
   for (std::size_t c = 0; c < CHANNELS.size(); ++c) {
-    const auto found = std::find(block.channels.begin(), block.channels.end(), CHANNELS[c]);
+    const auto found = std::find(block.channels.begin(), block.channels.end(),
+                                 (servo ? "current_" : "") + std::string(CHANNELS[c]));
     if (found == block.channels.end()) continue;
     const std::size_t at = static_cast<std::size_t>(found - block.channels.begin());
     for (std::size_t i = 0; i < block.size(); ++i) samples_[c].push_back(block.at(i, at));
@@ -70,6 +80,7 @@ MotorRecord MotorRecord::last(double duration) const {
   part.rate_ = rate_;
   part.start_ = start_;
   part.next_ = next_;
+  part.signed_ = signed_;
   const auto count = static_cast<std::size_t>(duration * rate_);
   for (std::size_t c = 0; c < samples_.size(); ++c) {
     const std::vector<double>& all = samples_[c];
@@ -78,11 +89,33 @@ MotorRecord MotorRecord::last(double duration) const {
   return part;
 }
 
+namespace {
+
+/// Mean of a current with its sign, and its standard deviation by pieces longer than what varies in it.
+Estimate meanOf(const std::vector<double>& samples) {
+  constexpr std::size_t PIECES = 8;
+  const std::size_t length = samples.size() / PIECES;
+  if (length < 2) throw Error("a record of " + std::to_string(samples.size()) + " samples is too short");
+  std::vector<double> pieces;
+  for (std::size_t k = 0; k < PIECES; ++k) {
+    const auto from = samples.begin() + static_cast<std::ptrdiff_t>(k * length);
+    pieces.push_back(mean(std::vector<double>(from, from + static_cast<std::ptrdiff_t>(length))));
+  }
+  const double middle = mean(pieces);
+  double squares = 0.0;
+  for (const double piece : pieces) squares += (piece - middle) * (piece - middle);
+  return {middle, std::sqrt(squares / static_cast<double>(PIECES * (PIECES - 1)))};
+}
+
+}  // namespace
+
 MotorReading readMotors(const MotorRecord& record, const MotorParameters& parameters,
-                        const std::array<double, 3>& velocity, double spindle_speed, bool is_short) {
+                        const std::array<double, 3>& velocity, double spindle_speed, bool is_short,
+                        int teeth) {
   MotorReading reading;
   reading.velocity = velocity;
   reading.spindle_speed = spindle_speed;
+  reading.is_signed = record.isSigned();
   for (std::size_t c = 0; c < CHANNELS.size(); ++c) {
     const bool spindle = c == 3;
     const double per = spindle ? parameters.phase_per_revolution : parameters.phase_per_metre[c];
@@ -91,12 +124,18 @@ MotorReading readMotors(const MotorRecord& record, const MotorParameters& parame
       continue;
     }
     const std::vector<double>& samples = record.channel(c);
-    if (!(per > 0.0) || samples.empty()) {
+    if (!(per > 0.0 || record.isSigned()) || samples.empty()) {
       reading.reason[c] = NOT_MEASURED;
       continue;
     }
     if (!std::all_of(samples.begin(), samples.end(), [](double v) { return std::isfinite(v); })) {
       reading.reason[c] = "its current has a sample that is not a finite number";
+      continue;
+    }
+    if (record.isSigned()) {
+      const Estimate pushing = meanOf(samples);
+      reading.range[c] = std::copysign(1.0, velocity[c]) * pushing.value;
+      if (is_short) reading.short_std[c] = pushing.std_dev;
       continue;
     }
     const double frequency = per * (spindle ? spindle_speed / units::TWO_PI : std::abs(velocity[c]));
@@ -105,10 +144,12 @@ MotorReading readMotors(const MotorRecord& record, const MotorParameters& parame
       continue;
     }
     try {
-      const Estimate range =
-          phaseRangeEstimate(samples, record.rate(), frequency, spindle ? parameters.largest_slip : 0.0);
-      (spindle ? reading.spindle_range : reading.range[c]) = range.value;
-      if (is_short) reading.short_std[c] = range.std_dev;
+      const PhaseFit fit =
+          fitPhase(samples, record.rate(), frequency, spindle ? parameters.largest_slip : 0.0);
+      (spindle ? reading.spindle_range : reading.range[c]) = fit.range.value;
+      if (is_short) reading.short_std[c] = fit.range.std_dev;
+      if (!spindle && teeth > 0)
+        reading.lines[c] = linesOf(samples, record.rate(), fit.frequency, linesOfCut(spindle_speed, teeth));
     } catch (const Error& error) {
       reading.reason[c] = error.what();
     }
@@ -197,7 +238,10 @@ MotorForce forceFromMotors(const MotorReading& cut, const std::vector<MotorReadi
     }
     if (std::abs(cut.velocity[a]) < parameters.smallest_velocity) continue;
     result.force[a] = force;
-    result.other[a] = other;
+    if (!cut.is_signed) result.other[a] = other;
+    const double squared = std::pow(calibration.drive[a]->newton_per_ampere.value, 2);
+    result.lines[a] = cut.lines[a];
+    for (VariationLine& line : result.lines[a]) line.power *= squared, line.power_std *= squared;
   }
   if (cut.spindle_range) addTorque(cut, air, calibration, &result);
   return result;

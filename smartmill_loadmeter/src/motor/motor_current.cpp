@@ -58,11 +58,10 @@ int levelFor(double frequency, double sample_rate) {
 }
 
 double phaseRange(const std::vector<double>& current, double sample_rate, double frequency, double slip) {
-  return phaseRangeEstimate(current, sample_rate, frequency, slip).value;
+  return fitPhase(current, sample_rate, frequency, slip).range.value;
 }
 
-Estimate phaseRangeEstimate(const std::vector<double>& current, double sample_rate, double frequency,
-                            double slip) {
+PhaseFit fitPhase(const std::vector<double>& current, double sample_rate, double frequency, double slip) {
   const double periods = static_cast<double>(current.size()) * frequency / sample_rate;
   if (!(periods >= 2.0)) throw Error("phase current: less than two periods in the record");
   const std::vector<double> smooth = denoise(current, levelFor(frequency, sample_rate));
@@ -97,7 +96,7 @@ Estimate phaseRangeEstimate(const std::vector<double>& current, double sample_ra
   double squares = 0.0;
   for (const double value : current) squares += value * value;
   const double n = static_cast<double>(current.size()), left = std::max(0.0, squares - best) / n;
-  return {2.0 * amplitude, 2.0 * std::sqrt(2.0 * left / n)};
+  return {{2.0 * amplitude, 2.0 * std::sqrt(2.0 * left / n)}, frequency * (1.0 + found_at / periods)};
 }
 
 double Line::stdAt(double x) const {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "node/parameters.h"
+#include "smartmill_core/cutting/force_curve.h"
 #include "smartmill_core/model/machine_model.h"
 
 namespace smartmill::loadmeter {
@@ -25,5 +26,11 @@ struct BagListeners {
 std::vector<IdentifyResult> identifyFromBag(const std::string& path, const MachineModel& model,
                                             const NodeParameters& parameters,
                                             const BagListeners& listeners = {});
+
+/// The force curves of a bag, the last of each tool and material, by the class that the node runs.
+/// @throws Error when it holds no force/compensated or spindle/angle, or no cut makes one (each with its
+/// reason).
+std::vector<FoundCurves> curvesFromBag(const std::string& path, const NodeParameters& parameters,
+                                       const std::function<void(double)>& progress = {});
 
 }  // namespace smartmill::loadmeter

@@ -4,11 +4,12 @@
 #include <smartmill_msgs/ForceEstimate.h>
 
 #include "node/fleet_message.h"
-#include "node/wiring.h"
 #include "smartmill_core/error.h"
-#include "smartmill_core/force_names.h"
+#include "smartmill_core/formatted.h"
+#include "smartmill_core/names.h"
 #include "smartmill_core/units.h"
 #include "smartmill_loadmeter/database/recommend.h"
+#include "smartmill_ros/force_curve_message.h"
 #include "smartmill_ros/frames.h"
 #include "smartmill_ros/node_main.h"
 #include "smartmill_ros/parameter_reader.h"
@@ -31,6 +32,7 @@ LoadMeterNode::LoadMeterNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
     : parameters_(ParameterReader::fromServer(private_nh).readAll<NodeParameters>()),
       shell_(nh, private_nh, "spindle load meter", parameters_.input_timeout),
       identification_(modelOf(parameters_), parameters_.identification, parameters_.hold_back),
+      curves_(parameters_.curve, parameters_.hold_back),
       database_(parameters_.database),
       server_(
           nh, names::IDENTIFY_COEFFICIENTS, [this](Server::GoalHandle handle) { goal(handle); },
@@ -44,24 +46,35 @@ LoadMeterNode::LoadMeterNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
   if (parameters_.keep_cuts)
     identification_.identification().onCut([this](const CoefficientRecord& cut) { keep(cut); });
   publisher_ = nh.advertise<smartmill_msgs::CuttingCoefficients>(names::COEFFICIENTS, 1, true);
-  if (!parameters_.motor_calibration.empty()) {
+  if (parameters_.motor_learn) identification_.identification().learnMotors();
+  if (!parameters_.motor_calibration.empty())
     identification_.identification().setMotors(readMotorCalibration(parameters_.motor_calibration));
+  if (parameters_.readsMotors()) {
     identification_.identification().onMotorForce([this](const MotorForce& force) { publish(force); });
     force_publisher_ = nh.advertise<geometry_msgs::WrenchStamped>(names::FORCE_OF_MOTORS, 10, true);
   }
   identification_.identification().onForce([this](const ForceEstimate& force) { tell(force); });
   identification_.identification().onForceWindow([this](const ForceEstimate& force) { publish(force); });
   estimate_publisher_ = nh.advertise<smartmill_msgs::ForceEstimate>(names::FORCE_ESTIMATE, 10, true);
-  connect(shell_.inputs(), parameters_, identification_);
+  if (parameters_.force_curve) {
+    curve_publisher_ = nh.advertise<smartmill_msgs::ForceCurve>(names::FORCE_CURVE, 1, true);
+    curves_.finder().onCurves([this](const FoundCurves& found) { publish(found); });
+    curves_.finder().onLeftOut([](const std::string& why) { ROS_WARN("force curve: %s", why.c_str()); });
+  }
+  connect(shell_.inputs(), parameters_, streams_);
+  connectCurves(shell_.inputs(), parameters_, streams_);
   find_service_ = nh.advertiseService(names::FIND_COEFFICIENTS, &LoadMeterNode::find, this);
   recommend_service_ = nh.advertiseService(names::RECOMMEND_CUT, &LoadMeterNode::recommend, this);
   discovered_ = nh.subscribe<smartmill_msgs::DiscoverActionResult>(
       std::string(names::DISCOVER) + "/result", 10,
       [this](const smartmill_msgs::DiscoverActionResult::ConstPtr& result) { keep(*result); });
+  health_ = nh.subscribe<smartmill_msgs::SpindleHealth>(
+      names::SPINDLE_HEALTH, 100,
+      [this](const smartmill_msgs::SpindleHealth::ConstPtr& health) { keep(*health); });
   shell_.diagnose("load meter", [this](auto& status) { diagnose(status); });
   shell_.every(WATCH_PERIOD, [this] { watch(); });
   if (!parameters_.fleet.empty()) {
-    fleet_publisher_ = nh.advertise<smartmill_msgs::FleetState>(FLEET_STATE, 1, true);
+    fleet_publisher_ = nh.advertise<smartmill_msgs::FleetState>(names::FLEET_STATE, 1, true);
     pusher_ =
         std::make_unique<FleetPusher>(parameters_.database, parameters_.fleet, parameters_.fleet_period);
   }
@@ -96,6 +109,10 @@ void LoadMeterNode::publish(const ForceEstimate& force) {
   };
   fill(force.mean, message.mean, message.mean_std);
   fill(force.rms, message.rms, message.rms_std);
+  for (const ForceLine& line : force.lines) {
+    message.line_frequency.push_back(line.frequency);
+    fill(line.amplitude, message.line_amplitude.emplace_back(), message.line_std.emplace_back());
+  }
   message.torque = force.torque.value;
   message.torque_std = force.torque.std_dev;
   message.surprise = force.surprise;
@@ -106,6 +123,17 @@ void LoadMeterNode::publish(const ForceEstimate& force) {
 void LoadMeterNode::tell(const ForceEstimate& force) {
   publish(force);
   ROS_INFO("force, test '%s': %s", force.name.c_str(), force.text().c_str());
+}
+
+void LoadMeterNode::publish(const FoundCurves& found) {
+  curve_publisher_.publish(toMsg(found));
+  const ForceCurve& curve = found.curves.tangential;
+  const double chip = 0.5 * curve.knots.back();
+  last_curve_ =
+      formatted("%s in %s, %zu cuts: %.2f +- %.2f N/mm tangential at a chip of %.4f mm", found.tool.c_str(),
+                found.material.c_str(), found.cuts.size(), curve.at(chip) / units::N_PER_MM,
+                curve.stdAt(chip) / units::N_PER_MM, chip / units::MM);
+  ROS_INFO("force curve, %s", last_curve_.c_str());
 }
 
 void LoadMeterNode::goal(Server::GoalHandle handle) {
@@ -252,6 +280,28 @@ void LoadMeterNode::keep(const smartmill_msgs::DiscoverActionResult& discovered)
   }
 }
 
+void LoadMeterNode::keep(const smartmill_msgs::SpindleHealth& health) {
+  std::vector<HealthRecord> records;
+  for (const smartmill_msgs::HealthChange& c : health.changes) {
+    HealthRecord r;
+    r.machine = parameters_.machine;
+    r.measured = health.measured;
+    r.quantity = c.quantity;
+    r.stamp = health.header.stamp.toSec();
+    r.days = health.days;
+    r.first = c.first;
+    r.now = c.now;
+    r.deviations = c.deviations;
+    r.drifted = c.drifted ? 1.0 : 0.0;
+    records.push_back(r);
+  }
+  try {
+    kept_health_ += database_.add(records);
+  } catch (const Error& error) {
+    ROS_ERROR("database: the spindle's health not kept: %s", error.what());
+  }
+}
+
 // After every try of the pusher.
 void LoadMeterNode::tellFleet() {
   if (!pusher_) return;
@@ -269,6 +319,7 @@ void LoadMeterNode::watch() {
   if (!shell_.inputs().any().dead()) return;
   if (!waiting_.empty()) ROS_WARN_THROTTLE(5.0, "no controller state or load any more: using what has come");
   identification_.flush();
+  curves_.flush();
 }
 
 void LoadMeterNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
@@ -292,8 +343,10 @@ void LoadMeterNode::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status
     status.addf("last cut's surprise", "%.1f sigma", production->surprise());
   }
   if (!last_force_.empty()) status.add("force by motor currents", last_force_);
+  if (!last_curve_.empty()) status.add("force curve", last_curve_);
   status.add("cuts kept", kept_cuts_);
   status.add("explanations kept", kept_explanations_);
+  status.add("quantities of the spindle's health kept", kept_health_);
   if (pusher_) {
     const FleetPusher::State fleet = pusher_->state();
     status.add("not sent to the fleet [records]", fleet.behind);

@@ -9,6 +9,7 @@
 
 #include "node/fleet_pusher.h"
 #include "node/parameters.h"
+#include "node/wiring.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_loadmeter/database/database.h"
 #include "smartmill_loadmeter/identification/sorted_identification.h"
@@ -16,6 +17,7 @@
 #include "smartmill_msgs/FindCoefficients.h"
 #include "smartmill_msgs/IdentifyCoefficientsAction.h"
 #include "smartmill_msgs/RecommendCut.h"
+#include "smartmill_msgs/SpindleHealth.h"
 #include "smartmill_ros/node_shell.h"
 
 namespace smartmill::loadmeter {
@@ -40,9 +42,11 @@ class LoadMeterNode {
                  smartmill_msgs::RecommendCut::Response& response);
   void keep(CoefficientRecord cut);
   void keep(const smartmill_msgs::DiscoverActionResult& discovered);
+  void keep(const smartmill_msgs::SpindleHealth& health);
   void publish(const MotorForce& force);
   void publish(const ForceEstimate& force);
   void tell(const ForceEstimate& force);
+  void publish(const FoundCurves& found);
   void watch();
   void tellFleet();
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
@@ -50,16 +54,18 @@ class LoadMeterNode {
   NodeParameters parameters_;
   NodeShell shell_;
   SortedIdentification identification_;
+  SortedCurves curves_;
+  CutStreams streams_{identification_, curves_, parameters_};
   CoefficientDatabase database_;
   std::unique_ptr<FleetPusher> pusher_;
   std::map<std::uint64_t, Server::GoalHandle> waiting_;
   std::uint64_t next_id_ = 1;
-  std::string last_message_, last_force_;
-  std::size_t kept_cuts_ = 0, kept_explanations_ = 0;
+  std::string last_message_, last_force_, last_curve_;
+  std::size_t kept_cuts_ = 0, kept_explanations_ = 0, kept_health_ = 0;
   std::uint64_t fleet_told_ = 0;
 
-  ros::Publisher publisher_, force_publisher_, estimate_publisher_, fleet_publisher_;
-  ros::Subscriber discovered_;
+  ros::Publisher publisher_, force_publisher_, estimate_publisher_, curve_publisher_, fleet_publisher_;
+  ros::Subscriber discovered_, health_;
   ros::ServiceServer find_service_, recommend_service_;
   Server server_;
 };

@@ -2,21 +2,66 @@
 
 #include "node/parameters.h"
 #include "smartmill_core/names.h"
+#include "smartmill_loadmeter/identification/curve_finder.h"
 #include "smartmill_loadmeter/identification/sorted_identification.h"
 #include "smartmill_ros/feed.h"
 
 namespace smartmill::loadmeter {
 
+/// What comes in, to both that think: coefficients, and force curves where they are asked for.
+struct CutStreams {
+  SortedIdentification& identification;
+  SortedCurves& curves;
+  const NodeParameters& parameters;
+
+  template <class Data>
+  void push(const Data& data) {
+    identification.push(data);
+  }
+  void push(const CncState& state) { both(state); }
+  void push(const CuttingCondition& condition) { both(condition); }
+  void push(const SpindleAngle& angle) { curves.push(angle); }
+  void push(const ForceBlock& block) {
+    if (parameters.force_sensor) identification.push(block);
+    if (parameters.force_curve) curves.push(block);
+  }
+
+ private:
+  template <class Data>
+  void both(const Data& data) {
+    identification.push(data);
+    if (parameters.force_curve) curves.push(data);
+  }
+};
+
 /// The streams of an identification, from a node's inputs or from a bag.
+/// @param sorted a SortedIdentification, or what stands before it
+template <class Source, class Sorted>
+void connect(Source& source, const NodeParameters& parameters, Sorted& sorted) {
+  feed<smartmill_msgs::CncState>(source, names::CNC_STATE, sorted);
+  feed<smartmill_msgs::LoadSample>(source, names::CNC_LOAD, sorted);
+  feed<smartmill_msgs::CuttingCondition>(source, names::CUTTING_CONDITION, sorted);
+  if (parameters.readsMotors())
+    feed<smartmill_msgs::SampleBlock>(
+        source, parameters.motor_servo ? names::daq("servo") : names::MOTOR_CURRENT, sorted);
+  if (parameters.force_sensor) feed<smartmill_msgs::ForceBlock>(source, names::FORCE_COMPENSATED, sorted);
+}
+
+/// What force curves need besides.
 template <class Source>
-void connect(Source& source, const NodeParameters& parameters, SortedIdentification& identification) {
-  feed<smartmill_msgs::CncState>(source, names::CNC_STATE, identification);
-  feed<smartmill_msgs::LoadSample>(source, names::CNC_LOAD, identification);
-  feed<smartmill_msgs::CuttingCondition>(source, names::CUTTING_CONDITION, identification);
-  if (!parameters.motor_calibration.empty())
-    feed<smartmill_msgs::SampleBlock>(source, names::MOTOR_CURRENT, identification);
-  if (parameters.force_sensor)
-    feed<smartmill_msgs::ForceBlock>(source, names::FORCE_COMPENSATED, identification);
+void connectCurves(Source& source, const NodeParameters& parameters, CutStreams& streams) {
+  if (!parameters.force_curve) return;
+  feed<smartmill_msgs::SpindleAngle>(source, names::SPINDLE_ANGLE, streams);
+  if (!parameters.force_sensor) feed<smartmill_msgs::ForceBlock>(source, names::FORCE_COMPENSATED, streams);
+}
+
+/// The streams of force curves alone.
+template <class Source>
+void connectCurves(Source& source, SortedCurves& curves) {
+  feed<smartmill_msgs::CncState>(source, names::CNC_STATE, curves);
+  feed<smartmill_msgs::SpindleAngle>(source, names::SPINDLE_ANGLE, curves);
+  feed<smartmill_msgs::CuttingCondition>(source, names::CUTTING_CONDITION, curves);
+  feed<smartmill_msgs::ForceBlock>(source, names::FORCE_COMPENSATED, curves);
 }
 
 }  // namespace smartmill::loadmeter

@@ -61,46 +61,86 @@ TEST(Causes, theFrequentCausesTestComesFirstAndOwnCausesAreLeftOut) {
   }
 }
 
-/// Two causes, well known; the first shows in tests of even number, the second in the others.
-FleetCauses two(std::size_t tests, double explanations) {
+/// Two causes as large as ever; the first shows in tests of even number, the second in the others.
+FleetCauses two(std::size_t tests, double squares) {
   FleetCauses fleet;
   fleet.explained = 100;
   fleet.other_odds = 1e-9;
   for (const char* name : {"first", "second"}) {
-    fleet.causes.push_back({name, {}, 1.0, {}, {}});
-    for (std::size_t t = 0; t < tests; ++t)
-      fleet.causes.back().outcomes.push_back({{(t % 2 == 0) == (*name == 'f') ? "fx" : "", explanations}});
+    Showing showing;
+    for (std::size_t t = 0; t < tests; ++t) {
+      const double here = (t % 2 == 0) == (*name == 'f') ? squares : 0.0;
+      showing.push_back({{"fx", here}, {"fy", here}});
+    }
+    fleet.causes.push_back({name, {}, 1.0, {}, {showing}});
   }
   for (std::size_t t = 0; t < tests; ++t) fleet.tests.push_back("t" + std::to_string(t));
   return fleet;
 }
 
-// Of two equally likely causes that a test parts surely: ln 2.
+// Of two equally likely causes, at any size far above what shows. Each of two places tells wrongly in 2 of
+// 100: both show, neither, or one, which tells nothing.
 TEST(Causes, aTestTellsWhatItsOutcomesPart) {
-  const FleetCauses fleet = two(1, 1e6);
-  EXPECT_NEAR(CauseSearch(fleet, {1e6, 1e6}).information(0), std::log(2.0), 1e-4);
+  const FleetCauses fleet = two(1, 1e9);
+  const double right = 0.98 * 0.98, wrong = 0.02 * 0.02, both = right + wrong;
+  const double told = right * std::log(2.0 * right / both) + wrong * std::log(2.0 * wrong / both);
+  EXPECT_NEAR(CauseSearch(fleet, {1e6, 1e6}).information(0), told, 1e-4);
 }
 
 // The prior is a million to one for the first; what the tests show decides all the same, and what nobody has
 // met is given no name.
 TEST(Causes, thePriorNamesNothing) {
-  const FleetCauses fleet = two(16, 20.0);
+  const FleetCauses fleet = two(40, 1e4);
   CauseSearch search(fleet, {1e6, 1.0}), strange(fleet, {1e6, 1.0});
   EXPECT_FALSE(search.alone());
-  for (std::size_t t = 0; t < 16; ++t) {
-    search.saw(t, t % 2 == 1 ? "fx" : "");
-    strange.saw(t, "fy fz");
+  for (std::size_t t = 0; t < 40; ++t) {
+    search.saw(t, t % 2 == 1 ? "fx fy" : "");
+    strange.saw(t, t % 4 < 2 ? "fx fy" : "");
   }
   EXPECT_EQ(search.alone(), 1u);
   EXPECT_FALSE(strange.alone());
+}
+
+// Outcomes share the size of the cause. Two causes show alike but that the second takes ten times the squares
+// in the odd tests. A small first cause shows in none of these, however many there are, and is no second one
+// for it; were outcomes independent given the cause, forty silent tests would be forty witnesses.
+TEST(Causes, outcomesShareTheSizeOfTheCause) {
+  FleetCauses fleet = two(40, 0.0);
+  for (std::size_t t = 0; t < 40; ++t) {
+    for (const char* channel : {"fx", "fy"}) {
+      fleet.causes[0].shown[0][t][channel] = 30.0;
+      fleet.causes[1].shown[0][t][channel] = t % 2 == 1 ? 300.0 : 30.0;
+    }
+  }
+  CauseSearch small(fleet, {1.0, 1.0}), silent(fleet, {1.0, 1.0});
+  for (std::size_t t = 0; t < 40; ++t) {
+    small.saw(t, t % 2 == 1 ? "fx fy" : "");  // the second, seven times smaller in size
+    silent.saw(t, "");
+  }
+  EXPECT_EQ(small.alone(), 1u);
+  EXPECT_FALSE(silent.alone()) << "each of them may be too small to show: none does not stand alone";
+}
+
+// A cause of its own: odds of each effect of the catalogue for `explain --prior`.
+TEST(Causes, oddsForAnExplanation) {
+  auto all = shop();
+  all.push_back(explained("d", effect("out_of_fashion"), 9.0, 9.0));
+  const CauseOdds odds = oddsOf(fleetCauses(all, "new"));
+  EXPECT_EQ(odds.machines, 9u);
+  EXPECT_DOUBLE_EQ(odds.of("unbalance"), 6.5 / 3.5);
+  EXPECT_DOUBLE_EQ(odds.of("tool_wear"), 0.5 / 9.5);
+  EXPECT_EQ(odds.listed.count("out_of_fashion"), 0u) << "no effect of this version's catalogue";
 }
 
 TEST(Causes, anExplanationOfSeveralCausesTellsNoTestWhereAnotherDoes) {
   auto all = shop();
   all.push_back(explained("d", effect("unbalance") + ", " + effect("runout"), 9.0, 9.0));
   const FleetCauses fleet = fleetCauses(all, "new");
-  EXPECT_EQ(fleet.causes[0].outcomes[1], (Outcomes{{"", 6.0}})) << "unbalance in a slot";
-  EXPECT_EQ(fleet.causes[1].outcomes[0], (Outcomes{{"", 1.0}})) << "runout in the air";
+  EXPECT_EQ(fleet.causes[0].shown.size(), 6u);
+  for (const Showing& unbalance : fleet.causes[0].shown) EXPECT_EQ(unbalance[1].at("fx"), 0.0) << "in a slot";
+  ASSERT_EQ(fleet.causes[1].shown.size(), 1u);
+  EXPECT_EQ(fleet.causes[1].shown[0][0].at("fx"), 0.0) << "runout in the air";
+  EXPECT_DOUBLE_EQ(fleet.causes[1].shown[0][1].at("fx"), (81.0 - 1.0) / 0.05);
   EXPECT_EQ(fleet.causes[1].machines.size(), 2u);
 }
 

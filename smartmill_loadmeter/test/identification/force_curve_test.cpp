@@ -63,6 +63,59 @@ TEST(ForceCurve, FindsAPowerLawWithFourTeethInASlot) {
               0.06 * 0.75 * tangential(0.2e-3) / 0.2e-3);
 }
 
+/// Four teeth with runout, cuts that differ from one another as a whole, an angle that is a little off: what
+/// is in a shop's records and in no curve.
+AngleRecord shopCut(const Engagement& e, double share, double runout, double early, double noise,
+                    std::mt19937& random) {
+  constexpr int TEETH = 4;
+  std::normal_distribution<double> normal(0.0, noise);
+  AngleRecord record;
+  record.engagement = e;
+  for (int i = 0; i < 360; ++i) {
+    const double angle = units::TWO_PI * (i + 0.5) / 360.0;
+    double fx = normal(random), fy = normal(random);
+    for (int t = 0; t < TEETH; ++t) {
+      const double place = 0.5 * units::PI * t, phi = std::fmod(angle + early + place, units::TWO_PI);
+      const double h = e.feed_per_tooth * std::sin(phi) +
+                       runout * (std::cos(1.0 + place) - std::cos(1.0 + place + 0.5 * units::PI));
+      if (phi <= e.entry || phi >= e.exit || h <= 0.0) continue;
+      fx += share * e.axial_depth * (-tangential(h) * std::cos(phi) - radial(h) * std::sin(phi));
+      fy += share * e.axial_depth * (tangential(h) * std::sin(phi) - radial(h) * std::cos(phi));
+    }
+    record.angle.push_back(angle);
+    record.fx.push_back(fx);
+    record.fy.push_back(fy);
+  }
+  return record;
+}
+
+// Both sides: neither too narrow nor wide enough for anything.
+TEST(ForceCurve, TheBandHoldsTheLawAsOftenAsItSays) {
+  int inside = 0, all = 0;
+  for (unsigned seed = 1; seed <= 60; ++seed) {
+    std::mt19937 random(seed);
+    std::normal_distribution<double> normal;
+    std::uniform_real_distribution<double> evenly(0.0, 1.0);
+    const double scatter = 0.01 * std::abs(normal(random)), runout = 6e-6 * evenly(random);
+    const double early = 0.005 * normal(random), noise = 0.5 + 2.0 * evenly(random);
+    const int cuts = 4 + static_cast<int>(4.0 * evenly(random));
+    std::vector<AngleRecord> records;
+    for (int c = 1; c <= cuts; ++c)
+      records.push_back(shopCut({0.0, units::PI, 2e-3, 0.2e-3 * c / cuts}, 1.0 + scatter * normal(random),
+                                runout, early, noise, random));
+    const ForceCurves curves = fitForceCurves(records, {4, 12e-3, 0.0, {}});
+    for (const double h : {0.03e-3, 0.07e-3, 0.11e-3, 0.15e-3, 0.19e-3}) {
+      inside += std::abs(curves.tangential.at(h) - tangential(h)) < 1.96 * curves.tangential.stdAt(h);
+      inside += std::abs(curves.radial.at(h) - radial(h)) < 1.96 * curves.radial.stdAt(h);
+      all += 2;
+    }
+  }
+  // 95 % of what is about 60 x 4 independent places: within 3 deviations of that count.
+  EXPECT_GT(inside, 0.91 * all);
+  EXPECT_LT(inside, 0.99 * all);
+  std::printf("inside 1.96 deviations: %.1f %%\n", 100.0 * inside / all);
+}
+
 TEST(ForceCurve, AFileTellsTheSameCurve) {
   const TemporaryFolder folder;
   const ForceCurves curves =

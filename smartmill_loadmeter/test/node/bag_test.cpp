@@ -1,15 +1,20 @@
 #include <cmath>
 #include <filesystem>
+#include <optional>
+#include <type_traits>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <rosbag/bag.h>
 
 #include "../../src/node/bag_identification.h"
+#include "../curve_shop.h"
 #include "../session.h"
+#include "smartmill_core/names.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_msgs/IdentifyCoefficientsActionGoal.h"
 #include "smartmill_ros/conversions.h"
+#include "smartmill_ros/force_curve_message.h"
 #include "smartmill_ros/testing/shipped_parameters.h"
 
 namespace smartmill::loadmeter {
@@ -122,6 +127,62 @@ TEST(Bag, aRunoutIsToldAsOnTheRunningMachine) {
   EXPECT_NEAR(k.value.ktc, TRUTH.ktc, 0.005 * TRUTH.ktc);
   EXPECT_NEAR(k.value.ktc, TRUTH.ktc, 2.0 * k.std_dev.ktc);
   EXPECT_THAT(found[0].message, HasSubstr("; runout of "));
+}
+
+TEST(Bag, givesTheForceCurveOfTheLiveRunToTheLastDigit) {
+  const TemporaryFolder folder;
+  const std::string file = folder.file("run.bag");
+  SortedCurves live({}, 0.05);
+  std::optional<FoundCurves> told;
+  live.finder().onCurves([&](const FoundCurves& found) { told = found; });
+  {
+    rosbag::Bag bag(file, rosbag::bagmode::Write);
+    const auto write = [&](const std::string& topic, const auto& message) {
+      bag.write("/smartmill/" + topic, message.header.stamp, message);
+      live.push(fromMsg(message));
+    };
+    Shop shop([&](const auto& input) {
+      using Input = std::decay_t<decltype(input)>;
+      if constexpr (std::is_same_v<Input, ForceBlock>) {
+        write(names::FORCE_COMPENSATED, toMsg(input, "machine"));
+      } else if constexpr (std::is_same_v<Input, SpindleAngle>) {
+        write(names::SPINDLE_ANGLE, toMsg(input));
+      } else if constexpr (std::is_same_v<Input, CncState>) {
+        write(names::CNC_STATE, toMsg(input));
+      } else {
+        write(names::CUTTING_CONDITION, toMsg(input));
+      }
+    });
+    for (const double feed : {5e-5, 1e-4, 2e-4}) shop.cut(std::to_string(feed), feed);
+    shop.end();
+  }
+  live.flush();
+  const std::vector<FoundCurves> offline = curvesFromBag(file, {});
+  ASSERT_TRUE(told);
+  ASSERT_EQ(offline.size(), 1u);
+  // By the message too.
+  const FoundCurves sent = fromMsg(toMsg(*told));
+  for (const FoundCurves* found : {&offline[0], &sent}) {
+    EXPECT_EQ(found->curves.tangential.value, told->curves.tangential.value);
+    EXPECT_EQ(found->curves.radial.std_dev, told->curves.radial.std_dev);
+    EXPECT_EQ(found->cuts, told->cuts);
+    EXPECT_EQ(found->material, "steel");
+  }
+  EXPECT_NEAR(told->curves.tangential.at(1e-4), KTC * 1e-4 + KTE, 0.005 * (KTC * 1e-4 + KTE));
+
+  smartmill_msgs::ForceCurve falling = toMsg(*told);
+  falling.radial[3] = 0.5 * falling.radial[2];
+  EXPECT_THAT(errorOf([&] { fromMsg(falling); }), HasSubstr("radial: the coefficients must not fall"));
+}
+
+TEST(Bag, withoutForcesMakesNoForceCurveAndSaysWhy) {
+  const TemporaryFolder folder;
+  {
+    Recorder recorder(folder.file("run.bag"));
+    takeThrough(recorder.session);
+  }
+  EXPECT_THAT(errorOf([&] { curvesFromBag(folder.file("run.bag"), {}); }),
+              HasSubstr("run.bag: holds no force/compensated"));
 }
 
 TEST(Parameters, theShippedFileIsTheDefaultsAndWrongOnesAreNamed) {

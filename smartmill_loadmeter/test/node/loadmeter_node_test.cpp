@@ -4,14 +4,15 @@
 #include <ros/ros.h>
 
 #include <cmath>
+#include <filesystem>
 #include <mutex>
 
 #include <gtest/gtest.h>
 
 #include "../session.h"
-#include "smartmill_core/force_names.h"
 #include "smartmill_core/names.h"
 #include "smartmill_core/testing/temporary_folder.h"
+#include "smartmill_loadmeter/database/database.h"
 #include "smartmill_msgs/CncState.h"
 #include "smartmill_msgs/CuttingCoefficients.h"
 #include "smartmill_msgs/CuttingCondition.h"
@@ -21,6 +22,7 @@
 #include "smartmill_msgs/IdentifyCoefficientsAction.h"
 #include "smartmill_msgs/LoadSample.h"
 #include "smartmill_msgs/SampleBlock.h"
+#include "smartmill_msgs/SpindleHealth.h"
 #include "smartmill_ros/conversions.h"
 #include "smartmill_ros/follower.h"
 
@@ -191,6 +193,52 @@ TEST(LoadMeterNode, keepsWhatADiscoveryFound) {
   }
   const std::lock_guard<std::mutex> guard(lock);
   EXPECT_EQ(kept, "1");
+}
+
+// What the hammer tells of the spindle's health is kept with the machine's other records, each quantity once.
+TEST(LoadMeterNode, keepsTheSpindlesHealth) {
+  ros::NodeHandle nh, node("loadmeter");
+  ros::AsyncSpinner spinner(1);
+  spinner.start();
+  const auto health = nh.advertise<smartmill_msgs::SpindleHealth>(names::SPINDLE_HEALTH, 0);
+  for (int i = 0; i < 2400 && health.getNumSubscribers() == 0; ++i) ros::WallDuration(0.05).sleep();
+  smartmill_msgs::SpindleHealth message;
+  message.header.stamp = ros::Time(2000.5);
+  message.measured = "T1 tool_tip x";
+  message.days = 1.5;
+  message.changes.resize(2);
+  message.changes[0].quantity = "frequency of the mode at 1000 Hz";
+  message.changes[0].first = 1000.0;
+  message.changes[0].now = 1012.0;
+  message.changes[0].deviations = 4.2;
+  message.changes[0].drifted = true;
+  message.changes[1] = message.changes[0];
+  message.changes[1].quantity = "gain of the mode at 2200 Hz, gone";
+  message.changes[1].deviations = std::nan("");
+  health.publish(message);
+  health.publish(message);  // the same again
+  std::string file;
+  ASSERT_TRUE(node.getParam("database", file));
+  std::vector<HealthRecord> kept;
+  for (int i = 0; i < 2400 && kept.size() < 2; ++i) {
+    ros::WallDuration(0.05).sleep();
+    kept = CoefficientDatabase(file).health();
+  }
+  ros::WallDuration(0.2).sleep();
+  kept = CoefficientDatabase(file).health();
+  ASSERT_EQ(kept.size(), 2u);
+  EXPECT_EQ(kept[0].machine, "mill 07");
+  EXPECT_EQ(kept[0].measured, "T1 tool_tip x");
+  EXPECT_EQ(kept[0].quantity, "frequency of the mode at 1000 Hz");
+  EXPECT_EQ(kept[0].stamp, 2000.5);
+  EXPECT_EQ(kept[0].days, 1.5);
+  EXPECT_EQ(kept[0].first, 1000.0);
+  EXPECT_EQ(kept[0].now, 1012.0);
+  EXPECT_EQ(kept[0].deviations, 4.2);
+  EXPECT_EQ(kept[0].drifted, 1.0);
+  EXPECT_TRUE(std::isnan(kept[1].deviations));
+  // The node holds it open; this is its last test.
+  for (const char* part : {"", "-shm", "-wal"}) std::filesystem::remove(file + part);
 }
 
 }  // namespace

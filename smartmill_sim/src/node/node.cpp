@@ -13,7 +13,6 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/modal/results.h"
 #include "smartmill_core/names.h"
-#include "smartmill_core/signal/force_channels.h"
 #include "smartmill_ros/conversions.h"
 #include "smartmill_ros/frames.h"
 #include "smartmill_ros/node_main.h"

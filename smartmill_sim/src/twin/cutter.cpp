@@ -89,14 +89,14 @@ CuttingForce Cutter::forceOf(Part& part, const ToolMotion& now) {
   if (part.rigid) {
     sums.edges = part.rigid->sumsAt(now.angle - lag_ * part.slice.low);
   } else {
-    sums = part.process->sumsAt(motionOf(part, now));
+    sums = part.process->sumsAt(part.slice.low == 0.0 ? now : motionOf(part, now));
   }
   if (kept_) kept_->push_back(sums);
   return part.rigid ? part.rigid->force(sums.edges) : part.process->force(sums);
 }
 
 CuttingForce Cutter::step(const ToolMotion& now) {
-  now_ = now;
+  if (parts_.size() > 1) now_ = now;  // where depths change, another part may engage
   CuttingForce sum;
   for (Part& part : parts_) {
     if (part.arcs == 0) continue;

@@ -209,9 +209,8 @@ void CuttingMachine::takeOver(const Input& input) {
   now_.chip = now_.depth = 0.0;
   if (!cutting() || now_.speed == 0.0) return;
   const std::array<double, 2>& feed = input.motion.velocity;
-  const std::array<double, 3> chip_of{{feed[0], feed[1], now_.speed}};
-  if (chip_of != chip_of_) {
-    chip_of_ = chip_of;
+  if (feed[0] != chip_of_[0] || feed[1] != chip_of_[1] || now_.speed != chip_of_[2]) {
+    chip_of_ = {{feed[0], feed[1], now_.speed}};
     chip_ = std::hypot(feed[0], feed[1]) * units::TWO_PI / (std::abs(now_.speed) * model_.tool->teeth);
   }
   now_.chip = chip_;
@@ -221,6 +220,11 @@ void CuttingMachine::takeOver(const Input& input) {
 CuttingForce CuttingMachine::cut(const Input& input) {
   if (replayed()) return followed_->steps.at(place_).force;
   if (!cutter_) return {};
+  if (rigid() && state_.feed_ratio == 1.0) {
+    CuttingForce force = cutter_->step(input.motion);
+    layers_.add(input.motion, force);
+    return force;
+  }
   ToolMotion motion = fed(input.motion);
   if (input.tip) motion.displacement = *input.tip;
   // The tip's place needs this step's force and the force needs the place: the force is first taken to go
@@ -303,15 +307,51 @@ void CuttingMachine::passOn(Output& out) {
   for (auto& [channel, line] : delays_) out.early[channel] = line.step(out.early[channel]);
 }
 
-void CuttingMachine::passTime(const ToolMotion& motion) {
-  now_.record_time += time_step_;
-  if (clock_.record || cutting()) clock_.edge_time += time_step_;
-  if (cutting()) cut_time_ += time_step_;
-  if (!clock_.record) clock_.start_time += time_step_;
+void CuttingMachine::passTime(const ToolMotion& motion, std::size_t steps) {
+  const double time = static_cast<double>(steps) * time_step_;
+  now_.record_time += time;
+  if (clock_.record || cutting()) clock_.edge_time += time;
+  if (cutting()) cut_time_ += time;
+  if (!clock_.record) clock_.start_time += time;
   if (state_.depth_slope != 0.0 && cutting()) {
     const std::array<double, 2>& v = motion.velocity;
-    feed_path_ += time_step_ * state_.feed_ratio * std::hypot(v[0], v[1]);
+    feed_path_ += time * state_.feed_ratio * std::hypot(v[0], v[1]);
   }
+}
+
+// Whether a step sets nothing anew and nothing asks where it is.
+bool CuttingMachine::stepsAlike() const {
+  return layers_.empty() && !probe_ &&
+         !(effects_.has(Stage::motion) || effects_.has(Stage::cutting_law) || effects_.has(Stage::sensor) ||
+           effects_.has(Stage::sensor_force) || effects_.has(Stage::drive) ||
+           effects_.has(Stage::sensor_output));
+}
+
+// The rest of what is followed, in a cut that goes on.
+void CuttingMachine::replay(std::size_t from, const EarlyRows& early, Course& course) {
+  std::vector<double>* const x = early[TOOL_X];
+  std::vector<double>* const y = early[TOOL_Y];
+  const std::size_t steps = course.force.size();
+  if (replayed()) {
+    for (std::size_t k = from; k < steps; ++k) {
+      const CutTrace::Step& step = followed_->steps.at(place_++);
+      course.force[k] = step.force;
+      if (x) (*x)[k] = step.displacement[0];
+      if (y) (*y)[k] = step.displacement[1];
+    }
+  } else {
+    const Input input;
+    Output out;
+    for (std::size_t k = from; k < steps; ++k) {
+      out.force = course.force[k] = cutter_->step(input.motion);
+      if (!vibrates_ || !(x || y)) continue;
+      settleTip(input, out);
+      if (x) (*x)[k] = out.early[TOOL_X];
+      if (y) (*y)[k] = out.early[TOOL_Y];
+    }
+  }
+  const CuttingForce& last = course.force.back();
+  last_cut_ = {{last.fx, last.fy, last.fz}};
 }
 
 void CuttingMachine::run(std::size_t steps, const std::function<void(std::size_t, Input&)>& next,
@@ -327,10 +367,7 @@ void CuttingMachine::run(std::size_t steps, const std::function<void(std::size_t
   }
   Course course;
   cutAll(steps, next, rows, course);
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    if (shows_force_[axis] && rows[FX + axis]) showForces(course, axis, *rows[FX + axis]);
-  }
-  if (drive_ && shows_load_ && rows[LOAD_METER]) showLoads(course, *rows[LOAD_METER]);
+  showAll(course, rows);
   if (effects_.has(Stage::sensor_output)) measureAll(course, rows);
   passAllOn(steps, rows);
 }
@@ -345,7 +382,15 @@ void CuttingMachine::cutAll(std::size_t steps, const std::function<void(std::siz
   if (kept_) (keepsSums() ? kept_->sums.reserve(steps) : kept_->steps.reserve(steps));
   Input input;
   Output out;
+  const bool alike = followed_ && stepsAlike();
   for (std::size_t k = 0; k < steps; ++k) {
+    if (alike && cutting() && jump_ == 0.0) {
+      replay(k, early, course);
+      next(steps - 1, input);
+      now_.angle = input.motion.angle;
+      passTime(input.motion, steps - k);
+      return;
+    }
     next(k, input);
     takeOver(input);
     if (measured) course.instants[k] = now_;
@@ -366,30 +411,37 @@ void CuttingMachine::cutAll(std::size_t steps, const std::function<void(std::siz
   }
 }
 
-void CuttingMachine::showForces(const Course& course, std::size_t axis, std::vector<double>& shown) {
+// Each filter waits for its own last step only: side by side they take little longer than one.
+void CuttingMachine::showAll(const Course& course, const EarlyRows& early) {
+  struct Shown {
+    std::size_t axis;
+    double CuttingForce::*of;
+    double* row;
+  };
   constexpr std::array<double CuttingForce::*, 3> OF_AXIS{
       {&CuttingForce::fx, &CuttingForce::fy, &CuttingForce::fz}};
-  ModalFilter& sensor = sensor_[axis];
-  auto jump = course.jumps.begin();
-  for (std::size_t k = 0; k < shown.size(); ++k) {
-    const double cut = course.force[k].*OF_AXIS[axis];
-    const double applied = course.applied.empty() ? cut : course.applied[k][axis];
-    if (jump == course.jumps.end() || jump->first != k) {
-      shown[k] = sign_ * sensor.step(applied);
-      continue;
-    }
-    const double last = k > 0 ? course.force[k - 1].*OF_AXIS[axis] : course.before[axis];
-    shown[k] = sign_ * sensor.jump(applied - (jump++)->second * (cut - last), applied);
+  std::vector<Shown> forces;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    if (shows_force_[axis] && early[FX + axis])
+      forces.push_back({axis, OF_AXIS[axis], early[FX + axis]->data()});
   }
-}
-
-void CuttingMachine::showLoads(const Course& course, std::vector<double>& shown) {
+  double* const load = drive_ && shows_load_ && early[LOAD_METER] ? early[LOAD_METER]->data() : nullptr;
   auto jump = course.jumps.begin();
-  for (std::size_t k = 0; k < shown.size(); ++k) {
-    const bool jumps = jump != course.jumps.end() && jump->first == k;
-    const double rise = 1.0 - (jumps ? (jump++)->second : 0.0), torque = course.force[k].torque;
-    shown[k] = drive_->step(last_torque_ + 0.5 * rise * (torque - last_torque_), now_.speed);
-    last_torque_ = torque;
+  CuttingForce last{course.before[0], course.before[1], course.before[2]};
+  for (std::size_t k = 0; k < course.force.size(); ++k) {
+    const CuttingForce& now = course.force[k];
+    const double jumps = jump != course.jumps.end() && jump->first == k ? (jump++)->second : 0.0;
+    for (const Shown& s : forces) {
+      const double cut = now.*s.of, applied = course.applied.empty() ? cut : course.applied[k][s.axis];
+      ModalFilter& sensor = sensor_[s.axis];
+      s.row[k] = sign_ * (jumps == 0.0 ? sensor.step(applied)
+                                       : sensor.jump(applied - jumps * (cut - last.*s.of), applied));
+    }
+    if (load) {
+      load[k] = drive_->step(last_torque_ + 0.5 * (1.0 - jumps) * (now.torque - last_torque_), now_.speed);
+      last_torque_ = now.torque;
+    }
+    last = now;
   }
 }
 

@@ -10,11 +10,6 @@ SpindleDrive::SpindleDrive(const Spindle& spindle, double time_step)
     : spindle_(spindle), decay_(std::exp(-units::TWO_PI * spindle.load_meter_bandwidth * time_step)) {
 }
 
-double SpindleDrive::friction(double speed) const {
-  if (speed < spindle_.friction_zero_below) return 0.0;
-  return factor_ * (spindle_.viscous * speed + spindle_.coulomb + extra_);
-}
-
 void SpindleDrive::setFriction(double extra, double factor) {
   extra_ = extra;
   factor_ = factor;
@@ -26,12 +21,6 @@ double SpindleDrive::steady(double speed) const {
 
 void SpindleDrive::reset(double speed) {
   voltage_ = steady(speed);
-}
-
-double SpindleDrive::step(double cutting_torque, double speed) {
-  const double steady = spindle_.load_meter_gain * (cutting_torque + friction(speed)) * speed;
-  voltage_ = steady + (voltage_ - steady) * decay_;
-  return voltage_;
 }
 
 double SpindleDrive::rounded(double voltage) const {

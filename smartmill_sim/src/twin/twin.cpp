@@ -205,7 +205,8 @@ void passThrough(CuttingMachine& machine, std::size_t samples, int substeps, con
   machine.run(
       samples * every,
       [&](std::size_t step, CuttingMachine::Input& at) {
-        input(step / every, static_cast<double>(step % every) / substeps, at);
+        const std::size_t i = every > 1 ? step / every : step;
+        input(i, every > 1 ? static_cast<double>(step - i * every) / substeps : 0.0, at);
       },
       rows);
   for (std::size_t c = 0; c < CHANNELS && every > 1; ++c) {
@@ -298,7 +299,9 @@ class SteadyTest {
         substeps_(options.substeps),
         // Half of what comes on linearly is there before the step ends.
         rise_(engagementRise(machine.vibrates()) + 2.0 * options.early_entry),
-        machine_(machine) {
+        machine_(machine),
+        // A rounded time stamp must not put the sample of engagement on the wrong side.
+        start_(test.engage_time.value_or(begin - 1.0) - 1e-3 / test.sample_rate) {
     if (!cut()) return;
     model.needCutting("simulate a cut");
     feed_ = test.engagement->feed_per_tooth * model.needTool("simulate a cut").teeth * test.spindle_speed /
@@ -315,10 +318,7 @@ class SteadyTest {
   // The same in a record; the tool engages when its time has come.
   void next(double t, CuttingMachine::Input& input) {
     inputAt(t, input);
-    const double start = test_.engage_time.value_or(begin_ - 1.0);
-    // A rounded time stamp must not put the sample of engagement on the wrong side.
-    if (cut() && !engaged_ && t >= start - 1e-3 / test_.sample_rate)
-      engage(input.motion, test_.engagement->axial_depth);
+    if (!engaged_ && cut() && t >= start_) engage(input.motion, test_.engagement->axial_depth);
   }
 
   // What ran before the record.
@@ -355,6 +355,7 @@ class SteadyTest {
   int substeps_;
   double rise_;  // [samples]
   CuttingMachine& machine_;
+  double start_;       // [s] from which the tool is in cut
   double feed_ = 0.0;  // [m/s]
   bool engaged_ = false;
 };

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <complex>
 #include <functional>
+#include <map>
 #include <memory>
 #include <random>
 
@@ -37,6 +38,10 @@ double around(const StabilityLimit& limit, std::size_t k, double margin,
     if (worse(limit.depth[j + 1], worst)) worst = limit.depth[j + 1];
   }
   return worst;
+}
+
+bool removesMore(const StabilityPoint& a, const StabilityPoint& b) {
+  return a.material_removal_rate > b.material_removal_rate;
 }
 
 /// The first points in the given order, one a pocket.
@@ -415,12 +420,46 @@ void ChartMaker::recommend(StabilityChart& chart, const StabilityLimit& wide) co
     const bool over_right = k + 1 == cuts.size() || rate >= cuts[k + 1].material_removal_rate;
     if (rate > 0.0 && over_left && over_right) peaks.push_back(cuts[k]);
   }
-  const auto removes_more = [](const StabilityPoint& a, const StabilityPoint& b) {
-    return a.material_removal_rate > b.material_removal_rate;
+  peaks = pick(peaks, static_cast<int>(peaks.size()), removesMore);
+  for (StabilityPoint& best : peaks) best = farthestFromFlanks(chart.limit, cuts, best);
+  peaks = pick(peaks, static_cast<int>(peaks.size()), removesMore);  // some have moved to the same place
+  chart.recommended = borne(std::move(peaks));
+}
+
+/// The best of these, as deep as collocation says that they are borne: zero-order limits do not know every
+/// loss. What it refuses is tried again less deep, in the order of what is removed then.
+std::vector<StabilityPoint> ChartMaker::borne(std::vector<StabilityPoint> peaks) const {
+  constexpr double LESS = 0.95, LEAST = 0.2;  // [1] of the depth at each try; then the point is given up
+  const std::optional<UncertainSystem> uncertain = uncertainSystem({});
+  RiskOptions options;
+  options.risk = parameters_.risk;
+  options.speed_margin = parameters_.speed_margin;
+  std::optional<DrawnMachines> machines;
+  if (parameters_.risk > 0.0 && uncertain) machines.emplace(*uncertain, options);
+  const bool mean_known = byCollocation();  // the chart's own limits are collocation's
+  const auto bears = [&](const StabilityPoint& cut) {
+    if (!machines) return true;
+    const double depth = cut.axial_depth / (1.0 - parameters_.depth_margin);
+    return (mean_known || machines->meanBears(cut.spindle_speed, depth)) &&
+           machines->probability(cut.spindle_speed, cut.axial_depth).has_value();
   };
-  chart.recommended = pick(peaks, parameters_.recommended, removes_more);
-  for (StabilityPoint& best : chart.recommended) best = farthestFromFlanks(chart.limit, cuts, best);
-  std::stable_sort(chart.recommended.begin(), chart.recommended.end(), removes_more);
+  std::stable_sort(peaks.begin(), peaks.end(), removesMore);
+  std::map<double, double> least;  // [m] by speed
+  for (const StabilityPoint& cut : peaks) least[cut.spindle_speed] = LEAST * cut.axial_depth;
+  std::vector<StabilityPoint> found;
+  while (!peaks.empty() && static_cast<int>(found.size()) < parameters_.recommended) {
+    const StabilityPoint cut = peaks.front();
+    peaks.erase(peaks.begin());
+    if (bears(cut)) {
+      found.push_back(cut);
+      continue;
+    }
+    const StabilityPoint less =
+        point(cut.spindle_speed, LESS * cut.axial_depth, cut.depth_limit, cut.chatter_frequency);
+    if (less.axial_depth > least[less.spindle_speed])
+      peaks.insert(std::upper_bound(peaks.begin(), peaks.end(), less, removesMore), less);
+  }
+  return found;
 }
 
 void ChartMaker::proposeUnstable(StabilityChart& chart, const StabilityLimit& wide) const {

@@ -12,9 +12,10 @@ void declarePoints(ChartParameters& p, ParameterTable& table) {
                "recommended depths stay this share below the limit");
   table.number("speed_margin", p.speed_margin, "1", Range::openHigh(0.0, 0.2),
                "and below it also for speeds this much off");
-  table.number("risk", p.risk, "1", Range::closed(0.0, 0.5),
-               "largest probability of chatter of a recommended cut, by the deviations of what was measured; "
-               "needs modes (tool/modes); 0: not asked for");
+  table.number(
+      "risk", p.risk, "1", Range::closed(0.0, 0.5),
+      "largest probability of chatter of a recommended cut, by the deviations of what was measured, by "
+      "zero-order theory and by collocation; needs modes (tool/modes); 0: not asked for");
   table.number("frequency_std", p.frequency_std, "1", Range::openHigh(0.0, 0.2),
                "deviation of a mode's frequency besides its estimate's: a spindle that turns and warms up is "
                "not the one tapped at rest");

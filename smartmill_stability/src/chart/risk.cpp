@@ -27,37 +27,35 @@ std::unique_ptr<FloquetSolver> solverOf(const RegenerativeSystem& system) {
   return makeFloquetSolver(Method::collocation, system, options);
 }
 
-/// Drawn machines, made when they are asked for.
-class Drawn {
- public:
-  Drawn(const UncertainSystem& system, const RiskOptions& options)
-      : system_(system), options_(options), random_(options.seed) {}
-
-  /// Share of the machines that chatter at a speed or a margin beside it; nothing as soon as it is above the
-  /// risk.
-  std::optional<double> probability(double speed, double depth) {
-    int chattering = 0;
-    for (int i = 0; i < options_.draws; ++i) {
-      while (static_cast<int>(solvers_.size()) <= i) solvers_.push_back(solverOf(system_.draw(random_)));
-      for (const double side : {0.0, options_.speed_margin, -options_.speed_margin}) {
-        const auto& solver = solvers_[static_cast<std::size_t>(i)];
-        if (solver->multiplier(speed * (1.0 + side), depth).radius() <= 1.0) continue;
-        ++chattering;
-        break;
-      }
-      if (chattering > options_.risk * options_.draws) return std::nullopt;
-    }
-    return static_cast<double>(chattering) / options_.draws;
+bool bears(const FloquetSolver& solver, double speed, double depth, double margin) {
+  for (const double side : {0.0, margin, -margin}) {
+    if (solver.multiplier(speed * (1.0 + side), depth).radius() > 1.0) return false;
   }
-
- private:
-  const UncertainSystem& system_;
-  RiskOptions options_;
-  std::mt19937_64 random_;
-  std::vector<std::unique_ptr<FloquetSolver>> solvers_;
-};
+  return true;
+}
 
 }  // namespace
+
+DrawnMachines::DrawnMachines(const UncertainSystem& system, const RiskOptions& options)
+    : system_(system), options_(options), random_(options.seed), mean_(solverOf(system.mean())) {
+  if (options.draws < 1) throw Error("draws: " + std::to_string(options.draws) + ", at least 1 is due");
+}
+
+DrawnMachines::~DrawnMachines() = default;
+
+std::optional<double> DrawnMachines::probability(double speed, double depth) {
+  int chattering = 0;
+  for (int i = 0; i < options_.draws; ++i) {
+    while (static_cast<int>(drawn_.size()) <= i) drawn_.push_back(solverOf(system_.draw(random_)));
+    chattering += !bears(*drawn_[static_cast<std::size_t>(i)], speed, depth, options_.speed_margin);
+    if (chattering > options_.risk * options_.draws) return std::nullopt;
+  }
+  return static_cast<double>(chattering) / options_.draws;
+}
+
+bool DrawnMachines::meanBears(double speed, double depth) const {
+  return bears(*mean_, speed, depth, options_.speed_margin);
+}
 
 UncertainSystem measuredSystem(const RegenerativeSystem& system, const ModalModel& x, const ModalModel& y,
                                const CoefficientSet& coefficients, const LeastDeviations& least) {
@@ -127,7 +125,7 @@ std::optional<StableSpeed> stableSpeed(const UncertainSystem& system, double dep
   constexpr double STEP = 0.004;  // [1] between speeds that are tried
   if (!(depth > 0.0) || !(low > 0.0) || !(high >= low))
     throw Error("stable speed: a depth above 0 and 0 < low <= high are due");
-  if (options.draws < 1) throw Error("draws: " + std::to_string(options.draws) + ", at least 1 is due");
+  DrawnMachines drawn(system, options);
   const auto mean = solverOf(system.mean());
   std::vector<double> speeds;
   std::vector<bool> stable;
@@ -135,7 +133,6 @@ std::optional<StableSpeed> stableSpeed(const UncertainSystem& system, double dep
     speeds.push_back(s);
     stable.push_back(mean->multiplier(s, depth).radius() < 1.0);
   }
-  Drawn drawn(system, options);
   for (std::size_t k = speeds.size(); k-- > 0;) {
     std::size_t below = k, above = k;
     while (stable[k] && below > 0 && stable[below - 1]) --below;

@@ -165,12 +165,8 @@ void ChatterDetector::handle(const SpindleAngle& angle) {
     angles_.push_back({angle.stamp, angle.angle, angle.angle});
     return;
   }
-  const Angle last = angles_.back();
-  if (!(angle.stamp > last.time)) return;
-  // The speed tells how many full turns lie between two readings.
-  const double expected = last.turned + angle.speed * (angle.stamp - last.time);
-  const double turns = std::round((expected - angle.angle) / units::TWO_PI);
-  angles_.push_back({angle.stamp, std::max(last.turned, angle.angle + units::TWO_PI * turns), angle.angle});
+  if (!(angle.stamp > angles_.back().time)) return;
+  angles_.push_back(angles_.back().next(angle));
   evaluate();
 }
 

@@ -1,5 +1,7 @@
 #include "node/bag_charts.h"
 
+#include <type_traits>
+
 #include "node/wiring.h"
 #include "smartmill_core/error.h"
 #include "smartmill_ros/bag_reader.h"
@@ -13,13 +15,26 @@ BagCharts chartsFromBag(const std::string& path, const MachineModel& model, cons
   SortedDetection detection(parameters.chatter, parameters.hold_back,
                             [&](const ChatterState& state) { found.states.push_back(state); });
   BagReader bag(path);
-  connectMeasured(bag, [&](const auto& measured) { maker.handle(measured); });
+  std::optional<FoundCurves> curves;
+  connectMeasured(bag, [&](const auto& measured) {
+    if constexpr (std::is_same_v<std::decay_t<decltype(measured)>, FoundCurves>) {
+      curves = measured;
+    } else {
+      maker.handle(measured);
+    }
+  });
   feed<smartmill_msgs::CuttingCondition>(bag, names::CUTTING_CONDITION, detection);
   connect(bag, parameters, detection);
   bag.run(progress);
   detection.flush();
   found.missing = maker.missing();
   if (found.missing.empty()) found.chart = maker.chart();
+  if (!parameters.force_curve.empty()) {
+    curves.emplace();
+    curves->curves = readForceCurves(parameters.force_curve);
+    curves->teeth = maker.teeth();
+  }
+  if (curves) found.bistable = bistableChart(maker, parameters.chart, *curves, parameters.bistable_speeds);
   return found;
 }
 

@@ -6,13 +6,15 @@
 #include <vector>
 
 #include "node/parameters.h"
+#include "smartmill_stability/chart/bistable_chart.h"
 
 namespace smartmill::stability {
 
 /// What the node would have published.
 struct BagCharts {
-  std::optional<StabilityChart> chart;  ///< the last one
-  std::string missing;                  ///< why there is none
+  std::optional<StabilityChart> chart;    ///< the last one
+  std::string missing;                    ///< why there is none
+  std::optional<BistableChart> bistable;  ///< by the last force curve
   std::vector<ChatterState> states;
 };
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include <smartmill_msgs/BistableChart.h>
 #include <smartmill_msgs/ChatterAdvice.h>
 #include <smartmill_msgs/ChatterState.h>
 #include <smartmill_msgs/StabilityChart.h>
@@ -63,12 +64,18 @@ StabilityNode::StabilityNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
       chart_(nh.advertise<smartmill_msgs::StabilityChart>(names::STABILITY_CHART, 1, true)),
       chatter_(nh.advertise<smartmill_msgs::ChatterState>(names::CHATTER_STATE, STREAM_QUEUE, true)),
       advice_(nh.advertise<smartmill_msgs::ChatterAdvice>(names::CHATTER_ADVICE, 10, true)),
+      bistable_(nh.advertise<smartmill_msgs::BistableChart>(names::BISTABLE_CHART, 1, true)),
       predict_(nh.advertiseService(names::PREDICT_STABILITY, &StabilityNode::predict, this)),
       overrides_(nh.serviceClient<smartmill_msgs::SetOverrides>(names::SET_OVERRIDES)) {
   ros::NodeHandle aside(nh);
   aside.setCallbackQueue(&what_if_queue_);
   what_if_ = aside.advertiseService(names::WHAT_IF, &StabilityNode::whatIf, this);
   what_if_spinner_.start();
+  if (!parameters_.force_curve.empty()) {
+    curves_.emplace();
+    curves_->curves = readForceCurves(parameters_.force_curve);
+    curves_->teeth = maker_.teeth();
+  }
   listen();
   shell_.diagnose("stability chart", [this](auto& status) { diagnoseChart(status); });
   shell_.diagnose("chatter detection", [this](auto& status) { diagnoseChatter(status); });
@@ -96,7 +103,11 @@ void StabilityNode::listen() {
 
 template <typename Measured>
 void StabilityNode::measured(const Measured& measured) {
-  {
+  bistable_due_ = true;
+  if constexpr (std::is_same_v<Measured, FoundCurves>) {
+    if (parameters_.force_curve.empty()) curves_ = measured;
+    return;
+  } else {
     const std::lock_guard<std::mutex> lock(maker_mutex_);
     maker_.handle(measured);
   }
@@ -239,7 +250,48 @@ bool StabilityNode::whatIf(smartmill_msgs::WhatIf::Request& request,
   return true;
 }
 
+void StabilityNode::startBistable() {
+  if (!bistable_due_ || bistable_chart_.valid() || !curves_ || !maker_.system({})) return;
+  bistable_due_ = false;
+  bistable_chart_ = std::async(std::launch::async, [maker = maker_, chart = parameters_.chart,
+                                                    curves = *curves_, speeds = parameters_.bistable_speeds] {
+    return bistableChart(maker, chart, curves, speeds);
+  });
+}
+
+void StabilityNode::publishBistable() {
+  if (!bistable_chart_.valid() ||
+      bistable_chart_.wait_for(std::chrono::seconds(0)) != std::future_status::ready)
+    return;
+  bistable_problem_.clear();
+  try {
+    const std::optional<BistableChart> chart = bistable_chart_.get();
+    if (!chart) return;
+    smartmill_msgs::BistableChart message;
+    message.header.stamp = fromSec(chart->stamp);
+    message.tool = chart->tool;
+    message.material = chart->material;
+    message.entry_angle = chart->entry;
+    message.exit_angle = chart->exit;
+    message.feed_per_tooth = chart->feed;
+    message.mean_chip = chart->mean_chip;
+    message.tangential_slope = chart->slope;
+    for (const BistableLimit& limit : chart->limits) {
+      message.spindle_speed.push_back(limit.speed);
+      message.small_depth_limit.push_back(limit.small.depth);
+      message.large_depth_limit.push_back(limit.large.depth);
+      message.secant_depth_limit.push_back(limit.secant.depth);
+    }
+    bistable_.publish(message);
+  } catch (const Error& error) {
+    bistable_problem_ = error.what();
+    ROS_ERROR("stability by the force curve: %s", error.what());
+  }
+}
+
 void StabilityNode::watch() {
+  publishBistable();
+  startBistable();
   // End of data: nothing more will come to release what waits.
   if (shell_.inputs().any().ended()) detection_.flush();
 }
@@ -253,6 +305,7 @@ void StabilityNode::diagnoseChart(diagnostic_updater::DiagnosticStatusWrapper& s
   } else {
     status.summary(diagnostic_msgs::DiagnosticStatus::OK, "chart published");
   }
+  if (!bistable_problem_.empty()) status.add("by the force curve", bistable_problem_);
 }
 
 void StabilityNode::diagnoseChatter(diagnostic_updater::DiagnosticStatusWrapper& status) {

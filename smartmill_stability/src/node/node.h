@@ -2,6 +2,7 @@
 
 #include <future>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <type_traits>
 
@@ -16,7 +17,9 @@
 #include <smartmill_msgs/WhatIf.h>
 
 #include "node/parameters.h"
+#include "smartmill_core/cutting/force_curve.h"
 #include "smartmill_ros/node_shell.h"
+#include "smartmill_stability/chart/bistable_chart.h"
 #include "smartmill_stability/chatter/chatter_advice.h"
 #include "smartmill_stability/control/milling_control.h"
 
@@ -56,6 +59,9 @@ class StabilityNode {
   bool predict(smartmill_msgs::PredictStability::Request& request,
                smartmill_msgs::PredictStability::Response& response);
   bool whatIf(smartmill_msgs::WhatIf::Request& request, smartmill_msgs::WhatIf::Response& response);
+  /// Makes the chart of small and large vibrations aside, where what it needs is there.
+  void startBistable();
+  void publishBistable();
   void watch();
   void diagnoseChart(diagnostic_updater::DiagnosticStatusWrapper& status);
   void diagnoseChatter(diagnostic_updater::DiagnosticStatusWrapper& status);
@@ -70,10 +76,15 @@ class StabilityNode {
   std::string chart_problem_;  // why the last chart could not be made
   ChatterState last_state_;
 
-  ros::Publisher chart_, chatter_, advice_;
+  ros::Publisher chart_, chatter_, advice_, bistable_;
   ros::ServiceServer predict_;
   ros::ServiceClient overrides_;
   std::future<smartmill_msgs::SetOverrides::Response> answer_;  // of the wish that is on its way
+
+  std::optional<FoundCurves> curves_;
+  bool bistable_due_ = false;
+  std::future<std::optional<BistableChart>> bistable_chart_;  // that is being made
+  std::string bistable_problem_;
 
   // What if is asked in a thread of its own: chatter must not wait for it.
   std::mutex maker_mutex_;

@@ -13,6 +13,8 @@ namespace smartmill::stability {
 struct NodeParameters {
   std::string model;
   ChartParameters chart;
+  int bistable_speeds = 40;
+  std::string force_curve;
   ChatterParameters chatter;
   std::string chatter_signal = "force";
   MillingControlParameters control;
@@ -26,6 +28,13 @@ struct NodeParameters {
     table.atLaunch("model", model,
                    "path of a smartmill-model/1 file; it gives the tool and the spindle's limits");
     chart.declare(table);
+    table.section("Small and large vibrations by a force curve (material/force_curve): stability/bistable.");
+    table.number("bistable_speeds", bistable_speeds, "1", Range::closed(0, 10000),
+                 "evenly from low to high; 0 or 1: none is made");
+    table.text(
+        "force_curve", force_curve,
+        "path of a smartmill-force-curve/1 file (force_law --curve) in the place of material/force_curve; "
+        "empty: the topic");
     table.section("Chatter in the running cut.");
     chatter.declare(table);
     table.choice(

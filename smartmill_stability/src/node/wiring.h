@@ -3,6 +3,7 @@
 #include "node/parameters.h"
 #include "smartmill_core/names.h"
 #include "smartmill_ros/feed.h"
+#include "smartmill_ros/force_curve_message.h"
 
 namespace smartmill::stability {
 
@@ -29,6 +30,7 @@ void connectMeasured(Source& source, Use use) {
   on(names::TOOL_FRF, smartmill_msgs::Frf());
   on(names::TOOL_MODES, smartmill_msgs::ModalModel());
   on(names::COEFFICIENTS, smartmill_msgs::CuttingCoefficients());
+  on(names::FORCE_CURVE, smartmill_msgs::ForceCurve());
 }
 
 }  // namespace smartmill::stability

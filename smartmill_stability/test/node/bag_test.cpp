@@ -1,3 +1,7 @@
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <rosbag/bag.h>
@@ -6,6 +10,7 @@
 #include "smartmill_core/names.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_ros/conversions.h"
+#include "smartmill_ros/force_curve_message.h"
 #include "smartmill_ros/testing/shipped_parameters.h"
 #include "smartmill_stability/control/control_stream.h"
 #include "smartmill_stability_testing/benchmark.h"
@@ -25,6 +30,8 @@ class Recorder {
   void operator()(const SpindleAngle& a) { write(names::SPINDLE_ANGLE, toMsg(a)); }
   void operator()(const ForceBlock& b) { write(names::FORCE_COMPENSATED, toMsg(b, "machine")); }
   void operator()(const MeasuredFrf& f) { write(names::TOOL_FRF, toMsg(f)); }
+  void operator()(const MeasuredModes& m) { write(names::TOOL_MODES, toMsg(m)); }
+  void operator()(const FoundCurves& f) { write(names::FORCE_CURVE, toMsg(f)); }
   void operator()(const CoefficientSet& s) { write(names::COEFFICIENTS, toMsg(s)); }
 
  private:
@@ -75,6 +82,77 @@ TEST(Bag, givesTheChartAndVerdictsOfTheLiveClasses) {
   }
   EXPECT_GT(valid, 10);
   EXPECT_EQ(chatter, valid);
+}
+
+MeasuredModes modes(const char* direction) {
+  MeasuredModes m;
+  m.stamp = 1.0;
+  m.tool = "tool";
+  m.point = POINT_TOOL_TIP;
+  m.direction = direction;
+  Mode mode;
+  mode.frequency = 900.0;
+  mode.damping_ratio = 0.03;
+  mode.gain = 1.0 / 2e7;
+  m.model.modes = {mode};
+  return m;
+}
+
+/// Kc h + Ke: a straight line in splines has its values at Greville's abscissae.
+FoundCurves straight(double kc, double ke, int teeth) {
+  constexpr int PIECES = 8;
+  constexpr double TOP = 2e-4;
+  FoundCurves found;
+  found.stamp = 2.0;
+  found.material = "steel";
+  found.teeth = teeth;
+  const auto knot = [&](int k) { return TOP * std::clamp(k, 0, PIECES) / PIECES; };
+  for (auto [curve, share] : {std::pair{&found.curves.tangential, 1.0}, {&found.curves.radial, 0.3}}) {
+    for (int k = 0; k <= PIECES; ++k) curve->knots.push_back(knot(k));
+    for (int k = 0; k < PIECES + 3; ++k)
+      curve->value.push_back(share * (kc * (knot(k - 2) + knot(k - 1) + knot(k)) / 3.0 + ke));
+    curve->std_dev.assign(PIECES + 1, 0.0);
+  }
+  return found;
+}
+
+// Of a straight law the slope is what counts for small and large vibrations alike: the limits of its Kc.
+TEST(Bag, givesTheLimitsByItsForceCurve) {
+  const TemporaryFolder folder;
+  const std::string file = folder.file("run.bag");
+  CoefficientSet set = coefficients();
+  set.value.ktc = 1.3e9;  // the curve stands in its place
+  const double kc = 700e6;
+  {
+    Recorder bag(file);
+    bag(modes("x"));
+    bag(modes("y"));
+    bag(set);
+    bag(straight(kc, 10e3, machine().needTool("cut").teeth));
+  }
+  NodeParameters p = parameters();
+  p.chart.use_modes = true;
+  p.bistable_speeds = 8;
+  const BagCharts found = chartsFromBag(file, machine(), p);
+  ASSERT_TRUE(found.bistable);
+  EXPECT_EQ(found.bistable->material, "steel");
+  EXPECT_NEAR(found.bistable->slope, kc, 1e-4 * kc);
+  ASSERT_EQ(found.bistable->limits.size(), 8u);
+  ChartMaker maker(p.chart, machine());
+  maker.handle(modes("x"));
+  maker.handle(modes("y"));
+  maker.handle(set);
+  RegenerativeSystem linear = *maker.system({});
+  linear.kt = kc;
+  linear.kr = 0.3 * kc;
+  const auto solver = makeSolver(Method::collocation, linear, {});
+  for (const BistableLimit& b : found.bistable->limits) {
+    const Limit limit = solver->limit(b.speed, p.chart.max_depth);
+    if (!std::isfinite(limit.depth)) continue;
+    EXPECT_NEAR(b.small.depth, limit.depth, 2e-3 * limit.depth) << b.speed;
+    EXPECT_NEAR(b.large.depth, limit.depth, 2e-3 * limit.depth) << b.speed;
+    EXPECT_LT(b.secant.depth, 0.95 * limit.depth) << b.speed;
+  }
 }
 
 TEST(Bag, saysWhatIsMissing) {

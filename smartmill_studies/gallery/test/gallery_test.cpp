@@ -42,6 +42,42 @@ TEST(Gallery, theLoadMetersNumbersComeBack) {
   }
 }
 
+Drawn drawn(const std::string& name, const std::string& folder, unsigned seed) {
+  for (const Figure& figure : allFigures())
+    if (figure.name == name) return figure.draw(folder, seed);
+  ADD_FAILURE() << "no figure is called " << name;
+  return {};
+}
+
+// Weights, the table dynamometer and the square of the speed (Burzoni eq. 3-6) tell what is right.
+TEST(Gallery, theSpindleSensorTellsWeightsAndUnbalance) {
+  const TemporaryFolder folder;
+  for (const char* name : {"burzoni_13", "burzoni_16"}) {
+    const Drawn found = drawn(name, folder.file(""), 2);
+    ASSERT_EQ(found.pictures.size(), 1u) << name;
+    EXPECT_GT(std::filesystem::file_size(found.pictures[0]), 20000u);
+    ASSERT_GE(found.rows.size(), 2u);
+    for (std::size_t i = 0; i < 2; ++i)
+      EXPECT_EQ(found.rows[i].verdict, Verdict::agrees) << found.rows[i].what << ": " << found.rows[i].ours;
+  }
+}
+
+// The force behind the current is put in.
+TEST(Gallery, theCurrentTellsTheForce) {
+  const TemporaryFolder folder;
+  for (const Compared& row : drawn("cheng_5", folder.file(""), 2).rows)
+    EXPECT_EQ(row.verdict, Verdict::agrees) << row.what << ": " << row.ours;
+}
+
+// Struck above its tip a tool shows stiffer than it is; the beam's shape tells how much, mode by mode.
+TEST(Gallery, theHammersOffsetStiffens) {
+  const TemporaryFolder folder;
+  const Drawn found = drawn("dunwoody_4_5", folder.file(""), 2);
+  ASSERT_EQ(found.rows.size(), 6u);
+  EXPECT_EQ(found.rows[1].verdict, Verdict::agrees) << found.rows[1].ours;
+  EXPECT_EQ(found.rows[3].verdict, Verdict::better) << found.rows[3].ours;
+}
+
 TEST(Gallery, thePageOpensWithTheCounts) {
   const TemporaryFolder folder;
   const Figure figure{"one", "A <figure>", nullptr};

@@ -336,16 +336,16 @@ class TuningStudy {
   }
 
   void draw(const std::string& picture) const {
-    std::vector<std::pair<std::string, TuningMap>> maps{{"sensor as measured", map_}};
+    std::vector<NamedMap> maps{{"sensor as measured", map_, cuts_}};
     for (const double k : {-3.0, -2.0, 2.0, 3.0}) {
       const std::string name = formatted("%+.0f standard deviations", k);
-      maps.emplace_back(name,
-                        tapMap(plantAt(taps_, frf_, rate(), k), sensor_, rate(), r_taps_, speeds_, BAND));
+      maps.push_back(
+          {name, tapMap(plantAt(taps_, frf_, rate(), k), sensor_, rate(), r_taps_, speeds_, BAND), cuts_});
       std::printf("plant at %s: best q at 9300 rpm 2^%d, at 17600 rpm 2^%d\n", name.c_str(),
-                  maps.back().second.best(units::radPerSecFromRpm(9300.0)),
-                  maps.back().second.best(units::radPerSecFromRpm(17600.0)));
+                  maps.back().map.best(units::radPerSecFromRpm(9300.0)),
+                  maps.back().map.best(units::radPerSecFromRpm(17600.0)));
     }
-    drawMaps(maps, cuts_, picture);
+    drawMaps(maps, picture);
     std::printf("maps drawn to %s\n", picture.c_str());
   }
 

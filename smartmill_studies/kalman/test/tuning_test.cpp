@@ -116,7 +116,7 @@ TEST(Tuning, DrawsTheMap) {
     map.rmse.push_back({1.0 + std::abs(n - 12), 1.0 + std::abs(n - 14), 1.0 + std::abs(n - 16)});
   EXPECT_EQ(map.best(190.0), 14);
   const std::string png = (std::filesystem::temp_directory_path() / "smartmill_tuning_test.png").string();
-  drawMaps({{"a", map}, {"b", map}}, {{200.0, 15}}, png);
+  drawMaps({{"a", map, {{200.0, 15}}}, {"b", map, {}}}, png);
   EXPECT_GT(std::filesystem::file_size(png), 1000u);
   std::filesystem::remove(png);
 }

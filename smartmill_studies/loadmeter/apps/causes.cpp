@@ -26,14 +26,15 @@ constexpr double SAMPLES = 3840.0;  // of a record of 0.15 s at 25.6 kHz
 struct Options {
   std::vector<std::string> reports;
   int shops = 200, explained = 30, newcomers = 50;
-  double ratio = 0.6;
+  double ratio = 0.6, scatter = 0.0;
   unsigned seed = 1;
 };
 
 /// One machine: a cause (the number of a report) of a size.
 class Draw {
  public:
-  Draw(const std::vector<ModelImprovement>& causes, const Options& o) : causes_(causes), random_(o.seed) {
+  Draw(const std::vector<ModelImprovement>& causes, const Options& o)
+      : causes_(causes), random_(o.seed), scatter_(o.scatter) {
     for (std::size_t c = 0; c < causes.size(); ++c) weights_.push_back(std::pow(o.ratio, double(c)));
   }
   /// Which causes are frequent differs from shop to shop.
@@ -47,7 +48,8 @@ class Draw {
         std::count_if(weights_.begin(), weights_.end(), [&](double w) { return w > weights_[cause]; }));
   }
   /// What an explanation of the whole plan would show: squares over the noise grow with the size's square,
-  /// and scatter by 4 m / n about their mean m over n samples (noncentral chi-square).
+  /// and scatter by 4 m / n about their mean m over n samples (noncentral chi-square). Its profile may differ
+  /// from the report's, each square by a logarithm of its own.
   ModelImprovement machine(const std::string& name, std::size_t cause) {
     const double size =
         std::exp(std::uniform_real_distribution<double>(std::log(0.1), std::log(1.5))(random_));
@@ -59,6 +61,7 @@ class Draw {
       for (auto& [channel, gap] : test["gaps"].items()) {
         const double before = gap[0], after = gap[1];
         double lost = std::max(0.0, before * before - after * after) * size * size;
+        if (scatter_ > 0.0) lost *= std::exp(scatter_ * normal(random_));
         lost += std::sqrt(4.0 * lost / (channel == "load_meter" ? 1.0 : SAMPLES)) * normal(random_);
         gap = {std::sqrt(std::max(0.0, 1.0 + lost)), 1.0};
       }
@@ -70,6 +73,7 @@ class Draw {
  private:
   const std::vector<ModelImprovement>& causes_;
   std::mt19937_64 random_;
+  double scatter_;  // [1] standard deviation of the logarithm
   std::vector<double> weights_;
 };
 
@@ -85,25 +89,24 @@ struct Count {
 
 enum class Way { fleet, alone, plan };
 
-/// @param due the truth's place among the fleet's causes; causes.size() + 1: none of these
-void search(const FleetCauses& fleet, const ModelImprovement& machine, std::size_t due, Way way,
-            Count* count) {
+/// @param search fresh @param due the truth's place among the fleet's causes; causes.size() + 1: none of
+/// these
+void tell(CauseSearch search, const std::vector<std::string>& tests, const ModelImprovement& machine,
+          std::size_t due, Way way, const std::vector<Count*>& counts) {
   std::map<std::string, Outcome> shows;
   for (const TestEvidence& t : evidenceOf(machine)) shows[t.test] = outcomeOf(t);
-  std::vector<double> odds;
-  for (const FleetCause& c : fleet.causes)
-    odds.push_back(way == Way::fleet ? c.odds : 1.0 / static_cast<double>(fleet.causes.size()));
-  CauseSearch search(fleet, odds);
-  ++count->machines;
-  for (std::size_t made = 0; made <= fleet.tests.size(); ++made) {
+  for (Count* count : counts) ++count->machines;
+  for (std::size_t made = 0; made <= tests.size(); ++made) {
     if (const auto alone = search.alone()) {
-      (*alone == due ? count->right : count->wrong) += 1;
-      if (*alone == due) count->tests += static_cast<double>(made);
+      for (Count* count : counts) {
+        (*alone == due ? count->right : count->wrong) += 1;
+        if (*alone == due) count->tests += static_cast<double>(made);
+      }
       return;
     }
     const auto test = way == Way::plan ? std::optional<std::size_t>(made) : search.next();
-    if (!test || *test >= fleet.tests.size()) return;
-    search.saw(*test, shows[fleet.tests[*test]]);
+    if (!test || *test >= tests.size()) return;
+    search.saw(*test, shows[tests[*test]]);
   }
 }
 
@@ -124,6 +127,10 @@ void run(const Options& o) {
     for (int m = 0; m < o.explained; ++m)
       known.push_back(draw.machine("m" + std::to_string(m), draw.cause()));
     const FleetCauses fleet = fleetCauses(known, "");
+    std::vector<double> odds;
+    for (const FleetCause& c : fleet.causes) odds.push_back(c.odds);
+    const CauseSearch by_fleet(fleet, odds),
+        by_none(fleet, std::vector<double>(odds.size(), 1.0 / static_cast<double>(odds.size())));
     for (int m = 0; m < o.newcomers; ++m) {
       const std::size_t truth = draw.cause();
       const ModelImprovement machine = draw.machine("new", truth);
@@ -133,8 +140,10 @@ void run(const Options& o) {
       const bool met = at != fleet.causes.end();
       const auto due = met ? static_cast<std::size_t>(at - fleet.causes.begin()) : fleet.causes.size() + 1;
       for (const Way way : {Way::fleet, Way::alone, Way::plan}) {
-        search(fleet, machine, due, way, &all[way]);
-        search(fleet, machine, due, way, &(!met ? unmet : draw.rankOf(truth) < 2 ? frequent : rare)[way]);
+        tell(way == Way::fleet ? by_fleet : by_none, fleet.tests, machine, due, way,
+             {&all[way], &(!met                     ? unmet
+                           : draw.rankOf(truth) < 2 ? frequent
+                                                    : rare)[way]});
       }
     }
   }
@@ -164,6 +173,10 @@ int main(int argc, char** argv) {
   line.option("--ratio", o.ratio, "frequency of each cause to the next more frequent one")
       .showDefault()
       .within(0.01, 1.0);
+  line.option("--scatter", o.scatter,
+              "of a machine's squares about the report's, standard deviation of the logarithm")
+      .showDefault()
+      .within(0.0, 3.0);
   line.option("--seed", o.seed, "of the draws").showDefault();
   return runProgram(line, argc, argv, [&] { run(o); });
 }

@@ -32,6 +32,13 @@ void row(const char* name, const std::array<double, 3>& e) {
   std::printf("  %-44s %7.1f %7.1f %7.1f\n", name, e[0], e[1], e[2]);
 }
 
+void variation(const DayErrors::Variation& v) {
+  row("  variation, RMSE X, Y, Z [N]", v.error);
+  row("  its stated deviation, root mean square [N]", v.stated);
+  std::printf("  %-44s %6.1f%% %6.1f%% %6.1f%%\n", "  within 0.674 std (50 %)", 100 * v.half[0],
+              100 * v.half[1], 100 * v.half[2]);
+}
+
 void tell(const char* name, const DayErrors& e) {
   std::printf("%s (%d, %d, %d cuts)\n", name, e.count[0], e.count[1], e.count[2]);
   row("regression, RMSE X, Y, tangential [N]", e.regression);
@@ -42,12 +49,14 @@ void tell(const char* name, const DayErrors& e) {
               100 * e.inside[1], 100 * e.inside[2]);
   std::printf("  %-44s %6.1f%% %6.1f%% %6.1f%%\n", "  within 1.96 std: dynamic", 100 * e.inside_rms[0],
               100 * e.inside_rms[1], 100 * e.inside_rms[2]);
+  variation(e.variation);
   std::printf("  %d windows of 0.5 s, ten a second while a cut is steady\n", e.windows);
   row("  RMSE X, Y, Z [N]", e.window);
   std::printf("  %-44s %6.1f%% %6.1f%% %6.1f%%\n", "  within 1.96 std: static", 100 * e.inside_window[0],
               100 * e.inside_window[1], 100 * e.inside_window[2]);
   std::printf("  %-44s %6.1f%% %6.1f%% %6.1f%%\n", "  within 1.96 std: dynamic", 100 * e.inside_window_rms[0],
               100 * e.inside_window_rms[1], 100 * e.inside_window_rms[2]);
+  variation(e.variation_window);
 }
 
 void run(int cuts, unsigned seed, double warmer, const std::string& out) {
@@ -64,6 +73,10 @@ void run(int cuts, unsigned seed, double warmer, const std::string& out) {
   const std::string name = "another day, " + std::to_string(static_cast<int>(warmer)) + " K warmer";
   tell(name.c_str(),
        judgeDay(standard, calibration, day("another day", {20.0 + warmer, seed + 2, cuts}, calibration)));
+  MotorDay no_lines{20.0 + warmer, seed + 2, cuts};
+  no_lines.rapid_moves = false;
+  tell((name + ", lags not known: no lines").c_str(),
+       judgeDay(standard, calibration, day("no lines", no_lines, calibration)));
   MotorDay with_sensor{20.0 + warmer, seed + 2, cuts};
   with_sensor.force_sensor = true;
   tell((name + ", with a force sensor").c_str(),

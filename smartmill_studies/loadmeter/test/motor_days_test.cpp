@@ -1,5 +1,8 @@
 #include "loadmeter/motor_days.h"
 
+#include <algorithm>
+#include <string>
+
 #include <gtest/gtest.h>
 
 namespace smartmill::loadmeter {
@@ -35,6 +38,16 @@ TEST(MotorDays, currentsOfTheTwinBecomeForces) {
     EXPECT_GT(errors.inside_window[a], 0.8);
     EXPECT_GT(errors.inside_window_rms[a], 0.8);
   }
+  // The drives follow to 60 Hz, as moves in rapid traverse told; the variation of the axes that move is known
+  // to few newtons then (8 N by mean forces and mechanics alone), and as well as it is stated.
+  for (std::size_t a = 0; a < 2; ++a) {
+    ASSERT_TRUE(warm.back().bandwidth[a]);
+    EXPECT_NEAR(warm.back().bandwidth[a]->value, 60.0, 3.0 * warm.back().bandwidth[a]->std_dev);
+    std::printf("variation: %.1f N, stated %.1f N\n", errors.variation.error[a], errors.variation.stated[a]);
+    EXPECT_LT(errors.variation.error[a], 5.0);
+    EXPECT_LT(errors.variation.error[a], 2.0 * errors.variation.stated[a]);
+    EXPECT_GE(errors.inside_rms[a], 0.8);
+  }
   // Table 1 of Cheng & Venuvinod has 29 N for a feed drive, 36 N for the tangential force.
   EXPECT_LT(errors.regression[0], 10.0);
   EXPECT_LT(errors.regression[1], 10.0);
@@ -49,6 +62,37 @@ TEST(MotorDays, currentsOfTheTwinBecomeForces) {
       EXPECT_LT(std::abs(cut.estimate->mean[a].value - cut.force[a]), 4.0 * cut.estimate->mean[a].std_dev);
       EXPECT_LT(std::abs(cut.estimate->rms[a].value - cut.rms[a]), 4.0 * cut.estimate->rms[a].std_dev);
     }
+  }
+}
+
+// No standard cuts: the session's own slots beside the twin's dynamometer, by the Hall sensors and by a
+// record of Servo Guide that begins at the block which feeds.
+TEST(MotorDays, aSessionCalibratesItself) {
+  for (const bool servo : {false, true}) {
+    MotorDay day;
+    day.cuts = 8;
+    day.diagonal = day.rapid_moves = false;
+    day.learn = day.force_sensor = true;
+    day.servo = servo;
+    const auto cuts = runDay(day, std::nullopt);
+    ASSERT_TRUE(cuts.back().learnt) << servo;
+    int drives = 0;
+    for (std::size_t a = 0; a < 2; ++a) {
+      const auto& drive = cuts.back().learnt->drive[a];
+      if (!drive) continue;
+      ++drives;
+      // AxisDrive has 628 N/A of the current that makes force, MotorTraits 200 N/A of a phase's range.
+      const double truth = servo ? 628.0 : 200.0;
+      EXPECT_NEAR(drive->newton_per_ampere.value, truth, 3.0 * drive->newton_per_ampere.std_dev)
+          << servo << a;
+      EXPECT_LT(drive->newton_per_ampere.std_dev, 0.1 * truth);
+      const auto& sources = cuts.back().estimate->sources;
+      if (cuts.back().cut.range[a]) {
+        EXPECT_NE(std::find(sources.begin(), sources.end(), std::string("motor_") + "xy"[a]), sources.end());
+        EXPECT_NE(servo, cuts.back().motors->other[a].has_value());  // a servo's current has a sign
+      }
+    }
+    EXPECT_GE(drives, 1);
   }
 }
 

@@ -5,6 +5,8 @@
 
 #include <gtest/gtest.h>
 
+#include "study_case.h"
+
 namespace smartmill::stability {
 namespace {
 
@@ -54,6 +56,24 @@ TEST(BulkCharts, whatIsKnownExactlyDoesNotChatter) {
     ASSERT_FALSE(found.chart.recommended.empty()) << seed;
     EXPECT_FALSE(found.chatters) << seed;
   }
+}
+
+// Case 116 of the study: 1.93 mm by zero-order theory, 0.84 mm by collocation, at the fastest speed, where
+// the best point of the zero-order chart chattered on the true machine and on every drawn one.
+TEST(BulkCharts, aLossThatZeroOrderTheoryDoesNotSeeIsRecommendedToNobody) {
+  std::mt19937_64 random(seedOfCase(1, 116));
+  const ChartMachine machine = drawChartMachine(random);
+  ChartParameters p = parameters();
+  p.speed_low = units::radPerSecFromRpm(3000.0);
+  p.speed_high = units::radPerSecFromRpm(24000.0);
+  p.speeds = 150;
+  p.frequency_std = ChartParameters{}.frequency_std;
+  p.gain_std = ChartParameters{}.gain_std;
+  const BulkChart found = bulkChart(machine, p, {}, random);
+  EXPECT_EQ(found.chart.method, "zero_order");
+  ASSERT_FALSE(found.chart.recommended.empty());
+  EXPECT_FALSE(found.chatters);
+  EXPECT_LE(found.probability, p.risk + 3.0 * std::sqrt(p.risk * (1.0 - p.risk) / 100.0));  // of 100 draws
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include <smartmill_msgs/SpindleAngle.h>
 
 #include <algorithm>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -45,6 +46,7 @@ class DamagedBag : public ::testing::Test {
       BagReader reader(file_);
       reader.on<smartmill_msgs::SampleBlock>(names::DYNAMOMETER, [](const auto& m, double) { fromMsg(m); });
       reader.on<smartmill_msgs::CncState>(names::CNC_STATE, [](const auto& m, double) { fromMsg(m); });
+      reader.on<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE, [](const auto&, double) {});
       reader.run();
     } catch (const Error& e) {
       return e.what();
@@ -92,6 +94,26 @@ TEST_F(DamagedBag, PackedBagsAreReadTheSame) {
       ASSERT_EQ(seen[static_cast<std::size_t>(i)], i ^ 1);
     }
   }
+}
+
+TEST_F(DamagedBag, APackedChunkOfAnotherChecksumIsRefused) {
+  {
+    rosbag::Bag bag(file_, rosbag::bagmode::Write);
+    bag.setCompression(rosbag::compression::LZ4);
+    for (int i = 0; i < 100; ++i)
+      bag.write(names::absolute(names::SPINDLE_ANGLE), ros::Time(1.0 + i), smartmill_msgs::SpindleAngle());
+    bag.close();
+  }
+  std::ifstream in(file_, std::ios::binary);
+  std::vector<char> bytes{std::istreambuf_iterator<char>(in), std::istreambuf_iterator<char>()};
+  ASSERT_EQ(fault(bytes), "");
+  const std::string magic = "\x04\x22\x4d\x18";  // of a frame; its length stands before it
+  const auto frame = std::search(bytes.begin(), bytes.end(), magic.begin(), magic.end());
+  ASSERT_NE(frame, bytes.end());
+  std::uint32_t length = 0;
+  std::memcpy(&length, &*frame - sizeof length, sizeof length);
+  *(frame + length - 1) ^= 1;  // the last of its checksum
+  EXPECT_NE(fault(bytes).find("another checksum than it tells"), std::string::npos) << fault(bytes);
 }
 
 // Where a chunk begins is believed of the index, but looked at.

@@ -12,6 +12,7 @@ struct DiscoveryParameters {
   std::string model;
   std::string record_folder;
   std::string folder;
+  std::string prior;
 
   std::vector<double> watch_speeds{418.9, 439.8, 397.9, 680.7, 471.2, 261.8};
   std::vector<double> watch_feeds{5.0e-5, 1.5e-4, 1.0e-4, 1.1e-4, 9.0e-5, 1.2e-4};

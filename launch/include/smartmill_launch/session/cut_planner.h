@@ -20,6 +20,7 @@ struct PathParameters {
   double safe_height = 10.0e-3;
   double plunge_feed = 20.0e-3;
   double spin_up_time = 3.0;
+  int feed_block = 0;
 
   void declareNames(ParameterTable& table);
   void declarePaths(ParameterTable& table);
@@ -59,6 +60,8 @@ class CutPlanner {
   /// @throws Error saying what does not fit machine or stock.
   PlannedCut slot(const SlotWish& wish) const;
   PlannedCut air(double speed, double time) const;
+  /// Along +x above the stock, as long as the time or the way asks, for the feed drives' friction.
+  PlannedCut airMove(double speed, double feed, double time, double way) const;
 
   /// NC program of a cut (dialect of smartmill_cnc), in increments from where the machine stands, free of
   /// work offsets. @param position [m] of the machine before it.
@@ -67,6 +70,7 @@ class CutPlanner {
  private:
   double spinUp(double speed) const;
   void checkSpeed(const std::string& name, double speed) const;
+  void checkTravel(const PlannedCut& cut) const;
   double laneY(std::size_t lane) const;
 
   PathParameters parameters_;

@@ -16,6 +16,8 @@ namespace smartmill::session {
 struct PlanParameters : PathParameters {
   std::vector<double> air_speeds{314.2, 628.3, 942.5, 1256.6};
   double air_time = 1.5;
+  std::vector<double> air_feeds;
+  double air_move_time = 1.2, air_way = 8.0e-3;
 
   double slot_speed = 418.9;
   double slot_depth = 1.0e-3;
@@ -52,6 +54,8 @@ class SessionPlan {
 
   const std::string& material() const { return planner_.material(); }
   const std::vector<PlannedCut>& airCuts() const { return air_cuts_; }
+  /// Moves in air along +x at the feeds that were asked for; none as shipped.
+  const std::vector<PlannedCut>& airMoves() const { return air_moves_; }
   const std::vector<PlannedCut>& slots() const { return slots_; }
   const std::optional<PlannedCut>& resonance() const { return resonance_; }
 
@@ -71,7 +75,7 @@ class SessionPlan {
  private:
   PlanParameters parameters_;
   CutPlanner planner_;
-  std::vector<PlannedCut> air_cuts_, slots_;
+  std::vector<PlannedCut> air_cuts_, air_moves_, slots_;
   std::optional<PlannedCut> resonance_;
 };
 

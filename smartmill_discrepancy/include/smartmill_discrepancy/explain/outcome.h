@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <string>
 #include <vector>
 
@@ -8,10 +9,11 @@
 
 namespace smartmill::discrepancy {
 
-/// What a model leaves of the records, over noise, and its RMS.
+/// What a model leaves of the records, over noise, and its RMS in all that is judged.
 struct Remains {
   std::vector<double> fit, heldout;
   GapPair gap;
+  std::map<std::string, double> chattering;  ///< prediction errors, as in ChatteringCut, by tests
 };
 Remains remainsOf(const Workbench& bench, const MachineModel& model);
 

@@ -18,6 +18,8 @@ namespace smartmill::discrepancy {
 struct Member {
   const Hypothesis* hypothesis = nullptr;
   std::vector<double> values;  ///< of its coordinates
+
+  bool operator==(const Member& o) const { return hypothesis == o.hypothesis && values == o.values; }
 };
 
 /// A point in the space of all models: nominal values and effects.
@@ -27,6 +29,10 @@ struct FitState {
   /// What is free of where the records lie (turnFreedoms() of each, in the runner's order), beside where they
   /// lay when they were loaded. Empty: there.
   std::vector<double> turns;
+
+  bool operator==(const FitState& o) const {
+    return nominal == o.nominal && members == o.members && turns == o.turns;
+  }
 };
 
 /// The same without one of its members.

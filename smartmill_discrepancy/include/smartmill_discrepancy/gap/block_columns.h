@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
 #include <vector>
 
 #include <Eigen/Core>
@@ -25,6 +26,9 @@ class BlockColumns {
   /// The last columns.
   BlockColumns right(Eigen::Index count) const;
 
+  /// Some of the samples, in rising order.
+  Eigen::MatrixXd rows(const std::vector<Eigen::Index>& samples) const;
+
   /// this' * this, this' * other, this' * vector.
   Eigen::MatrixXd gram() const;
   Eigen::MatrixXd cross(const BlockColumns& other) const;
@@ -42,8 +46,9 @@ class BlockColumns {
     std::vector<Eigen::Index> columns;  // that are not zero here
     Eigen::MatrixXd values;
   };
+  using Parts = std::vector<Part>;  // of each block
   Eigen::Index cols_ = 0;
-  std::vector<Part> parts_;  // of each block
+  std::shared_ptr<const Parts> parts_ = std::make_shared<const Parts>();  // copies share them
 };
 
 }  // namespace smartmill::discrepancy

@@ -14,6 +14,7 @@
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_discrepancy/data/dataset.h"
 #include "smartmill_discrepancy/data/phase.h"
+#include "smartmill_discrepancy/gap/whitening.h"
 #include "smartmill_sim/twin/cut_traces.h"
 #include "smartmill_sim/twin/twin.h"
 
@@ -27,6 +28,8 @@ struct Block {
   std::size_t size = 0;
   double noise = 0.0;               ///< [unit of the channel]
   const SlowMeans* slow = nullptr;  ///< values are these means, not the record's samples
+  bool judged = true;   ///< false: of a cut that chatters, which is fitted but takes no part in gaps
+  double counts = 0.0;  ///< [samples] that count
 };
 
 /// What a model says of each block, over its noise. Where nothing that a test knows of has changed, models
@@ -44,10 +47,15 @@ class TwinRunner {
   const std::vector<Block>& blocks() const { return blocks_; }
   const std::vector<std::size_t>& tests() const { return tests_; }
   std::size_t size() const { return size_; }
+  double counts() const;  ///< [samples] that count: less than size() where some are trusted less
   const Dataset& data() const { return data_; }
 
-  /// The records.
-  const std::vector<double>& measured() const { return measured_; }
+  /// The records, whitened as what simulates them is.
+  const std::vector<double>& measured() const { return whitened_.empty() ? measured_ : whitened_; }
+
+  /// From here on everything over the campaign is seen through these filters, one a block, or none at all:
+  /// samples of what is left then count once each.
+  void setWhitening(std::vector<Whitening> of_blocks);
 
   int threads() const { return threads_; }
 
@@ -58,6 +66,9 @@ class TwinRunner {
   /// Phases, speeds and entries of the dataset's records are others now; until then those of the last call
   /// stand.
   void readPhases();
+
+  /// Which tests are guided by themselves, and how far they are trusted, is told otherwise now.
+  void readGuidance();
 
   /// Whether tools with modes are guided by the displacement that cuts' records show, see SimulationOptions.
   void setGuided(bool guided);
@@ -92,12 +103,16 @@ class TwinRunner {
     Record record;
     CampaignTest test;
     double phase = 0.0, early_entry = 0.0;
+    bool guided = false;
     std::mutex mutex;
     std::vector<Shown> shown;  // of each channel
     std::unique_ptr<sim::CutTraces> traces;
 
     void forget();
   };
+  bool readTrust(std::size_t block);
+  void whitenRecords();
+  bool guides(std::size_t chosen) const { return guided_ || kept_[chosen].guided; }
   SimulatedBlocks simulateOne(const MachineModel& model, std::size_t chosen) const;
   SimulatedBlocks blocksOf(const MachineModel& model, std::size_t chosen, const CampaignTest& test,
                            const sim::SimulationOptions& options) const;
@@ -111,6 +126,8 @@ class TwinRunner {
   std::vector<std::size_t> first_block_;  // of each chosen test; one more at the end
   std::size_t size_ = 0;
   std::vector<double> measured_;
+  std::vector<Whitening> whitening_;  // of each block, or none
+  std::vector<double> whitened_;      // the records through them; empty: as they are
   std::vector<double> correction_;
   mutable std::atomic<std::size_t> simulations_{0};
 };
@@ -118,7 +135,8 @@ class TwinRunner {
 /// Sum of squares over noise that a simulation leaves of the records.
 double squaresLeft(const TwinRunner& runner, const std::vector<double>& simulated);
 
-/// Calls job(0) .. job(count - 1), spread over threads. @throws the first exception of a job, by index.
+/// Calls job(0) .. job(count - 1), spread over threads; within such a job, one after the other. @throws the
+/// first exception of a job, by index.
 void runParallel(std::size_t count, int threads, const std::function<void(std::size_t)>& job);
 
 }  // namespace smartmill::discrepancy

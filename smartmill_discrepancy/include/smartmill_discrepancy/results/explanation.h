@@ -76,6 +76,15 @@ struct SpectrumCurve {
   std::vector<double> frequency_hz, before, after;  ///< [Hz], [unit of the channel]
 };
 
+/// A cut that chatters, as it is predicted from one step to the next.
+struct ChatteringCut {
+  std::string test;
+  double frequency = 0.0, amplitude = 0.0;  ///< [Hz], [N] of the chatter
+  /// [1] RMS of what the prediction leaves over that of the channel about its mean, the largest of fx, fy,
+  /// tool_x and tool_y
+  double before = 0.0, after = 0.0;
+};
+
 struct GapPair {
   double fit = 0.0, heldout = 0.0;
 };
@@ -96,6 +105,7 @@ struct Explanation {
   std::vector<ChannelShare> channels;
   std::vector<TriedEffect> ladder;
   std::vector<std::string> notes;
+  std::vector<ChatteringCut> chattering;  ///< that took part in the fit
   std::vector<RevolutionCurve> revolutions;
   std::vector<SpectrumCurve> spectra;
   MachineModel model;        ///< the improved one, as written

@@ -4,6 +4,13 @@
 
 namespace smartmill::discrepancy {
 
+/// Rivals of fewer values than the member that they came near to are followed to where they fit best beside
+/// the others, so that the comparison begins there: where a search is guided its squares are smooth, those of
+/// a free simulation near a tool's limit are not.
+/// @param now where the search stands @param tangents there @param ladder receives the values
+void followSimpler(const Fitter& fitter, const Fit& now, const NominalTangents& tangents,
+                   std::vector<Rung>* ladder);
+
 /// Fits a state with every value free and simulated exactly, and measures what each member contributes and
 /// how its best rivals do in its place.
 /// @param result its ladder tells the rivals; best, contribution, needed and rivals are written

@@ -2,9 +2,11 @@
 
 #include <cstddef>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "smartmill_core/model/cause_odds.h"
 #include "smartmill_discrepancy/fit/fit.h"
 #include "smartmill_discrepancy/results/tried_effect.h"
 #include "smartmill_discrepancy/search/workbench.h"
@@ -17,8 +19,9 @@ struct SearchOptions {
   double least_gain = 100.0;  ///< [1] difference of BIC below which nothing is named
   double least_prior_gain =
       3.0;  ///< [1] the same where it comes from nominal values that need not be pulled off any more
-  double twin_accuracy = 2e-4;  ///< [1] of the signal, by which two faithful simulations differ
-  double least_share = 0.05;    ///< [1] of the squares above the noise that an effect must take
+  double twin_accuracy = 2e-4;     ///< [1] of the signal, by which two faithful simulations differ
+  double least_share = 0.05;       ///< [1] of the squares above the noise that an effect must take
+  std::optional<CauseOdds> prior;  ///< between names that the records do not part; names nothing
   std::function<void(const std::string&)> progress;
   /// Told after each stage which share of the work is done, should nothing more be found.
   std::function<void(double share)> course;

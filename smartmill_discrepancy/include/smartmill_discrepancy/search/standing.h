@@ -31,6 +31,9 @@ struct AskedShare {
 /// Of tests that tell the models apart; of none the deviation is infinite.
 AskedShare sharedBy(const std::vector<AskedTest>& tests);
 
+/// What each of a runner's tests asks for. @param between, left over the noise, laid out as its vectors
+std::vector<AskedTest> askedIn(const TwinRunner& runner, const double* between, const double* left);
+
 /// How one model stands against another in tests that it was not fitted to, and in those that it was.
 struct Standing {
   /// Standard deviations by which each group asks for more than half and less than one and a half: few tests
@@ -45,7 +48,19 @@ struct Standing {
   /// Probability that the less sure group asks for more than half and less than one and a half.
   double confidence() const;
   bool holds() const;
+
+  static bool holdsInFitted(const AskedShare& fitted) { return fitted.beyond() > FITTED_BEYOND; }
+  /// Held-out tests ask for less than half of it as surely as they must ask for more where it is named.
+  static bool isDenied(const AskedShare& heldout) {
+    return 0.5 - heldout.share > HELDOUT_BEYOND * heldout.std_dev;
+  }
+  /// [1] Squares over the noise below which fit tests cannot be that sure: noise alone leaves a deviation of
+  /// one over their root.
+  static constexpr double tellingSquares() { return 4.0 * FITTED_BEYOND * FITTED_BEYOND; }
 };
+
+/// What the fit tests ask for of the way from one fit to a better one, as these two left them.
+AskedShare fittedShare(const Fitter& fitter, const Fit& better, const Fit& other);
 
 /// @param better, other states of the same campaign, both simulated exactly
 Standing standingOf(const Workbench& bench, const FitState& better, const FitState& other);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "smartmill_discrepancy/data/dataset.h"
@@ -38,8 +39,8 @@ class Workbench {
   const WorkbenchOptions& options() const { return options_; }
   bool cancelled() const { return options_.cancelled && options_.cancelled(); }
 
-  /// Samples of the fit tests.
-  double samples() const { return static_cast<double>(exact_runner_.size()); }
+  /// Samples of the fit tests that count.
+  double samples() const { return exact_runner_.counts(); }
 
   /// Makes the quick twin equal to the exact one at a state and takes the nominal tangents there.
   /// @param exact_squares receives what the exact twin leaves there; may be nullptr
@@ -48,11 +49,27 @@ class Workbench {
   NominalTangents lineariseBy(NominalTangents tangents, const FitState& state,
                               double* exact_squares = nullptr);
 
+  /// From here on samples count by what the exact twin leaves of them at a state, fit and held-out tests each
+  /// by their own (gap/whitening.h): what follows upon another tells nothing new. The records are turned
+  /// there. @return false, and nothing has changed: all of it is noise as stated; or a guided twin, which no
+  /// free one follows, has part of the records on both sides, so that what is left is not noise beside what
+  /// it says
+  bool weighBy(const FitState& state);
+  /// Every sample alike, by its noise, as the gap is told.
+  void weighAlike();
+
   /// Whether some cut of a tool with modes shows its displacement: such tools are searched guided by it, so
   /// that no candidate runs away, and judged freely.
   bool canGuide() const { return can_guide_; }
   bool guided() const { return guided_; }
   void guide(bool guided);
+
+  /// Guided cuts are trusted as far as a state predicts them, those that chatter from the beginning on.
+  void trustAt(const FitState& state);
+  /// Where the search is not guided: cuts of which free simulation leaves clearly more than a guided one are
+  /// guided from here on (near its limit a tool rings on in free simulation at what any small error has
+  /// begun). Until guide().
+  void guideNearLimit(const FitState& state);
 
   /// What the exact twin leaves of the fit tests at a state.
   double exactSquares(const FitState& state);
@@ -75,8 +92,16 @@ class Workbench {
 
  private:
   void turnFitted(const FitState& state);
+  void readGuidance();
   void correctAt(const FitState& state, double* exact_squares);
 
+  // The last tangents: the search comes back to where it stood. They hold as long as the quick twin says the
+  // same there: not where records lie elsewhere, steps are others, or what is compared is weighed anew.
+  struct Taken {
+    FitState state;
+    SimulatedBlocks said;
+    NominalTangents tangents;
+  };
   WorkbenchOptions options_;
   Dataset data_;                  // its records without spindle angle are turned as the model becomes better
   std::vector<TestData> loaded_;  // those to be fitted, as they were loaded
@@ -85,6 +110,7 @@ class Workbench {
   bool can_guide_, guided_ = false;
   TwinRunner quick_runner_, exact_runner_, guided_runner_, heldout_runner_;
   Fitter quick_, exact_;
+  std::optional<Taken> taken_;
 };
 
 }  // namespace smartmill::discrepancy

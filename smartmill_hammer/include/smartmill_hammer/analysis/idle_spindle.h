@@ -127,6 +127,9 @@ struct IdleFriction {
 /// By weighted least squares over all stretches; none where there are not two speeds.
 std::optional<IdleFriction> frictionOf(const std::vector<IdleLoad>& loads);
 
+/// [s] end of the last stretch
+double endOf(const IdleRecord& record);
+
 /// Adds what stands at speeds that the record does not have yet. @return whether there was any
 bool addSpeeds(IdleRecord& record, const IdleRecord& more);
 

@@ -50,6 +50,8 @@ struct SpindleSensorCalibration {
   static SpindleSensorCalibration table3();
   /// @throws Error naming key and value.
   void validate() const;
+  /// @throws Error naming a length [m] of tool and holder that the constants are not known for.
+  void needLength(double length) const;
 };
 
 /// Pairs' means (eq. 3-1): x half the difference, y half the negative difference, z half the sum: a force
@@ -105,6 +107,9 @@ struct StaticCalibration {
 /// @param base gives what readings do not tell (preload, limits).
 /// @throws Error when a direction was never loaded.
 StaticCalibration calibrateStatic(const StaticReadings& readings, const SpindleSensorCalibration& base);
+
+/// @throws Error naming the table and a length in it that the constants are not known for.
+void needLengths(const StaticReadings& readings, const SpindleSensorCalibration& calibration);
 
 /// Verification (Burzoni 3.2.1): largest difference between force told and applied, over the largest applied
 /// force, an axis each [1]. Zero and drift from the readings without load. An axis never loaded: over the

@@ -2,10 +2,12 @@
 
 #include <cstddef>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "smartmill_core/model/cause_odds.h"
 #include "smartmill_loadmeter/database/shop_records.h"
 
 namespace smartmill::loadmeter {
@@ -15,11 +17,13 @@ namespace smartmill::loadmeter {
 
 /// Channels in which a test shows something, between blanks; empty: in none.
 using Outcome = std::string;
-/// How many explanations had each outcome of a test.
-using Outcomes = std::map<Outcome, double>;
 
 /// In which channels a test shows its cause: where the gap lost what would name it in a record alone.
 Outcome outcomeOf(const TestEvidence& test);
+
+/// What the tests of one explanation lost with its cause, over what would name it in a record alone, by
+/// channel [1]; of FleetCauses::tests, empty: not made.
+using Showing = std::vector<std::map<std::string, double>>;
 
 /// A cause that machines of a shop have.
 struct FleetCause {
@@ -29,7 +33,7 @@ struct FleetCause {
   /// of a share).
   double odds = 0.0;
   FoundCause newest;
-  std::vector<Outcomes> outcomes;  ///< of FleetCauses::tests; empty: never made with it
+  std::vector<Showing> shown;  ///< the newest explanations, eight at most
 };
 
 struct FleetCauses {
@@ -43,8 +47,22 @@ struct FleetCauses {
 /// among the machines, and among the tests only where no other one tells.
 FleetCauses fleetCauses(const std::vector<ModelImprovement>& improvements, const std::string& except);
 
+/// What the fleet's frequency of causes says beforehand of one machine more. Names that the catalogue of
+/// effects does not know are left out.
+CauseOdds oddsOf(const FleetCauses& fleet);
+
+struct CauseTable;
+
 /// Which test to make next: the one whose outcome is expected to tell most about the cause (Lindley 1956: the
-/// entropy that it takes away). One cause, none, or one that nobody has met, which shows what any other may.
+/// entropy that it takes away). One cause, none, or one that nobody has met.
+///
+/// Outcomes of a machine's tests are not independent given the cause: they share its size. Each hypothesis is
+/// a mixture, and within a part of it channels show independently of each other:
+/// - a cause: each of its explanations, as large a cause or up to twenty times larger or smaller (squares
+/// grow
+///   with the size's square), two machines' profiles differing by half a natural logarithm besides;
+/// - one that nobody has met: like one that is known but for a tenth or a third of its places; in the same
+///   channels whatever the test; anything.
 /// The prior weighs the choice of tests only: a cause stands alone where the outcomes speak for it
 /// against each other one by 100 to 1, whatever was likely beforehand. Names are an explanation's to give.
 class CauseSearch {
@@ -59,10 +77,11 @@ class CauseSearch {
   std::optional<std::size_t> alone() const;
 
  private:
-  double likelihood(std::size_t hypothesis, std::size_t test, const Outcome& outcome) const;
-
-  const FleetCauses& fleet_;
-  std::vector<double> probability_, evidence_;  // evidence: logarithm of the likelihood
+  void weigh();
+  std::shared_ptr<const CauseTable> table_;
+  std::vector<double> prior_, probability_, evidence_;  // evidence: logarithm of the likelihood
+  std::vector<double> parts_;                           // logarithms of weight and likelihood
+  std::vector<double> now_;                             // probability of each part
   std::vector<bool> made_;
 };
 

@@ -21,8 +21,8 @@ struct WayAnswer {
 
 /// What to reckon with when this tool is to cut this material.
 struct CutAnswer {
-  AnswerWay way{};                          ///< the surest one, whose coefficients these are
-  CoefficientSet set;                       ///< standard deviations widened where the ways disagree
+  AnswerWay way{};                          ///< the surest one, whose coefficients these are, but for Ktc
+  CoefficientSet set;                       ///< Ktc by all ways together, less sure where they contradict
   double ktc_lower = 0.0, ktc_upper = 0.0;  ///< [N/m2] with 95 % probability Ktc lies between, log-normal
   /// [1] largest distance between two ways, over their joint standard deviation; NaN: there is one only
   double surprise = CoefficientRecord::UNKNOWN;

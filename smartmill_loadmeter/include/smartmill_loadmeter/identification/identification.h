@@ -14,9 +14,11 @@
 #include "smartmill_loadmeter/calibration/load_meter.h"
 #include "smartmill_loadmeter/database/database.h"
 #include "smartmill_loadmeter/identification/production.h"
+#include "smartmill_loadmeter/motor/drive_moves.h"
 #include "smartmill_loadmeter/motor/force_estimate.h"
 #include "smartmill_loadmeter/motor/force_record.h"
 #include "smartmill_loadmeter/motor/motor_chain.h"
+#include "smartmill_loadmeter/motor/self_calibration.h"
 
 namespace smartmill::loadmeter {
 
@@ -109,6 +111,12 @@ class LoadMeterIdentification {
   void onResult(std::function<void(const IdentifyResult&)> callback) { result_ = std::move(callback); }
   /// Uses motor currents too. Tests made so far keep what they had.
   void setMotors(const MotorCalibration& calibration) { motors_ = calibration; }
+  /// Uses motor currents, and calibrates them by the session's own air moves and cuts (SelfCalibration).
+  void learnMotors() { learnt_.emplace(parameters_.motor); }
+  /// How far a drive follows its load [Hz], by the moves in rapid traverse so far.
+  const std::optional<Estimate>& driveBandwidth(std::size_t axis) const { return moves_.bandwidth(axis); }
+  /// What the session itself says of the motors; empty without learnMotors(), or before anything was learnt.
+  std::optional<MotorCalibration> learntMotors() const;
   /// Force of each cut by its motors.
   void onMotorForce(std::function<void(const MotorForce&)> callback) { motor_force_ = std::move(callback); }
   /// Force of each cut by all that was measured of it.
@@ -123,7 +131,8 @@ class LoadMeterIdentification {
 
   void handle(const CncState& state);
   void handle(const LoadSample& sample);
-  /// Topic daq/motor_current: channels x, y, z, spindle [A], phase currents by Hall sensors.
+  /// Topic daq/motor_current: channels x, y, z, spindle [A], phase currents by Hall sensors; or daq/servo, a
+  /// record of Servo Guide, of which what comes after its trigger counts.
   void handle(const SampleBlock& block);
   /// Topic force/compensated: what a force sensor shows of the tool's force.
   void handle(const ForceBlock& block);
@@ -148,7 +157,9 @@ class LoadMeterIdentification {
   void dropAfter(double stamp);
   bool counts(double stamp) const;
   std::optional<Estimate> cuttingTorque(const LoadTest& cut) const;
-  std::optional<ForceEstimate> estimate(const LoadTest& cut) const;
+  std::optional<ForceEstimate> estimate(const LoadTest& cut, bool without_motors = false) const;
+  bool readsMotors() const { return motors_ || learnt_; }
+  std::string motorsText() const;
   void lookBack(double now);
   void closeTest();
   LoadTest steadyTest(double since = -1e300) const;
@@ -177,6 +188,8 @@ class LoadMeterIdentification {
   std::function<void(const ForceEstimate&)> force_, window_;
   double next_window_ = 0.0;  // [s]
   std::optional<MotorCalibration> motors_;
+  std::optional<SelfCalibration> learnt_;
+  DriveMoves moves_;
   std::function<void(const MotorForce&)> motor_force_;
   struct PathPoint {
     double stamp;

@@ -8,6 +8,7 @@
 #include "smartmill_core/cutting/tool.h"
 #include "smartmill_core/parameters/parameter_table.h"
 #include "smartmill_loadmeter/calibration/machine_calibration.h"
+#include "smartmill_loadmeter/motor/drive_response.h"
 
 namespace smartmill::loadmeter {
 
@@ -39,8 +40,18 @@ struct ForceReadings {
   std::array<std::optional<Estimate>, 3> motor_force;  ///< [N] mean, of axes that moved
   /// [N] what that is where the cut pulls the axis on; empty: it cannot be.
   std::array<std::optional<Estimate>, 3> motor_other;
+  double spindle_speed = 0.0;  ///< [rad/s] 0: not known, no lines are told
+  /// [N2] lines of the feed drives' load, as their lag leaves them.
+  std::array<std::vector<VariationLine>, 3> motor_lines;
+  std::array<std::optional<Estimate>, 3> bandwidth;     ///< [Hz] of that lag; empty: lines are not used
   std::array<std::optional<Estimate>, 3> sensor_force;  ///< [N] mean, of a force sensor
   std::array<std::optional<Estimate>, 3> sensor_rms;    ///< [N] variation over a tooth, of the sensor
+};
+
+/// What the force varies by at one frequency.
+struct ForceLine {
+  double frequency = 0.0;             ///< [Hz]
+  std::array<Estimate, 3> amplitude;  ///< [N] machine X, Y, Z; NaN: nobody saw it
 };
 
 /// All three components of one cut. A component that no sensor saw is what the others and the mechanics of
@@ -51,6 +62,7 @@ struct ForceEstimate {
   std::string name;
   std::array<Estimate, 3> mean;  ///< [N] static part: mean on the tool, machine X, Y, Z
   std::array<Estimate, 3> rms;   ///< [N] dynamic part: root mean square about the mean, over a tooth
+  std::vector<ForceLine> lines;  ///< the revolution's by the drives alone, tooth passing and its harmonics
   Estimate torque;               ///< [N m] mean
   /// [1] squared distance of the readings from the estimate over their number; much above 1: they disagree.
   double surprise = 0.0;
@@ -61,7 +73,10 @@ struct ForceEstimate {
 
 /// One estimator of load meter, motor currents and force sensor: six cutting coefficients as Ktc, Kte and the
 /// ratios of the others to these, whose prior any metal obeys, weighted least squares with the cut's
-/// mechanics; the forces and their deviations follow from the coefficients'.
+/// mechanics; the forces and their deviations follow from the coefficients'. A feed drive's lines stand
+/// beside the mechanics' through its lag H(f), whose bandwidth and whose motor's constant are unknowns too:
+/// what the drive does not follow is as unsure as cut and metal leave it, and no quotient by a small H is
+/// ever formed.
 /// @throws Error without any reading, or with one that has no standard deviation.
 ForceEstimate estimateForce(const ForceReadings& readings, const ForceEstimateParameters& parameters);
 

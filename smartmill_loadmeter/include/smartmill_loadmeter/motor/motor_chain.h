@@ -8,6 +8,7 @@
 
 #include "smartmill_core/parameters/parameter_table.h"
 #include "smartmill_core/signal/streams.h"
+#include "smartmill_loadmeter/motor/drive_response.h"
 #include "smartmill_loadmeter/motor/joint.h"
 #include "smartmill_loadmeter/motor/motor_calibration.h"
 
@@ -35,7 +36,11 @@ struct MotorParameters {
   void validate() const;
 };
 
-/// Samples of the channels x, y, z, spindle of daq/motor_current while a test is steady.
+/// A record of Servo Guide (daq/servo): currents with their sign that make force, and a trigger.
+bool isServoRecord(const SampleBlock& block);
+
+/// Samples of the channels x, y, z, spindle of daq/motor_current while a test is steady; or of current_x,
+/// current_y, current_z of a Servo Guide record, from its trigger on.
 class MotorRecord {
  public:
   void clear();
@@ -47,6 +52,8 @@ class MotorRecord {
   MotorRecord last(double duration) const;
   bool empty() const { return rate_ == 0.0; }
   double rate() const { return rate_; }  ///< [Hz]
+  /// Currents have a sign: a record of Servo Guide.
+  bool isSigned() const { return signed_; }
   /// [A] of channel x, y, z, spindle (0..3); empty without the channel.
   const std::vector<double>& channel(std::size_t index) const { return samples_[index]; }
 
@@ -55,6 +62,7 @@ class MotorRecord {
   std::array<std::vector<double>, 4> samples_;
   double rate_ = 0.0, start_ = 0.0;
   std::uint64_t next_ = 0;
+  bool signed_ = false;
 };
 
 /// One test by its motors.
@@ -66,10 +74,14 @@ struct MotorReading {
   /// [A] of a range beyond the scatter of the calibration's cuts: of a record much shorter than theirs.
   std::array<double, 4> short_std{{0, 0, 0, 0}};
   std::array<std::string, 4> reason;  ///< why there is none
+  bool is_signed = false;  ///< ranges are mean currents, positive where they push on: their sign is known
+  std::array<std::vector<VariationLine>, 3> lines;  ///< [A2] of ranges that vary with a cut's revolution
 };
 /// @param is_short of a part of a cut: the noise counts beside the calibration's scatter
+/// @param teeth of the tool in a cut; 0: no lines are looked for
 MotorReading readMotors(const MotorRecord& record, const MotorParameters& parameters,
-                        const std::array<double, 3>& velocity, double spindle_speed, bool is_short = false);
+                        const std::array<double, 3>& velocity, double spindle_speed, bool is_short = false,
+                        int teeth = 0);
 
 /// Cutting force by the motors: F = m (I - Ia), T = a(N) dI^b(N).
 struct MotorForce {
@@ -78,8 +90,9 @@ struct MotorForce {
   std::array<std::optional<Estimate>, 3> force;  ///< [N] mean force on the tool, machine X, Y, Z
   /// [N] what it is where the cut pulls the axis on harder than friction holds it: a range has no sign.
   std::array<std::optional<Estimate>, 3> other;
-  std::optional<Estimate> torque;     ///< [N m] of the spindle
-  std::array<std::string, 4> reason;  ///< why X, Y, Z, torque are not known
+  std::array<std::vector<VariationLine>, 3> lines;  ///< [N2] its variation, as the drives' lag leaves it
+  std::optional<Estimate> torque;                   ///< [N m] of the spindle
+  std::array<std::string, 4> reason;                ///< why X, Y, Z, torque are not known
   /// E.g. "Fx -120.1 +- 3.0 N; Fy not observable: the axis stands still".
   std::string text() const;
 };

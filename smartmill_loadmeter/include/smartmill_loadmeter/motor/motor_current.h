@@ -26,9 +26,14 @@ int levelFor(double frequency, double sample_rate);
 /// @throws Error with less than two periods.
 double phaseRange(const std::vector<double>& current, double sample_rate, double frequency,
                   double slip = 0.0);
-/// The same with the standard deviation that what is left beside the sine gives it.
-Estimate phaseRangeEstimate(const std::vector<double>& current, double sample_rate, double frequency,
-                            double slip = 0.0);
+/// The same with the standard deviation that what is left beside the sine gives it, and the frequency that
+/// was found.
+struct PhaseFit {
+  Estimate range;          ///< [A]
+  double frequency = 0.0;  ///< [Hz]
+};
+PhaseFit fitPhase(const std::vector<double>& current, double sample_rate, double frequency,
+                  double slip = 0.0);
 
 /// A straight line y = slope x + level, with its covariance.
 struct Line {

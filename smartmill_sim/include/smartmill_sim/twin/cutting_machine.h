@@ -143,7 +143,7 @@ class CuttingMachine {
   void showForce(Output& out);
   void showLoad(double speed, Output& out);
   void passOn(Output& out);  // what effects on channels make of them, in time
-  void passTime(const ToolMotion& motion);
+  void passTime(const ToolMotion& motion, std::size_t steps = 1);
   // The same stages of many steps.
   struct Course {
     std::array<double, 3> before{{0, 0, 0}};  // [N] force of the cut before the first step
@@ -154,8 +154,9 @@ class CuttingMachine {
   };
   void cutAll(std::size_t steps, const std::function<void(std::size_t, Input&)>& next, const EarlyRows& early,
               Course& course);
-  void showForces(const Course& course, std::size_t axis, std::vector<double>& shown);
-  void showLoads(const Course& course, std::vector<double>& shown);
+  bool stepsAlike() const;
+  void replay(std::size_t from, const EarlyRows& early, Course& course);
+  void showAll(const Course& course, const EarlyRows& early);
   void measureAll(const Course& course, const EarlyRows& early) const;
   void passAllOn(std::size_t steps, const EarlyRows& early);
 

@@ -22,6 +22,7 @@ class EdgeLayers {
   /// @param setup after all effects have changed it @param rigid a tool that does not vibrate, at steady feed
   EdgeLayers(const TwinSetup& setup, const CuttingLaw& law, double time_step, bool rigid);
 
+  bool empty() const { return layers_.empty(); }
   void engage(const std::vector<ContactArc>& arcs, const ToolMotion& now);
   void setDepths(const std::vector<double>& depths);
   void setLaw(const CuttingLaw& law);

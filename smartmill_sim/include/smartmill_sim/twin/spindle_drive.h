@@ -12,7 +12,10 @@ class SpindleDrive {
   SpindleDrive(const Spindle& spindle, double time_step);
 
   /// Friction torque [N m] at a speed [rad/s]; zero below friction_zero_below.
-  double friction(double speed) const;
+  double friction(double speed) const {
+    if (speed < spindle_.friction_zero_below) return 0.0;
+    return factor_ * (spindle_.viscous * speed + spindle_.coulomb + extra_);
+  }
 
   /// Friction besides the model's [N m], and a factor on all of it.
   void setFriction(double extra, double factor);
@@ -24,7 +27,11 @@ class SpindleDrive {
 
   /// Load meter [V], unrounded, after one time step under a cutting torque [N m] that is constant over it:
   /// exact.
-  double step(double cutting_torque, double speed);
+  double step(double cutting_torque, double speed) {
+    const double steady = spindle_.load_meter_gain * (cutting_torque + friction(speed)) * speed;
+    voltage_ = steady + (voltage_ - steady) * decay_;
+    return voltage_;
+  }
 
   /// The reading: rounded to the load meter's resolution [V].
   double rounded(double voltage) const;

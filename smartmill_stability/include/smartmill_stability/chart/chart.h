@@ -107,6 +107,7 @@ class ChartMaker {
   StabilityLimit wideLimits(const Basis& given) const;
   std::vector<double> depthShares(const std::vector<double>& speeds) const;
   void recommend(StabilityChart& chart, const StabilityLimit& wide) const;
+  std::vector<StabilityPoint> borne(std::vector<StabilityPoint> peaks) const;
   void proposeUnstable(StabilityChart& chart, const StabilityLimit& wide) const;
   StabilityPoint point(double speed, double depth, double limit, double frequency) const;
   double torquePerDepth() const;  // [N]

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <memory>
 #include <optional>
+#include <random>
 #include <vector>
 
 #include "smartmill_core/cutting/coefficient_set.h"
@@ -44,6 +46,27 @@ struct RiskOptions {
   double speed_margin = 0.01;  ///< [1] the speed may be so much off
   int draws = 40;              ///< >= 1
   unsigned seed = 1;
+};
+
+/// Machines drawn from what is known of one, asked by collocation; each is made when it is first asked for.
+/// The mean machine is asked first, as it costs least.
+class DrawnMachines {
+ public:
+  DrawnMachines(const UncertainSystem& system, const RiskOptions& options);
+  ~DrawnMachines();
+
+  /// [1] Share of them that chatters in a cut at a speed [rad/s] or the margin of speed beside it; nothing as
+  /// soon as it is above the risk. @param depth [m]
+  std::optional<double> probability(double speed, double depth);
+  /// Whether the mean machine is stable in the cut at all these speeds.
+  bool meanBears(double speed, double depth) const;
+
+ private:
+  const UncertainSystem& system_;
+  RiskOptions options_;
+  std::mt19937_64 random_;
+  std::unique_ptr<FloquetSolver> mean_;
+  std::vector<std::unique_ptr<FloquetSolver>> drawn_;
 };
 
 struct StableSpeed {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "smartmill_core/parameters/parameter_table.h"
+#include "smartmill_core/signal/counted_angle.h"
 #include "smartmill_core/signal/stream_sorter.h"
 #include "smartmill_core/signal/streams.h"
 
@@ -88,9 +89,7 @@ class ChatterDetector {
     double time;
     std::array<double, 3> force;
   };
-  struct Angle {
-    double time, turned, shown;  // [s], [rad] counted on over full turns, [rad] as it came
-  };
+  using Angle = CountedAngle;
   void dropWindow();
   void notSteady(double stamp);
   void evaluate();

@@ -12,6 +12,7 @@
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/io/csv.h"
 #include "smartmill_core/io/text_file.h"
+#include "smartmill_core/signal/force_channels.h"
 #include "smartmill_core/units.h"
 
 namespace smartmill {
@@ -273,7 +274,7 @@ Record readRecord(const Campaign& campaign, const CampaignTest& test) {
 Record readRecord(const Campaign& campaign, const CampaignTest& test, const MachineModel& model) {
   Record record = readRecord(campaign, test);
   if (!model.force_sensor.measures_workpiece) return record;
-  for (const char* name : {"fx", "fy", "fz"}) {
+  for (const char* name : FORCE_CHANNELS) {
     if (!record.has(name)) continue;
     for (double& value : record.add(name)) value = -value;
   }

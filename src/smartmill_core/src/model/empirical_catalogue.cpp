@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "smartmill_core/model/effect_catalogue.h"
+#include "smartmill_core/signal/force_channels.h"
 #include "smartmill_core/units.h"
 
 // Causes without a name: one entry a form. What is fitted has few numbers, each bounded so that force grows
@@ -18,7 +19,7 @@ using Stage = EffectStage;
 using Values = std::vector<double>;
 
 const std::vector<std::string> CHANNELS{"fx", "fy", "fz", "load_meter"};
-const std::vector<std::string> FORCES{"fx", "fy", "fz"};
+const std::vector<std::string> FORCES(FORCE_CHANNELS.begin(), FORCE_CHANNELS.end());
 const std::vector<std::string> TIMES{"always", "turning"};   // of the spindle
 const std::vector<std::string> CLOCKS{"record", "machine"};  // that began with it, or when it was cold
 const std::vector<std::string> SHARES{"chip", "edge"};       // of the force

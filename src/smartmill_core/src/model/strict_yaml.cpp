@@ -91,6 +91,7 @@ StrictYaml StrictYaml::fromFile(const std::string& file) {
   } catch (const YAML::Exception& error) {
     throw Error(file + ": not a YAML file: " + lineOf(error.what()));
   }
+  if (root.IsNull()) throw Error(file + ": is empty");
   if (!root.IsMap()) throw Error(file + ": keys are due, but it is " + shown(root));
   return StrictYaml(Impl::make(root, file, ""));
 }

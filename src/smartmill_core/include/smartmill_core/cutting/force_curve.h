@@ -23,7 +23,17 @@ struct ForceCurve {
 
 struct ForceCurves {
   ForceCurve tangential, radial;
-  double rms = 0.0;  ///< [N] of what is left in fx, fy
+  double rms = 0.0;      ///< [N] of what is left in fx, fy
+  double scatter = 0.0;  ///< [1] of one cut's force against another's as a whole; not in the file
+};
+
+/// Curves with where they come from (topic material/force_curve).
+struct FoundCurves {
+  double stamp = 0.0;  ///< [s] end of the last cut used
+  std::string tool, material;
+  int teeth = 0;                  ///< [1] of the tool
+  std::vector<std::string> cuts;  ///< conditions used, oldest first
+  ForceCurves curves;
 };
 
 /// YAML, format smartmill-force-curve/1. @throws Error.
