@@ -114,8 +114,9 @@ TEST(ChatteringCut, IsDataOfItsOwnWeight) {
     if (name.find("damping") != std::string::npos) truth = std::log(0.03 / 0.036);
     EXPECT_LT(with.std_dev[c], without.std_dev[c]) << name;
     // Modes are known by what vibrates.
-    if (name.find("damping") != std::string::npos)
+    if (name.find("damping") != std::string::npos) {
       EXPECT_LT(with.std_dev[c], 0.5 * without.std_dev[c]) << name;
+    }
     EXPECT_LT(std::abs(with.value[c] - truth), 3.5 * with.std_dev[c]) << name;
   }
   EXPECT_NEAR(with.gap, 1.0, 0.02);
