@@ -44,6 +44,7 @@ std::string TopicDifference::text(const std::string& topic) const {
   };
   add(first_only, "only in the first");
   add(second_only, "only in the second");
+  if (!missing.empty()) out += " (the first of them: " + missing + ")";
   add(contradictions, "that contradict themselves");
   add(first_ends, "of the first beyond the other's ends");
   add(second_ends, "of the second beyond the other's ends");
@@ -90,16 +91,20 @@ void TopicComparison::addSecond(const ResultRecord& record) {
 
 TopicDifference TopicComparison::result() const {
   TopicDifference difference = found_;
-  const auto sortOut = [&](double stamp, std::size_t& within, std::size_t& ends) {
+  double earliest = INFINITE;
+  const auto sortOut = [&](const std::string& key, double stamp, std::size_t& within, std::size_t& ends) {
     const bool begin = stamp < common_from_ && stamp >= common_from_ - slack_;
     const bool end = stamp > common_to_ && stamp <= common_to_ + slack_;
     ++(begin || end ? ends : within);
+    if (begin || end || stamp >= earliest) return;
+    earliest = stamp;
+    difference.missing = key;
   };
   for (const auto& [key, record] : first_) {
-    if (!seen_.count(key)) sortOut(record.stamp, difference.first_only, difference.first_ends);
+    if (!seen_.count(key)) sortOut(key, record.stamp, difference.first_only, difference.first_ends);
   }
   for (const auto& [key, stamp] : second_only_) {
-    sortOut(stamp, difference.second_only, difference.second_ends);
+    sortOut(key, stamp, difference.second_only, difference.second_ends);
   }
   return difference;
 }

@@ -127,11 +127,13 @@ void ChatterDetector::dropWindow() {
 
 void ChatterDetector::notSteady(double stamp) {
   dropWindow();
-  if (said_invalid_) return;
+  // The condition that holds at the beginning is older than its receipt: who recorded it late must not hear
+  // more than who had it in time.
+  if (said_invalid_ || !condition_) return;
   said_invalid_ = true;
   ChatterState state;
   state.stamp = stamp;
-  state.condition = condition_ ? condition_->name : "";
+  state.condition = condition_->name;
   output_(state);
 }
 

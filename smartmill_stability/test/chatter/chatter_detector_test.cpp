@@ -202,6 +202,43 @@ TEST(SortedDetection, anyArrivalGivesTheSameVerdicts) {
   EXPECT_TRUE(results[0].back().chatter);
 }
 
+// The condition that holds when a recording begins may have been recorded behind the first states.
+TEST(SortedDetection, theConditionOfTheBeginningMayComeLate) {
+  const auto verdicts = [](int before) {
+    std::vector<ChatterState> states;
+    SortedDetection detection({}, 0.05, [&](const ChatterState& state) { states.push_back(state); });
+    for (int b = 0; b < 100; ++b) {
+      if (b == before) {
+        CuttingCondition condition;
+        condition.stamp = -0.5;
+        detection.push(condition);
+      }
+      const double t = 0.01 * b;
+      CncState state;
+      state.stamp = t;
+      state.connected = true;
+      state.axes = {"X", "Y", "Z"};
+      state.position = {0.0, 0.0, 0.0};
+      ForceBlock block;
+      block.stamp = t;
+      block.sample_rate = RATE;
+      block.first_index = static_cast<std::uint64_t>(b) * BLOCK;
+      for (auto& axis : block.force) axis.assign(BLOCK, 0.0);
+      detection.push(state);
+      detection.push(SpindleAngle{t, 0.0, 0.0});
+      detection.push(block);
+    }
+    detection.flush();
+    return states;
+  };
+  for (const int before : {0, 60}) {
+    const std::vector<ChatterState> states = verdicts(before);
+    ASSERT_EQ(states.size(), 1u) << before;
+    EXPECT_EQ(states[0].stamp, -0.5);
+    EXPECT_FALSE(states[0].valid);
+  }
+}
+
 TEST(ChatterDetector, refusesBadParameters) {
   ChatterParameters parameters;
   parameters.energy_ratio = 0.0;

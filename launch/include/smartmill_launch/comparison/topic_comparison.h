@@ -26,6 +26,7 @@ struct TopicDifference {
   double largest = 0.0;                         ///< largest difference of two values
   double scale = 0.0;                           ///< largest value of the topic
   std::string where;                            ///< key of the first difference
+  std::string missing;                          ///< key of the first one of first_only and second_only
   bool same() const;
   /// As same(), with up to this share of all results [1] missing on one side or the other.
   bool sameButFor(double share) const;
