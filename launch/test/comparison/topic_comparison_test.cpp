@@ -68,6 +68,10 @@ TEST(TopicComparison, AMissingBlockInTheMiddleIsADifference) {
   EXPECT_FALSE(hole.same());
   EXPECT_EQ(hole.first_only, 1u);
   EXPECT_EQ(hole.first_ends, 0u);
+  EXPECT_EQ(hole.missing, "sample 2");
+  const TopicDifference two = compare({block(1), block(4)}, {block(1), block(2), block(3), block(4)}, 0.0);
+  EXPECT_EQ(two.second_only, 2u);
+  EXPECT_EQ(two.missing, "sample 2");
 }
 
 TEST(TopicComparison, ABusyRecordersLossesMayBeForgivenDifferencesNot) {
