@@ -105,7 +105,8 @@ double pulledVariance(const TwinRunner& runner, const Eigen::VectorXd& influence
 }
 
 // Cost, residual and covariance at a point. @return false: no numbers there
-bool describe(const CampaignCost& cost, const Eigen::VectorXd& at, double samples, Fit& fit) {
+bool describe(const CampaignCost& cost, const Eigen::VectorXd& at, double samples, std::size_t records,
+              Fit& fit) {
   const CampaignCost::Linear* point = cost.linearise(at);
   if (!point) return false;
   fit.state = cost.stateAt(at);
@@ -116,8 +117,11 @@ bool describe(const CampaignCost& cost, const Eigen::VectorXd& at, double sample
   for (std::size_t k = 0; k < cost.turnsBegin(); ++k)
     fit.penalty += cost.precision(k) * std::pow(at[static_cast<Index>(k)] - cost.coordinates()[k].null, 2);
   fit.bic = fit.chi2 + fit.penalty;
-  for (const Member& m : fit.state.members)
+  const auto of_records = static_cast<double>(records);
+  for (const Member& m : fit.state.members) {
     fit.bic += static_cast<double>(m.values.size()) * std::log(samples) + m.hypothesis->handicap;
+    fit.bic += m.hypothesis->found_in_each_record * of_records * std::log(samples / of_records);
+  }
   fit.covariance = inverseAt(cost, point->information);
   return true;
 }
@@ -180,7 +184,7 @@ Fit Fitter::fit(const FitState& start, const NominalTangents* frozen, const FitO
   const double samples = runner_.counts();
   Fit fit;
   const std::optional<Eigen::VectorXd> at = solve(cost, options, samples, cancelled_);
-  fit.converged = at && describe(cost, *at, samples, fit);
+  fit.converged = at && describe(cost, *at, samples, runner_.tests().size(), fit);
   if (!fit.converged) {
     fit.state = start;
     fit.chi2 = fit.bic = std::numeric_limits<double>::infinity();

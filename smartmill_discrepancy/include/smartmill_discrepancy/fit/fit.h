@@ -40,9 +40,11 @@ FitState without(const FitState& state, std::size_t member);
 
 struct Fit {
   FitState state;
-  double chi2 = 0.0;             ///< sum of squares of residuals over noise
-  double penalty = 0.0;          ///< of the priors
-  double bic = 0.0;              ///< chi2 + penalty + effect coordinates x ln(samples) + handicaps
+  double chi2 = 0.0;     ///< sum of squares of residuals over noise
+  double penalty = 0.0;  ///< of the priors
+  /// chi2 + penalty + effect coordinates x ln(samples) + handicaps + for what is found in each record
+  /// ln(samples of a record) a record: without it, noise alone would make a tone
+  double bic = 0.0;
   std::vector<double> residual;  ///< (measured - simulated) / noise at the state; empty unless converged
   /// Covariance of nominal coordinates, then members' in their order, then turns: inverse of Fisher
   /// information with priors.

@@ -173,6 +173,7 @@ Forms hums(const Scope&) {
                         .probe({0.0, 0.6}, {{2.0, 0.6}})
                         .probe({0.0, -0.6}, {{2.0, -0.6}})
                         .number("frequency_hz", frequency)
+                        .foundInEachRecord(1)
                         .named(frequency == 50.0 ? "50 Hz" : "60 Hz"));
   }
   return forms;

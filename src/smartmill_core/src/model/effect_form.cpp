@@ -244,6 +244,11 @@ EffectForm& EffectForm::startingAt(const Values& point) {
   return *this;
 }
 
+EffectForm& EffectForm::foundInEachRecord(int count) {
+  found_in_each_record = count;
+  return *this;
+}
+
 EffectForm& EffectForm::sought(Seek what) {
   seek = what;
   return *this;

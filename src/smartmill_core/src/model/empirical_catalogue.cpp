@@ -259,7 +259,7 @@ Forms tones(const Scope& scope) {
                               amplitude("amplitude", {0.0, 1e3 * unit, 5e-4 * unit, 10.0 * unit})});
          })) {
       if (when != TIMES.front()) form.named(form.variant + ", " + when);
-      forms.push_back(form.word("while", when));
+      forms.push_back(form.word("while", when).foundInEachRecord(1));
     }
   }
   return forms;
@@ -268,7 +268,8 @@ Forms tones(const Scope& scope) {
 Forms orders(const Scope& scope) {
   return onChannels(scope, [](const std::string& channel) {
     const double unit = unitOf(channel);
-    return EffectForm({amplitude("amplitude", {0.0, 1e3 * unit, 5e-4 * unit, 10.0 * unit})});
+    return EffectForm({amplitude("amplitude", {0.0, 1e3 * unit, 5e-4 * unit, 10.0 * unit})})
+        .foundInEachRecord(1);
   });
 }
 
@@ -322,10 +323,11 @@ Forms burstTrains(const Scope& scope) {
   return onChannels(scope, [](const std::string& channel) {
     const double unit = unitOf(channel);
     return EffectForm(
-        {logarithm("period_s", {std::log(2e-3), std::log(1.0), 1e-6, 1.0}, 1.0, std::log(0.03)),
-         logarithm("frequency_hz", {std::log(20.0), std::log(1e4), 1e-5, 1.0}, 1.0, std::log(1e3)),
-         logarithm("decay_s", {std::log(1e-4), std::log(0.1), 1e-3, 1.0}, 1.0, std::log(2e-3)),
-         amplitude("amplitude", {0.0, 1e3 * unit, 1e-3 * unit, 10.0 * unit})});
+               {logarithm("period_s", {std::log(2e-3), std::log(1.0), 1e-6, 1.0}, 1.0, std::log(0.03)),
+                logarithm("frequency_hz", {std::log(20.0), std::log(1e4), 1e-5, 1.0}, 1.0, std::log(1e3)),
+                logarithm("decay_s", {std::log(1e-4), std::log(0.1), 1e-3, 1.0}, 1.0, std::log(2e-3)),
+                amplitude("amplitude", {0.0, 1e3 * unit, 1e-3 * unit, 10.0 * unit})})
+        .foundInEachRecord(1);
   });
 }
 

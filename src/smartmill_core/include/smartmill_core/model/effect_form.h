@@ -105,6 +105,7 @@ struct EffectForm {
   EffectForm& scaled(double reach, const Values& scales);
   EffectForm& probe(const Values& null, const std::vector<Values>& points);
   EffectForm& startingAt(const Values& point);  ///< a fit starts there
+  EffectForm& foundInEachRecord(int count);     ///< values of it that are no coordinates: a phase
   EffectForm& sought(Seek what);
   /// The effect is put together of pieces that may be found one by one, those of this form in the order of
   /// its coordinates.
@@ -118,6 +119,7 @@ struct EffectForm {
   Seek seek = Seek::nothing;
   std::vector<std::string> pieces;  ///< of the effect; empty: it is one whole
   double handicap = 0.0;            ///< [BIC] of the effect
+  int found_in_each_record = 0;     ///< values that the twin takes from each record: a tone's phase
 
   std::string title() const { return variant.empty() ? effect : effect + " (" + variant + ")"; }
   /// values.size() == coordinates.size()
