@@ -66,6 +66,32 @@ TEST_F(StudiesEngine, goesOnWhereItEndedAndGivesTheSameTable) {
   EXPECT_THAT(said(), HasSubstr("is not the build of this study"));
 }
 
+TEST_F(StudiesEngine, goesOnFromWhatAnotherMachineHasDone) {
+  ASSERT_EQ(call("run self_test -j 2 --nice 0 -o " + at("there")), 0) << said();
+  std::string lines;
+  for (const char* number : {"0", "2"}) lines += contentOf(at("there/cases/") + number + ".json");
+  std::ofstream(at("done.jsonl")) << lines;
+  ASSERT_EQ(call("run self_test -j 1 --nice 0 --from " + at("done.jsonl") + " -o " + at("here")), 0)
+      << said();
+  for (const char* number : {"0", "2"}) {
+    const std::string name = std::string("/cases/") + number + ".json";
+    EXPECT_EQ(contentOf(at("here" + name)), contentOf(at("there" + name)));
+  }
+  ASSERT_EQ(call("collect " + at("there")), 0) << said();
+  ASSERT_EQ(call("collect " + at("here")), 0) << said();
+  EXPECT_EQ(contentOf(at("here/table.md")), contentOf(at("there/table.md")));
+
+  lines.replace(lines.rfind("\"build\": \"") + 10, 4, "none");
+  std::ofstream(at("other.jsonl")) << lines;
+  EXPECT_EQ(call("run self_test -j 1 --from " + at("other.jsonl") + " -o " + at("c")), 1);
+  EXPECT_THAT(said(), HasSubstr("other.jsonl: line 2 is of another build"));
+  std::ofstream(at("torn.jsonl")) << lines.substr(0, 40) << "\n";
+  EXPECT_EQ(call("run self_test -j 1 --from " + at("torn.jsonl") + " -o " + at("d")), 1);
+  EXPECT_THAT(said(), HasSubstr("torn.jsonl: line 1 is no case of a study"));
+  EXPECT_EQ(call("run self_test -j 1 --from " + at("none.jsonl") + " -o " + at("d")), 1);
+  EXPECT_THAT(said(), HasSubstr("none.jsonl: cannot be read"));
+}
+
 TEST_F(StudiesEngine, refusesWhatItDoesNotKnow) {
   EXPECT_EQ(call("run nothing -o " + at("a")), 2);
   EXPECT_THAT(said(), HasSubstr("'nothing' is no study, there are bench"));
