@@ -5,20 +5,45 @@
 #include <limits>
 #include <map>
 #include <numeric>
+#include <utility>
 #include <vector>
 
 namespace smartmill::discrepancy {
 namespace {
 
-std::vector<AskedTest> askedBy(const TwinRunner& runner, const MachineModel& better,
-                               const MachineModel& other) {
-  const auto simulated = runner.simulate({better, other});
+std::vector<AskedTest> askedBy(const TwinRunner& runner, const std::vector<double>& better,
+                               const std::vector<double>& other) {
   std::vector<double> between(runner.size()), left(runner.size());
   for (std::size_t i = 0; i < between.size(); ++i) {
-    between[i] = simulated[0][i] - simulated[1][i];
-    left[i] = runner.measured()[i] - simulated[0][i];
+    between[i] = better[i] - other[i];
+    left[i] = runner.measured()[i] - better[i];
   }
   return askedIn(runner, between.data(), left.data());
+}
+
+// What a state says of the fit tests, its records where they lie by its own turns, while the bench's lie by
+// those of another: its other values were found with them.
+std::vector<double> saidWhereItLies(const Workbench& bench, const FitState& state, const FitState& turned) {
+  const TwinRunner& runner = bench.fitted();
+  const MachineModel model = bench.exact().model(state);
+  SimulatedBlocks said = runner.simulateBlocks({model}).front();
+  const std::vector<Fitter::TurnOf>& turns = bench.quick().turns();
+  const auto at = [](const FitState& s, std::size_t k) { return s.turns.empty() ? 0.0 : s.turns[k]; };
+  std::map<std::size_t, Turn> by_test;
+  for (std::size_t k = 0; k < turns.size(); ++k) {
+    const double by = at(state, k) - at(turned, k);
+    if (by != 0.0) by_test[turns[k].chosen].*turns[k].freedom.value = by;
+  }
+  const std::vector<std::pair<std::size_t, Turn>> moved(by_test.begin(), by_test.end());
+  const SimulatedBlocks base = said;
+  runParallel(moved.size(), runner.threads(), [&](std::size_t m) {
+    const auto& [chosen, by] = moved[m];
+    const SimulatedBlocks there = runner.turned(model, base, chosen, by);
+    for (std::size_t b = 0; b < there.size(); ++b) {
+      if (runner.blocks()[b].test == runner.tests()[chosen]) said[b] = there[b];
+    }
+  });
+  return runner.joined(said);
 }
 
 // Where structure is left, stated values are pulled by it too: its variance is that of the residuals.
@@ -82,9 +107,11 @@ bool Standing::holds() const {
 
 Standing standingOf(const Workbench& bench, const FitState& better, const FitState& other) {
   constexpr double TELLS = 25.0;  // squares over the noise
-  const MachineModel first = bench.exact().model(better), second = bench.exact().model(other);
-  const std::vector<AskedTest> heldout = askedBy(bench.heldout(), first, second);
-  std::vector<AskedTest> fitted = askedBy(bench.fitted(), first, second);
+  const auto held = bench.heldout().simulate({bench.exact().model(better), bench.exact().model(other)});
+  const std::vector<AskedTest> heldout = askedBy(bench.heldout(), held[0], held[1]);
+  std::vector<AskedTest> fitted =
+      askedBy(bench.fitted(), bench.fitted().simulate(bench.exact().model(better)),
+              saidWhereItLies(bench, other, better));
   const double variance = std::max(1.0, bench.exactSquaresHere(better) / bench.samples());
   fitted.push_back(askedByStated(bench.freedom(), better, other, variance));
   const double squares = std::accumulate(heldout.begin(), heldout.end(), 0.0,
