@@ -8,7 +8,9 @@
 #include <gtest/gtest.h>
 
 #include "air_cuts.h"
+#include "explain/small_campaign.h"
 #include "smartmill_core/testing/coverage.h"
+#include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_discrepancy/hypotheses/hypothesis.h"
 
 namespace smartmill::discrepancy {
@@ -159,6 +161,49 @@ TEST(Fitter, whatIsLeftIsThatOfItsState) {
       EXPECT_NEAR(along.chi2, there.squaredNorm(), 1e-6 * along.chi2) << h.title() << " after " << iterations;
     }
   }
+}
+
+// BIC by which the fit is better with a hum. @param amplitude [N] of the machine's
+double gainOfHum(double amplitude) {
+  const TemporaryFolder folder;
+  Campaign campaign;
+  campaign.folder = folder.file(".");
+  campaign.model_file = "model.yaml";
+  campaign.tests = slotsOfManyKinds();
+  writeMachineModel(believed(), folder.file("model.yaml"));
+  writeCampaign(campaign, campaign.folder);
+  MachineModel machine = believed();
+  if (amplitude > 0.0)
+    machine.effects.push_back(
+        effectEntry("mains_hum", {{"frequency_hz", 50.0}, {"amplitude_n", amplitude}, {"y_ratio", 0.6}}));
+  sim::SimulationOptions options;
+  options.random_phases = true;
+  for (const CampaignTest& test : campaign.tests) {
+    ++options.seed;
+    writeCsv(sim::simulateTest(machine, test, 0.2, options), folder.file(test.file));
+  }
+  const Dataset data = loadDataset(campaign, readMachineModel(campaign.modelPath()));
+  const std::vector<Hypothesis> hypotheses = catalogueHypotheses(data, nullptr);
+  const auto hum = std::find_if(hypotheses.begin(), hypotheses.end(), [](const Hypothesis& h) {
+    return h.effect == "mains_hum" && h.variant == "50 Hz";
+  });
+  const TwinRunner runner(data, {0, 1, 2, 3, 4, 5, 6, 7}, 1, 1);
+  const NominalFreedom freedom(data.nominal);
+  const Fitter fitter(runner, freedom);
+  FitState start;
+  start.nominal.assign(freedom.coordinates().size(), 0.0);
+  const Fit without_it = fitter.fit(start, nullptr, {30, 1e-10, true});
+  start.members.push_back({&*hum, {0.5, 0.6}});
+  const Fit with = fitter.fit(start, nullptr, {30, 1e-10, true});
+  EXPECT_TRUE(with.converged && without_it.converged);
+  return without_it.bic - with.bic;
+}
+
+// The phase of a hum is found in each record: in noise there is always one that fits, and all amplitudes
+// that come of it are above zero.
+TEST(Fitter, noiseAloneMakesNoHum) {
+  EXPECT_LT(gainOfHum(0.0), -20.0);
+  EXPECT_GT(gainOfHum(2.0), 200.0);
 }
 
 }  // namespace

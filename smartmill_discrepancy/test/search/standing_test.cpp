@@ -6,8 +6,12 @@
 
 #include <gtest/gtest.h>
 
+#include "explain/small_campaign.h"
+#include "smartmill_core/campaign/campaign.h"
 #include "smartmill_core/testing/coverage.h"
+#include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_core/units.h"
+#include "smartmill_discrepancy/data/dataset.h"
 
 namespace smartmill::discrepancy {
 namespace {
@@ -107,6 +111,43 @@ TEST(AskedShare, NothingToldIsNothingKnown) {
   EXPECT_TRUE((Standing{{0.9, 0.3}, {1.0, 0.01}}.holds()));
   EXPECT_FALSE((Standing{{0.9, 0.45}, {1.0, 0.01}}.holds()));
   EXPECT_NEAR((Standing{{0.9, 0.2}, {1.0, 0.01}}.confidence()), 0.97725, 1e-5);
+}
+
+// Records whose angle nobody measured lie where a model laid them. One that laid them a tenth of a radian off
+// is told of by the forces that it says there, not by those that it would say where another laid them.
+TEST(Standing, EachModelIsToldOfRecordsWhereItLaidThem) {
+  const TemporaryFolder folder;
+  Campaign campaign;
+  campaign.folder = folder.file(".");
+  campaign.model_file = "model.yaml";
+  campaign.tests = slotsOfManyKinds();
+  writeMachineModel(believed(), folder.file("model.yaml"));
+  writeCampaign(campaign, campaign.folder);
+  for (const CampaignTest& test : campaign.tests) {
+    const Record with_angle = sim::simulateTest(believed(), test, 0.2, {});
+    Record record;
+    record.time = with_angle.time;
+    for (const char* name : {"fx", "fy", "fz"}) record.add(name) = with_angle.column(name);
+    writeCsv(record, folder.file(test.file));
+  }
+  const Dataset data = loadDataset(campaign, readMachineModel(campaign.modelPath()));
+  WorkbenchOptions options;
+  options.threads = 1;
+  Workbench bench(data, options);
+  FitState right;
+  right.nominal.assign(bench.freedom().coordinates().size(), 0.0);
+  bench.turnPhases(right);
+  bench.turnTo(right);
+  FitState off = right;
+  off.turns.resize(bench.quick().turns().size(), 0.0);
+  for (std::size_t k = 0; k < off.turns.size(); ++k) {
+    if (bench.quick().turns()[k].freedom.value == &Turn::middle) off.turns[k] += 0.1;
+  }
+  const AskedShare asked = standingOf(bench, right, off).fitted;
+  EXPECT_NEAR(asked.share, 1.0, 0.1);
+  EXPECT_LT(asked.std_dev, 0.05);
+  // And the same model where it lies is no other one.
+  EXPECT_TRUE(std::isinf(standingOf(bench, right, right).fitted.std_dev));
 }
 
 }  // namespace
