@@ -47,10 +47,10 @@ inline std::vector<CampaignTest> slotsOfManyKinds() {
           slot("g", 3000, 0.03, 810), slot("h", 4500, 0.06, 900)};
 }
 
-/// @param record of a test, drawn with a seed
-inline Explanation explained(const std::function<Record(const CampaignTest&, std::uint64_t seed)>& record,
-                             const std::string& folder, const ExplainOptions& options = {},
-                             const std::vector<CampaignTest>& tests = slotsOfManyKinds()) {
+/// A campaign of them, nominal model as believed. @param record of a test, drawn with a seed
+inline Dataset datasetOf(const std::function<Record(const CampaignTest&, std::uint64_t seed)>& record,
+                         const std::string& folder,
+                         const std::vector<CampaignTest>& tests = slotsOfManyKinds()) {
   Campaign campaign;
   campaign.folder = folder;
   campaign.model_file = "model.yaml";
@@ -59,7 +59,13 @@ inline Explanation explained(const std::function<Record(const CampaignTest&, std
   writeCampaign(campaign, folder);
   std::uint64_t seed = 1;
   for (const CampaignTest& test : campaign.tests) writeCsv(record(test, ++seed), folder + "/" + test.file);
-  return explain(loadDataset(campaign, readMachineModel(campaign.modelPath())), options, folder);
+  return loadDataset(campaign, readMachineModel(campaign.modelPath()));
+}
+
+inline Explanation explained(const std::function<Record(const CampaignTest&, std::uint64_t seed)>& record,
+                             const std::string& folder, const ExplainOptions& options = {},
+                             const std::vector<CampaignTest>& tests = slotsOfManyKinds()) {
+  return explain(datasetOf(record, folder, tests), options, folder);
 }
 
 }  // namespace smartmill::discrepancy

@@ -166,23 +166,17 @@ TEST(Fitter, whatIsLeftIsThatOfItsState) {
 // BIC by which the fit is better with a hum. @param amplitude [N] of the machine's
 double gainOfHum(double amplitude) {
   const TemporaryFolder folder;
-  Campaign campaign;
-  campaign.folder = folder.file(".");
-  campaign.model_file = "model.yaml";
-  campaign.tests = slotsOfManyKinds();
-  writeMachineModel(believed(), folder.file("model.yaml"));
-  writeCampaign(campaign, campaign.folder);
   MachineModel machine = believed();
   if (amplitude > 0.0)
     machine.effects.push_back(
         effectEntry("mains_hum", {{"frequency_hz", 50.0}, {"amplitude_n", amplitude}, {"y_ratio", 0.6}}));
-  sim::SimulationOptions options;
-  options.random_phases = true;
-  for (const CampaignTest& test : campaign.tests) {
-    ++options.seed;
-    writeCsv(sim::simulateTest(machine, test, 0.2, options), folder.file(test.file));
-  }
-  const Dataset data = loadDataset(campaign, readMachineModel(campaign.modelPath()));
+  const auto record = [&](const CampaignTest& test, std::uint64_t seed) {
+    sim::SimulationOptions options;
+    options.seed = seed;
+    options.random_phases = true;
+    return sim::simulateTest(machine, test, 0.2, options);
+  };
+  const Dataset data = datasetOf(record, folder.file("."));
   const std::vector<Hypothesis> hypotheses = catalogueHypotheses(data, nullptr);
   const auto hum = std::find_if(hypotheses.begin(), hypotheses.end(), [](const Hypothesis& h) {
     return h.effect == "mains_hum" && h.variant == "50 Hz";

@@ -7,11 +7,9 @@
 #include <gtest/gtest.h>
 
 #include "explain/small_campaign.h"
-#include "smartmill_core/campaign/campaign.h"
 #include "smartmill_core/testing/coverage.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_core/units.h"
-#include "smartmill_discrepancy/data/dataset.h"
 
 namespace smartmill::discrepancy {
 namespace {
@@ -117,20 +115,16 @@ TEST(AskedShare, NothingToldIsNothingKnown) {
 // is told of by the forces that it says there, not by those that it would say where another laid them.
 TEST(Standing, EachModelIsToldOfRecordsWhereItLaidThem) {
   const TemporaryFolder folder;
-  Campaign campaign;
-  campaign.folder = folder.file(".");
-  campaign.model_file = "model.yaml";
-  campaign.tests = slotsOfManyKinds();
-  writeMachineModel(believed(), folder.file("model.yaml"));
-  writeCampaign(campaign, campaign.folder);
-  for (const CampaignTest& test : campaign.tests) {
-    const Record with_angle = sim::simulateTest(believed(), test, 0.2, {});
+  const auto without_angle = [](const CampaignTest& test, std::uint64_t seed) {
+    sim::SimulationOptions options;
+    options.seed = seed;
+    const Record with_angle = sim::simulateTest(believed(), test, 0.2, options);
     Record record;
     record.time = with_angle.time;
     for (const char* name : {"fx", "fy", "fz"}) record.add(name) = with_angle.column(name);
-    writeCsv(record, folder.file(test.file));
-  }
-  const Dataset data = loadDataset(campaign, readMachineModel(campaign.modelPath()));
+    return record;
+  };
+  const Dataset data = datasetOf(without_angle, folder.file("."));
   WorkbenchOptions options;
   options.threads = 1;
   Workbench bench(data, options);
