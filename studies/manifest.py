@@ -8,6 +8,7 @@ import sys
 import tomllib
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
+SAME = ("program", "arguments", "cases", "seed", "build")  # what of a study makes its cases
 
 
 def fail(what, code=1):

@@ -109,10 +109,9 @@ Standing standingOf(const Workbench& bench, const FitState& better, const FitSta
   constexpr double TELLS = 25.0;  // squares over the noise
   const auto held = bench.heldout().simulate({bench.exact().model(better), bench.exact().model(other)});
   const std::vector<AskedTest> heldout = askedBy(bench.heldout(), held[0], held[1]);
-  std::vector<AskedTest> fitted =
-      askedBy(bench.fitted(), bench.fitted().simulate(bench.exact().model(better)),
-              saidWhereItLies(bench, other, better));
-  const double variance = std::max(1.0, bench.exactSquaresHere(better) / bench.samples());
+  const std::vector<double> said = bench.fitted().simulate(bench.exact().model(better));
+  std::vector<AskedTest> fitted = askedBy(bench.fitted(), said, saidWhereItLies(bench, other, better));
+  const double variance = std::max(1.0, squaresLeft(bench.fitted(), said) / bench.samples());
   fitted.push_back(askedByStated(bench.freedom(), better, other, variance));
   const double squares = std::accumulate(heldout.begin(), heldout.end(), 0.0,
                                          [](double sum, const AskedTest& t) { return sum + t.squares; });

@@ -85,6 +85,8 @@ TEST_F(StudiesEngine, goesOnFromWhatAnotherMachineHasDone) {
   std::ofstream(at("other.jsonl")) << lines;
   EXPECT_EQ(call("run self_test -j 1 --from " + at("other.jsonl") + " -o " + at("c")), 1);
   EXPECT_THAT(said(), HasSubstr("other.jsonl: line 2 is of another build"));
+  EXPECT_EQ(call("run self_test -j 1 --seed 5 --from " + at("done.jsonl") + " -o " + at("e")), 1);
+  EXPECT_THAT(said(), HasSubstr("done.jsonl: line 1 is of another seed (1, not 5)"));
   std::ofstream(at("torn.jsonl")) << lines.substr(0, 40) << "\n";
   EXPECT_EQ(call("run self_test -j 1 --from " + at("torn.jsonl") + " -o " + at("d")), 1);
   EXPECT_THAT(said(), HasSubstr("torn.jsonl: line 1 is no case of a study"));
