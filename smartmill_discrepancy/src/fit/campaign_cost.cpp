@@ -6,6 +6,7 @@
 
 #include "fit/tangent.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/fit/bounded_quadratic.h"
 #include "smartmill_core/math/linear_algebra.h"
 
 namespace smartmill::discrepancy {
@@ -37,6 +38,23 @@ CampaignCost::CampaignCost(const Fitter& fitter, const FitState& start, const No
   const std::size_t own_begin = nominal_frozen ? nominal_ : 0;
   for (std::size_t c = 0; c < coordinates_.size(); ++c)
     (c < own_begin || c >= turnsBegin() ? frozen_places_ : own_places_).push_back(static_cast<Index>(c));
+  setPoints();
+}
+
+void CampaignCost::setPoints() {
+  Values start(start_.nominal.begin(), start_.nominal.begin() + static_cast<std::ptrdiff_t>(nominal_));
+  for (const Member& m : start_.members) start.insert(start.end(), m.values.begin(), m.values.end());
+  if (turns_ > 0) start.insert(start.end(), start_.turns.begin(), start_.turns.end());
+  const auto all = static_cast<Index>(coordinates_.size());
+  for (VectorXd* of : {&start_point_, &low_, &high_, &precision_, &null_}) of->resize(all);
+  for (Index c = 0; c < all; ++c) {
+    const auto k = static_cast<std::size_t>(c);
+    low_[c] = coordinates_[k].low;
+    high_[c] = coordinates_[k].high;
+    precision_[c] = precision(k);
+    null_[c] = coordinates_[k].null;
+    start_point_[c] = std::clamp(start[k], low_[c], high_[c]);
+  }
 }
 
 // No further from where the tangents were taken than they are worth something.
@@ -54,12 +72,8 @@ void CampaignCost::addTurns() {
 }
 
 std::vector<fit::Parameter> CampaignCost::parameters() const {
-  Values start(start_.nominal.begin(), start_.nominal.begin() + static_cast<std::ptrdiff_t>(nominal_));
-  for (const Member& m : start_.members) start.insert(start.end(), m.values.begin(), m.values.end());
-  if (turns_ > 0) start.insert(start.end(), start_.turns.begin(), start_.turns.end());
   std::vector<fit::Parameter> parameters;
-  for (std::size_t c = 0; c < start.size(); ++c)
-    parameters.push_back({start[c], coordinates_[c].low, coordinates_[c].high, 1.0});
+  for (const Index c : own_places_) parameters.push_back({start_point_[c], low_[c], high_[c], 1.0});
   return parameters;
 }
 
@@ -214,30 +228,82 @@ const CampaignCost::Linear* CampaignCost::linearise(const VectorXd& at) const {
   return &linear_;
 }
 
-bool CampaignCost::evaluate(const VectorXd& at, VectorXd* residual, MatrixXd* jacobian) const {
-  const Index n = at.size();
+std::optional<VectorXd> CampaignCost::pointAt(const VectorXd& own) const {
+  VectorXd at = start_point_;
+  at(own_places_) = own;
+  if (!simulate(at)) return {};
+  if (frozen_places_.empty()) return at;
+  MatrixXd information = frozen_->information;
+  const VectorXd precision = precision_(frozen_places_);
+  const VectorXd taken_at = -shiftAt(VectorXd::Zero(at.size()));
+  const VectorXd right =
+      information * taken_at - frozen_along_ + precision.cwiseProduct(null_(frozen_places_));
+  information.diagonal() += precision;
+  at(frozen_places_) = fit::leastWithin(information, right, low_(frozen_places_), high_(frozen_places_));
+  return at;
+}
+
+// What is simulated alone, with priors on the rest in the squares: frozen coordinates follow where no bound
+// holds them.
+CampaignCost::Linear CampaignCost::eliminated(const VectorXd& at, const Linear& of_all) const {
+  Linear own{of_all.squares, of_all.information(own_places_, own_places_), of_all.gradient(own_places_)};
+  std::vector<Index> follow;
+  for (const Index c : frozen_places_) {
+    own.squares += precision_[c] * std::pow(at[c] - null_[c], 2);
+    if (at[c] > low_[c] && at[c] < high_[c]) follow.push_back(c);
+  }
+  if (follow.empty()) return own;
+  MatrixXd information = of_all.information(follow, follow);
+  information.diagonal() += precision_(follow);
+  const MatrixXd beside = of_all.information(follow, own_places_);
+  own.information -= beside.transpose() * linear::solveSymmetric(information, beside);
+  return own;
+}
+
+double CampaignCost::promisedAt(const VectorXd& own) const {
+  const std::optional<VectorXd> at = pointAt(own);
+  const Linear* of_all = at ? linearise(*at) : nullptr;
+  if (!of_all) return 0.0;
+  Linear point = eliminated(*at, *of_all);
+  const VectorXd precision = precision_(own_places_);
+  point.gradient += precision.cwiseProduct(own - null_(own_places_));
+  point.information.diagonal() += precision;
+  std::vector<Index> moves;
+  for (Index k = 0; k < own.size(); ++k) {
+    const Index c = own_places_[static_cast<std::size_t>(k)];
+    const bool pressed =
+        (own[k] <= low_[c] && point.gradient[k] > 0.0) || (own[k] >= high_[c] && point.gradient[k] < 0.0);
+    if (!pressed) moves.push_back(k);
+  }
+  const VectorXd gradient = point.gradient(moves);
+  const MatrixXd information = point.information(moves, moves);
+  return gradient.dot(linear::solveSymmetric(information, gradient));
+}
+
+bool CampaignCost::evaluate(const VectorXd& own, VectorXd* residual, MatrixXd* jacobian) const {
+  const Index n = own.size();
   VectorXd& r = *residual;
   r.setZero();
-  const double prior_root = std::sqrt(prior_weight_);
-  for (Index c = 0; c < n; ++c) {
-    const Coordinate& k = coordinates_[static_cast<std::size_t>(c)];
-    r[n + 1 + c] = prior_root * (at[c] - k.null) / k.prior_std;
-  }
+  const VectorXd prior_root = precision_(own_places_).cwiseSqrt();
+  r.tail(n) = prior_root.cwiseProduct(own - null_(own_places_));
+  const std::optional<VectorXd> at = pointAt(own);
+  if (!at) return false;
   if (!jacobian) {
-    if (!simulate(at)) return false;
-    r[n] = std::sqrt(std::max(squaresAt(at), 0.0));
+    double squares = squaresAt(*at);
+    for (const Index c : frozen_places_) squares += precision_[c] * std::pow((*at)[c] - null_[c], 2);
+    r[n] = std::sqrt(std::max(squares, 0.0));
     return true;
   }
-  const Linear* at_point = linearise(at);
-  if (!at_point) return false;
+  const Linear* of_all = linearise(*at);
+  if (!of_all) return false;
+  const Linear point = eliminated(*at, *of_all);
   // information = R' R; the residual's share along the tangents is R'^-1 gradient.
-  const linear::SymmetricRoot root = linear::symmetricRoot(at_point->information, at_point->gradient);
+  const linear::SymmetricRoot root = linear::symmetricRoot(point.information, point.gradient);
   MatrixXd& j = *jacobian;
   j.topRows(n) = root.root;
   r.head(n) = root.along;
-  r[n] = std::sqrt(std::max(at_point->squares - r.head(n).squaredNorm(), 0.0));
-  for (Index c = 0; c < n; ++c)
-    j(n + 1 + c, c) = prior_root / coordinates_[static_cast<std::size_t>(c)].prior_std;
+  r[n] = std::sqrt(std::max(point.squares - r.head(n).squaredNorm(), 0.0));
+  j.bottomRows(n) = prior_root.asDiagonal();
   return true;
 }
 

@@ -11,9 +11,11 @@
 
 namespace smartmill::discrepancy {
 
-/// Cost of a campaign for least squares: (measured - simulated) over noise, then the priors. The residuals of
-/// the records, of which there are some 1e5, are handed on rotated into as many as there are coordinates,
-/// which leaves cost, gradient and normal equations as they are.
+/// Cost of a campaign for least squares: (measured - simulated) over noise, then the priors. The solver moves
+/// what is simulated; what acts linearly, along frozen tangents, stands at its best beside each point
+/// (variable projection: Golub and Pereyra, SIAM J. Numer. Anal. 10, 1973). The residuals of the records, of
+/// which there are some 1e5, are handed on rotated into as many as the solver has unknowns, which leaves
+/// cost, gradient and normal equations as they are.
 class CampaignCost : public fit::Residuals {
  public:
   /// All must outlive this. @param frozen as in Fitter::fit()
@@ -21,15 +23,25 @@ class CampaignCost : public fit::Residuals {
                const FitOptions& options);
 
   const std::vector<Coordinate>& coordinates() const { return coordinates_; }
-  Eigen::Index count() const override { return 2 * static_cast<Eigen::Index>(coordinates_.size()) + 1; }
+  Eigen::Index count() const override { return 2 * static_cast<Eigen::Index>(own_places_.size()) + 1; }
 
-  /// Unknowns of a fit that begins at the start, and the state of such unknowns.
+  /// What is simulated, at the start.
   std::vector<fit::Parameter> parameters() const;
+  /// All coordinates at the start, and the state of such coordinates.
+  const Eigen::VectorXd& start() const { return start_point_; }
   FitState stateAt(const Eigen::VectorXd& at) const;
 
-  /// @return false at a point that the twin refuses or where it gives no numbers
-  bool evaluate(const Eigen::VectorXd& at, Eigen::VectorXd* residual,
+  /// @param own what is simulated. @return false at a point that the twin refuses or where it gives no
+  /// numbers
+  bool evaluate(const Eigen::VectorXd& own, Eigen::VectorXd* residual,
                 Eigen::MatrixXd* jacobian) const override;
+
+  /// All coordinates, frozen ones at their best. @return no value where evaluate() is false
+  std::optional<Eigen::VectorXd> pointAt(const Eigen::VectorXd& own) const;
+
+  /// Squares, priors included, that an undamped step from there promises to take away; of what presses
+  /// against its bound it promises nothing.
+  double promisedAt(const Eigen::VectorXd& own) const;
 
   /// Of (simulated - measured) / noise: the normal equations without priors.
   struct Linear {
@@ -49,17 +61,22 @@ class CampaignCost : public fit::Residuals {
   /// From which coordinate on they are turns of records: what a prior holds of them only keeps steps short.
   std::size_t turnsBegin() const { return coordinates_.size() - turns_; }
 
+  /// Whether nothing acts linearly.
+  bool simulatesAll() const { return frozen_places_.empty(); }
+
   /// Of a coordinate's prior.
   double precision(std::size_t coordinate) const;
 
  private:
   void addTurns();
+  void setPoints();
   Eigen::VectorXd ownOf(const Eigen::VectorXd& at) const;
   MachineModel modelAt(const Eigen::VectorXd& at) const;
   bool simulate(const Eigen::VectorXd& at) const;
   void compare(SimulatedBlocks simulated) const;
   bool takeTangents(const Eigen::VectorXd& at) const;
   Eigen::VectorXd shiftAt(const Eigen::VectorXd& at) const;
+  Linear eliminated(const Eigen::VectorXd& at, const Linear& of_all) const;
   double squaresAt(const Eigen::VectorXd& at) const;
   void normalEquations(const Eigen::VectorXd& at, Linear* linear) const;
 
@@ -70,6 +87,9 @@ class CampaignCost : public fit::Residuals {
   std::size_t nominal_ = 0, turns_ = 0;
   std::vector<Coordinate> coordinates_;                   // nominal ones, members', turns
   std::vector<Eigen::Index> frozen_places_, own_places_;  // of the coordinates
+  Eigen::VectorXd start_point_;
+  // Of the coordinates.
+  Eigen::VectorXd low_, high_, precision_, null_;
   // The solver comes back to the points where it is, and what is frozen moves without a simulation: own
   // values where the twin has run, where own tangents were taken; all values of the normal equations.
   mutable std::optional<Eigen::VectorXd> simulated_at_, tangents_at_, linearised_at_;

@@ -21,30 +21,18 @@ using Values = std::vector<double>;
 using Eigen::Index;
 using Eigen::MatrixXd;
 
-// Squares, priors included, that an undamped step at a point promises to take away.
-double promisedAt(const CampaignCost& cost, const Eigen::VectorXd& at) {
-  const CampaignCost::Linear* point = cost.linearise(at);
-  if (!point) return 0.0;
-  MatrixXd information = point->information;
-  Eigen::VectorXd gradient = point->gradient;
-  for (Index c = 0; c < at.size(); ++c) {
-    const auto coordinate = static_cast<std::size_t>(c);
-    information(c, c) += cost.precision(coordinate);
-    gradient[c] += cost.precision(coordinate) * (at[c] - cost.coordinates()[coordinate].null);
-  }
-  return gradient.dot(linear::solveSymmetric(information, gradient));
-}
-
-// Damped steps first, which cross what is curved; then undamped ones: an effect beside the nominal value that
-// it resembles leaves a narrow valley, in which damping would creep.
+// Damped steps first, which cross what is curved; then undamped ones: an effect beside another that it
+// resembles leaves a narrow valley, in which damping would creep.
 // @return no value: the twin gives no numbers at the start
 std::optional<Eigen::VectorXd> solve(const CampaignCost& cost, const FitOptions& options, double samples,
                                      const std::function<bool()>& cancelled) {
   constexpr double HOPE = 10.0;  // times what a step gains or promises, that later ones may bring
   constexpr int PATIENCE = 3;
+  constexpr int EASILY = 3;  // times the steps where each simulates little
+  if (options.iterations == 0) return cost.start();
   fit::Options solver;
   solver.name = "fit of a campaign";
-  solver.iterations = options.iterations;
+  solver.iterations = cost.simulatesAll() ? options.iterations : EASILY * options.iterations;
   solver.function_tolerance = options.tolerance;
   solver.parameter_tolerance = 1e-7;
   solver.dear_derivatives = true;
@@ -57,7 +45,7 @@ std::optional<Eigen::VectorXd> solve(const CampaignCost& cost, const FitOptions&
     return !hopeless && !(cancelled && cancelled());
   };
   std::vector<fit::Parameter> parameters = cost.parameters();
-  Eigen::VectorXd at(static_cast<Index>(parameters.size()));
+  Eigen::VectorXd own(static_cast<Index>(parameters.size()));
   for (const double radius : {1e4, 1e10}) {
     solver.trust_radius = radius;
     fit::Result result;
@@ -67,16 +55,16 @@ std::optional<Eigen::VectorXd> solve(const CampaignCost& cost, const FitOptions&
       return {};
     }
     if (!result.usable()) return {};
-    at = result.value;
-    for (std::size_t c = 0; c < parameters.size(); ++c) parameters[c].start = at[static_cast<Index>(c)];
+    own = result.value;
+    for (std::size_t c = 0; c < parameters.size(); ++c) parameters[c].start = own[static_cast<Index>(c)];
     // A step that gains less than the tolerance is not taken: near the noise only the excess over it counts.
     const double least =
         options.tolerance * std::min(std::max(result.squares - samples, 20.0), result.squares);
     solver.function_tolerance = least / result.squares;
-    const double promised = options.iterations > 0 ? promisedAt(cost, at) : 0.0;
+    const double promised = cost.promisedAt(own);
     if (promised < least || result.squares - HOPE * promised > options.to_beat) break;
   }
-  return at;
+  return cost.pointAt(own);
 }
 
 // Inverse of the information with priors.
@@ -197,9 +185,8 @@ MatrixXd Fitter::sandwichCovariance(const FitState& state, const NominalTangents
   FitOptions options;
   options.prior_weight = prior_weight;
   const CampaignCost cost(*this, state, &tangents, options);
-  const std::vector<fit::Parameter> parameters = cost.parameters();
-  Eigen::VectorXd at(static_cast<Index>(parameters.size())), std_dev = at;
-  for (Index c = 0; c < at.size(); ++c) at[c] = parameters[static_cast<std::size_t>(c)].start;
+  const Eigen::VectorXd& at = cost.start();
+  Eigen::VectorXd std_dev(at.size());
   const CampaignCost::Linear* point = cost.linearise(at);
   if (!point) return {};
   const MatrixXd inverse = inverseAt(cost, point->information);
@@ -208,7 +195,7 @@ MatrixXd Fitter::sandwichCovariance(const FitState& state, const NominalTangents
   std::vector<Values> power(blocks.size());
   runParallel(blocks.size(), runner_.threads(),
               [&](std::size_t b) { power[b] = powerOf(residual.data() + blocks[b].offset, blocks[b].size); });
-  runParallel(parameters.size(), runner_.threads(), [&](std::size_t coordinate) {
+  runParallel(cost.coordinates().size(), runner_.threads(), [&](std::size_t coordinate) {
     const auto c = static_cast<Index>(coordinate);
     double variance = pulledVariance(runner_, cost.influence(inverse.col(c)), residual, power);
     // What is stated lies off by its own deviation.

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "smartmill_discrepancy/search/evidence.h"
+#include "smartmill_discrepancy/search/screening.h"
 
 namespace smartmill::discrepancy {
 namespace {
@@ -97,6 +98,11 @@ std::vector<const Rung*> rivalsOf(const FitState& state, std::size_t member,
   return rivals;
 }
 
+// Where a rival's fit in the place of a member begins.
+std::vector<double> startOf(const Fitter& fitter, const Rung& rival, const Member& member) {
+  return inPlaceOf(fitter, member, *rival.hypothesis).value_or(rival.values);
+}
+
 // A rival does at least half of what the member does: what acts elsewhere may be there beside it.
 bool standsFor(const Fit& rival, const Fit& member, const Fit& lacking) {
   double both = 0.0, own = 0.0;
@@ -117,7 +123,7 @@ void followSimpler(const Fitter& fitter, const Fit& now, const NominalTangents& 
       Rung& simpler = (*ladder)[static_cast<std::size_t>(rival - ladder->data())];
       if (simpler.values.size() >= now.state.members[m].values.size()) continue;
       FitState with = without(now.state, m);
-      with.members.push_back({simpler.hypothesis, simpler.values});
+      with.members.push_back({simpler.hypothesis, startOf(fitter, simpler, now.state.members[m])});
       const Fit fit = fitter.fit(with, &tangents, {8, 1e-5, true});
       if (fit.converged) simpler.values = fit.state.members.back().values;
     }
@@ -142,7 +148,7 @@ bool refine(Workbench& bench, const FitState& state, const SearchOptions& option
     result->needed.push_back(tells(bench.quick().runner(), rest, result->best, options));
     for (const Rung* rival : rivalsOf(at, m, result->ladder)) {
       FitState with = less;
-      with.members.push_back({rival->hypothesis, rival->values});
+      with.members.push_back({rival->hypothesis, startOf(bench.quick(), *rival, at.members[m])});
       const Fit fit = bench.quick().fit(with, &settled.tangents, compared);
       if (fit.converged && rest.converged && standsFor(fit, result->best, rest))
         result->rivals.push_back({m, rival->tried.effect, rest.bic - fit.bic, fit.state});

@@ -13,6 +13,7 @@
 #include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_discrepancy/search/mode_probes.h"
 #include "smartmill_discrepancy/search/order_probes.h"
+#include "smartmill_sim/effects/effect.h"
 
 namespace smartmill::discrepancy {
 namespace {
@@ -561,16 +562,51 @@ AskedShare fittedShare(const Fitter& fitter, const Promise& promise) {
   return sharedBy(tests);
 }
 
-std::vector<double> bestStart(const Fitter& fitter, const Fit& now, const Promise& promise) {
-  if (promise.null.empty()) return promise.start;
+std::optional<std::vector<double>> inPlaceOf(const Fitter& fitter, const Member& member,
+                                             const Hypothesis& hypothesis) {
+  const auto radii = [&](const EffectEntry& entry) {
+    MachineModel model = fitter.runner().data().nominal;
+    model.effects = {entry};
+    const std::vector<double> offset = sim::setUpOf(model, sim::EffectSet(model)).radius_offset;
+    return Eigen::VectorXd(
+        Eigen::Map<const Eigen::VectorXd>(offset.data(), static_cast<Index>(offset.size())));
+  };
+  std::vector<double> values;
+  for (const Coordinate& c : hypothesis.coordinates) values.push_back(c.null);
+  const Eigen::VectorXd null = radii(hypothesis.entry(values));
+  const Eigen::VectorXd wanted = radii(member.hypothesis->entry(member.values)) - null;
+  if (wanted.size() == 0 || wanted.isZero(0.0)) return {};
+  Eigen::MatrixXd columns(null.size(), static_cast<Index>(values.size()));
+  for (std::size_t c = 0; c < values.size(); ++c) {
+    std::vector<double> moved = values;
+    moved[c] += hypothesis.coordinates[c].step;
+    columns.col(static_cast<Index>(c)) =
+        (radii(hypothesis.entry(moved)) - null) / hypothesis.coordinates[c].step;
+  }
+  if (columns.size() == 0 || (columns.colwise().squaredNorm().array() == 0.0).any()) return {};
+  const Eigen::VectorXd found = linear::leastNorm(columns, wanted);
+  for (std::size_t c = 0; c < values.size(); ++c)
+    values[c] = std::clamp(values[c] + found[static_cast<Index>(c)], hypothesis.coordinates[c].low,
+                           hypothesis.coordinates[c].high);
+  return values;
+}
+
+std::vector<double> bestStart(const Fitter& fitter, const Fit& now, const Promise& promise,
+                              const std::optional<std::vector<double>>& other) {
+  if (promise.null.empty() && !other) return promise.start;
   std::vector<std::vector<double>> starts;
-  std::vector<MachineModel> models;
   for (const double share : {1.0, 0.5, 0.2, 0.05}) {
     std::vector<double> start = promise.null;
     for (std::size_t c = 0; c < start.size(); ++c) start[c] += share * (promise.start[c] - promise.null[c]);
+    if (promise.null.empty()) start = promise.start;
+    starts.push_back(std::move(start));
+    if (promise.null.empty()) break;
+  }
+  if (other) starts.push_back(*other);
+  std::vector<MachineModel> models;
+  for (const std::vector<double>& start : starts) {
     FitState with = now.state;
     with.members.push_back({promise.hypothesis, start});
-    starts.push_back(std::move(start));
     models.push_back(fitter.model(with));
   }
   const auto simulated = fitter.runner().simulate(models);

@@ -294,7 +294,9 @@ bool Search::worthFitting(const Round& round, const Promise& promise, double lar
 
 void Search::fitPromise(const Promise& promise, Round& round) {
   FitState with = now_.state;
-  with.members.push_back({promise.hypothesis, bestStart(quick_, now_, promise)});
+  std::optional<std::vector<double>> in_place;
+  if (round.better) in_place = inPlaceOf(quick_, round.best.state.members.back(), *promise.hypothesis);
+  with.members.push_back({promise.hypothesis, bestStart(quick_, now_, promise, in_place)});
   const auto begin = std::chrono::steady_clock::now();
   const std::size_t simulations = quick_.runner().simulations();
   const NominalTangents turns = tangents_.ofTurns();

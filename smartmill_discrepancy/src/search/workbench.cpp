@@ -26,6 +26,22 @@ bool guides(const TestData& test, const MachineModel& nominal) {
          sim::Guide::canBe(test.record);
 }
 
+// So many that the quick twin follows the tool's fastest mode: with fewer it chatters elsewhere than the
+// machine, and a fit goes where it does not.
+int quickSubsteps(const Dataset& data, const WorkbenchOptions& options) {
+  constexpr double STEPS = 16.0;  // a period
+  double substeps = options.screening_substeps;
+  for (const ModalModel* axis : {&data.nominal.tool_tip.x, &data.nominal.tool_tip.y}) {
+    for (const Mode& mode : axis->modes) {
+      for (const TestData& t : data.tests) {
+        if (t.test.kind == TestKind::cut)
+          substeps = std::max(substeps, std::ceil(STEPS * mode.frequency / t.test.sample_rate));
+      }
+    }
+  }
+  return std::min(static_cast<int>(substeps), options.final_substeps);
+}
+
 // Of each block, by what a model leaves.
 std::vector<Whitening> whiteningOf(const TwinRunner& runner, const MachineModel& model) {
   std::vector<double> left = runner.simulate(model);
@@ -103,7 +119,7 @@ Workbench::Workbench(const Dataset& data, const WorkbenchOptions& options)
                                     [](const TestData& t) { return t.phase_estimated; })),
       can_guide_(std::any_of(data.tests.begin(), data.tests.end(),
                              [&](const TestData& t) { return guides(t, data.nominal); })),
-      quick_runner_(data_, testsOf(data_, false), options.threads, options.screening_substeps),
+      quick_runner_(data_, testsOf(data_, false), options.threads, quickSubsteps(data_, options)),
       exact_runner_(data_, testsOf(data_, false), options.threads, options.final_substeps),
       guided_runner_(data_, testsOf(data_, false), options.threads, options.final_substeps),
       heldout_runner_(data_, testsOf(data_, true), options.threads, options.final_substeps),

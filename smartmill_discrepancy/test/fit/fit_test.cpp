@@ -163,6 +163,50 @@ TEST(Fitter, whatIsLeftIsThatOfItsState) {
   }
 }
 
+// Friction far beyond what is stated holds nominal values at their bounds, against which they press: from
+// wherever it starts a fit ends at one point, and what is simulated alone moves there.
+TEST(Fitter, endsAtOnePointWhereNominalValuesPressAgainstTheirBounds) {
+  std::mt19937_64 random(29);
+  const MachineModel nominal = spindleOnly();
+  MachineModel machine = nominal;
+  machine.spindle->coulomb *= 3.0;
+  machine.effects.push_back(stribeckFriction(0.4, 2500.0));
+  const Dataset data = airCuts(machine, nominal, random);
+  const std::vector<Hypothesis> hypotheses = catalogueHypotheses(data, nullptr);
+  const auto stribeck = std::find_if(hypotheses.begin(), hypotheses.end(),
+                                     [](const Hypothesis& h) { return h.effect == "stribeck_friction"; });
+  ASSERT_NE(stribeck, hypotheses.end());
+  const TwinRunner runner(data, {0, 1, 2, 3, 4, 5}, 1, 1);
+  const NominalFreedom freedom(nominal);
+  const Fitter fitter(runner, freedom);
+  const FitState at_nominal{std::vector<double>(freedom.coordinates().size(), 0.0), {}, {}};
+  const NominalTangents tangents = fitter.nominalTangents(at_nominal);
+  std::vector<Fit> fits;
+  for (const double breakaway : {0.35, 0.8}) {
+    for (const double speed : {1500.0, 5000.0}) {
+      FitState start = at_nominal;
+      start.members.push_back({&*stribeck, {breakaway, std::log(speed)}});
+      fits.push_back(fitter.fit(start, &tangents, {8, 1e-6, true}));
+      ASSERT_TRUE(fits.back().converged);
+    }
+  }
+  const Fit& first = fits.front();
+  bool at_bound = false;
+  for (std::size_t c = 0; c < first.state.nominal.size(); ++c) {
+    const Coordinate& k = freedom.coordinates()[c];
+    at_bound = at_bound || first.state.nominal[c] == k.high || first.state.nominal[c] == k.low;
+  }
+  EXPECT_TRUE(at_bound);
+  for (const Fit& fit : fits) {
+    EXPECT_NEAR(fit.chi2 + fit.penalty, first.chi2 + first.penalty, 1e-5 * first.chi2);
+    for (std::size_t k = 0; k < 2; ++k) {
+      const auto i = static_cast<Eigen::Index>(at_nominal.nominal.size() + k);
+      EXPECT_NEAR(fit.state.members[0].values[k], first.state.members[0].values[k],
+                  std::sqrt(first.covariance(i, i)));
+    }
+  }
+}
+
 // BIC by which the fit is better with a hum. @param amplitude [N] of the machine's
 double gainOfHum(double amplitude) {
   const TemporaryFolder folder;

@@ -70,5 +70,40 @@ TEST(Screening, WhatPushedAValueToItsBoundIsPromisedWhole) {
   EXPECT_TRUE(Standing::holdsInFitted(promised));
 }
 
+// Runout moves the teeth of a four-tooth tool out by its size times cosine and sine of a quarter turn after
+// the other: of one tooth that stands out by 20 um half can be runout towards it. Nothing else of the
+// catalogue but radii themselves does anything to radii.
+TEST(Screening, runoutTakesThePlaceOfRadii) {
+  const TemporaryFolder folder;
+  const Dataset data = axialGain(folder.file("."));
+  const NominalFreedom freedom(data.nominal);
+  const TwinRunner runner(data, {0}, 1, 1);
+  const Fitter fitter(runner, freedom);
+  const std::vector<Hypothesis> hypotheses = catalogueHypotheses(data, nullptr);
+  const auto find = [&](const std::string& effect) {
+    return &*std::find_if(hypotheses.begin(), hypotheses.end(),
+                          [&](const Hypothesis& h) { return h.effect == effect; });
+  };
+  const Hypothesis &radius = *find("tooth_radius"), &runout = *find("runout");
+  ASSERT_EQ(data.nominal.tool->teeth, 4);
+  EffectEntry one_out;
+  one_out.name = "tooth_radius";
+  one_out.lists["offset_um"] = {15.0, -5.0, -5.0, -5.0};
+  const Member member{&radius, radius.values(one_out)};
+  const auto found = inPlaceOf(fitter, member, runout);
+  ASSERT_TRUE(found);
+  EXPECT_NEAR((*found)[0], 10.0, 1e-6);
+  EXPECT_NEAR((*found)[1], 0.0, 1e-6);
+  const auto back = inPlaceOf(fitter, {&runout, *found}, radius);
+  ASSERT_TRUE(back);
+  const std::vector<double> radii = radius.entry(*back).lists.at("offset_um");
+  const std::vector<double> expected{10.0, 0.0, -10.0, 0.0};
+  for (std::size_t j = 0; j < 4; ++j) EXPECT_NEAR(radii[j], expected[j], 1e-6);
+  for (const Hypothesis& h : hypotheses) {
+    if (h.effect != "tooth_radius" && h.effect != "runout")
+      EXPECT_FALSE(inPlaceOf(fitter, member, h)) << h.title();
+  }
+}
+
 }  // namespace
 }  // namespace smartmill::discrepancy

@@ -31,10 +31,7 @@ CuttingMachine::CuttingMachine(const MachineModel& model, double time_step, Feed
       model_(model),
       time_step_(time_step),
       sign_(model.force_sensor.measures_workpiece ? -1.0 : 1.0) {
-  model_.effects.clear();
-  TwinSetup setup{std::move(model_), {}, {}, 0.0, {}, {}, {}};
-  if (setup.model.tool) setup.radius_offset.assign(static_cast<std::size_t>(setup.model.tool->teeth), 0.0);
-  effects_.setUp(setup);
+  TwinSetup setup = setUpOf(std::move(model_), effects_);
   model_ = std::move(setup.model);
 
   const double rate = 1.0 / time_step;

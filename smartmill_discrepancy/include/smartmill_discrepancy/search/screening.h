@@ -2,6 +2,7 @@
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -65,7 +66,14 @@ BlockColumns memberTangents(const Fitter& fitter, const FitState& state,
 /// What the fit tests would ask for of what is promised: as sure as a fit of it would be.
 AskedShare fittedShare(const Fitter& fitter, const Promise& promise);
 
-/// The promise is linear: of shorter ways from the null point to its start the one that fits best.
-std::vector<double> bestStart(const Fitter& fitter, const Fit& now, const Promise& promise);
+/// Where a hypothesis does to the radii of the teeth what a member does, as nearly as it can: runout in the
+/// place of radii that were fitted one by one. No value: one of both changes none.
+std::optional<std::vector<double>> inPlaceOf(const Fitter& fitter, const Member& member,
+                                             const Hypothesis& hypothesis);
+
+/// The promise is linear: of shorter ways from the null point to its start the one that fits best, or one
+/// that is given beside them.
+std::vector<double> bestStart(const Fitter& fitter, const Fit& now, const Promise& promise,
+                              const std::optional<std::vector<double>>& other = {});
 
 }  // namespace smartmill::discrepancy

@@ -16,7 +16,7 @@ constexpr double PHASE_SETTLED = 1e-4;
 
 struct WorkbenchOptions {
   int threads = 2;
-  int screening_substeps = 1;
+  int screening_substeps = 1;  ///< at least: more where modes of the tool need them
   int final_substeps = 8;
   std::function<bool()> cancelled;  ///< asked now and then; true ends every fit where it stands
 };

@@ -180,4 +180,8 @@ class EffectSet {
   std::array<bool, static_cast<std::size_t>(Stage::signal) + 1> has_{};
 };
 
+/// What a machine is before it starts, with what its effects change of it.
+/// @throws Error as EffectSet()
+TwinSetup setUpOf(MachineModel model, const EffectSet& effects);
+
 }  // namespace smartmill::sim

@@ -1,0 +1,73 @@
+#include "smartmill_core/fit/bounded_quadratic.h"
+
+#include <cmath>
+#include <vector>
+
+#include "smartmill_core/math/linear_algebra.h"
+
+namespace smartmill::fit {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+// Where the free elements want to go while the others stay.
+VectorXd wanted(const Eigen::MatrixXd& h, const VectorXd& b, const VectorXd& x,
+                const std::vector<Index>& free) {
+  VectorXd staying = x;
+  staying(free).setZero();
+  const Eigen::MatrixXd of_free = h(free, free);
+  const VectorXd right = (b - h * staying)(free);
+  return linear::solveSymmetric(of_free, right);
+}
+
+}  // namespace
+
+VectorXd leastWithin(const Eigen::MatrixXd& h, const VectorXd& b, const VectorXd& low, const VectorXd& high) {
+  const Index n = b.size();
+  VectorXd x = linear::solveSymmetric(h, b).cwiseMax(low).cwiseMin(high);
+  std::vector<bool> held(static_cast<std::size_t>(n));
+  for (Index i = 0; i < n; ++i) held[static_cast<std::size_t>(i)] = x[i] <= low[i] || x[i] >= high[i];
+  // Each set is visited once at most, since the value falls from one to the next; rounding may not see it.
+  for (Index round = 0; round < 20 * (n + 1); ++round) {
+    std::vector<Index> free;
+    for (Index i = 0; i < n; ++i) {
+      if (!held[static_cast<std::size_t>(i)]) free.push_back(i);
+    }
+    const VectorXd to = wanted(h, b, x, free);
+    double share = 1.0;  // of the way that is open
+    Index stops = -1;
+    for (std::size_t k = 0; k < free.size(); ++k) {
+      const Index i = free[k];
+      const double by = to[static_cast<Index>(k)] - x[i];
+      const double room = by > 0.0 ? high[i] - x[i] : low[i] - x[i];
+      if (by == 0.0 || room / by >= share) continue;
+      share = room / by;
+      stops = i;
+    }
+    for (std::size_t k = 0; k < free.size(); ++k)
+      x[free[k]] += share * (to[static_cast<Index>(k)] - x[free[k]]);
+    if (stops >= 0) {
+      x[stops] = x[stops] - low[stops] < high[stops] - x[stops] ? low[stops] : high[stops];
+      held[static_cast<std::size_t>(stops)] = true;
+      continue;
+    }
+    // The one that would gain most by leaving its bound.
+    const VectorXd slope = b - h * x;
+    Index leaves = -1;
+    double most = 0.0;
+    for (Index i = 0; i < n; ++i) {
+      if (!held[static_cast<std::size_t>(i)] || low[i] == high[i]) continue;
+      const double inward = x[i] <= low[i] ? slope[i] : -slope[i], gain = inward / std::sqrt(h(i, i));
+      if (gain <= most) continue;
+      most = gain;
+      leaves = i;
+    }
+    const double rounding = 1e-12 * std::sqrt(std::abs(b.dot(x)));
+    if (leaves < 0 || most <= rounding) break;
+    held[static_cast<std::size_t>(leaves)] = false;
+  }
+  return x;
+}
+
+}  // namespace smartmill::fit

@@ -1,0 +1,70 @@
+#include "smartmill_core/fit/bounded_quadratic.h"
+
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include <gtest/gtest.h>
+
+namespace smartmill::fit {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr double INFINITE = std::numeric_limits<double>::infinity();
+
+// Two unknowns that lean on each other: held at its bound, the first moves the second.
+TEST(LeastWithin, holdsAtBoundsAndMovesTheRest) {
+  MatrixXd h(2, 2);
+  h << 2.0, 1.0, 1.0, 2.0;
+  const VectorXd b = (VectorXd(2) << 6.0, 3.0).finished();  // freely: (3, 0)
+  const VectorXd open = VectorXd::Constant(2, INFINITE);
+  const VectorXd freely = leastWithin(h, b, -open, open);
+  EXPECT_NEAR(freely[0], 3.0, 1e-12);
+  EXPECT_NEAR(freely[1], 0.0, 1e-12);
+  const VectorXd bound = leastWithin(h, b, -open, VectorXd::Constant(2, 1.0));
+  EXPECT_DOUBLE_EQ(bound[0], 1.0);
+  EXPECT_NEAR(bound[1], 1.0, 1e-12);  // (3 - 1) / 2, at the bound as it happens
+  const VectorXd held =
+      leastWithin(h, b, (VectorXd(2) << 2.0, -9.0).finished(), (VectorXd(2) << 2.0, 9.0).finished());
+  EXPECT_DOUBLE_EQ(held[0], 2.0);
+  EXPECT_NEAR(held[1], 0.5, 1e-12);
+}
+
+TEST(LeastWithin, nothingIsNothing) {
+  EXPECT_EQ(leastWithin({}, {}, {}, {}).size(), 0);
+}
+
+// Karush, Kuhn and Tucker: free elements have no slope, at a bound it points outwards. Half of the problems
+// are narrow valleys (condition 1e8), with bounds everywhere.
+TEST(LeastWithin, slopesPointOutwardsOnly) {
+  std::mt19937_64 random(5);
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> width(0.0, 2.0);
+  for (int trial = 0; trial < 200; ++trial) {
+    const Index n = 1 + trial % 40;
+    MatrixXd a(n + 5, n);
+    for (double& v : a.reshaped()) v = normal(random);
+    if (trial % 2 == 1 && n > 1) a.col(0) = a.col(1) + 1e-4 * a.col(0);
+    const MatrixXd h = a.transpose() * a;
+    VectorXd b(n), low(n), high(n);
+    for (Index i = 0; i < n; ++i) {
+      b[i] = 10.0 * normal(random);
+      low[i] = -width(random);
+      high[i] = low[i] + width(random);
+    }
+    const VectorXd x = leastWithin(h, b, low, high), slope = b - h * x;
+    for (Index i = 0; i < n; ++i) {
+      const double outwards = 1e-7 * std::sqrt(h(i, i)) * b.norm();
+      EXPECT_GE(x[i], low[i]);
+      EXPECT_LE(x[i], high[i]);
+      EXPECT_TRUE(x[i] == low[i] || slope[i] >= -outwards) << trial << ": " << i;
+      EXPECT_TRUE(x[i] == high[i] || slope[i] <= outwards) << trial << ": " << i;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace smartmill::fit
