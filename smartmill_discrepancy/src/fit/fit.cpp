@@ -21,32 +21,59 @@ using Values = std::vector<double>;
 using Eigen::Index;
 using Eigen::MatrixXd;
 
-// Damped steps first, which cross what is curved; then undamped ones: an effect beside another that it
-// resembles leaves a narrow valley, in which damping would creep.
+// Ends a fit that is through: what a step gains is a trifle beside what is above the noise, steps in a row
+// gain nothing, or it comes too slowly near what it has to beat.
+class Course {
+ public:
+  Course(const FitOptions& options, double samples) : options_(options), samples_(samples) {}
+
+  bool goesOn(const fit::Progress& now) {
+    constexpr int IN_VAIN = 4, PATIENCE = 3;
+    const double gain = before_ - now.squares;
+    before_ = now.squares;
+    in_vain_ = gain > 0.0 ? 0 : in_vain_ + 1;
+    if (now.iteration == 0) return true;
+    const bool trifle = gain > 0.0 && gain < least(now.squares);
+    const bool hopeless = now.iteration >= PATIENCE && now.squares - options_.to_beat > HOPE * gain;
+    return !trifle && !hopeless && in_vain_ < IN_VAIN;
+  }
+  bool mayBeat(double squares, double promised) const {
+    return promised >= least(squares) && squares - HOPE * promised <= options_.to_beat;
+  }
+
+ private:
+  static constexpr double HOPE = 10.0;  // times what a step gains or promises, that later ones may bring
+  double least(double squares) const {
+    return options_.tolerance * std::min(std::max(squares - samples_, 20.0), squares);
+  }
+  const FitOptions& options_;
+  double samples_, before_ = std::numeric_limits<double>::infinity();
+  int in_vain_ = 0;
+};
+
+// Damped steps, which cross what is curved. Where nominal values are simulated undamped ones follow: an
+// effect beside the nominal value that it resembles leaves a narrow valley, in which damping would creep.
 // @return no value: the twin gives no numbers at the start
 std::optional<Eigen::VectorXd> solve(const CampaignCost& cost, const FitOptions& options, double samples,
                                      const std::function<bool()>& cancelled) {
-  constexpr double HOPE = 10.0;  // times what a step gains or promises, that later ones may bring
-  constexpr int PATIENCE = 3;
-  constexpr int EASILY = 3;  // times the steps where each simulates little
+  constexpr int EASILY = 2;  // times the steps where each simulates little
   if (options.iterations == 0) return cost.start();
   fit::Options solver;
   solver.name = "fit of a campaign";
   solver.iterations = cost.simulatesAll() ? options.iterations : EASILY * options.iterations;
-  solver.function_tolerance = options.tolerance;
+  solver.function_tolerance = 1e-15;  // Course ends it
   solver.parameter_tolerance = 1e-7;
   solver.dear_derivatives = true;
   solver.finish_at_bounds = false;  // simulations are dear, and the next round comes back
-  double before = std::numeric_limits<double>::infinity();
-  solver.progress = [&](const fit::Progress& now) {
-    const bool hopeless =
-        now.iteration >= PATIENCE && now.squares - options.to_beat > HOPE * (before - now.squares);
-    before = now.squares;
-    return !hopeless && !(cancelled && cancelled());
-  };
   std::vector<fit::Parameter> parameters = cost.parameters();
   Eigen::VectorXd own(static_cast<Index>(parameters.size()));
-  for (const double radius : {1e4, 1e10}) {
+  const std::vector<double> radii =
+      cost.simulatesAll() ? std::vector<double>{1e4, 1e10} : std::vector<double>{1e5};
+  for (const double radius : radii) {
+    Course course(options, samples);
+    solver.progress = [&](const fit::Progress& now) {
+      return course.goesOn(now) && !(cancelled && cancelled());
+    };
     solver.trust_radius = radius;
     fit::Result result;
     try {
@@ -57,12 +84,7 @@ std::optional<Eigen::VectorXd> solve(const CampaignCost& cost, const FitOptions&
     if (!result.usable()) return {};
     own = result.value;
     for (std::size_t c = 0; c < parameters.size(); ++c) parameters[c].start = own[static_cast<Index>(c)];
-    // A step that gains less than the tolerance is not taken: near the noise only the excess over it counts.
-    const double least =
-        options.tolerance * std::min(std::max(result.squares - samples, 20.0), result.squares);
-    solver.function_tolerance = least / result.squares;
-    const double promised = cost.promisedAt(own);
-    if (promised < least || result.squares - HOPE * promised > options.to_beat) break;
+    if (radius == radii.back() || !course.mayBeat(result.squares, cost.promisedAt(own))) break;
   }
   return cost.pointAt(own);
 }

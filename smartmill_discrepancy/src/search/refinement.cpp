@@ -142,14 +142,16 @@ bool refine(Workbench& bench, const FitState& state, const SearchOptions& option
   result->rivals.clear();
   for (std::size_t m = 0; m < at.members.size(); ++m) {
     const FitState less = without(at, m);
-    const Fit rest = bench.quick().fit(less, &settled.tangents, compared);
+    FitOptions without_it = compared;
+    without_it.to_beat = result->best.chi2 + result->best.penalty;
+    const Fit rest = bench.quick().fit(less, &settled.tangents, without_it);
     result->contribution.push_back(rest.bic - result->best.bic);
     result->lacking.push_back(rest.state);
     result->needed.push_back(tells(bench.quick().runner(), rest, result->best, options));
     for (const Rung* rival : rivalsOf(at, m, result->ladder)) {
       FitState with = less;
       with.members.push_back({rival->hypothesis, startOf(bench.quick(), *rival, at.members[m])});
-      const Fit fit = bench.quick().fit(with, &settled.tangents, compared);
+      const Fit fit = bench.quick().fit(with, &settled.tangents, without_it);
       if (fit.converged && rest.converged && standsFor(fit, result->best, rest))
         result->rivals.push_back({m, rival->tried.effect, rest.bic - fit.bic, fit.state});
     }

@@ -29,7 +29,7 @@ bool guides(const TestData& test, const MachineModel& nominal) {
 // So many that the quick twin follows the tool's fastest mode: with fewer it chatters elsewhere than the
 // machine, and a fit goes where it does not.
 int quickSubsteps(const Dataset& data, const WorkbenchOptions& options) {
-  constexpr double STEPS = 16.0;  // a period
+  constexpr double STEPS = 12.0;  // a period
   double substeps = options.screening_substeps;
   for (const ModalModel* axis : {&data.nominal.tool_tip.x, &data.nominal.tool_tip.y}) {
     for (const Mode& mode : axis->modes) {

@@ -61,7 +61,7 @@ ceres::Solver::Options solverOptions(const Options& options, Reporter* reporter)
   solver.initial_trust_region_radius = options.trust_radius;
   if (options.dear_derivatives) {
     solver.line_search_interpolation_type = ceres::QUADRATIC;
-    solver.max_num_line_search_step_size_iterations = 12;
+    solver.max_num_line_search_step_size_iterations = 4;
   }
   solver.logging_type = ceres::SILENT;
   solver.num_threads = 1;
