@@ -26,10 +26,11 @@ bool guides(const TestData& test, const MachineModel& nominal) {
          sim::Guide::canBe(test.record);
 }
 
-// So many that the quick twin follows the tool's fastest mode: with fewer it chatters elsewhere than the
-// machine, and a fit goes where it does not.
+// The quick twin follows the tool's modes: with too few steps it chatters elsewhere than the machine, and a
+// fit goes where it does not. Beyond twice the steps refineQuick() is for where it must be.
 int quickSubsteps(const Dataset& data, const WorkbenchOptions& options) {
   constexpr double STEPS = 12.0;  // a period
+  constexpr double MOST = 2.0;
   double substeps = options.screening_substeps;
   for (const ModalModel* axis : {&data.nominal.tool_tip.x, &data.nominal.tool_tip.y}) {
     for (const Mode& mode : axis->modes) {
@@ -39,7 +40,8 @@ int quickSubsteps(const Dataset& data, const WorkbenchOptions& options) {
       }
     }
   }
-  return std::min(static_cast<int>(substeps), options.final_substeps);
+  const double most = std::max(MOST, static_cast<double>(options.screening_substeps));
+  return std::min(static_cast<int>(std::min(substeps, most)), options.final_substeps);
 }
 
 // Of each block, by what a model leaves.
