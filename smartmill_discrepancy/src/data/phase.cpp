@@ -271,7 +271,7 @@ void turnRecord(TestData& t, const Turn& by) {
   setAngle(t, turnedPhase(firstAngle(t), by));
 }
 
-double turnPhases(Dataset& data, const MachineModel& model) {
+double turnPhases(Dataset& data, const MachineModel& model, double least) {
   constexpr double LEAST_GAIN = 25.0;   // of squares over noise: less tells no phase
   constexpr double LEAST_SHOWN = 0.05;  // squares of the lines beside those of the tooth passing
   constexpr int ALL_ROUND = 1440, NEAR = 40, MOST_ORDERS = 60;
@@ -311,6 +311,9 @@ double turnPhases(Dataset& data, const MachineModel& model) {
       early = linesBetween(from, middle).best(turn, range, NEAR);
       late = linesBetween(middle, end).best(turn, range, NEAR);
     }
+    const double by =
+        std::max(std::abs(std::remainder(early, TWO_PI)), std::abs(std::remainder(late, TWO_PI)));
+    if (by < least) continue;
     turn = 0.5 * (early + late);
     const double rate = (late - early) / (0.5 * span);  // [rad/s]
     const double at_start = turn - rate * (0.5 * span + static_cast<double>(from) / t.test.sample_rate);
@@ -323,8 +326,7 @@ double turnPhases(Dataset& data, const MachineModel& model) {
       t = before;
       continue;
     }
-    largest =
-        std::max({largest, std::abs(std::remainder(early, TWO_PI)), std::abs(std::remainder(late, TWO_PI))});
+    largest = std::max(largest, by);
   }
   return largest;
 }

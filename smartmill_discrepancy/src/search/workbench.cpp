@@ -283,9 +283,12 @@ bool Workbench::refineQuick() {
 }
 
 double Workbench::turnPhases(FitState& state) {
+  // Fits find what is less better, by every sample and with what else is free: turned back and forth between
+  // two answers nothing would settle.
+  constexpr double FITTED = 0.05;  // [rad]
   if (!phases_estimated_) return 0.0;
   turnFitted(state);
-  const double turn = discrepancy::turnPhases(data_, quick_.model(state));
+  const double turn = discrepancy::turnPhases(data_, quick_.model(state), FITTED);
   heldout_runner_.readPhases();
   if (turn == 0.0) return turn;
   state.turns.clear();

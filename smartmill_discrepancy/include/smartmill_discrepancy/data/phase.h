@@ -46,7 +46,8 @@ void turnRecord(TestData& test, const Turn& by);
 /// Turns the records without spindle angle, tooth and speed included, to where the lines of a model's forces
 /// say, wherever the model then fits better: a model with effects knows which tooth is which, and lines of
 /// once a revolution in air.
+/// @param least [rad] smaller turns are left alone
 /// @return the largest change of an angle [rad], 0 where every record has its angle
-double turnPhases(Dataset& data, const MachineModel& model);
+double turnPhases(Dataset& data, const MachineModel& model, double least = 0.0);
 
 }  // namespace smartmill::discrepancy

@@ -84,7 +84,8 @@ class Workbench {
   bool phasesEstimated() const { return phases_estimated_; }  ///< some records have no spindle angle
 
   /// Turns the records without spindle angle, of the state and held out, to where the lines of the state's
-  /// forces say, where it then fits better: another tooth, another turn in air. @return by how much [rad]
+  /// forces say, where it then fits better: another tooth, another turn in air; not by what fits find
+  /// themselves. @return by how much [rad]
   double turnPhases(FitState& state);
 
   /// The records lie where a state has them, those held out where it fits them best.
