@@ -178,6 +178,8 @@ void TwinRunner::whitenRecords() {
 }
 
 void TwinRunner::setSubsteps(int substeps) {
+  if (substeps == substeps_) return;
+  correction_.clear();
   substeps_ = substeps;
   for (Kept& kept : kept_) {
     const std::lock_guard<std::mutex> lock(kept.mutex);

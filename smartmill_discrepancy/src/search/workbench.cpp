@@ -26,9 +26,9 @@ bool guides(const TestData& test, const MachineModel& nominal) {
          sim::Guide::canBe(test.record);
 }
 
-// The quick twin follows the tool's modes: with too few steps it chatters elsewhere than the machine, and a
+// Of the quick twin where nothing guides it: with too few steps it chatters elsewhere than the machine, and a
 // fit goes where it does not. Beyond twice the steps refineQuick() is for where it must be.
-int quickSubsteps(const Dataset& data, const WorkbenchOptions& options) {
+int freeSubsteps(const Dataset& data, const WorkbenchOptions& options) {
   constexpr double STEPS = 12.0;  // a period
   constexpr double MOST = 2.0;
   double substeps = options.screening_substeps;
@@ -121,7 +121,7 @@ Workbench::Workbench(const Dataset& data, const WorkbenchOptions& options)
                                     [](const TestData& t) { return t.phase_estimated; })),
       can_guide_(std::any_of(data.tests.begin(), data.tests.end(),
                              [&](const TestData& t) { return guides(t, data.nominal); })),
-      quick_runner_(data_, testsOf(data_, false), options.threads, quickSubsteps(data_, options)),
+      quick_runner_(data_, testsOf(data_, false), options.threads, freeSubsteps(data_, options)),
       exact_runner_(data_, testsOf(data_, false), options.threads, options.final_substeps),
       guided_runner_(data_, testsOf(data_, false), options.threads, options.final_substeps),
       heldout_runner_(data_, testsOf(data_, true), options.threads, options.final_substeps),
@@ -248,6 +248,8 @@ void Workbench::guide(bool guided) {
   for (TestData& t : data_.tests) t.guided = t.chatter.has_value();
   readGuidance();
   quick_runner_.setGuided(guided_);
+  if (!refined_)
+    quick_runner_.setSubsteps(guided_ ? options_.screening_substeps : freeSubsteps(data_, options_));
   heldout_runner_.setGuided(guided_);
 }
 
@@ -278,6 +280,7 @@ double Workbench::exactSquaresHere(const FitState& state) const {
 bool Workbench::refineQuick() {
   constexpr int FINER = 4;
   if (quick_runner_.substeps() >= exact_runner_.substeps()) return false;
+  refined_ = true;
   quick_runner_.setSubsteps(std::min(FINER * quick_runner_.substeps(), exact_runner_.substeps()));
   return true;
 }

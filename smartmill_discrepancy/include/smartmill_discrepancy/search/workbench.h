@@ -16,7 +16,7 @@ constexpr double PHASE_SETTLED = 1e-4;
 
 struct WorkbenchOptions {
   int threads = 2;
-  int screening_substeps = 1;  ///< at least: more where modes of the tool need them
+  int screening_substeps = 1;  ///< more where nothing guides the modes of a tool
   int final_substeps = 8;
   std::function<bool()> cancelled;  ///< asked now and then; true ends every fit where it stands
 };
@@ -108,7 +108,7 @@ class Workbench {
   std::vector<TestData> loaded_;  // those to be fitted, as they were loaded
   NominalFreedom freedom_;
   bool phases_estimated_;
-  bool can_guide_, guided_ = false;
+  bool can_guide_, guided_ = false, refined_ = false;
   TwinRunner quick_runner_, exact_runner_, guided_runner_, heldout_runner_;
   Fitter quick_, exact_;
   std::optional<Taken> taken_;
