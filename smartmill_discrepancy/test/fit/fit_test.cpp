@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 #include <random>
+#include <string>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -15,6 +17,11 @@
 
 namespace smartmill::discrepancy {
 namespace {
+
+const Hypothesis& effectOf(const std::vector<Hypothesis>& hypotheses, const std::string& effect) {
+  return *std::find_if(hypotheses.begin(), hypotheses.end(),
+                       [&](const Hypothesis& h) { return h.effect == effect; });
+}
 
 // Machines drawn with friction that their nominal models lack, nominal values off by what is stated of them:
 // the fit's standard deviations tell how far it is from the truth, neither too small nor inflated.
@@ -32,14 +39,12 @@ TEST(Fitter, standardDeviationsAreHonest) {
     machine.effects.push_back(stribeckFriction(breakaway, speed));
     const Dataset data = airCuts(machine, nominal, random);
     const std::vector<Hypothesis> hypotheses = catalogueHypotheses(data, nullptr);
-    const auto stribeck = std::find_if(hypotheses.begin(), hypotheses.end(),
-                                       [](const Hypothesis& h) { return h.effect == "stribeck_friction"; });
-    ASSERT_NE(stribeck, hypotheses.end());
+    const Hypothesis& stribeck = effectOf(hypotheses, "stribeck_friction");
     const TwinRunner runner(data, {0, 1, 2, 3, 4, 5}, 1, 1);
     const Fitter fitter(runner, freedom);
     FitState start;
     start.nominal.assign(freedom.coordinates().size(), 0.0);
-    start.members.push_back({&*stribeck, {0.3, std::log(2000.0)}});
+    start.members.push_back({&stribeck, {0.3, std::log(2000.0)}});
     const Fit fit = fitter.fit(start, nullptr, {30, 1e-10, true});
     ASSERT_TRUE(fit.converged);
     const std::vector<double>& values = fit.state.members.front().values;
@@ -84,14 +89,12 @@ TEST(Fitter, standardDeviationsAreHonestBesideNoiseThatIsCarriedOn) {
     Dataset data = airCuts(machine, nominal, random);
     carryNoiseOn(SHARE, machine, &data);
     const std::vector<Hypothesis> hypotheses = catalogueHypotheses(data, nullptr);
-    const auto stribeck = std::find_if(hypotheses.begin(), hypotheses.end(),
-                                       [](const Hypothesis& h) { return h.effect == "stribeck_friction"; });
-    ASSERT_NE(stribeck, hypotheses.end());
+    const Hypothesis& stribeck = effectOf(hypotheses, "stribeck_friction");
     TwinRunner runner(data, {0, 1, 2, 3, 4, 5}, 1, 1);
     const Fitter fitter(runner, freedom);
     const FitOptions options{30, 1e-10, false};
     const FitState start{
-        std::vector<double>(freedom.coordinates().size(), 0.0), {{&*stribeck, {0.4, std::log(2500.0)}}}, {}};
+        std::vector<double>(freedom.coordinates().size(), 0.0), {{&stribeck, {0.4, std::log(2500.0)}}}, {}};
     const Fit first = fitter.fit(start, nullptr, options);
     ASSERT_TRUE(first.converged);
     std::vector<Whitening> whitening;
@@ -173,9 +176,7 @@ TEST(Fitter, endsAtOnePointWhereNominalValuesPressAgainstTheirBounds) {
   machine.effects.push_back(stribeckFriction(0.4, 2500.0));
   const Dataset data = airCuts(machine, nominal, random);
   const std::vector<Hypothesis> hypotheses = catalogueHypotheses(data, nullptr);
-  const auto stribeck = std::find_if(hypotheses.begin(), hypotheses.end(),
-                                     [](const Hypothesis& h) { return h.effect == "stribeck_friction"; });
-  ASSERT_NE(stribeck, hypotheses.end());
+  const Hypothesis& stribeck = effectOf(hypotheses, "stribeck_friction");
   const TwinRunner runner(data, {0, 1, 2, 3, 4, 5}, 1, 1);
   const NominalFreedom freedom(nominal);
   const Fitter fitter(runner, freedom);
@@ -185,7 +186,7 @@ TEST(Fitter, endsAtOnePointWhereNominalValuesPressAgainstTheirBounds) {
   for (const double breakaway : {0.35, 0.8}) {
     for (const double speed : {1500.0, 5000.0}) {
       FitState start = at_nominal;
-      start.members.push_back({&*stribeck, {breakaway, std::log(speed)}});
+      start.members.push_back({&stribeck, {breakaway, std::log(speed)}});
       fits.push_back(fitter.fit(start, &tangents, {8, 1e-6, true}));
       ASSERT_TRUE(fits.back().converged);
     }

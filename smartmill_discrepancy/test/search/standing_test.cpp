@@ -121,6 +121,19 @@ Record withoutAngle(const CampaignTest& test, std::uint64_t seed) {
   return record;
 }
 
+// What is believed is the machine; nobody measured the spindle's angle.
+struct WithoutAngle {
+  const TemporaryFolder folder;
+  const Dataset data = datasetOf(withoutAngle, folder.file("."));
+  Workbench bench{data, WorkbenchOptions{1, 1, 8, {}}};
+
+  FitState stated() const {
+    FitState state;
+    state.nominal.assign(bench.freedom().coordinates().size(), 0.0);
+    return state;
+  }
+};
+
 // The state with all records laid further on.
 FitState turned(const Workbench& bench, const FitState& state, double by) {
   FitState further = state;
@@ -134,13 +147,9 @@ FitState turned(const Workbench& bench, const FitState& state, double by) {
 // What lines alone say of an angle and what a fit says differ by little: where that were turned back each
 // time, a fit would never settle.
 TEST(Workbench, whatFitsFindThemselvesIsNotTurnedBack) {
-  const TemporaryFolder folder;
-  const Dataset data = datasetOf(withoutAngle, folder.file("."));
-  WorkbenchOptions options;
-  options.threads = 1;
-  Workbench bench(data, options);
-  FitState right;
-  right.nominal.assign(bench.freedom().coordinates().size(), 0.0);
+  WithoutAngle records;
+  Workbench& bench = records.bench;
+  FitState right = records.stated();
   const FitState near = turned(bench, right, 0.02);
   FitState same = near;
   EXPECT_EQ(bench.turnPhases(same), 0.0);
@@ -158,13 +167,9 @@ TEST(Workbench, whatFitsFindThemselvesIsNotTurnedBack) {
 // Records whose angle nobody measured lie where a model laid them. One that laid them a tenth of a radian off
 // is told of by the forces that it says there, not by those that it would say where another laid them.
 TEST(Standing, EachModelIsToldOfRecordsWhereItLaidThem) {
-  const TemporaryFolder folder;
-  const Dataset data = datasetOf(withoutAngle, folder.file("."));
-  WorkbenchOptions options;
-  options.threads = 1;
-  Workbench bench(data, options);
-  FitState right;
-  right.nominal.assign(bench.freedom().coordinates().size(), 0.0);
+  WithoutAngle records;
+  Workbench& bench = records.bench;
+  FitState right = records.stated();
   bench.turnPhases(right);
   bench.turnTo(right);
   const FitState off = turned(bench, right, 0.1);
