@@ -30,7 +30,7 @@ namespace beast = boost::beast;
 namespace http = beast::http;
 namespace websocket = beast::websocket;
 using nlohmann::json;
-using tcp = asio::ip::tcp;
+using Tcp = asio::ip::tcp;
 
 constexpr const char* PROTOCOL = "foxglove.websocket.v1";
 
@@ -127,7 +127,7 @@ class TestClient {
   explicit TestClient(int port, const std::string& origin = {}, const std::string& protocol = PROTOCOL,
                       const std::string& host = {})
       : stream_(io_) {
-    const tcp::endpoint place(asio::ip::make_address("127.0.0.1"), static_cast<unsigned short>(port));
+    const Tcp::endpoint place(asio::ip::make_address("127.0.0.1"), static_cast<unsigned short>(port));
     stream_.next_layer().connect(place);
     stream_.set_option(websocket::stream_base::decorator([=](websocket::request_type& request) {
       if (!origin.empty()) request.set(http::field::origin, origin);
@@ -185,7 +185,7 @@ class TestClient {
 
  private:
   asio::io_context io_;
-  websocket::stream<tcp::socket> stream_;
+  websocket::stream<Tcp::socket> stream_;
   beast::error_code failed_;
   std::string chosen_;
 };
