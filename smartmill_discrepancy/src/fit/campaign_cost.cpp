@@ -51,7 +51,7 @@ void CampaignCost::setPoints() {
     const auto k = static_cast<std::size_t>(c);
     low_[c] = coordinates_[k].low;
     high_[c] = coordinates_[k].high;
-    precision_[c] = precision(k);
+    precision_[c] = prior_weight_ / (coordinates_[k].prior_std * coordinates_[k].prior_std);
     null_[c] = coordinates_[k].null;
     start_point_[c] = std::clamp(start[k], low_[c], high_[c]);
   }
@@ -93,11 +93,6 @@ MachineModel CampaignCost::modelAt(const VectorXd& at) const {
   FitState state = stateAt(at);
   if (frozen_ && !frozen_->at.empty()) state.nominal = frozen_->at;
   return fitter_.model(state);
-}
-
-double CampaignCost::precision(std::size_t coordinate) const {
-  const double std_dev = coordinates_[coordinate].prior_std;
-  return prior_weight_ / (std_dev * std_dev);
 }
 
 VectorXd CampaignCost::ownOf(const VectorXd& at) const {
@@ -243,13 +238,19 @@ std::optional<VectorXd> CampaignCost::pointAt(const VectorXd& own) const {
   return at;
 }
 
+double CampaignCost::frozenPenalty(const VectorXd& at) const {
+  double penalty = 0.0;
+  for (const Index c : frozen_places_) penalty += precision_[c] * std::pow(at[c] - null_[c], 2);
+  return penalty;
+}
+
 // What is simulated alone, with priors on the rest in the squares: frozen coordinates follow where no bound
 // holds them.
 CampaignCost::Linear CampaignCost::eliminated(const VectorXd& at, const Linear& of_all) const {
-  Linear own{of_all.squares, of_all.information(own_places_, own_places_), of_all.gradient(own_places_)};
+  Linear own{of_all.squares + frozenPenalty(at), of_all.information(own_places_, own_places_),
+             of_all.gradient(own_places_)};
   std::vector<Index> follow;
   for (const Index c : frozen_places_) {
-    own.squares += precision_[c] * std::pow(at[c] - null_[c], 2);
     if (at[c] > low_[c] && at[c] < high_[c]) follow.push_back(c);
   }
   if (follow.empty()) return own;
@@ -289,9 +290,7 @@ bool CampaignCost::evaluate(const VectorXd& own, VectorXd* residual, MatrixXd* j
   const std::optional<VectorXd> at = pointAt(own);
   if (!at) return false;
   if (!jacobian) {
-    double squares = squaresAt(*at);
-    for (const Index c : frozen_places_) squares += precision_[c] * std::pow((*at)[c] - null_[c], 2);
-    r[n] = std::sqrt(std::max(squares, 0.0));
+    r[n] = std::sqrt(std::max(squaresAt(*at) + frozenPenalty(*at), 0.0));
     return true;
   }
   const Linear* of_all = linearise(*at);

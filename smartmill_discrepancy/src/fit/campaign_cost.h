@@ -65,7 +65,7 @@ class CampaignCost : public fit::Residuals {
   bool simulatesAll() const { return frozen_places_.empty(); }
 
   /// Of a coordinate's prior.
-  double precision(std::size_t coordinate) const;
+  double precision(std::size_t coordinate) const { return precision_[static_cast<Eigen::Index>(coordinate)]; }
 
  private:
   void addTurns();
@@ -76,6 +76,7 @@ class CampaignCost : public fit::Residuals {
   void compare(SimulatedBlocks simulated) const;
   bool takeTangents(const Eigen::VectorXd& at) const;
   Eigen::VectorXd shiftAt(const Eigen::VectorXd& at) const;
+  double frozenPenalty(const Eigen::VectorXd& at) const;
   Linear eliminated(const Eigen::VectorXd& at, const Linear& of_all) const;
   double squaresAt(const Eigen::VectorXd& at) const;
   void normalEquations(const Eigen::VectorXd& at, Linear* linear) const;

@@ -594,13 +594,12 @@ std::optional<std::vector<double>> inPlaceOf(const Fitter& fitter, const Member&
 std::vector<double> bestStart(const Fitter& fitter, const Fit& now, const Promise& promise,
                               const std::optional<std::vector<double>>& other) {
   if (promise.null.empty() && !other) return promise.start;
-  std::vector<std::vector<double>> starts;
-  for (const double share : {1.0, 0.5, 0.2, 0.05}) {
+  std::vector<std::vector<double>> starts{promise.start};
+  for (const double share : {0.5, 0.2, 0.05}) {
+    if (promise.null.empty()) break;
     std::vector<double> start = promise.null;
     for (std::size_t c = 0; c < start.size(); ++c) start[c] += share * (promise.start[c] - promise.null[c]);
-    if (promise.null.empty()) start = promise.start;
     starts.push_back(std::move(start));
-    if (promise.null.empty()) break;
   }
   if (other) starts.push_back(*other);
   std::vector<MachineModel> models;
