@@ -244,8 +244,8 @@ TEST(Effects, cornerRadiusIsTheSameByHistory) {
   CuttingLaw law;
   law.coefficients = *model.cutting;
   const double speed = 300.0, dt = TWO_PI / speed / 1024.0;
-  Cutter tables(*model.tool, law, dt, {}, 4e-3, Cutter::Way::tables),
-      history(*model.tool, law, dt, {}, 4e-3, Cutter::Way::history);
+  Cutter tables(*model.tool, law, dt, {}, 4e-3, 0.0, Cutter::Way::tables),
+      history(*model.tool, law, dt, {}, 4e-3, 0.0, Cutter::Way::history);
   ToolMotion motion;
   motion.speed = speed;
   motion.velocity[0] = 3e-4 * speed / TWO_PI;

@@ -89,9 +89,10 @@ double derivative(const std::function<double(double)>& f, double t) {
   return (f(t + H) - f(t - H)) / (2.0 * H);
 }
 
-/// Largest difference of a prescribed way from the rule summed over discs, as a share of the largest force.
+/// Largest difference of a prescribed way from the rule (share 0) or from the teeth's path, summed over
+/// discs, as a share of the largest force.
 double differenceOnTheWay(const Way& way, const ToolGeometry& tool, const std::vector<double>& radius,
-                          const CuttingLaw& law, double duration) {
+                          const CuttingLaw& law, double duration, double share = 0.0, bool by_path = false) {
   testing::DiscMill reference{tool, law, radius, [&](double turned) {
                                 const double t = way.time(turned);
                                 testing::DiscMill::State state{turned, way.centre(t), {{0.0, 0.0}}};
@@ -103,6 +104,8 @@ double differenceOnTheWay(const Way& way, const ToolGeometry& tool, const std::v
                                       derivative([&](double s) { return way.displacement(s)[i]; }, t);
                                 return state;
                               }};
+  reference.by_path = by_path;
+  if (by_path) reference.passes = 6;  // nothing that is left so long ago is met
   const double dt = 1e-5, depth = 1.5e-3;
   const auto motionOf = [&](double t) {
     ToolMotion motion;
@@ -114,7 +117,7 @@ double differenceOnTheWay(const Way& way, const ToolGeometry& tool, const std::v
     motion.displacement = way.displacement(t);
     return motion;
   };
-  MillingProcess process(tool, law, dt, radius);
+  MillingProcess process(tool, law, dt, radius, share);
   process.engage({{0.1, 2.9, depth}}, motionOf(0.0));
   double worst = 0.0, largest = 0.0;
   const auto steps = static_cast<int>(duration / dt);
@@ -154,6 +157,29 @@ TEST(MillingProcess, isTheRuleSummedOverDiscs) {
   EXPECT_LT(differenceOnTheWay(way, tool, {0.0, 14e-6, -6e-6, 5e-6}, law, 0.12), 0.01);
 }
 
+std::array<double, 2> swinging(double t) {
+  return {{60e-6 * std::sin(5200.0 * t), 90e-6 * std::sin(4700.0 * t)}};
+}
+
+// Before the whole of its path, what a tooth left is met where it was when it passed beside the ray.
+TEST(MillingProcess, whatTeethLeaveByTheirPath) {
+  const double speed = 471.0, feed = 4.0 * 2e-4 * speed / TWO_PI;
+  const Way way{[=](double turned) { return turned / speed; },
+                [=](double t) {
+                  return std::array<double, 2>{{feed * t, 0.0}};
+                },
+                swinging, [=](double) { return speed; }, [=](double t) { return speed * t; }};
+  ToolGeometry tool = endMill(4, 30.0);
+  const std::vector<double> even(4, 0.0);
+  EXPECT_LT(differenceOnTheWay(way, tool, even, aluminium(), 0.06, 1.0, true), 0.01);
+  const double by_rule = differenceOnTheWay(way, tool, even, aluminium(), 0.06, 0.0, true);
+  EXPECT_GT(by_rule, 0.1);
+  EXPECT_NEAR(differenceOnTheWay(way, tool, even, aluminium(), 0.06, 0.5, true), 0.5 * by_rule,
+              0.1 * by_rule);
+  tool.pitch = {1.5, 1.65, 1.55, TWO_PI - 4.7};
+  EXPECT_LT(differenceOnTheWay(way, tool, {0.0, 14e-6, -6e-6, 5e-6}, aluminium(), 0.06, 1.0, true), 0.01);
+}
+
 // The spindle runs up and the feed turns into a curve at the same time.
 TEST(MillingProcess, speedAndFeedMayChange) {
   const double begin = 400.0, rise = 1200.0, feed = 9e-3, bend = 4.0;
@@ -170,6 +196,10 @@ TEST(MillingProcess, speedAndFeedMayChange) {
   };
   const Way way{time, centre, shaking, speed, turned};
   EXPECT_LT(differenceOnTheWay(way, endMill(4, 30.0), {0.0, 14e-6, -6e-6, 5e-6}, aluminium(), 0.12), 0.01);
+  const Way wide{time, centre, swinging, speed, turned};
+  EXPECT_LT(
+      differenceOnTheWay(wide, endMill(4, 30.0), {0.0, 14e-6, -6e-6, 5e-6}, aluminium(), 0.06, 1.0, true),
+      0.01);
 }
 
 // A steady stretch after a change is the same as one without it, once the teeth no longer meet what was

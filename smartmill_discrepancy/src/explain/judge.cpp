@@ -157,10 +157,11 @@ MachineModel nameEffects(const Workbench& bench, const SearchOptions& options, c
   auto first = static_cast<Eigen::Index>(best.state.nominal.size());
   for (Eigen::Index i = 0; i < first; ++i) nominal_std.push_back(std::sqrt(covariance(i, i)));
   bench.freedom().writeStdDevs(model, nominal_std);
+  const std::size_t first_entry = model.effects.size() - best.state.members.size();
   for (std::size_t m = 0; m < best.state.members.size(); ++m) {
     const Member& member = best.state.members[m];
     const auto own = static_cast<Eigen::Index>(member.values.size());
-    EffectEntry& entry = model.effects[bench.data().nominal.effects.size() + m];
+    EffectEntry& entry = model.effects[first_entry + m];
     FoundEffect effect;
     effect.name = member.hypothesis->effect;
     effect.variant = member.hypothesis->variant;

@@ -6,10 +6,19 @@
 #include <string>
 #include <utility>
 
+#include "smartmill_core/model/effect_catalogue.h"
+
 namespace smartmill::discrepancy {
 namespace {
 
 using ModesOf = std::function<std::vector<Mode>&(MachineModel&)>;
+
+const char* const TOOTH_PATH = "empirical:tooth_path";
+const char* const PATH_SHARE = "tool.path_share";
+
+bool isToothPath(const EffectEntry& entry) {
+  return entry.name == TOOTH_PATH;
+}
 
 }  // namespace
 
@@ -17,6 +26,23 @@ NominalFreedom::NominalFreedom(const MachineModel& nominal) {
   if (nominal.cutting) addCutting(nominal);
   addModes(nominal);
   if (nominal.spindle) addSpindle(nominal);
+  if (nominal.tool && nominal.cutting &&
+      (!nominal.tool_tip.x.modes.empty() || !nominal.tool_tip.y.modes.empty()))
+    addToothPath();
+}
+
+// From the rule of the surface, which other programs follow, to what the teeth of a machine leave.
+void NominalFreedom::addToothPath() {
+  constexpr double STD = 0.5, LEAST = -0.5, MOST = 1.5, STEP = 0.02;
+  coordinates_.push_back({PATH_SHARE, 0.0, LEAST, MOST, STEP, STD});
+  scale_.push_back([](MachineModel& m, double factor) {
+    auto path = std::find_if(m.effects.begin(), m.effects.end(), isToothPath);
+    if (path == m.effects.end()) {
+      m.effects.push_back(effectEntry(TOOTH_PATH, {{"share", 0.0}}));
+      path = m.effects.end() - 1;
+    }
+    path->numbers["share"] += std::log(factor);
+  });
 }
 
 void NominalFreedom::add(std::string name, double value, double percent, Scale scale) {
@@ -92,7 +118,7 @@ MachineModel NominalFreedom::apply(const MachineModel& nominal, const std::vecto
 }
 
 void NominalFreedom::writeStdDevs(MachineModel& model, const std::vector<double>& std_devs) const {
-  if (!model.cutting) return;
+  constexpr double TOLD = 3.0;  // standard deviations
   const double none = std::numeric_limits<double>::quiet_NaN();
   CuttingCoefficients stds{none, none, none, none, none, none};
   for (std::size_t i = 0; i < coordinates_.size(); ++i) {
@@ -100,8 +126,12 @@ void NominalFreedom::writeStdDevs(MachineModel& model, const std::vector<double>
       if (coordinates_[i].name == std::string("cutting.") + key.key)
         stds.*key.coefficient = std_devs[i] * (*model.cutting).*key.coefficient;
     }
+    const auto path = std::find_if(model.effects.begin(), model.effects.end(), isToothPath);
+    if (coordinates_[i].name != PATH_SHARE || path == model.effects.end()) continue;
+    path->std_devs["share"] = std_devs[i];
+    if (std::abs(path->numbers["share"]) < TOLD * std_devs[i]) model.effects.erase(path);
   }
-  model.cutting_std = stds;
+  if (model.cutting) model.cutting_std = stds;
 }
 
 }  // namespace smartmill::discrepancy

@@ -208,6 +208,94 @@ TEST(Fitter, endsAtOnePointWhereNominalValuesPressAgainstTheirBounds) {
   }
 }
 
+MachineModel slenderTool() {
+  MachineModel m = mill();
+  m.tool_tip.x.modes = {{1100.0, 0.03, 1.0 / 25e6}};
+  m.tool_tip.y.modes = {{900.0, 0.04, 1.0 / 30e6}};
+  m.force_sensor.noise_rms = {{1.0, 1.0, 1.0}};
+  m.uncertainty = {3.0, 0.0, 0.0, 0.0, 0.0};
+  return m;
+}
+
+// A slot of little more than a turn, in which the tool swings once while a tooth turns on by D / R.
+Dataset slowSlot(const MachineModel& machine, const MachineModel& nominal, std::mt19937_64& random) {
+  TestData t;
+  t.test.name = "slot";
+  t.test.kind = TestKind::cut;
+  t.test.sample_rate = 12800.0;
+  t.test.spindle_speed = units::radPerSecFromRpm(1200.0);
+  t.test.engagement = Engagement{0.0, units::PI, 1e-3, 0.2e-3};
+  sim::SimulationOptions options;
+  options.seed = random();
+  options.substeps = 2;
+  t.record = sim::simulateTest(machine, t.test, 0.06, options);
+  t.channels = {"fx", "fy"};
+  t.quiet = t.first_cut = 0;
+  Dataset data;
+  data.nominal = nominal;
+  for (std::size_t a = 0; a < 2; ++a) data.noise[t.channels[a]] = machine.force_sensor.noise_rms->at(a);
+  data.tests.push_back(std::move(t));
+  return data;
+}
+
+const EffectEntry* toothPathOf(const MachineModel& model) {
+  const auto path = std::find_if(model.effects.begin(), model.effects.end(),
+                                 [](const EffectEntry& e) { return e.name == "empirical:tooth_path"; });
+  return path == model.effects.end() ? nullptr : &*path;
+}
+
+// Machines between the rule of the surface and their teeth's path: the fit finds where, as well as it says.
+TEST(Fitter, tellsTheShareOfTheTeethsPath) {
+  std::mt19937_64 random(31);
+  std::normal_distribution<double> normal;
+  const MachineModel nominal = slenderTool();
+  const NominalFreedom freedom(nominal);
+  const std::size_t share = freedom.coordinates().size() - 1;
+  Coverage coverage;
+  for (int run = 0; run < Coverage::RUNS; ++run) {
+    std::vector<double> off;
+    for (const Coordinate& c : freedom.coordinates()) off.push_back(c.prior_std * normal(random));
+    off[share] = 0.1 * (run % 11);
+    const Dataset data = slowSlot(freedom.apply(nominal, off), nominal, random);
+    const TwinRunner runner(data, {0}, 1, 2);
+    const Fitter fitter(runner, freedom);
+    const Fit fit = fitter.fit({std::vector<double>(off.size(), 0.0), {}, {}}, nullptr, {30, 1e-8, true});
+    ASSERT_TRUE(fit.converged);
+    const auto i = static_cast<Eigen::Index>(share);
+    coverage.add(fit.state.nominal[share] - off[share], std::sqrt(fit.covariance(i, i)));
+    ASSERT_LT(std::sqrt(fit.covariance(i, i)), 0.1);
+  }
+  EXPECT_TRUE(coverage.honest());
+}
+
+// The share has no place among nominal values: it stands in the model as an entry, where it tells anything.
+TEST(NominalFreedom, writesTheShareOfTheTeethsPath) {
+  MachineModel nominal = slenderTool();
+  const NominalFreedom freedom(nominal);
+  ASSERT_EQ(freedom.coordinates().back().name, "tool.path_share");
+  std::vector<double> values(freedom.coordinates().size(), 0.0), std_devs(values.size(), 0.01);
+  EXPECT_EQ(toothPathOf(freedom.apply(nominal, values)), nullptr);
+  values.back() = 0.7;
+  MachineModel model = freedom.apply(nominal, values);
+  EXPECT_NEAR(toothPathOf(model)->numbers.at("share"), 0.7, 1e-12);
+  std_devs.back() = 0.2;
+  freedom.writeStdDevs(model, std_devs);
+  ASSERT_NE(toothPathOf(model), nullptr);
+  EXPECT_EQ(toothPathOf(model)->std_devs.at("share"), 0.2);
+  std_devs.back() = 0.3;
+  freedom.writeStdDevs(model, std_devs);
+  EXPECT_EQ(toothPathOf(model), nullptr);
+  // What a model had found before goes on from there.
+  nominal.effects = {effectEntry("empirical:tooth_path", {{"share", 0.2}})};
+  model = NominalFreedom(nominal).apply(nominal, values);
+  EXPECT_EQ(model.effects.size(), 1u);
+  EXPECT_NEAR(toothPathOf(model)->numbers.at("share"), 0.9, 1e-12);
+  // Rigid tools have none.
+  nominal.tool_tip = {};
+  const NominalFreedom rigid(nominal);
+  for (const Coordinate& c : rigid.coordinates()) EXPECT_NE(c.name, "tool.path_share");
+}
+
 // BIC by which the fit is better with a hum. @param amplitude [N] of the machine's
 double gainOfHum(double amplitude) {
   const TemporaryFolder folder;

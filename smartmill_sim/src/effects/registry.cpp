@@ -127,7 +127,7 @@ std::vector<BurstTrain*> EffectSet::bursts() {
 
 TwinSetup setUpOf(MachineModel model, const EffectSet& effects) {
   model.effects.clear();
-  TwinSetup setup{std::move(model), {}, {}, 0.0, {}, {}, {}};
+  TwinSetup setup{std::move(model), {}, {}, 0.0, 0.0, {}, {}, {}};
   if (setup.model.tool) setup.radius_offset.assign(static_cast<std::size_t>(setup.model.tool->teeth), 0.0);
   effects.setUp(setup);
   return setup;

@@ -5,7 +5,7 @@
 namespace smartmill::sim {
 
 Cutter::Cutter(const ToolGeometry& tool, const CuttingLaw& law, double time_step,
-               const std::vector<double>& radius_offset, double corner_radius, Way way)
+               const std::vector<double>& radius_offset, double corner_radius, double path_share, Way way)
     : way_(way), corner_radius_(corner_radius), lag_(tool.lag()), law_(law) {
   for (const EdgeSlice& slice : edgeSlices(tool, corner_radius)) {
     Part part;
@@ -15,7 +15,7 @@ Cutter::Cutter(const ToolGeometry& tool, const CuttingLaw& law, double time_step
     if (way == Way::tables) {
       part.rigid.emplace(straight, lawOf(slice, law), radius_offset);
     } else {
-      part.process.emplace(straight, lawOf(slice, law), time_step, radius_offset);
+      part.process.emplace(straight, lawOf(slice, law), time_step, radius_offset, path_share);
     }
     parts_.push_back(std::move(part));
   }

@@ -34,7 +34,8 @@ EdgeLayers::EdgeLayers(const TwinSetup& setup, const CuttingLaw& law, double tim
     if (rigid && of.only_tooth < 0) {
       layer.rigid.emplace(*setup.model.tool, lawOf(of, law), std::move(radius));
     } else {
-      layer.process.emplace(*setup.model.tool, lawOf(of, law), time_step, std::move(radius));
+      layer.process.emplace(*setup.model.tool, lawOf(of, law), time_step, std::move(radius),
+                            setup.path_share);
       if (of.only_tooth >= 0) layer.process->showOnly(of.only_tooth);
     }
     layers_.push_back(std::move(layer));

@@ -27,12 +27,13 @@ std::array<double, 2> feedOf(const ToolMotion& motion) {
 }
 
 MillingProcess::MillingProcess(const ToolGeometry& tool, const CuttingLaw& law, double time_step,
-                               std::vector<double> radius_offset)
+                               std::vector<double> radius_offset, double path_share)
     : tool_((validate(tool), tool)),
       rule_(tool, std::move(radius_offset)),
       law_(law),
       time_step_(time_step),
       lag_(tool.lag()),
+      path_share_(path_share),
       passes_(static_cast<std::size_t>(tool.teeth)) {
 }
 
@@ -85,12 +86,12 @@ bool MillingProcess::steadySince(double turn) const {
   return regime_ == 0 || turned_now_ - regime_began_ > turn + SETTLED_STEPS * now_.speed * time_step_;
 }
 
-/// Weights of a place so many steps ago: cubic through the four steps about it.
-void MillingProcess::place(Delay& delay, double steps) {
-  const double whole = std::max(std::floor(steps), 2.0), f = steps - whole;
-  delay.steps = static_cast<std::size_t>(whole);
-  delay.weights = {{(f + 1.0) * f * (f - 1.0) / 6.0, -(f + 1.0) * f * (f - 2.0) / 2.0,
-                    (f + 1.0) * (f - 1.0) * (f - 2.0) / 2.0, -f * (f - 1.0) * (f - 2.0) / 6.0}};
+/// The place so many steps ago: cubic through the four steps about it.
+MillingProcess::Place MillingProcess::placeOf(double steps) {
+  steps = std::max(2.0, steps);
+  const auto whole = static_cast<std::size_t>(steps);
+  const double f = steps - static_cast<double>(whole), g = f - 1.0, h = f - 2.0, across = (f + 1.0) * f;
+  return {steps, whole, {{across * g / 6.0, -across * h / 2.0, (f + 1.0) * g * h / 2.0, -f * g * h / 6.0}}};
 }
 
 /// Finds the place in a history of changing speed or feed.
@@ -106,22 +107,39 @@ void MillingProcess::search(Delay& delay) {
         kept == 0 ? now_.centre : centre_[ring(count_ - kept, centre_.size())];
     const double before = (kept == 0 ? turned_now_ : turnedAt(kept)) - target;
     for (std::size_t i = 0; i < 2; ++i) delay.fed[i] = now_.centre[i] - oldest[i] + first_feed_[i] * before;
-    place(delay, static_cast<double>(count_ + 3));
+    delay.at = placeOf(static_cast<double>(kept) + std::max(3.0, before / (now_.speed * time_step_)));
     return;
   }
   auto ago = static_cast<long>(delay.turn / (now_.speed * time_step_));
-  if (delay.steps > 0) ago = static_cast<long>(delay.steps) + 1;
+  if (delay.at.steps > 0) ago = static_cast<long>(delay.at.steps) + 1;
   ago = std::clamp(ago, 1L, kept);
   while (turnedAt(ago) > target) ++ago;
   while (ago > 1 && turnedAt(ago - 1) <= target) --ago;
   const double at = turnedAt(ago), next = turnedAt(ago - 1);
-  place(delay, static_cast<double>(ago) - (next > at ? (target - at) / (next - at) : 0.0));
+  delay.at = placeOf(static_cast<double>(ago) - (next > at ? (target - at) / (next - at) : 0.0));
   delay.fed = now_.centre;
   for (std::size_t k = 0; k < 4; ++k) {
-    const long step = count_ - static_cast<long>(delay.steps) - 2 + static_cast<long>(k);
+    const long step = count_ - static_cast<long>(delay.at.steps) - 2 + static_cast<long>(k);
     const std::array<double, 2>& centre = centre_[ring(std::max(step, count_ - kept), centre_.size())];
-    for (std::size_t i = 0; i < 2; ++i) delay.fed[i] -= delay.weights[k] * centre[i];
+    for (std::size_t i = 0; i < 2; ++i) delay.fed[i] -= delay.at.weights[k] * centre[i];
   }
+}
+
+// Displacement at a place; none before the history.
+std::array<double, 2> MillingProcess::displacementAt(const Place& at) const {
+  const std::size_t size = displacement_.size();
+  const long kept = std::min(count_, static_cast<long>(size));
+  std::array<double, 2> sum{};
+  long ago = static_cast<long>(at.steps) + 2;
+  for (const double weight : at.weights) {
+    if (ago <= kept) {
+      const std::array<double, 2>& u = displacement_[ring(count_ - ago, size)];
+      sum[0] += weight * u[0];
+      sum[1] += weight * u[1];
+    }
+    --ago;
+  }
+  return sum;
 }
 
 MillingProcess::Delay& MillingProcess::lookBack(Delay& delay) {
@@ -131,21 +149,14 @@ MillingProcess::Delay& MillingProcess::lookBack(Delay& delay) {
     search(delay);
     delay.of_regime = -1;
   } else if (delay.of_regime != regime_) {
-    place(delay, delay.turn / (now_.speed * time_step_));
+    delay.at = placeOf(delay.turn / (now_.speed * time_step_));
     delay.fed = {{feed_[0] * delay.turn, feed_[1] * delay.turn}};
     delay.of_regime = regime_;
   }
   const auto kept = static_cast<std::size_t>(std::min(count_, static_cast<long>(displacement_.size())));
-  delay.displacement = {{0.0, 0.0}};
-  delay.known = delay.steps <= kept;
-  deepest_ = std::max(deepest_, delay.steps);
-  for (std::size_t k = 0; k < 4; ++k) {
-    const std::size_t ago = delay.steps + 2 - k;
-    if (ago > kept) continue;
-    const std::array<double, 2>& u =
-        displacement_[ring(count_ - static_cast<long>(ago), displacement_.size())];
-    for (std::size_t i = 0; i < 2; ++i) delay.displacement[i] += delay.weights[k] * u[i];
-  }
+  delay.displacement = displacementAt(delay.at);
+  delay.known = delay.at.steps <= kept;
+  deepest_ = std::max(deepest_, delay.at.steps);
   return delay;
 }
 
@@ -176,20 +187,55 @@ void MillingProcess::shapePass(int tooth, int n, Pass& pass) {
   pass.of_regime = steady ? regime_ : -1;
 }
 
+// By so much a surface that is looked up beside the ray may lie off the rule's.
+double MillingProcess::besides() const {
+  constexpr double SHARE = 0.1;  // [1] of what the tool is fed in a turn
+  return path_share_ == 0.0 ? 0.0
+                            : SHARE * std::abs(path_share_) * units::TWO_PI * std::hypot(feed_[0], feed_[1]);
+}
+
+// On the ray at phi from the axis lies what a tooth left when it stood at psi = phi + D.t / R, D what the
+// axis has moved since then, t across the ray: its distance is R - D(psi).e - (D.t)^2 / (2 R).
+void MillingProcess::lookBeside(const Delay& pass, const Delay& first, const Stretch& cell,
+                                ChipShape* shape) const {
+  constexpr int PASSES = 2;      // each gains a factor of D / R
+  constexpr double MOST = 0.25;  // [rad] of a tool that does not run away
+  const double radius = tool_.radius(), steps = 1.0 / (now_.speed * time_step_);  // [m], [1/rad]
+  const auto across = [&](double x, double y) { return x * cell.at.cosine - y * cell.at.sine; };
+  std::array<double, 2> then = pass.displacement;
+  double by = 0.0;  // [rad]
+  const auto aside = [&] {
+    return across(pass.fed[0] - feed_[0] * by + now_.displacement[0] - then[0],
+                  pass.fed[1] - feed_[1] * by + now_.displacement[1] - then[1]);
+  };
+  for (int k = 0; k < PASSES; ++k) {
+    by = std::clamp(path_share_ * aside() / radius, -MOST, MOST);
+    then = displacementAt(placeOf(pass.at.ago - by * steps));
+  }
+  const double of_rule = across(pass.fed[0], pass.fed[1]), of_first = across(first.fed[0], first.fed[1]);
+  shape->sine += pass.displacement[0] - then[0] - feed_[0] * by;
+  shape->cosine += pass.displacement[1] - then[1] - feed_[1] * by;
+  // The rule holds the roundness of later passes against that of the first.
+  shape->level +=
+      path_share_ * (aside() * aside() - of_rule * of_rule + of_first * of_first) / (2.0 * radius);
+}
+
 /// The passes that may give a tooth's chip over a cell of its edge: from the last one back until none can be
 /// nearer.
 /// @return whether there is contact; a single pass is in contact all along when `certain`
 bool MillingProcess::gather(int tooth, const Stretch& cell, bool& certain) {
   shapes_.clear();
-  const Pass& last = passOf(tooth, 1);
+  const Pass last = passOf(tooth, 1);
   const std::array<double, 2> then = back(last.delay).displacement;
-  const auto chip = [&](const Pass& pass, const std::array<double, 2>& u) {
+  const auto chip = [&](const Pass& pass) {
+    const Delay& at = back(pass.delay);
     ChipShape shape = pass.still;
-    shape.sine += now_.displacement[0] - u[0];
-    shape.cosine += now_.displacement[1] - u[1];
+    shape.sine += now_.displacement[0] - at.displacement[0];
+    shape.cosine += now_.displacement[1] - at.displacement[1];
+    if (path_share_ != 0.0) lookBeside(at, back(last.delay), cell, &shape);
     return shape;
   };
-  const ChipShape first = chip(last, then);
+  const ChipShape first = chip(last);
   const ChipBounds of_first = bounds(first, cell);
   if (of_first.high <= 0.0) return false;
   certain = of_first.low > 0.0;
@@ -197,7 +243,7 @@ bool MillingProcess::gather(int tooth, const Stretch& cell, bool& certain) {
   // By so much vibration may bring an older surface nearer than the last one: (u_1 - u_n).e.
   const double reach = std::max(largest_[0], largest_[1]) -
                        (then[0] * cell.at.sine + then[1] * cell.at.cosine) +
-                       cell.half * (std::abs(then[0]) + std::abs(then[1]));
+                       cell.half * (std::abs(then[0]) + std::abs(then[1])) + besides();
   const double end = reach + rule_.overhang(tooth);
   int unknown = 0;
   for (int n = 2; unknown < rule_.teeth(); ++n) {
@@ -212,8 +258,12 @@ bool MillingProcess::gather(int tooth, const Stretch& cell, bool& certain) {
     ChipShape over_first = pass.behind;
     over_first.sine += x;
     over_first.cosine += y;
-    if (bounds(over_first, pass.bend + std::abs(x) + std::abs(y), cell).low >= 0.0) continue;
-    shapes_.push_back(chip(pass, delay.displacement));
+    if (bounds(over_first, pass.bend + std::abs(x) + std::abs(y), cell).low >= besides()) continue;
+    shapes_.push_back(chip(pass));
+    if (path_share_ != 0.0 && bounds(shapes_.back() - first, cell).low >= 0.0) {
+      shapes_.pop_back();
+      continue;
+    }
     if (bounds(shapes_.back(), cell).high <= 0.0) return false;
   }
   certain = certain && shapes_.size() == 1;

@@ -15,6 +15,7 @@
 #include "smartmill_core/testing/shared_data.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_core/units.h"
+#include "smartmill_sim/twin/twin.h"
 
 namespace smartmill::plant {
 namespace {
@@ -235,6 +236,44 @@ TEST(Machine, MeetsRecordsOfAnotherProgram) {
         squares += std::pow((record.column(name)[i] - own.column(name)[i]) / noise, 2);
       EXPECT_LT(std::sqrt(squares / own.size()), 1.7) << test.name << " " << name;
     }
+  }
+}
+
+// The twin's share of the teeth's path, from the rule of formats.md (0) to what lies on a machine (1): a slot
+// in which the tool swings far while it turns little.
+TEST(Machine, LeavesTheSurfaceOfTheTeethsPath) {
+  MachineModel model;
+  model.tool = rigidPlant().tool;
+  model.cutting = rigidPlant().cutting;
+  model.tool_tip.x.modes = {{1100.0, 0.03, 1.0 / 25e6}};
+  model.tool_tip.y.modes = {{900.0, 0.04, 1.0 / 30e6}};
+  const CampaignTest test = slot(1200.0, 0.2e-3, 1e-3);
+  std::mt19937_64 random(1);
+  RunOptions o;
+  o.noise = false;
+  o.steps = 8;
+  o.show_tip = true;
+  o.slice = 0.02e-3;
+  const Record machine = run(plantOf(model), test, o, random);
+  const auto difference = [&](double share, const char* name) {
+    model.effects = {effectEntry("empirical:tooth_path", {{"share", share}})};
+    sim::SimulationOptions options;
+    options.noise = false;
+    options.substeps = 8;
+    const Record twin = sim::simulateTest(model, test, machine, options);
+    double squares = 0.0, size = 0.0;
+    for (std::size_t i = twin.size() / 2; i < twin.size(); ++i) {
+      squares += std::pow(twin.column(name)[i] - machine.column(name)[i], 2);
+      size += std::pow(machine.column(name)[i], 2);
+    }
+    return std::sqrt(squares / size);
+  };
+  for (const char* name : {"fx", "fy", "tool_x", "tool_y"}) {
+    const double by_rule = difference(0.0, name), half = difference(0.5, name),
+                 by_path = difference(1.0, name);
+    EXPECT_LT(by_path, 0.2 * by_rule) << name << " " << by_rule;
+    EXPECT_LT(by_path, 0.005) << name;
+    EXPECT_NEAR(half, 0.5 * by_rule, 0.15 * by_rule) << name;
   }
 }
 

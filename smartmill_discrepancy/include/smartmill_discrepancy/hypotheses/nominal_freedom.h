@@ -9,14 +9,17 @@
 namespace smartmill::discrepancy {
 
 /// Values of the nominal model, free within their stated uncertainty: each coordinate is the natural
-/// logarithm of value over nominal value.
+/// logarithm of value over nominal value. Of a tool with modes there is one more, which no nominal model
+/// states: how far the surface that its teeth leave lies from the rule of formats.md (0) towards that of their
+/// true path (1), an entry `empirical:tooth_path`.
 class NominalFreedom {
  public:
   explicit NominalFreedom(const MachineModel& nominal);
   const std::vector<Coordinate>& coordinates() const { return coordinates_; }
   /// The model with these values. values.size() == coordinates().size()
   MachineModel apply(const MachineModel& nominal, const std::vector<double>& values) const;
-  /// Writes the standard deviations that the file format has a place for (cutting coefficients).
+  /// Writes the standard deviations that the file format has a place for (cutting coefficients, share of the
+  /// teeth's path), and leaves out a share that is no more than three of them.
   void writeStdDevs(MachineModel& model, const std::vector<double>& std_devs) const;
 
  private:
@@ -24,6 +27,7 @@ class NominalFreedom {
   void add(std::string name, double value, double percent, Scale scale);
   void addCutting(const MachineModel& nominal);
   void addModes(const MachineModel& nominal);
+  void addToothPath();
   void addSpindle(const MachineModel& nominal);
 
   std::vector<Coordinate> coordinates_;

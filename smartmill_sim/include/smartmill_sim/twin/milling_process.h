@@ -42,7 +42,7 @@ class MillingProcess {
   /// @param time_step [s] > 0 @param radius_offset [m] of each tooth, empty: none. @throws Error on an
   /// impossible tool.
   MillingProcess(const ToolGeometry& tool, const CuttingLaw& law, double time_step,
-                 std::vector<double> radius_offset = {});
+                 std::vector<double> radius_offset = {}, double path_share = 0.0);
 
   /// Changes where there is material. Where there was none before, the tool had moved as now and had not
   /// vibrated.
@@ -64,16 +64,21 @@ class MillingProcess {
   void settle(const std::array<double, 2>& displacement);
 
  private:
+  /// In the history.
+  struct Place {
+    double ago = 0.0;                 // [steps]
+    std::size_t steps = 0;            // ago: the step before it
+    std::array<double, 4> weights{};  // of the steps steps + 2, steps + 1, steps, steps - 1 ago
+  };
   /// A turn of the spindle back in the history.
   struct Delay {
-    double turn = 0.0;                     // [rad]
-    std::size_t steps = 0;                 // ago: the step before it
-    std::array<double, 4> weights{};       // of the steps steps + 1, steps, steps - 1, steps - 2 ago
+    double turn = 0.0;  // [rad]
+    Place at;
     long of_regime = -1;                   // for which these hold
     long of_step = -1;                     // for which the rest holds
     bool known = false;                    // the history reaches back to it
     std::array<double, 2> displacement{};  // [m] then
-    std::array<double, 2> fed{};           // [m] since then; of an unsteady regime only
+    std::array<double, 2> fed{};           // [m] since then
   };
   /// An earlier pass as one tooth meets it.
   struct Pass {
@@ -99,9 +104,12 @@ class MillingProcess {
   }
   void addPass(int tooth);
   Delay& lookBack(Delay& delay);
-  void place(Delay& delay, double steps);
+  static Place placeOf(double steps);
   void search(Delay& delay);
   void shapePass(int tooth, int n, Pass& pass);
+  double besides() const;
+  std::array<double, 2> displacementAt(const Place& at) const;
+  void lookBeside(const Delay& pass, const Delay& first, const Stretch& cell, ChipShape* shape) const;
   bool gather(int tooth, const Stretch& cell, bool& certain);
   void cut(int tooth, const Stretch& cell, double height, CutSums& sums);
   void add(const ChipShape& shape, const Stretch& over, double height, CutSums& sums) const;
@@ -111,6 +119,7 @@ class MillingProcess {
   ChipRule rule_;
   CuttingLaw law_;
   double time_step_, lag_;
+  double path_share_;  // [1]
   int only_tooth_ = -1;
   std::vector<ContactArc> arcs_;
   ToolMotion now_;

@@ -383,6 +383,11 @@ Forms revolutions(const Scope& scope) {
 std::vector<EffectKind> cuttingForms() {
   const Range positive = Range::positive(), not_negative = Range::notNegative();
   return {
+      empirical("geometry", "tooth_path", Stage::geometry,
+                "an earlier surface on a ray is what that tooth left when it stood beside the ray, with the "
+                "displacement that it then had; share of the way there from the rule of the surface",
+                "the surface of trochoidal paths", {key("share", "1")}, {Need::cuts},
+                [](const EffectScope&) { return std::vector<EffectForm>{}; }),
       empirical("geometry", "lost_edge", Stage::geometry,
                 "below this height one tooth does not cut, and the next one takes its chip",
                 "chip rule of formats.md with that edge far inside",

@@ -27,6 +27,7 @@ struct DiscMill {
   std::vector<double> radius;                 ///< [m] of each tooth over the nominal one
   std::function<State(double turned)> state;  ///< by the angle that the spindle has turned, negative ones too
   int passes = 40;
+  bool by_path = false;  ///< instead of the rule, what lies on the ray is what the teeth left on their way
 
   double pitch(int k) const {
     return tool.pitch.empty() ? 2.0 * M_PI / tool.teeth
@@ -35,6 +36,32 @@ struct DiscMill {
 
   /// [m] Chip of a tooth at an immersion angle when the spindle has turned so far.
   double chip(double turned, int tooth, double phi) const {
+    return by_path ? chipByPath(turned, tooth, phi) : chipByRule(turned, tooth, phi);
+  }
+
+  double chipByPath(double turned, int tooth, double phi) const {
+    const State now = state(turned);
+    const double s = std::sin(phi), c = std::cos(phi), own = radius[static_cast<std::size_t>(tooth)];
+    double least = 1e300, back = 0.0;
+    for (int n = 1; n <= passes; ++n) {
+      back += pitch(tooth + n - 1);
+      const double reach = 0.5 * tool.diameter + radius[static_cast<std::size_t>((tooth + n) % tool.teeth)];
+      double beside = 0.0, along = 0.0;  // [rad], [m]
+      for (int step = 0; step < 6; ++step) {
+        const State then = state(turned - back + beside);
+        const double x = then.centre[0] + then.displacement[0] - now.centre[0] - now.displacement[0] +
+                         reach * std::sin(phi + beside);
+        const double y = then.centre[1] + then.displacement[1] - now.centre[1] - now.displacement[1] +
+                         reach * std::cos(phi + beside);
+        along = x * s + y * c;
+        beside -= (x * c - y * s) / reach;
+      }
+      least = std::min(least, 0.5 * tool.diameter + own - along);
+    }
+    return least;
+  }
+
+  double chipByRule(double turned, int tooth, double phi) const {
     const State now = state(turned);
     const double s = std::sin(phi), c = std::cos(phi);
     double least = 1e300, back = 0.0, first = 0.0;
