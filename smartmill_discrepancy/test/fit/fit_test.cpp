@@ -290,10 +290,10 @@ TEST(NominalFreedom, writesTheShareOfTheTeethsPath) {
   model = NominalFreedom(nominal).apply(nominal, values);
   EXPECT_EQ(model.effects.size(), 1u);
   EXPECT_NEAR(toothPathOf(model)->numbers.at("share"), 0.9, 1e-12);
-  // Rigid tools have none.
-  nominal.tool_tip = {};
-  const NominalFreedom rigid(nominal);
-  for (const Coordinate& c : rigid.coordinates()) EXPECT_NE(c.name, "tool.path_share");
+  // What has no tool has none.
+  nominal.tool.reset();
+  const NominalFreedom none(nominal);
+  for (const Coordinate& c : none.coordinates()) EXPECT_NE(c.name, "tool.path_share");
 }
 
 // BIC by which the fit is better with a hum. @param amplitude [N] of the machine's

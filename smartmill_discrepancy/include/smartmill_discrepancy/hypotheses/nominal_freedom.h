@@ -9,9 +9,9 @@
 namespace smartmill::discrepancy {
 
 /// Values of the nominal model, free within their stated uncertainty: each coordinate is the natural
-/// logarithm of value over nominal value. Of a tool with modes there is one more, which no nominal model
-/// states: how far the surface that its teeth leave lies from the rule of formats.md (0) towards that of their
-/// true path (1), an entry `empirical:tooth_path`.
+/// logarithm of value over nominal value. Of a tool there is one more, which no nominal model states: how far
+/// the surface that its teeth leave where it vibrates lies from the rule of formats.md (0) towards that of
+/// their true path (1), an entry `empirical:tooth_path`.
 class NominalFreedom {
  public:
   explicit NominalFreedom(const MachineModel& nominal);
