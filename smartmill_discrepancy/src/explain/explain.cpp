@@ -12,6 +12,7 @@
 #include "smartmill_discrepancy/explain/outcome.h"
 #include "smartmill_discrepancy/explain/sentence.h"
 #include "smartmill_discrepancy/explain/weighed.h"
+#include "smartmill_discrepancy/hypotheses/nominal_freedom.h"
 #include "smartmill_discrepancy/search/refinement.h"
 #include "smartmill_discrepancy/search/standing.h"
 #include "smartmill_sim/twin/twin.h"
@@ -104,6 +105,16 @@ MachineModel namedBy(Workbench& bench, const SearchOptions& options, const Searc
   return improved;
 }
 
+void tellSurface(const MachineModel& model, Explanation* result) {
+  const EffectEntry* const path = toothPathOf(model);
+  if (path == nullptr) return;
+  const auto std_dev = path->std_devs.find("share");
+  result->notes.push_back(
+      formatted("surface: %.3f", path->numbers.at("share")) +
+      (std_dev == path->std_devs.end() ? "" : formatted(" +- %.2g", std_dev->second)) +
+      " of the way from the rule of formats.md to what the teeth of a machine leave on their path");
+}
+
 void sayVerdict(const SearchOptions& options, const Explanation& e) {
   options.say(formatted("verdict %s; gap %.4f -> %.4f, held out %.4f -> %.4f", nameOf(e.verdict),
                         e.before.fit, e.after.fit, e.before.heldout, e.after.heldout));
@@ -160,6 +171,7 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
     withdraw(found, &result);
     result.unexplained = findStructure(bench.fitted(), found.null.residual, structure);
   }
+  tellSurface(improved, &result);
   writeOutcome(bench, before, improved, folder, &result);
   addChatter(bench.data(), &result);
   result.verdict = verdictOf(result);

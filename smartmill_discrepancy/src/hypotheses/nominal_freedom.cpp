@@ -133,4 +133,9 @@ void NominalFreedom::writeStdDevs(MachineModel& model, const std::vector<double>
   if (model.cutting) model.cutting_std = stds;
 }
 
+const EffectEntry* toothPathOf(const MachineModel& model) {
+  const auto path = std::find_if(model.effects.begin(), model.effects.end(), isToothPath);
+  return path == model.effects.end() ? nullptr : &*path;
+}
+
 }  // namespace smartmill::discrepancy

@@ -46,7 +46,7 @@ Settled settle(Workbench& bench, FitState from, Fit* best) {
   Settled settled;
   bool tangents_hold = false;
   for (int pass = 0; pass <= PASSES; ++pass) {
-    const bool turned = bench.turnPhases(from) > PHASE_SETTLED * std::sqrt(settled.weight);
+    const bool turned = bench.turnPhases(from) > 0.0;
     double squares = 0.0;
     settled.tangents = tangents_hold ? bench.lineariseBy(std::move(settled.tangents), from, &squares)
                                      : bench.linearise(from, &squares);

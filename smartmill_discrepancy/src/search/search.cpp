@@ -191,7 +191,7 @@ Fit Search::withPhasesTurned(Fit fit) {
   constexpr double ANOTHER = 0.1;  // [rad] where everything looks otherwise
   for (int pass = 0; pass < PASSES && bench_.phasesEstimated() && !bench_.cancelled(); ++pass) {
     const double turn = bench_.turnPhases(fit.state);
-    if (turn < PHASE_SETTLED) break;
+    if (turn == 0.0) break;
     if (turn > ANOTHER) screened_.clear();
     tangents_ = linearise(fit.state);
     const double before = fit.bic;
@@ -415,7 +415,7 @@ bool Search::helpsElsewhere(const Fit& before, const Hypothesis& newest) {
 void Search::stepBack(Begin begin) {
   ++repeated_;
   now_ = std::move(begin.fit);
-  const bool turned = bench_.turnPhases(now_.state) > PHASE_SETTLED;
+  const bool turned = bench_.turnPhases(now_.state) > 0.0;
   tangents_ =
       turned ? linearise(now_.state) : bench_.lineariseBy(std::move(begin.tangents), near(now_.state));
   now_ = refit(now_, {8, 1e-4, true});

@@ -304,12 +304,13 @@ double Workbench::turnPhases(FitState& state) {
 
 void Workbench::turnTo(const FitState& state) {
   constexpr int PASSES = 3;
+  constexpr double SETTLED = 1e-4;  // [rad]
   turnFitted(state);
   for (int pass = 0; pass < PASSES; ++pass) {
     const MachineModel model = quick_.model(state);
     const double turn = turnOnce(heldout_runner_, model, &data_);
     heldout_runner_.readPhases();
-    if (turn < PHASE_SETTLED) return;
+    if (turn < SETTLED) return;
   }
 }
 

@@ -14,6 +14,7 @@
 #include "smartmill_core/testing/coverage.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_discrepancy/hypotheses/hypothesis.h"
+#include "smartmill_discrepancy/hypotheses/nominal_freedom.h"
 
 namespace smartmill::discrepancy {
 namespace {
@@ -236,12 +237,6 @@ Dataset slowSlot(const MachineModel& machine, const MachineModel& nominal, std::
   for (std::size_t a = 0; a < 2; ++a) data.noise[t.channels[a]] = machine.force_sensor.noise_rms->at(a);
   data.tests.push_back(std::move(t));
   return data;
-}
-
-const EffectEntry* toothPathOf(const MachineModel& model) {
-  const auto path = std::find_if(model.effects.begin(), model.effects.end(),
-                                 [](const EffectEntry& e) { return e.name == "empirical:tooth_path"; });
-  return path == model.effects.end() ? nullptr : &*path;
 }
 
 // Machines between the rule of the surface and their teeth's path: the fit finds where, as well as it says.

@@ -57,7 +57,7 @@ void MillingProcess::clear(const ToolMotion& now) {
   count_ = 0;
   turned_now_ = 0.0;
   deepest_ = 0;
-  largest_ = {{0.0, 0.0}};
+  largest_ = fastest_ = {{0.0, 0.0}};
   regime_ = 0;
   regime_began_ = 0.0;
   now_ = now;
@@ -94,6 +94,13 @@ MillingProcess::Place MillingProcess::placeOf(double steps) {
   return {steps, whole, {{across * g / 6.0, -across * h / 2.0, (f + 1.0) * g * h / 2.0, -f * g * h / 6.0}}};
 }
 
+/// By how much these weights change a step farther back.
+std::array<double, 4> MillingProcess::slopesOf(const Place& at) {
+  const double f = at.ago - static_cast<double>(at.steps), square = 3.0 * f * f;
+  return {{(square - 1.0) / 6.0, (2.0 + 2.0 * f - square) / 2.0, (square - 4.0 * f - 1.0) / 2.0,
+           (6.0 * f - square - 2.0) / 6.0}};
+}
+
 /// Finds the place in a history of changing speed or feed.
 void MillingProcess::search(Delay& delay) {
   const double target = turned_now_ - delay.turn;
@@ -125,21 +132,15 @@ void MillingProcess::search(Delay& delay) {
   }
 }
 
-// Displacement at a place; none before the history.
-std::array<double, 2> MillingProcess::displacementAt(const Place& at) const {
+// Displacements about a place; none before the history.
+template <class Step>
+void MillingProcess::forEachStep(const Place& at, Step&& step) const {
   const std::size_t size = displacement_.size();
-  const long kept = std::min(count_, static_cast<long>(size));
-  std::array<double, 2> sum{};
-  long ago = static_cast<long>(at.steps) + 2;
-  for (const double weight : at.weights) {
-    if (ago <= kept) {
-      const std::array<double, 2>& u = displacement_[ring(count_ - ago, size)];
-      sum[0] += weight * u[0];
-      sum[1] += weight * u[1];
-    }
-    --ago;
+  const long kept = std::min(count_, static_cast<long>(size)), first = static_cast<long>(at.steps) + 2;
+  for (std::size_t k = 0; k < 4; ++k) {
+    const long ago = first - static_cast<long>(k);
+    if (ago <= kept) step(k, displacement_[ring(count_ - ago, size)]);
   }
-  return sum;
 }
 
 MillingProcess::Delay& MillingProcess::lookBack(Delay& delay) {
@@ -154,7 +155,10 @@ MillingProcess::Delay& MillingProcess::lookBack(Delay& delay) {
     delay.of_regime = regime_;
   }
   const auto kept = static_cast<std::size_t>(std::min(count_, static_cast<long>(displacement_.size())));
-  delay.displacement = displacementAt(delay.at);
+  delay.displacement = {{0.0, 0.0}};
+  forEachStep(delay.at, [&](std::size_t k, const std::array<double, 2>& u) {
+    for (std::size_t i = 0; i < 2; ++i) delay.displacement[i] += delay.at.weights[k] * u[i];
+  });
   delay.known = delay.at.steps <= kept;
   deepest_ = std::max(deepest_, delay.at.steps);
   return delay;
@@ -187,37 +191,64 @@ void MillingProcess::shapePass(int tooth, int n, Pass& pass) {
   pass.of_regime = steady ? regime_ : -1;
 }
 
-// By so much a surface that is looked up beside the ray may lie off the rule's.
-double MillingProcess::besides() const {
-  constexpr double SHARE = 0.1;  // [1] of what the tool is fed in a turn
-  return path_share_ == 0.0 ? 0.0
-                            : SHARE * std::abs(path_share_) * units::TWO_PI * std::hypot(feed_[0], feed_[1]);
+// By so much a surface that is looked up beside the ray may lie nearer than the rule's.
+// @param vibrated, fed [m] across the ray, since then
+double MillingProcess::beside(double vibrated, double fed) const {
+  constexpr double MARGIN = 1.25;  // of what the tool moves while its tooth turns on
+  const double moved = std::abs(fed + vibrated), share = std::abs(path_share_) / tool_.radius();
+  const double by = MARGIN * share * moved;
+  return by * (std::abs(feed_[0]) + std::abs(feed_[1])) +
+         std::min(by * steepest_, 2.0 * std::max(largest_[0], largest_[1])) +
+         0.5 * share * std::max(fed * fed - moved * moved, 0.0);
+}
+
+double MillingProcess::besides(const Delay& delay, const Stretch& cell) const {
+  const auto across = [&](double x, double y) { return x * cell.at.cosine - y * cell.at.sine; };
+  return beside(
+      across(now_.displacement[0] - delay.displacement[0], now_.displacement[1] - delay.displacement[1]),
+      across(delay.fed[0], delay.fed[1]));
+}
+
+/// The same of whatever a tooth left so many radians ago.
+double MillingProcess::mostBeside(double turn) const {
+  if (path_share_ == 0.0) return 0.0;
+  const double fed = turn * (std::abs(feed_[0]) + std::abs(feed_[1])),
+               vibrated = 2.0 * std::max(largest_[0], largest_[1]);
+  return beside(vibrated, fed) + beside(-std::min(vibrated, fed), fed);
 }
 
 // On the ray at phi from the axis lies what a tooth left when it stood at psi = phi + D.t / R, D what the
-// axis has moved since then, t across the ray: its distance is R - D(psi).e - (D.t)^2 / (2 R).
-void MillingProcess::lookBeside(const Delay& pass, const Delay& first, const Stretch& cell,
+// axis has moved since then, t across the ray: its distance is R - D(psi).e - (D.t)^2 / (2 R). One step of
+// Newton from where the pass was last met.
+void MillingProcess::lookBeside(const Delay& delay, const Delay& first, const Stretch& cell, Pass& pass,
                                 ChipShape* shape) const {
-  constexpr int PASSES = 2;      // each gains a factor of D / R
-  constexpr double MOST = 0.25;  // [rad] of a tool that does not run away
+  constexpr double MOST = 0.25;         // [rad] of a tool that does not run away
+  constexpr double LEAST_SLOPE = 0.25;  // [1] of what is solved
   const double radius = tool_.radius(), steps = 1.0 / (now_.speed * time_step_);  // [m], [1/rad]
+  const double share = path_share_ / radius;
   const auto across = [&](double x, double y) { return x * cell.at.cosine - y * cell.at.sine; };
-  std::array<double, 2> then = pass.displacement;
-  double by = 0.0;  // [rad]
-  const auto aside = [&] {
-    return across(pass.fed[0] - feed_[0] * by + now_.displacement[0] - then[0],
-                  pass.fed[1] - feed_[1] * by + now_.displacement[1] - then[1]);
-  };
-  for (int k = 0; k < PASSES; ++k) {
-    by = std::clamp(path_share_ * aside() / radius, -MOST, MOST);
-    then = displacementAt(placeOf(pass.at.ago - by * steps));
-  }
-  const double of_rule = across(pass.fed[0], pass.fed[1]), of_first = across(first.fed[0], first.fed[1]);
-  shape->sine += pass.displacement[0] - then[0] - feed_[0] * by;
-  shape->cosine += pass.displacement[1] - then[1] - feed_[1] * by;
+  const Place at = placeOf(delay.at.ago - pass.beside * steps);
+  const std::array<double, 4> slopes = slopesOf(at);
+  std::array<double, 2> then{}, rate{};  // [m], [m] a step farther back
+  forEachStep(at, [&](std::size_t k, const std::array<double, 2>& u) {
+    for (std::size_t i = 0; i < 2; ++i) {
+      then[i] += at.weights[k] * u[i];
+      rate[i] += slopes[k] * u[i];
+    }
+  });
+  const double x = delay.fed[0] + now_.displacement[0], y = delay.fed[1] + now_.displacement[1];
+  const double slope_x = steps * rate[0] - feed_[0], slope_y = steps * rate[1] - feed_[1];
+  const double slope = across(slope_x, slope_y);
+  const double there = across(x - feed_[0] * pass.beside - then[0], y - feed_[1] * pass.beside - then[1]);
+  const double move = (share * there - pass.beside) / std::max(1.0 - share * slope, LEAST_SLOPE);
+  const double by = std::clamp(pass.beside + move, -MOST, MOST), moved = by - pass.beside;
+  const double aside = there + slope * moved;
+  const double of_rule = across(delay.fed[0], delay.fed[1]), of_first = across(first.fed[0], first.fed[1]);
+  shape->sine += delay.displacement[0] - then[0] - feed_[0] * pass.beside + slope_x * moved;
+  shape->cosine += delay.displacement[1] - then[1] - feed_[1] * pass.beside + slope_y * moved;
   // The rule holds the roundness of later passes against that of the first.
-  shape->level +=
-      path_share_ * (aside() * aside() - of_rule * of_rule + of_first * of_first) / (2.0 * radius);
+  shape->level += 0.5 * share * (aside * aside - of_rule * of_rule + of_first * of_first);
+  pass.beside = by;
 }
 
 /// The passes that may give a tooth's chip over a cell of its edge: from the last one back until none can be
@@ -225,17 +256,22 @@ void MillingProcess::lookBeside(const Delay& pass, const Delay& first, const Str
 /// @return whether there is contact; a single pass is in contact all along when `certain`
 bool MillingProcess::gather(int tooth, const Stretch& cell, bool& certain) {
   shapes_.clear();
-  const Pass last = passOf(tooth, 1);
-  const std::array<double, 2> then = back(last.delay).displacement;
-  const auto chip = [&](const Pass& pass) {
+  const std::size_t last = passOf(tooth, 1).delay;
+  const std::array<double, 2> then = back(last).displacement;
+  double off = 0.0;  // [m] by which the pass that was looked at last lies off the rule's
+  const auto chip = [&](Pass& pass) {
     const Delay& at = back(pass.delay);
     ChipShape shape = pass.still;
     shape.sine += now_.displacement[0] - at.displacement[0];
     shape.cosine += now_.displacement[1] - at.displacement[1];
-    if (path_share_ != 0.0) lookBeside(at, back(last.delay), cell, &shape);
+    if (path_share_ == 0.0) return shape;
+    const double by_rule = shape.at(cell.at.sine, cell.at.cosine);
+    lookBeside(at, back(last), cell, pass, &shape);
+    off = shape.at(cell.at.sine, cell.at.cosine) - by_rule;
     return shape;
   };
-  const ChipShape first = chip(last);
+  const ChipShape first = chip(passOf(tooth, 1));
+  const double off_first = off;
   const ChipBounds of_first = bounds(first, cell);
   if (of_first.high <= 0.0) return false;
   certain = of_first.low > 0.0;
@@ -243,22 +279,23 @@ bool MillingProcess::gather(int tooth, const Stretch& cell, bool& certain) {
   // By so much vibration may bring an older surface nearer than the last one: (u_1 - u_n).e.
   const double reach = std::max(largest_[0], largest_[1]) -
                        (then[0] * cell.at.sine + then[1] * cell.at.cosine) +
-                       cell.half * (std::abs(then[0]) + std::abs(then[1])) + besides();
+                       cell.half * (std::abs(then[0]) + std::abs(then[1]));
   const double end = reach + rule_.overhang(tooth);
   int unknown = 0;
   for (int n = 2; unknown < rule_.teeth(); ++n) {
-    const Pass& pass = passOf(tooth, n);
+    Pass& pass = passOf(tooth, n);
     const double behind = bounds(pass.behind, pass.bend, cell).low;
-    if (behind - pass.step > end) break;
+    if (behind - pass.step > end + mostBeside(delays_[pass.delay].turn) + off_first) break;
     const Delay& delay = back(pass.delay);
+    const double beside = path_share_ == 0.0 ? 0.0 : besides(delay, cell) + off_first;
     // Older than the history none has vibrated, and a tooth is only farther than a turn later.
     unknown = delay.known ? 0 : unknown + 1;
-    if (behind > reach) continue;
+    if (behind > reach + beside) continue;
     const double x = then[0] - delay.displacement[0], y = then[1] - delay.displacement[1];
     ChipShape over_first = pass.behind;
     over_first.sine += x;
     over_first.cosine += y;
-    if (bounds(over_first, pass.bend + std::abs(x) + std::abs(y), cell).low >= besides()) continue;
+    if (bounds(over_first, pass.bend + std::abs(x) + std::abs(y), cell).low >= beside) continue;
     shapes_.push_back(chip(pass));
     if (path_share_ != 0.0 && bounds(shapes_.back() - first, cell).low >= 0.0) {
       shapes_.pop_back();
@@ -306,6 +343,7 @@ CutSums MillingProcess::sumsAt(const ToolMotion& now) {
   CutSums sums;
   if (arcs_.empty()) return sums;
   advance(now);
+  if (path_share_ != 0.0) steepest_ = std::max(fastest_[0], fastest_[1]) / (now.speed * time_step_);
   damping_ = {{0.0, 0.0}};
   if (law_.damping != 0.0) {
     const double share = law_.damping / (time_step_ * now.speed * tool_.radius());
@@ -344,7 +382,14 @@ CuttingForce MillingProcess::force(const CutSums& sums) const {
 void MillingProcess::settle(const std::array<double, 2>& displacement) {
   if (arcs_.empty()) return;
   const std::size_t at = ring(count_, displacement_.size());
-  if (at == 0 && count_ > 0) largest_ = {{0.0, largest_[0]}};
+  if (at == 0 && count_ > 0) {
+    largest_ = {{0.0, largest_[0]}};
+    fastest_ = {{0.0, fastest_[0]}};
+  }
+  if (path_share_ != 0.0 && count_ > 0) {
+    const std::array<double, 2>& before = displacement_[ring(count_ - 1, displacement_.size())];
+    fastest_[0] = std::max(fastest_[0], std::hypot(displacement[0] - before[0], displacement[1] - before[1]));
+  }
   displacement_[at] = displacement;
   centre_[at] = now_.centre;
   turned_[at] = turned_now_;

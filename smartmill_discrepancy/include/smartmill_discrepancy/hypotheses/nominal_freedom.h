@@ -34,4 +34,7 @@ class NominalFreedom {
   std::vector<Scale> scale_;
 };
 
+/// The entry `empirical:tooth_path` of a model; nullptr: it has none.
+const EffectEntry* toothPathOf(const MachineModel& model);
+
 }  // namespace smartmill::discrepancy

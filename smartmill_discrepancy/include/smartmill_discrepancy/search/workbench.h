@@ -11,9 +11,6 @@
 
 namespace smartmill::discrepancy {
 
-/// [rad] A turn of the records that changes nothing any more.
-constexpr double PHASE_SETTLED = 1e-4;
-
 struct WorkbenchOptions {
   int threads = 2;
   int screening_substeps = 1;  ///< more where nothing guides the modes of a tool
@@ -85,7 +82,7 @@ class Workbench {
 
   /// Turns the records without spindle angle, of the state and held out, to where the lines of the state's
   /// forces say, where it then fits better: another tooth, another turn in air; not by what fits find
-  /// themselves. @return by how much [rad]
+  /// themselves. @return by how much [rad], 0: not at all
   double turnPhases(FitState& state);
 
   /// The records lie where a state has them, those held out where it fits them best.

@@ -88,11 +88,12 @@ class MillingProcess {
     ChipShape still;      // the chip without vibration
     ChipShape behind;     // by how much it is thicker than that of the first pass
     double bend = 0.0;    // of behind
+    double beside = 0.0;  // [rad] by which its tooth stood beside the ray when it was last met
   };
   void clear(const ToolMotion& now);
   void advance(const ToolMotion& now);
   bool steadySince(double turn) const;
-  const Pass& passOf(int tooth, int n) {
+  Pass& passOf(int tooth, int n) {
     std::vector<Pass>& passes = passes_[static_cast<std::size_t>(tooth)];
     if (passes.size() < static_cast<std::size_t>(n)) addPass(tooth);
     Pass& pass = passes[static_cast<std::size_t>(n) - 1];
@@ -105,11 +106,16 @@ class MillingProcess {
   void addPass(int tooth);
   Delay& lookBack(Delay& delay);
   static Place placeOf(double steps);
+  static std::array<double, 4> slopesOf(const Place& at);
+  template <class Step>
+  void forEachStep(const Place& at, Step&& step) const;
   void search(Delay& delay);
   void shapePass(int tooth, int n, Pass& pass);
-  double besides() const;
-  std::array<double, 2> displacementAt(const Place& at) const;
-  void lookBeside(const Delay& pass, const Delay& first, const Stretch& cell, ChipShape* shape) const;
+  double beside(double vibrated, double fed) const;
+  double besides(const Delay& delay, const Stretch& cell) const;
+  double mostBeside(double turn) const;
+  void lookBeside(const Delay& delay, const Delay& first, const Stretch& cell, Pass& pass,
+                  ChipShape* shape) const;
   bool gather(int tooth, const Stretch& cell, bool& certain);
   void cut(int tooth, const Stretch& cell, double height, CutSums& sums);
   void add(const ChipShape& shape, const Stretch& over, double height, CutSums& sums) const;
@@ -131,8 +137,10 @@ class MillingProcess {
   std::vector<double> turned_;                                // [rad] since the first step
   long count_ = 0;
   double turned_now_ = 0.0;
-  std::size_t deepest_ = 0;                // steps that were looked back
-  std::array<double, 2> largest_{{0, 0}};  // [m] displacement, of the ring's length now and of the one before
+  std::size_t deepest_ = 0;  // steps that were looked back
+  // [m] Displacement and its change from step to step, of the ring's length now and of the one before.
+  std::array<double, 2> largest_{{0, 0}}, fastest_{{0, 0}};
+  double steepest_ = 0.0;  // [m/rad] vibration
   // Speed and feed stay as they are within a regime.
   long regime_ = 0;
   double regime_began_ = 0.0;  // [rad]
