@@ -138,15 +138,20 @@ std::array<double, 2> shaking(double t) {
            12e-6 * std::sin(7300.0 * t + 1.0) - 10e-6}};
 }
 
+// @param feed [m] a turn
+Way steadyWay(double feed, std::function<std::array<double, 2>(double)> displacement) {
+  constexpr double SPEED = 471.0;  // [rad/s]
+  return {[](double turned) { return turned / SPEED; },
+          [=](double t) {
+            return std::array<double, 2>{{feed * SPEED / TWO_PI * t, 0.0}};
+          },
+          std::move(displacement), [](double) { return SPEED; }, [](double t) { return SPEED * t; }};
+}
+
 // Any vibration, runout and pitch: what earlier teeth left stays until the feed, or the roundness of the
 // tool, has taken it away.
 TEST(MillingProcess, isTheRuleSummedOverDiscs) {
-  const double speed = 471.0, feed = 4.0 * 3e-5 * speed / TWO_PI;
-  const Way way{[=](double turned) { return turned / speed; },
-                [=](double t) {
-                  return std::array<double, 2>{{feed * t, 0.0}};
-                },
-                shaking, [=](double) { return speed; }, [=](double t) { return speed * t; }};
+  const Way way = steadyWay(4.0 * 3e-5, shaking);
   ToolGeometry tool = endMill(4, 30.0);
   EXPECT_LT(differenceOnTheWay(way, tool, {0, 0, 0, 0}, aluminium(), 0.12), 0.01);
   tool.pitch = {1.5, 1.65, 1.55, TWO_PI - 4.7};
@@ -163,12 +168,7 @@ std::array<double, 2> swinging(double t) {
 
 // Before the whole of its path, what a tooth left is met where it was when it passed beside the ray.
 TEST(MillingProcess, whatTeethLeaveByTheirPath) {
-  const double speed = 471.0, feed = 4.0 * 2e-4 * speed / TWO_PI;
-  const Way way{[=](double turned) { return turned / speed; },
-                [=](double t) {
-                  return std::array<double, 2>{{feed * t, 0.0}};
-                },
-                swinging, [=](double) { return speed; }, [=](double t) { return speed * t; }};
+  const Way way = steadyWay(4.0 * 2e-4, swinging);
   ToolGeometry tool = endMill(4, 30.0);
   const std::vector<double> even(4, 0.0);
   EXPECT_LT(differenceOnTheWay(way, tool, even, aluminium(), 0.06, 1.0, true), 0.01);
