@@ -359,13 +359,15 @@ void Search::fitStanding(Round& round) {
   }
 }
 
-// It takes much of what is left, or the fit tests ask for it as they must where it is named.
+// It takes most of what is left, or the fit tests ask for it as they must where it is named: what does not
+// hold beside what is left takes the shape of that.
 bool Search::isBetter(const Round& round, const Fit& tried) const {
+  constexpr double MUCH = 0.25;  // [1] of what is left
   if (!tried.converged) return false;
   const double gain = now_.bic - tried.bic;
   if (excess(now_) < 0.01 * bench_.samples() && relieves(now_, tried, options_)) return true;
   if (gain <= leastGain(quick_.runner(), now_, tried, options_)) return false;
-  return gain > round.least || Standing::holdsInFitted(fittedShare(quick_, tried, now_));
+  return gain > MUCH * excess(now_) || Standing::holdsInFitted(fittedShare(quick_, tried, now_));
 }
 
 // Takes a round's best fit in and fits everything anew beside it.
