@@ -24,7 +24,7 @@ MonitorParameters read(const ros::NodeHandle& private_nh) {
 
 }  // namespace
 
-MonitorNode::MonitorNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
+MonitorNode::MonitorNode(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
     : parameters_(read(private_nh)),
       model_(readMachineModel(parameters_.model)),
       shell_(nh, private_nh, "none", INPUT_TIMEOUT),

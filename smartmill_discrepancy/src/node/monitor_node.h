@@ -21,7 +21,7 @@ class MonitorNode {
  public:
   using Parameters = MonitorParameters;
   /// @throws Error on a wrong parameter or model.
-  MonitorNode(ros::NodeHandle nh, ros::NodeHandle private_nh);
+  MonitorNode(ros::NodeHandle nh, const ros::NodeHandle& private_nh);
 
  private:
   void judge(const Stretch& stretch);

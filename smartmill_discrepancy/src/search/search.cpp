@@ -124,7 +124,7 @@ class Search {
   bool isHint(const Round& round, const Promise& promise) const;
   bool worthFitting(const Round& round, const Promise& promise, double largest) const;
   void fitPromise(const Promise& promise, Round& round);
-  bool isBetter(const Round& round, const Fit& tried) const;
+  bool isBetter(const Fit& tried) const;
   void settle(Fit best);
   void dropNeedless();
   bool helpsElsewhere(const Fit& before, const Hypothesis& newest);
@@ -312,7 +312,7 @@ void Search::fitPromise(const Promise& promise, Round& round) {
                          newest.values});
   options_.say(formatted("  promise %.4g, gain %.4g  ", promise.gain, now_.bic - tried.bic) +
                describe(newest));
-  if (tried.bic < round.best.bic && isBetter(round, tried)) {
+  if (tried.bic < round.best.bic && isBetter(tried)) {
     round.best = tried;
     round.best_promise = promise.gain;
     round.better = true;
@@ -361,7 +361,7 @@ void Search::fitStanding(Round& round) {
 
 // It takes most of what is left, or the fit tests ask for it as they must where it is named: what does not
 // hold beside what is left takes the shape of that.
-bool Search::isBetter(const Round& round, const Fit& tried) const {
+bool Search::isBetter(const Fit& tried) const {
   constexpr double MUCH = 0.25;  // [1] of what is left
   if (!tried.converged) return false;
   const double gain = now_.bic - tried.bic;
