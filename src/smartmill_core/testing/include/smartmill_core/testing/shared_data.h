@@ -19,4 +19,4 @@ std::string sharedData(const std::string& name);
 ///     SMARTMILL_SHARED_DATA(folder, "measured/slot_6000");
 #define SMARTMILL_SHARED_DATA(variable, name)                 \
   const std::string variable = ::smartmill::sharedData(name); \
-  if (variable.empty()) GTEST_SKIP() << ::smartmill::sharedFolder() << "/" << (name) << " is absent"
+  if ((variable).empty()) GTEST_SKIP() << ::smartmill::sharedFolder() << "/" << (name) << " is absent"
