@@ -141,13 +141,14 @@ class TestClient {
   bool connected() const { return !failed_; }
   const std::string& chosen() const { return chosen_; }
   void send(const json& request) { sendText(request.dump()); }
+  // The server may close while it is still written to; the next read tells.
   void sendText(const std::string& text) {
     stream_.text(true);
-    stream_.write(asio::buffer(text));
+    stream_.write(asio::buffer(text), failed_);
   }
   void sendBinary(const std::string& bytes) {
     stream_.binary(true);
-    stream_.write(asio::buffer(bytes));
+    stream_.write(asio::buffer(bytes), failed_);
   }
   void subscribe(std::uint32_t channel, std::uint32_t id) {
     send({{"op", "subscribe"}, {"subscriptions", {{{"id", id}, {"channelId", channel}}}}});
