@@ -353,6 +353,7 @@ TEST(Effects, processDampingOpposesTheMotionIntoTheWork) {
     process.settle({{0.0, 0.0}});
     motion.angle = 0.5 * PI;
     motion.displacement[0] = v * dt;
+    motion.rate[0] = v;
     return process.step(motion);
   };
   const CuttingForce a = forceOf(damped.law), b = forceOf(plain);

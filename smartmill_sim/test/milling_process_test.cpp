@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <functional>
 #include <utility>
 #include <vector>
@@ -10,6 +11,7 @@
 
 #include "smartmill_core/cutting/mechanistic.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/model/effect_catalogue.h"
 #include "smartmill_core/testing/disc_mill.h"
 #include "smartmill_core/units.h"
 #include "smartmill_sim/effects/effect.h"
@@ -115,6 +117,8 @@ double differenceOnTheWay(const Way& way, const ToolGeometry& tool, const std::v
     for (std::size_t i = 0; i < 2; ++i)
       motion.velocity[i] = derivative([&](double s) { return way.centre(s)[i]; }, t);
     motion.displacement = way.displacement(t);
+    for (std::size_t i = 0; i < 2; ++i)
+      motion.rate[i] = derivative([&](double s) { return way.displacement(s)[i]; }, t);
     return motion;
   };
   MillingProcess process(tool, law, dt, radius, share);
@@ -292,6 +296,37 @@ TEST(CuttingMachine, steadyFeedChattersAtTheSameLimits) {
   }
   EXPECT_LT(growth(0.98 * 0.0483482e-3, 6000.0, true, 2000, Feed::steady), 1.0);
   EXPECT_GT(growth(1.02 * 0.0483482e-3, 6000.0, true, 2000, Feed::steady), 1.0);
+}
+
+// Four straight teeth in a slot: the squares of their sines sum to 2 of them, so that edges that only rub are
+// a damper of C b / v_c in x. The mode is overdamped, c/m times a step 2.5 and 1.3.
+TEST(CuttingMachine, rubbingEdgesAreADamper) {
+  constexpr double DAMPING = 640e3, DEPTH = 2e-3, STIFFNESS = 13e6, FREQUENCY = 5000.0, RATIO = 0.03;
+  MachineModel model;
+  model.tool = endMill(4, 0.0);
+  model.cutting = CuttingCoefficients{};
+  model.tool_tip.x.modes = {{FREQUENCY, RATIO, 1.0 / STIFFNESS}};
+  model.effects = {effectEntry("process_damping", {{"coefficient_n_per_mm", 1e-3 * DAMPING}})};
+  const double speed = 125.0, w0 = TWO_PI * FREQUENCY, w = TWO_PI * 1000.0;
+  const double mass = STIFFNESS / (w0 * w0);
+  const double rubbing = DAMPING * DEPTH / (speed * model.tool->radius());
+  const std::complex<double> compliance =
+      1.0 / std::complex<double>(STIFFNESS - mass * w * w, w * (2.0 * RATIO * w0 * mass + rubbing));
+  for (const double rate : {25600.0, 51200.0}) {
+    CuttingMachine machine(model, 1.0 / rate);
+    CuttingMachine::Input input;
+    input.motion = motionAt(0.0, speed, 1e-2);
+    machine.engage({{0.0, PI, DEPTH}}, input.motion);
+    std::complex<double> shown = 0.0;
+    const auto steps = static_cast<int>(0.2 * rate);
+    for (int i = 0; i < steps; ++i) {
+      input.motion = motionAt(i / rate, speed, 1e-2);
+      input.tip_force[0] = std::cos(w * i / rate);
+      const double x = machine.step(input).displacement[0];
+      if (2 * i >= steps) shown += x * std::polar(4.0 / steps, -w * i / rate);
+    }
+    EXPECT_LT(std::abs(shown / compliance - 1.0), 0.02) << rate;
+  }
 }
 
 TEST(MillingProcess, runoutLetsOneToothOfTwoDoAllTheWork) {

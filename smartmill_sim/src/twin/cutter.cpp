@@ -2,6 +2,9 @@
 
 #include <algorithm>
 
+#include <Eigen/Core>
+#include <Eigen/LU>
+
 namespace smartmill::sim {
 
 Cutter::Cutter(const ToolGeometry& tool, const CuttingLaw& law, double time_step,
@@ -80,33 +83,52 @@ void Cutter::setLaw(const CuttingLaw& law) {
   }
 }
 
-CuttingForce Cutter::forceOf(Part& part, const ToolMotion& now) {
-  if (followed_) {
-    const CutSums& sums = followed_->at(place_++);
-    return part.rigid ? part.rigid->force(sums.edges) : part.process->force(sums);
-  }
+CutSums Cutter::sumsOf(Part& part, const ToolMotion& now) const {
+  if (part.process) return part.process->sumsAt(part.slice.low == 0.0 ? now : motionOf(part, now));
   CutSums sums;
-  if (part.rigid) {
-    sums.edges = part.rigid->sumsAt(now.angle - lag_ * part.slice.low);
-  } else {
-    sums = part.process->sumsAt(part.slice.low == 0.0 ? now : motionOf(part, now));
-  }
-  if (kept_) kept_->push_back(sums);
-  return part.rigid ? part.rigid->force(sums.edges) : part.process->force(sums);
+  sums.edges = part.rigid->sumsAt(now.angle - lag_ * part.slice.low);
+  return sums;
 }
 
-CuttingForce Cutter::step(const ToolMotion& now) {
-  if (parts_.size() > 1) now_ = now;  // where depths change, another part may engage
+CuttingForce Cutter::force() const {
   CuttingForce sum;
-  for (Part& part : parts_) {
+  for (const Part& part : parts_) {
     if (part.arcs == 0) continue;
-    const CuttingForce force = forceOf(part, now);
-    sum.fx += force.fx;
-    sum.fy += force.fy;
-    sum.fz += force.fz;
-    sum.torque += force.torque;
+    sum.add(part.rigid ? part.rigid->force(part.sums.edges) : part.process->force(part.sums));
   }
   return sum;
+}
+
+// The force is linear in the rate, and the rate in the force.
+void Cutter::yieldTo(const ToolMotion& now, const TipYield& yield) {
+  const auto forceAt = [&](const Eigen::Vector2d& rate) -> Eigen::Vector2d {
+    for (Part& part : parts_) {
+      if (part.arcs > 0) part.sums.rubbing.rate = part.process->rubbingRate({{rate[0], rate[1]}}, now.speed);
+    }
+    const CuttingForce f = force();
+    return {f.fx, f.fy};
+  };
+  const Eigen::Vector2d assumed(yield.assumed[0], yield.assumed[1]), told(now.rate[0], now.rate[1]);
+  const Eigen::DiagonalMatrix<double, 2> gives(yield.rate[0], yield.rate[1]);
+  const Eigen::Vector2d still = forceAt({0.0, 0.0});
+  Eigen::Matrix2d rises;
+  rises << forceAt({1.0, 0.0}) - still, forceAt({0.0, 1.0}) - still;
+  const Eigen::Matrix2d whole = Eigen::Matrix2d::Identity() - gives * rises;
+  forceAt(whole.inverse() * (told + gives * (still - assumed)));
+}
+
+CuttingForce Cutter::step(const ToolMotion& now, const TipYield& yield) {
+  if (parts_.size() > 1) now_ = now;  // where depths change, another part may engage
+  for (Part& part : parts_) {
+    if (part.arcs == 0) continue;
+    part.sums = followed_ ? followed_->at(place_++) : sumsOf(part, now);
+  }
+  const bool yields = yield.rate[0] != 0.0 || yield.rate[1] != 0.0;
+  if (!followed_ && yields && law_.damping != 0.0) yieldTo(now, yield);
+  for (const Part& part : parts_) {
+    if (kept_ && part.arcs > 0) kept_->push_back(part.sums);
+  }
+  return force();
 }
 
 void Cutter::settle(const std::array<double, 2>& displacement) {

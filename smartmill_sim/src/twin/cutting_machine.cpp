@@ -224,16 +224,28 @@ CuttingForce CuttingMachine::cut(const Input& input) {
     return force;
   }
   ToolMotion motion = fed(input.motion);
-  if (input.tip) motion.displacement = *input.tip;
+  if (input.tip) {
+    motion.displacement = input.tip->displacement;
+    motion.rate = input.tip->rate;
+  }
   // The tip's place needs this step's force and the force needs the place: the force is first taken to go
   // on in a straight line, which errs by the square of the step.
+  TipYield yield;
   for (std::size_t axis = 0; axis < 2 && vibrates_ && !input.tip; ++axis) {
     const std::array<double, 2>& f = tip_history_[axis];
-    motion.displacement[axis] = tip_[axis].peek(2.0 * f[0] - f[1]);
+    const double force = 2.0 * f[0] - f[1];
+    motion.displacement[axis] = tip_[axis].peek(force);
+    if (state_.law.damping == 0.0) continue;
+    motion.rate[axis] = tip_[axis].peekRate(force);
+    yield.rate[axis] = tip_[axis].rateOfInput();
+    yield.assumed[axis] = force - input.tip_force[axis];
   }
-  CuttingForce force = cutter_->step(motion);
-  layers_.add(motion, force);
-  return force;
+  CuttingForce layers;
+  layers_.add(motion, layers);
+  yield.assumed[0] -= layers.fx;
+  yield.assumed[1] -= layers.fy;
+  layers.add(cutter_->step(motion, yield));
+  return layers;
 }
 
 void CuttingMachine::moveTip(const Input& input, Output& out) {
@@ -268,7 +280,7 @@ void CuttingMachine::settleTip(const Input& input, Output& out) {
   if (!cutter_) return;
   std::array<double, 2> at{};
   if (input.tip) {
-    at = *input.tip;
+    at = input.tip->displacement;
   } else if (vibrates_) {
     at = {{channels[TOOL_X], channels[TOOL_Y]}};
   }

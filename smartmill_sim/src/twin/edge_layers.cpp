@@ -69,11 +69,7 @@ void EdgeLayers::setLaw(const CuttingLaw& law) {
 
 void EdgeLayers::add(const ToolMotion& now, CuttingForce& sum) {
   for (Layer& layer : layers_) {
-    const CuttingForce own = layer.rigid ? layer.rigid->at(now.angle) : layer.process->step(now);
-    sum.fx += layer.of.weight * own.fx;
-    sum.fy += layer.of.weight * own.fy;
-    sum.fz += layer.of.weight * own.fz;
-    sum.torque += layer.of.weight * own.torque;
+    sum.add(layer.rigid ? layer.rigid->at(now.angle) : layer.process->step(now), layer.of.weight);
   }
 }
 

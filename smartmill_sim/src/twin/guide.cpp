@@ -32,15 +32,21 @@ std::vector<double> pushed(const std::vector<double>& shown, const ModalModel& s
   return place;
 }
 
-}  // namespace
-
-double interpolated(const std::vector<double>& samples, std::size_t i, double share) {
+// Four samples, the second of which is sample i.
+std::array<double, 4> about(const std::vector<double>& samples, std::size_t i) {
   const auto at = [&](std::ptrdiff_t k) {
     return samples[static_cast<std::size_t>(
         std::clamp<std::ptrdiff_t>(k, 0, static_cast<std::ptrdiff_t>(samples.size()) - 1))];
   };
   const auto k = static_cast<std::ptrdiff_t>(i);
-  return catmullRom(at(k - 1), at(k), at(k + 1), at(k + 2), share);
+  return {{at(k - 1), at(k), at(k + 1), at(k + 2)}};
+}
+
+}  // namespace
+
+double interpolated(const std::vector<double>& samples, std::size_t i, double share) {
+  const std::array<double, 4> s = about(samples, i);
+  return catmullRom(s[0], s[1], s[2], s[3], share);
 }
 
 bool Guide::canBe(const Record& recorded) {
@@ -51,7 +57,8 @@ bool Guide::byForce(const Record& recorded) {
   return !(recorded.has(TIP[0]) && recorded.has(TIP[1])) && recorded.has(FORCE[0]) && recorded.has(FORCE[1]);
 }
 
-Guide::Guide(const MachineModel& model, const Record& recorded, double sample_rate) {
+Guide::Guide(const MachineModel& model, const Record& recorded, double sample_rate)
+    : sample_rate_(sample_rate) {
   const double sign = model.force_sensor.measures_workpiece ? -1.0 : 1.0;
   for (std::size_t a = 0; a < 2; ++a) {
     tip_[a] = byForce(recorded) ? pushed(recorded.column(FORCE[a]), model.force_sensor.axis[a],
@@ -60,8 +67,14 @@ Guide::Guide(const MachineModel& model, const Record& recorded, double sample_ra
   }
 }
 
-std::array<double, 2> Guide::at(std::size_t i, double share) const {
-  return {{interpolated(tip_[0], i, share), interpolated(tip_[1], i, share)}};
+TipPlace Guide::at(std::size_t i, double share) const {
+  TipPlace place;
+  for (std::size_t a = 0; a < 2; ++a) {
+    const std::array<double, 4> s = about(tip_[a], i);
+    place.displacement[a] = catmullRom(s[0], s[1], s[2], s[3], share);
+    place.rate[a] = sample_rate_ * catmullRomSlope(s[0], s[1], s[2], s[3], share);
+  }
+  return place;
 }
 
 }  // namespace smartmill::sim

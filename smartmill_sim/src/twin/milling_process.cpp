@@ -320,10 +320,12 @@ void MillingProcess::add(const ChipShape& shape, const Stretch& over, double hei
     sums.edges.edge_cosine += e * c;
     sums.edges.edge += e;
     if (law_.damping == 0.0) return;
-    const double d = w * (damping_[0] * s + damping_[1] * c);
-    sums.damping_sine += d * s;
-    sums.damping_cosine += d * c;
-    sums.damping += d;
+    RubbingSums& r = sums.rubbing;
+    r.sine2 += w * s * s;
+    r.sine_cosine += w * s * c;
+    r.cosine2 += w * c * c;
+    r.sine += w * s;
+    r.cosine += w * c;
   });
 }
 
@@ -344,13 +346,7 @@ CutSums MillingProcess::sumsAt(const ToolMotion& now) {
   if (arcs_.empty()) return sums;
   advance(now);
   if (path_share_ != 0.0) steepest_ = std::max(fastest_[0], fastest_[1]) / (now.speed * time_step_);
-  damping_ = {{0.0, 0.0}};
-  if (law_.damping != 0.0) {
-    const double share = law_.damping / (time_step_ * now.speed * tool_.radius());
-    const std::array<double, 2> before =
-        count_ > 0 ? displacement_[ring(count_ - 1, displacement_.size())] : now.displacement;
-    for (std::size_t i = 0; i < 2; ++i) damping_[i] = share * (now.displacement[i] - before[i]);
-  }
+  if (law_.damping != 0.0) sums.rubbing.rate = rubbingRate(now.rate, now.speed);
   forEachEdgePart(arcs_, lag_, rule_.toothAngle(), now.angle, [&](const EdgePart& part) {
     if (only_tooth_ >= 0 && part.tooth != only_tooth_) return;
     // A straight edge stands at one angle: any little spread gives the same.
@@ -365,6 +361,8 @@ CutSums MillingProcess::sumsAt(const ToolMotion& now) {
 CuttingForce MillingProcess::force(const CutSums& sums) const {
   const CuttingCoefficients& k = law_.coefficients;
   const EdgeSums& at = sums.edges;
+  const RubbingSums& rub = sums.rubbing;
+  const double x = law_.damping * rub.rate[0], y = law_.damping * rub.rate[1];
   const double chip = law_.chip_factor, edge = law_.edge_factor;
   const auto of = [&](double chips, double edges, double damping) {
     return std::array<double, 3>{
@@ -373,9 +371,10 @@ CuttingForce MillingProcess::force(const CutSums& sums) const {
          chip * k.kac * chips + edge * k.kae * edges + law_.damping_axial * damping}};
   };
   // Tangential, radial and axial, as in EdgeForce::add().
-  const std::array<double, 3> sine = of(at.chip_sine, at.edge_sine, sums.damping_sine),
-                              cosine = of(at.chip_cosine, at.edge_cosine, sums.damping_cosine),
-                              plain = of(at.chip, at.edge, sums.damping);
+  const std::array<double, 3> sine = of(at.chip_sine, at.edge_sine, x * rub.sine2 + y * rub.sine_cosine),
+                              cosine =
+                                  of(at.chip_cosine, at.edge_cosine, x * rub.sine_cosine + y * rub.cosine2),
+                              plain = of(at.chip, at.edge, x * rub.sine + y * rub.cosine);
   return {-cosine[0] - sine[1], sine[0] - cosine[1], plain[2], plain[0] * tool_.radius()};
 }
 

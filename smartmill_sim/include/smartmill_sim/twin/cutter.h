@@ -11,6 +11,12 @@
 
 namespace smartmill::sim {
 
+/// How a tip gives way to the force of the step that is being taken.
+struct TipYield {
+  std::array<double, 2> assumed{{0, 0}};  ///< [N] force of the cut with which it moves as the motion tells
+  std::array<double, 2> rate{{0, 0}};     ///< [m/s/N] that each newton more adds to its rate
+};
+
 /// A tool in its work: a straight mill, or, where the tool has a corner radius, one a slice of its height.
 class Cutter {
  public:
@@ -38,8 +44,9 @@ class Cutter {
   void keep(std::vector<CutSums>* sums) { kept_ = sums; }
   void follow(const std::vector<CutSums>* sums) { followed_ = sums; }
 
-  /// Force on the tool with its tip displaced as in this motion.
-  CuttingForce step(const ToolMotion& now);
+  /// Force on the tool with its tip displaced as in this motion. The rate is the one that comes of this very
+  /// force: edges that rub would else drive a light mode that they damp.
+  CuttingForce step(const ToolMotion& now, const TipYield& yield = {});
   /// Ends the step with the tip there [m].
   void settle(const std::array<double, 2>& displacement);
 
@@ -51,10 +58,13 @@ class Cutter {
     std::optional<MillingProcess> process;
     std::optional<RigidCut> rigid;
     std::size_t arcs = 0;  // in which it stands
+    CutSums sums;          // of the step
   };
   void place(Part& part);
   ToolMotion motionOf(const Part& part, const ToolMotion& now) const;
-  CuttingForce forceOf(Part& part, const ToolMotion& now);
+  CutSums sumsOf(Part& part, const ToolMotion& now) const;
+  CuttingForce force() const;  // of the sums
+  void yieldTo(const ToolMotion& now, const TipYield& yield);
 
   Way way_;
   double corner_radius_, lag_;

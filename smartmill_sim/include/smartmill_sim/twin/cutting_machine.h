@@ -14,6 +14,7 @@
 #include "smartmill_sim/effects/shelf_filter.h"
 #include "smartmill_sim/twin/cutter.h"
 #include "smartmill_sim/twin/edge_layers.h"
+#include "smartmill_sim/twin/guide.h"
 #include "smartmill_sim/twin/spindle_drive.h"
 
 namespace smartmill::sim {
@@ -41,11 +42,11 @@ class CuttingMachine {
  public:
   /// What happens between now and the last step.
   struct Input {
-    ToolMotion motion;                              ///< displacement is not read: the structure gives it
+    ToolMotion motion;                              ///< vibration is not read: the structure gives it
     std::array<double, 2> tip_force{{0, 0}};        ///< [N] on the tool besides cutting (a hammer)
     std::array<double, 3> sensor_force{{0, 0, 0}};  ///< [N] on the sensor besides cutting
-    /// [m] where the tip is known to be, x and y: the chip is of that, whatever the structure would do.
-    std::optional<std::array<double, 2>> tip;
+    /// Where the tip is known to be: the chip is of that, whatever the structure would do.
+    std::optional<TipPlace> tip;
   };
   /// At the end of a step.
   struct Output {

@@ -20,13 +20,20 @@ struct ToolMotion {
   std::array<double, 2> centre{{0, 0}};        ///< [m] x, y of the undeflected tool
   std::array<double, 2> velocity{{0, 0}};      ///< [m/s] of the undeflected tool
   std::array<double, 2> displacement{{0, 0}};  ///< [m] vibration of the tip
+  std::array<double, 2> rate{{0, 0}};          ///< [m/s] of the displacement
 };
 
-/// What of the edges is in contact at a step, in which the force is linear: sums that no coefficient nor
-/// factor of the law enters, and those of process damping, with d of CuttingLaw.
+/// Edges that rub on the work (process damping): sums over their length in contact [m].
+struct RubbingSums {
+  double sine2 = 0.0, sine_cosine = 0.0, cosine2 = 0.0, sine = 0.0, cosine = 0.0;
+  std::array<double, 2> rate{{0, 0}};  ///< [1] of the displacement, over the cutting speed
+};
+
+/// What of the edges is in contact at a step, in which the force is linear: no coefficient nor factor of the
+/// law enters.
 struct CutSums {
   EdgeSums edges;
-  double damping_sine = 0.0, damping_cosine = 0.0, damping = 0.0;  ///< [N] of d sin(phi), d cos(phi), d
+  RubbingSums rubbing;  ///< of laws with damping
 };
 
 /// [m/rad] Feed of a turn of the spindle. @throws Error when the spindle stands.
@@ -60,6 +67,10 @@ class MillingProcess {
   /// The same in two steps.
   CutSums sumsAt(const ToolMotion& now);
   CuttingForce force(const CutSums& sums) const;
+  /// The rate of RubbingSums of a tip that moves like this [m/s] at a speed [rad/s].
+  std::array<double, 2> rubbingRate(const std::array<double, 2>& rate, double speed) const {
+    return {{rate[0] / (speed * tool_.radius()), rate[1] / (speed * tool_.radius())}};
+  }
   /// Ends the step with the tip there [m].
   void settle(const std::array<double, 2>& displacement);
 
@@ -130,7 +141,6 @@ class MillingProcess {
   std::vector<ContactArc> arcs_;
   ToolMotion now_;
   std::array<double, 2> feed_{{0, 0}}, first_feed_{{0, 0}};  // [m/rad] now, when the material began
-  std::array<double, 2> damping_{{0, 0}};  // [N/m] radial force of process damping: x sin + y cos
 
   // What was at each step since the material began, newest at count_ - 1; rings.
   std::vector<std::array<double, 2>> displacement_, centre_;  // [m]

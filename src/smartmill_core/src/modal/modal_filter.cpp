@@ -9,7 +9,8 @@
 
 namespace smartmill {
 
-ModalFilter::ModalFilter(const ModalModel& model, double sample_rate, Hold hold) : direct_(model.direct) {
+ModalFilter::ModalFilter(const ModalModel& model, double sample_rate, Hold hold)
+    : direct_(model.direct), sample_rate_(sample_rate) {
   if (!(sample_rate > 0.0)) {
     throw Error("modal filter: sample rate " + std::to_string(sample_rate) + " Hz is not positive");
   }
@@ -64,6 +65,20 @@ double ModalFilter::peek(double input) const {
     output += s.gain * (s.a11 * s.x + s.a12 * s.v + s.b1 * last_input_ + s.c1 * input);
   }
   return output;
+}
+
+double ModalFilter::peekRate(double input) const {
+  double rate = direct_ * sample_rate_ * (input - last_input_);
+  for (const Section& s : sections_) {
+    rate += s.gain * (s.a21 * s.x + s.a22 * s.v + s.b2 * last_input_ + s.c2 * input);
+  }
+  return rate;
+}
+
+double ModalFilter::rateOfInput() const {
+  double rate = direct_ * sample_rate_;
+  for (const Section& s : sections_) rate += s.gain * s.c2;
+  return rate;
 }
 
 void ModalFilter::reset(double constant_input) {

@@ -10,6 +10,13 @@ namespace smartmill {
 struct CuttingForce {
   double fx = 0.0, fy = 0.0, fz = 0.0;  ///< [N] x feed direction
   double torque = 0.0;                  ///< [N m] sum of tangential forces x R
+
+  void add(const CuttingForce& other, double weight = 1.0) {
+    fx += weight * other.fx;
+    fy += weight * other.fy;
+    fz += weight * other.fz;
+    torque += weight * other.torque;
+  }
 };
 
 /// Direction of the elementary forces (formats.md): Fx = -Ft cos - Fr sin, Fy = +Ft sin - Fr cos, Fz = +Fa.

@@ -39,6 +39,10 @@ class ModalFilter {
   /// What step() would give, without taking the step.
   double peek(double input) const;
 
+  /// The rate of that output [unit/s x unit of input], and by how much a unit more of this input raises it.
+  double peekRate(double input) const;
+  double rateOfInput() const;
+
   /// At rest, or in the static state of a constant input.
   void reset(double constant_input = 0.0);
 
@@ -58,7 +62,7 @@ class ModalFilter {
     double stiffness, damping;  // x'' = stiffness (input - x) - damping x'
   };
   std::vector<Section> sections_;
-  double direct_;
+  double direct_, sample_rate_;
   double last_input_ = 0.0;
 };
 
