@@ -261,6 +261,20 @@ CampaignCost::Linear CampaignCost::eliminated(const VectorXd& at, const Linear& 
   return own;
 }
 
+std::optional<VectorXd> CampaignCost::straightOn(const VectorXd& at) const {
+  const Linear* const here = linearise(at);
+  if (!here) return {};
+  const VectorXd right = here->information * at - here->gradient + precision_.cwiseProduct(null_);
+  MatrixXd information = here->information;
+  information.diagonal() += precision_;
+  return fit::leastWithin(information, right, low_, high_);
+}
+
+double CampaignCost::penaltyAt(const VectorXd& at) const {
+  const auto n = static_cast<Index>(turnsBegin());
+  return precision_.head(n).dot((at - null_).head(n).cwiseAbs2());
+}
+
 double CampaignCost::promisedAt(const VectorXd& own) const {
   const std::optional<VectorXd> at = pointAt(own);
   const Linear* of_all = at ? linearise(*at) : nullptr;

@@ -39,6 +39,13 @@ class CampaignCost : public fit::Residuals {
   /// All coordinates, frozen ones at their best. @return no value where evaluate() is false
   std::optional<Eigen::VectorXd> pointAt(const Eigen::VectorXd& own) const;
 
+  /// All coordinates where squares and priors would be least were the twin straight about this point. @return
+  /// no value where evaluate() is false
+  std::optional<Eigen::VectorXd> straightOn(const Eigen::VectorXd& at) const;
+
+  /// Squares of the priors, those of turns left out.
+  double penaltyAt(const Eigen::VectorXd& at) const;
+
   /// Squares, priors included, that an undamped step from there promises to take away; of what presses
   /// against its bound it promises nothing.
   double promisedAt(const Eigen::VectorXd& own) const;

@@ -124,8 +124,7 @@ bool describe(const CampaignCost& cost, const Eigen::VectorXd& at, double sample
   fit.chi2 = residual.squaredNorm();
   fit.residual.resize(static_cast<std::size_t>(residual.size()));
   Eigen::Map<Eigen::VectorXd>(fit.residual.data(), residual.size()) = -residual;
-  for (std::size_t k = 0; k < cost.turnsBegin(); ++k)
-    fit.penalty += cost.precision(k) * std::pow(at[static_cast<Index>(k)] - cost.coordinates()[k].null, 2);
+  fit.penalty = cost.penaltyAt(at);
   fit.bic = fit.chi2 + fit.penalty;
   const auto of_records = static_cast<double>(records);
   for (const Member& m : fit.state.members) {
@@ -200,6 +199,22 @@ Fit Fitter::fit(const FitState& start, const NominalTangents* frozen, const FitO
     fit.chi2 = fit.bic = std::numeric_limits<double>::infinity();
   }
   return fit;
+}
+
+std::optional<FitState> Fitter::straightOn(const FitState& state, const NominalTangents& tangents,
+                                           double prior_weight) const {
+  FitOptions options;
+  options.prior_weight = prior_weight;
+  const CampaignCost cost(*this, state, &tangents, options);
+  const std::optional<Eigen::VectorXd> at = cost.straightOn(cost.start());
+  return at ? std::optional<FitState>(cost.stateAt(*at)) : std::nullopt;
+}
+
+double Fitter::penalty(const FitState& state, double prior_weight) const {
+  FitOptions options;
+  options.prior_weight = prior_weight;
+  const CampaignCost cost(*this, state, nullptr, options);
+  return cost.penaltyAt(cost.start());
 }
 
 MatrixXd Fitter::sandwichCovariance(const FitState& state, const NominalTangents& tangents,

@@ -29,8 +29,7 @@ NominalFreedom::NominalFreedom(const MachineModel& nominal) {
   if (nominal.tool && nominal.cutting) addToothPath();
 }
 
-// From the rule of the surface, which other programs follow, to what the teeth of a machine leave. Also where
-// no modes are stated: those of a hypothesis may come.
+// From the rule of the surface, which other programs follow, to what the teeth of a machine leave.
 void NominalFreedom::addToothPath() {
   constexpr double STD = 0.5, LEAST = -0.5, MOST = 1.5, STEP = 0.02;
   coordinates_.push_back({PATH_SHARE, 0.0, LEAST, MOST, STEP, STD});

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "smartmill_discrepancy/search/evidence.h"
@@ -42,7 +43,7 @@ FitOptions weighted(FitOptions options, double weight) {
 // end when no value moves by much of its standard deviation: in a narrow valley the cost says little.
 Settled settle(Workbench& bench, FitState from, Fit* best) {
   constexpr int PASSES = 6;
-  constexpr double SETTLED = 0.1, SAME_TANGENTS = 2.0;  // standard deviations
+  constexpr double SETTLED = 0.1, SAME_TANGENTS = 2.0, APART = 0.5;  // standard deviations
   Settled settled;
   bool tangents_hold = false;
   for (int pass = 0; pass <= PASSES; ++pass) {
@@ -61,10 +62,19 @@ Settled settle(Workbench& bench, FitState from, Fit* best) {
     if (pass == PASSES || bench.cancelled()) break;
     const Fit next = bench.quick().fit(from, &settled.tangents, weighted({6, 1e-5, true}, settled.weight));
     if (!next.converged) break;
-    const double by = moved(from, next.state, covariance);
+    FitState on = next.state;
+    // Where values stand for each other, what only acts linearly holds the others back.
+    const std::optional<FitState> straight = bench.quick().straightOn(from, settled.tangents, settled.weight);
+    if (straight && moved(next.state, *straight, covariance) > APART) {
+      const auto cost = [&](const FitState& state) {
+        return bench.exactSquares(state) + bench.quick().penalty(state, settled.weight);
+      };
+      if (cost(*straight) < cost(next.state)) on = *straight;
+    }
+    const double by = moved(from, on, covariance);
     if (by < SETTLED && !turned) break;
     tangents_hold = by < SAME_TANGENTS && !turned;
-    from = next.state;
+    from = on;
   }
   return settled;
 }

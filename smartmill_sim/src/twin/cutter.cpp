@@ -16,7 +16,7 @@ Cutter::Cutter(const ToolGeometry& tool, const CuttingLaw& law, double time_step
     part.top = slice.high;
     const ToolGeometry straight = toolOf(slice, tool);
     if (way == Way::tables) {
-      part.rigid.emplace(straight, lawOf(slice, law), radius_offset);
+      part.rigid.emplace(straight, lawOf(slice, law), radius_offset, path_share);
     } else {
       part.process.emplace(straight, lawOf(slice, law), time_step, radius_offset, path_share);
     }

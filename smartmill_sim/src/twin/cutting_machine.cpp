@@ -40,7 +40,6 @@ CuttingMachine::CuttingMachine(const MachineModel& model, double time_step, Feed
   if (model_.tool && model_.cutting) {
     nominal_.law.coefficients = model_.needCutting("simulate a cut");
     const bool tables = feed == Feed::steady && !vibrates_;
-    if (!vibrates_) setup.path_share = 0.0;
     cutter_.emplace(*model_.tool, nominal_.law, time_step, setup.radius_offset, setup.corner_radius,
                     setup.path_share, tables ? Cutter::Way::tables : Cutter::Way::history);
     layers_ = EdgeLayers(setup, nominal_.law, time_step, tables);

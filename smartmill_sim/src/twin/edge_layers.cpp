@@ -32,7 +32,7 @@ EdgeLayers::EdgeLayers(const TwinSetup& setup, const CuttingLaw& law, double tim
     Layer layer{of, {}, {}};
     // Tables do not tell one tooth from the next.
     if (rigid && of.only_tooth < 0) {
-      layer.rigid.emplace(*setup.model.tool, lawOf(of, law), std::move(radius));
+      layer.rigid.emplace(*setup.model.tool, lawOf(of, law), std::move(radius), setup.path_share);
     } else {
       layer.process.emplace(*setup.model.tool, lawOf(of, law), time_step, std::move(radius),
                             setup.path_share);

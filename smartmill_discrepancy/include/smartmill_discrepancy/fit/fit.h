@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <functional>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -96,6 +97,13 @@ class Fitter {
   /// nullptr: they are simulated anew
   /// @return at a start where the twin gives no numbers: the start, not converged
   Fit fit(const FitState& start, const NominalTangents* frozen, const FitOptions& options) const;
+
+  /// Where squares and priors would be least were the twin straight about a state, nominal values and turns
+  /// included. @param tangents taken there @return no value where the twin gives no numbers
+  std::optional<FitState> straightOn(const FitState& state, const NominalTangents& tangents,
+                                     double prior_weight) const;
+  /// As Fit::penalty.
+  double penalty(const FitState& state, double prior_weight) const;
 
   /// Covariance of a fit at its state when what is left is not noise: each value is moved by u.r, u its
   /// influence over the samples, and that has the variance of varianceOfProducts(), if not less than that of

@@ -67,7 +67,7 @@ struct TwinSetup {
   std::vector<double> radius_offset;   ///< [m] of each tooth
   std::array<double, CHANNELS> delay;  ///< [s] of each channel
   double corner_radius = 0.0;          ///< [m] of the tool
-  double path_share = 0.0;  ///< [1] of a tool with modes: 0 the rule of the surface, 1 the teeth's path
+  double path_share = 0.0;             ///< [1] 0: the rule of the surface, 1: the teeth's path
   std::vector<EdgeLayer> layers;
   std::vector<Resonance> resonances;                   ///< of channels, before shelves
   std::vector<std::pair<std::size_t, Shelf>> shelves;  ///< of channels, before they are late

@@ -63,9 +63,18 @@ ChipShape ChipRule::shape(int j, int n, const std::array<double, 2>& fed,
           0.5 * curvature_ * (x2 - y2)};
 }
 
-ChipShape ChipRule::steadyShape(int j, int n, const std::array<double, 2>& feed) const {
+ChipShape ChipRule::steadyShape(int j, int n, const std::array<double, 2>& feed, double path_share) const {
   const double turned = turn(j, n), first = turn(j, 1);
-  return shape(j, n, {{feed[0] * turned, feed[1] * turned}}, {{feed[0] * first, feed[1] * first}});
+  ChipShape steady =
+      shape(j, n, {{feed[0] * turned, feed[1] * turned}}, {{feed[0] * first, feed[1] * first}});
+  if (path_share == 0.0) return steady;
+  // With f: (f x e)^2 as in shape(), 2 (f x e) f.e = (fx^2 - fy^2) sin(2 phi) + 2 fx fy cos(2 phi).
+  const double share = path_share * curvature_, round = share * first * first;
+  const double x2 = feed[0] * feed[0], y2 = feed[1] * feed[1], xy = feed[0] * feed[1];
+  steady.level += 0.5 * round * (x2 + y2);
+  steady.sine2 -= round * xy + share * turned * (x2 - y2);
+  steady.cosine2 += 0.5 * round * (x2 - y2) - 2.0 * share * turned * xy;
+  return steady;
 }
 
 }  // namespace smartmill

@@ -34,8 +34,13 @@ void addDifference(const EdgeSums& a, const EdgeSums& b, double share, EdgeSums&
 
 }  // namespace
 
-RigidCut::RigidCut(const ToolGeometry& tool, const CuttingLaw& law, std::vector<double> radius_offset)
-    : tool_((validate(tool), tool)), rule_(tool, std::move(radius_offset)), law_(law), lag_(tool.lag()) {
+RigidCut::RigidCut(const ToolGeometry& tool, const CuttingLaw& law, std::vector<double> radius_offset,
+                   double path_share)
+    : tool_((validate(tool), tool)),
+      rule_(tool, std::move(radius_offset)),
+      law_(law),
+      lag_(tool.lag()),
+      path_share_(path_share) {
 }
 
 RigidCut::RigidCut(const ToolGeometry& tool, const CuttingLaw& law, const Engagement& engagement,
@@ -80,7 +85,7 @@ void RigidCut::shape() {
   shapes_.assign(rule_.alike() ? 1 : static_cast<std::size_t>(rule_.teeth()), {});
   for (std::size_t j = 0; j < shapes_.size(); ++j) {
     for (int n = 1; n <= rule_.teeth(); ++n)
-      shapes_[j].push_back(rule_.steadyShape(static_cast<int>(j), n, feed_));
+      shapes_[j].push_back(rule_.steadyShape(static_cast<int>(j), n, feed_, path_share_));
   }
 }
 

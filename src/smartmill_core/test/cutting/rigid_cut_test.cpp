@@ -264,6 +264,9 @@ TEST(RigidCut, chipsAreThoseOfTheTrochoids) {
   const double radius = 9.525e-3, feed = 3e-5, per_rad = teeth * feed / TWO_PI;
   const std::vector<double> offset{20e-6, 0.0, 3e-6, -1e-6};
   RigidCut rigid(mill(teeth, 0.0), aluminium(), Engagement{0.0, PI, 1e-3, feed}, offset);
+  // Of the whole path what is left out is F_n^2 f / R^2, f the feed a radian.
+  RigidCut by_path(mill(teeth, 0.0), aluminium(), offset, 1.0);
+  by_path.engage({{0.0, PI, 1e-3}}, {{per_rad, 0.0}});
   int older = 0;
   for (int j = 0; j < teeth; ++j) {
     for (double phi = 0.002; phi < PI; phi += 0.0131) {
@@ -288,6 +291,9 @@ TEST(RigidCut, chipsAreThoseOfTheTrochoids) {
       const double left_out =
           feed * feed * c * c / (2.0 * radius) + per_rad * teeth * feed * std::abs(s * c) / radius;
       EXPECT_NEAR(rigid.chip(j, phi), chip, left_out + 2e-9) << j << " " << phi << " " << nearest;
+      const double turn = teeth * feed;
+      EXPECT_NEAR(by_path.chip(j, phi), chip, 2.0 * turn * turn * per_rad / (radius * radius) + 1e-10)
+          << j << " " << phi << " " << nearest;
     }
   }
   EXPECT_GT(older, 20);

@@ -71,8 +71,12 @@ class ChipRule {
   /// The chip of tooth j against its pass n. @param fed, fed_first [m] D_n, D_1. @param moved [m] u - u_n
   ChipShape shape(int j, int n, const std::array<double, 2>& fed, const std::array<double, 2>& fed_first,
                   const std::array<double, 2>& moved = {{0.0, 0.0}}) const;
-  /// The same of a tool that does not vibrate. @param feed [m/rad] of the spindle
-  ChipShape steadyShape(int j, int n, const std::array<double, 2>& feed) const;
+  /// The same of a tool that does not vibrate. @param feed [m/rad] of the spindle @param path_share [1] of
+  /// the way from the rule (0) to the true path of the teeth (1): a tooth left what lies on the ray when it
+  /// stood at psi = phi + (D_n x e) / R, and not at phi, and the first pass is as round as the others,
+  ///
+  ///     h_n + ((D_1 x e)^2 / 2 - (D_n x e) f.e) / R,  f the feed a radian
+  ChipShape steadyShape(int j, int n, const std::array<double, 2>& feed, double path_share = 0.0) const;
 
  private:
   std::vector<double> offset_, overhang_, tooth_angle_, pitch_;

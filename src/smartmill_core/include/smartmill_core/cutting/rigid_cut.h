@@ -26,8 +26,10 @@ struct EdgeSums {
 /// (eq. 3.13..3.15 with any chip).
 class RigidCut {
  public:
-  /// @param radius_offset [m] of each tooth (runout), empty: none. @throws Error on an impossible tool.
-  RigidCut(const ToolGeometry& tool, const CuttingLaw& law, std::vector<double> radius_offset = {});
+  /// @param radius_offset [m] of each tooth (runout), empty: none. @param path_share [1] see ChipRule.
+  /// @throws Error on an impossible tool.
+  RigidCut(const ToolGeometry& tool, const CuttingLaw& law, std::vector<double> radius_offset = {},
+           double path_share = 0.0);
   /// One arc, fed along x. @throws Error on an impossible engagement too.
   RigidCut(const ToolGeometry& tool, const CuttingLaw& law, const Engagement& engagement,
            std::vector<double> radius_offset = {});
@@ -80,7 +82,7 @@ class RigidCut {
   ToolGeometry tool_;
   ChipRule rule_;
   CuttingLaw law_;
-  double lag_;
+  double lag_, path_share_;
   std::vector<ContactArc> arcs_;
   std::array<double, 2> feed_{{0, 0}};          // [m/rad]
   std::vector<std::vector<ChipShape>> shapes_;  // what a tooth may meet; one entry when all teeth are alike
