@@ -148,7 +148,8 @@ struct Foreign {
   std::string name;
 };
 
-Foreign bestForeignLabel(const Dataset& data, const std::vector<double>& gaps, std::size_t of) {
+Foreign bestForeignLabel(const Dataset& data, const MachineModel& model, const std::vector<double>& gaps,
+                         std::size_t of) {
   const TestData& t = data.tests[of];
   Foreign best{gaps[of], 0.0, {}};
   for (std::size_t k = 0; k < gaps.size(); ++k) {
@@ -156,7 +157,7 @@ Foreign bestForeignLabel(const Dataset& data, const std::vector<double>& gaps, s
     if (other.test.kind != TestKind::cut || other.test.name == t.test.name) continue;
     CampaignTest test = t.test;
     test.engagement = other.test.engagement;
-    const double gap = forceSquares(t, sim::simulateTest(data.nominal, test, t.record, quickly())) /
+    const double gap = forceSquares(t, sim::simulateTest(model, test, t.record, quickly())) /
                        static_cast<double>(t.record.size());
     if (gap < best.gap) best = {gap, gaps[k], other.test.name};
   }
@@ -164,7 +165,8 @@ Foreign bestForeignLabel(const Dataset& data, const std::vector<double>& gaps, s
 }
 
 // Cuts that another cut's label fits far better than their own, while the others fit theirs.
-std::vector<std::string> foreignLabels(const Dataset& data, const std::vector<Record>& own) {
+std::vector<std::string> foreignLabels(const Dataset& data, const MachineModel& model,
+                                       const std::vector<Record>& own) {
   std::vector<double> gaps(own.size(), 0.0), all;
   for (std::size_t i = 0; i < own.size(); ++i) {
     if (data.tests[i].test.kind != TestKind::cut) continue;
@@ -177,12 +179,29 @@ std::vector<std::string> foreignLabels(const Dataset& data, const std::vector<Re
   for (std::size_t i = 0; i < own.size(); ++i) {
     const TestData& t = data.tests[i];
     if (t.test.kind != TestKind::cut || gaps[i] < 3.0 * usual || gaps[i] < FAR) continue;
-    const Foreign best = bestForeignLabel(data, gaps, i);
+    const Foreign best = bestForeignLabel(data, model, gaps, i);
     if (best.gap < RELABELLED * gaps[i] && best.gap < AS_WELL * std::max(best.theirs, 6.0))
       doubtful.push_back("test " + t.test.name + " looks mislabelled: feed, depth or immersion of " +
                          best.name + " fit its record");
   }
   return doubtful;
+}
+
+std::vector<Record> simulated(const Dataset& data, const MachineModel& model, int threads) {
+  std::vector<Record> own(data.tests.size());
+  runParallel(own.size(), threads, [&](std::size_t i) {
+    own[i] = sim::simulateTest(model, data.tests[i].test, data.tests[i].record, quickly());
+  });
+  return own;
+}
+
+// What no free simulation follows tells nothing of labels.
+Dataset withoutChatter(const Dataset& data) {
+  Dataset others = data;
+  others.tests.erase(std::remove_if(others.tests.begin(), others.tests.end(),
+                                    [](const TestData& t) { return t.chatter.has_value(); }),
+                     others.tests.end());
+  return others;
 }
 
 }  // namespace
@@ -191,22 +210,17 @@ Labels checkLabels(const Dataset& data, int threads) {
   Labels labels;
   labels.wrong = wrongSpeeds(data);
   if (!labels.wrong.empty()) return labels;
-  const auto chatters = [](const TestData& t) { return t.chatter.has_value(); };
-  if (std::any_of(data.tests.begin(), data.tests.end(), chatters)) {
-    // What no free simulation follows tells nothing of labels.
-    Dataset others = data;
-    others.tests.erase(std::remove_if(others.tests.begin(), others.tests.end(), chatters),
-                       others.tests.end());
-    return checkLabels(others, threads);
-  }
-  std::vector<Record> own(data.tests.size());
-  runParallel(own.size(), threads, [&](std::size_t i) {
-    own[i] = sim::simulateTest(data.nominal, data.tests[i].test, data.tests[i].record, quickly());
-  });
-  labels.wrong = wrongScales(data, own);
-  if (labels.wrong.empty()) labels.wrong = swappedChannels(data, own);
-  if (labels.wrong.empty()) labels.doubtful = foreignLabels(data, own);
+  const Dataset free = withoutChatter(data);
+  const std::vector<Record> own = simulated(free, data.nominal, threads);
+  labels.wrong = wrongScales(free, own);
+  if (labels.wrong.empty()) labels.wrong = swappedChannels(free, own);
+  if (labels.wrong.empty()) labels.doubtful = foreignLabels(free, data.nominal, own);
   return labels;
+}
+
+std::vector<std::string> doubtfulWith(const MachineModel& model, const Dataset& data, int threads) {
+  const Dataset free = withoutChatter(data);
+  return foreignLabels(free, model, simulated(free, model, threads));
 }
 
 }  // namespace smartmill::discrepancy

@@ -176,8 +176,9 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
   addChatter(bench.data(), &result);
   result.verdict = verdictOf(result);
   if (result.verdict == Verdict::no_disagreement) result.where.clear();
-  // An effect that acts in one test most may look like another test's label; one that explains all clears it.
-  if (!result.unexplained.empty()) refuse(data, labels.doubtful);
+  // What acts in one test most may look like another test's label; a model that has it clears it.
+  if (!labels.doubtful.empty() && !result.unexplained.empty())
+    refuse(data, doubtfulWith(improved, bench.data(), options.bench.threads));
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   sayVerdict(options.search, result);
   return result;

@@ -8,7 +8,9 @@
 
 #include <gtest/gtest.h>
 
+#include "smartmill_core/model/effect_catalogue.h"
 #include "smartmill_core/testing/shared_data.h"
+#include "smartmill_sim/twin/twin.h"
 
 namespace smartmill::discrepancy {
 namespace {
@@ -44,6 +46,37 @@ TEST(Labels, nameSwappedChannelsWrongSignsAndAnotherSpeed) {
   Dataset speed = data;
   speed.tests[2].test.spindle_speed *= 1.25;
   ASSERT_EQ(checkLabels(speed, 2).wrong.size(), 1u);
+}
+
+// Chips at other feeds than the label says are doubted with any model. Where the law bends, so that a high
+// feed is as easy as a lower one, that is doubted beside a nominal model only.
+TEST(Labels, areClearedByAModelThatHasTheCause) {
+  SMARTMILL_SHARED_DATA(folder, "campaigns/none");
+  const Campaign campaign = readCampaign(folder);
+  const Dataset data = loadDataset(campaign, readMachineModel(campaign.modelPath()));
+  MachineModel bent = data.nominal;
+  bent.effects = {effectEntry("empirical:chip_thickness", {}, {},
+                              {{"h_um", {30.0, 60.0, 100.0}}, {"factor", {1.0, 0.75, 0.55}}})};
+  Dataset machine = data, relabelled = data;
+  std::size_t again = 0, high = 0;
+  for (std::size_t i = 0; i < data.tests.size(); ++i) {
+    sim::SimulationOptions options;
+    options.noise = false;
+    machine.tests[i].record = sim::simulateTest(bent, data.tests[i].test, data.tests[i].record, options);
+    if (data.tests[i].test.name == "slot_4500_again") again = i;
+    if (data.tests[i].test.name == "slot_4500_100") high = i;
+  }
+  const std::vector<std::string> doubtful = checkLabels(machine, 2).doubtful;
+  ASSERT_EQ(doubtful.size(), 1u);
+  EXPECT_EQ(doubtful.front(),
+            "test slot_4500_100 looks mislabelled: feed, depth or immersion of slot_4500_060 fit its record");
+  EXPECT_EQ(doubtfulWith(data.nominal, machine, 2), doubtful);
+  EXPECT_TRUE(doubtfulWith(bent, machine, 2).empty());
+  relabelled.tests[again].test.engagement = data.tests[high].test.engagement;
+  const std::vector<std::string> wrong = checkLabels(relabelled, 2).doubtful;
+  ASSERT_EQ(wrong.size(), 1u);
+  EXPECT_NE(wrong.front().find("slot_4500_again looks mislabelled"), std::string::npos) << wrong.front();
+  EXPECT_EQ(doubtfulWith(data.nominal, relabelled, 2), wrong);
 }
 
 }  // namespace

@@ -11,12 +11,14 @@ namespace smartmill::discrepancy {
 /// slot_2".
 struct Labels {
   std::vector<std::string> wrong;  ///< channels swapped, channel in another unit, spindle at another speed
-  /// A test that another's label fits. An effect that acts in that test most looks alike: only where nothing
-  /// explains the campaign the label is wrong.
+  /// A test that another's label fits. What acts in that test most looks alike: see doubtfulWith().
   std::vector<std::string> doubtful;
 };
 
 /// Compares with the nominal model; looks only for what would be far larger than any effect of the catalogue.
 Labels checkLabels(const Dataset& data, int threads);
+
+/// Labels::doubtful beside a model that has what was found: those that it does not clear are wrong.
+std::vector<std::string> doubtfulWith(const MachineModel& model, const Dataset& data, int threads);
 
 }  // namespace smartmill::discrepancy
