@@ -12,6 +12,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/fit/least_squares.h"
 #include "smartmill_core/math/linear_algebra.h"
+#include "smartmill_core/signal/statistics.h"
 #include "smartmill_discrepancy/gap/asked.h"
 
 namespace smartmill::discrepancy {
@@ -111,7 +112,10 @@ double pulledVariance(const TwinRunner& runner, const Eigen::VectorXd& influence
     tests.push_back(asked);
     squares += asked.squares;
   }
-  return std::max(squares, varianceOfProducts(tests));
+  // A few tests tell their own scatter but poorly: their interval is Student's.
+  const Scatter scatter = scatterOf(tests);
+  const double student = studentOverNormal(std::max(scatter.freedom, 1.0));
+  return std::max({squares, varianceOfProducts(tests), student * student * scatter.variance});
 }
 
 // Cost, residual and covariance at a point. @return false: no numbers there

@@ -51,18 +51,27 @@ void AskedTest::add(const double* between, const double* left, std::size_t size,
 
 // The common share follows a test by that test's part of the squares: by just that part the square of what is
 // left of it is less than its variance.
-double varianceOfProducts(const std::vector<AskedTest>& tests) {
-  double squares = 0.0, variance = 0.0, product = 0.0, scatter = 0.0;
+Scatter scatterOf(const std::vector<AskedTest>& tests) {
+  double squares = 0.0, product = 0.0, even = 0.0;
   for (const AskedTest& t : tests) {
     squares += t.squares;
-    variance += t.variance;
     product += t.product;
+    even += t.squares * t.squares;
   }
+  Scatter scatter;
   for (const AskedTest& t : tests) {
     const double others = squares - t.squares;
-    if (others > 0.0) scatter += std::pow(t.product - t.squares * product / squares, 2) * squares / others;
+    if (others > 0.0)
+      scatter.variance += std::pow(t.product - t.squares * product / squares, 2) * squares / others;
   }
-  return std::max(variance, scatter);
+  if (even > 0.0) scatter.freedom = squares * squares / even - 1.0;
+  return scatter;
+}
+
+double varianceOfProducts(const std::vector<AskedTest>& tests) {
+  double variance = 0.0;
+  for (const AskedTest& t : tests) variance += t.variance;
+  return std::max(variance, scatterOf(tests).variance);
 }
 
 }  // namespace smartmill::discrepancy

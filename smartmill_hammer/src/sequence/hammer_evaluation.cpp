@@ -9,6 +9,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/modal/modal_fit.h"
+#include "smartmill_core/signal/statistics.h"
 #include "smartmill_hammer/analysis/hits_needed.h"
 #include "smartmill_hammer/analysis/offset_factor.h"
 #include "smartmill_hammer/analysis/pole_gains.h"
@@ -41,12 +42,6 @@ void addCommon(FrequencyResponse& frf, double relative) {
 void addCommon(ModalModel& model, double relative) {
   for (Mode& mode : model.modes) mode.gain_std = std::hypot(mode.gain_std, relative * mode.gain);
   model.direct_std = std::hypot(model.direct_std, relative * model.direct);
-}
-
-/// [1] 97.5 % quantile of Student's t over the normal's (Abramowitz and Stegun 26.7.5).
-double studentOverNormal(std::size_t freedom) {
-  const double z = 1.96, n = static_cast<double>(freedom), z2 = z * z;
-  return 1.0 + (z2 + 1.0) / (4.0 * n) + (5.0 * z2 * z2 + 16.0 * z2 + 3.0) / (96.0 * n * n);
 }
 
 }  // namespace
@@ -96,7 +91,7 @@ void HammerSequence::addScatter(const FrequencyResponse& frf, ModalModel& model)
     for (std::size_t k = 0; k < frf.size(); ++k) change[k] -= frf.value[k];
     shifts.push_back(shiftOf(frf, change, model, parameters_.fit_low, parameters_.fit_high));
   }
-  const double wide = std::sqrt((n - 1.0) / n) * studentOverNormal(hits_.size() - 1);
+  const double wide = std::sqrt((n - 1.0) / n) * studentOverNormal(n - 1.0);
   for (std::size_t k = 0; k < model.modes.size(); ++k) {
     const auto scatter = [&](double Mode::*value) {
       double sum = 0.0, squares = 0.0;

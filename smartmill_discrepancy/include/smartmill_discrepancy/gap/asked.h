@@ -20,8 +20,14 @@ struct AskedTest {
 /// Squares by frequency behind a Hann window, of which there are as many as those of the values.
 std::vector<double> powerOf(const double* values, std::size_t size);
 
-/// Variance of the sum of the products over tests: of what is left at random phases, or, where that is more,
-/// as the tests scatter about a common share of d.
+/// Variance of the sum of the products over tests as these scatter about a common share of d.
+struct Scatter {
+  double variance = 0.0;
+  double freedom = 0.0;  ///< degrees: as many tests as tell so much evenly, less one
+};
+Scatter scatterOf(const std::vector<AskedTest>& tests);
+
+/// The same of what is left at random phases, or, where that is more, as the tests scatter.
 double varianceOfProducts(const std::vector<AskedTest>& tests);
 
 }  // namespace smartmill::discrepancy

@@ -77,4 +77,10 @@ std::size_t longestRunAtExtreme(const std::vector<double>& values) {
   return longest;
 }
 
+double studentOverNormal(double freedom) {
+  const double n = freedom, z = 1.96, z2 = z * z;
+  return 1.0 + (z2 + 1.0) / (4.0 * n) + ((5.0 * z2 + 16.0) * z2 + 3.0) / (96.0 * n * n) +
+         (((3.0 * z2 + 19.0) * z2 + 17.0) * z2 - 15.0) / (384.0 * n * n * n);
+}
+
 }  // namespace smartmill

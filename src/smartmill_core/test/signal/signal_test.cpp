@@ -254,6 +254,10 @@ TEST(Statistics, closedForms) {
   EXPECT_DOUBLE_EQ(median({4.0, 1.0, 3.0, 2.0}), 2.5);
   EXPECT_DOUBLE_EQ(percentile({10.0, 0.0, 5.0}, 0.1), 1.0);
   EXPECT_DOUBLE_EQ(percentile({7.0}, 1.0), 7.0);
+  // Tables of Student's t.
+  EXPECT_NEAR(1.96 * studentOverNormal(5.0), 2.571, 5e-3);
+  EXPECT_NEAR(1.96 * studentOverNormal(8.0), 2.306, 2e-3);
+  EXPECT_NEAR(1.96 * studentOverNormal(30.0), 2.042, 1e-3);
   EXPECT_EQ(firstNotFinite({1.0, std::numeric_limits<double>::infinity()}), 1u);
   EXPECT_EQ(firstNotFinite({1.0, 2.0}), 2u);
   EXPECT_EQ(longestRunAtExtreme({0.0, 5.0, 5.0, 5.0, 1.0, -2.0, -2.0}), 3u);
