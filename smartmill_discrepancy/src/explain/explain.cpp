@@ -157,7 +157,9 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
   tellFallen(named, found.best.state, &result.resembles);
   result.interrupted = bench.cancelled();
   found = settledByWeight(bench, std::move(weighed), found);
+  const Eigen::MatrixXd of_fit = found.best.covariance;
   found.best.covariance = settledCovariance(bench, found.best);
+  leaveOutUntoldPath(data.nominal, bench.freedom(), of_fit, &found.best);
   bench.guide(false);
   bench.turnTo(found.best.state);
 

@@ -97,6 +97,13 @@ MatrixXd inverseAt(const CampaignCost& cost, MatrixXd information) {
   return linear::inverseSymmetric(information);
 }
 
+// [1] Of the variance, which an estimate of it with so many degrees of freedom passes in one of twenty
+// (Wilson and Hilferty 1931).
+double scatterByChance(double freedom) {
+  const double spread = 2.0 / (9.0 * freedom);
+  return std::pow(1.0 - spread + 1.645 * std::sqrt(spread), 3);
+}
+
 // Variance of influence.residual over all tests.
 double pulledVariance(const TwinRunner& runner, const Eigen::VectorXd& influence,
                       const Eigen::VectorXd& residual, const std::vector<Values>& power) {
@@ -112,10 +119,13 @@ double pulledVariance(const TwinRunner& runner, const Eigen::VectorXd& influence
     tests.push_back(asked);
     squares += asked.squares;
   }
-  // A few tests tell their own scatter but poorly: their interval is Student's.
+  const double within = std::max(squares, varianceOfLines(tests));
   const Scatter scatter = scatterOf(tests);
-  const double student = studentOverNormal(std::max(scatter.freedom, 1.0));
-  return std::max({squares, varianceOfProducts(tests), student * student * scatter.variance});
+  const double freedom = std::max(scatter.freedom, 1.0);
+  if (scatter.variance < scatterByChance(freedom) * within) return std::max(within, scatter.variance);
+  // Each test has an error of its own, of which a few tests tell the size but poorly.
+  const double student = studentOverNormal(freedom);
+  return student * student * scatter.variance;
 }
 
 // Cost, residual and covariance at a point. @return false: no numbers there

@@ -68,10 +68,13 @@ Scatter scatterOf(const std::vector<AskedTest>& tests) {
   return scatter;
 }
 
+double varianceOfLines(const std::vector<AskedTest>& tests) {
+  return std::accumulate(tests.begin(), tests.end(), 0.0,
+                         [](double sum, const AskedTest& t) { return sum + t.variance; });
+}
+
 double varianceOfProducts(const std::vector<AskedTest>& tests) {
-  double variance = 0.0;
-  for (const AskedTest& t : tests) variance += t.variance;
-  return std::max(variance, scatterOf(tests).variance);
+  return std::max(varianceOfLines(tests), scatterOf(tests).variance);
 }
 
 }  // namespace smartmill::discrepancy

@@ -115,8 +115,19 @@ MachineModel NominalFreedom::apply(const MachineModel& nominal, const std::vecto
   return model;
 }
 
+std::optional<std::size_t> NominalFreedom::pathShare() const {
+  for (std::size_t k = 0; k < coordinates_.size(); ++k) {
+    if (coordinates_[k].name == PATH_SHARE) return k;
+  }
+  return {};
+}
+
+bool NominalFreedom::tellsPath(double share, double std_dev) {
+  constexpr double TOLD = 3.0;
+  return std::abs(share) >= TOLD * std_dev;
+}
+
 void NominalFreedom::writeStdDevs(MachineModel& model, const std::vector<double>& std_devs) const {
-  constexpr double TOLD = 3.0;  // standard deviations
   const double none = std::numeric_limits<double>::quiet_NaN();
   CuttingCoefficients stds{none, none, none, none, none, none};
   for (std::size_t i = 0; i < coordinates_.size(); ++i) {
@@ -127,7 +138,7 @@ void NominalFreedom::writeStdDevs(MachineModel& model, const std::vector<double>
     const auto path = std::find_if(model.effects.begin(), model.effects.end(), isToothPath);
     if (coordinates_[i].name != PATH_SHARE || path == model.effects.end()) continue;
     path->std_devs["share"] = std_devs[i];
-    if (std::abs(path->numbers["share"]) < TOLD * std_devs[i]) model.effects.erase(path);
+    if (!tellsPath(path->numbers["share"], std_devs[i])) model.effects.erase(path);
   }
   if (model.cutting) model.cutting_std = stds;
 }

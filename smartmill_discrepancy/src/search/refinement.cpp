@@ -176,4 +176,26 @@ Eigen::MatrixXd settledCovariance(Workbench& bench, const Fit& best) {
   return covariance.size() > 0 ? covariance : weight * best.covariance;
 }
 
+void leaveOutUntoldPath(const MachineModel& nominal, const NominalFreedom& freedom,
+                        const Eigen::MatrixXd& of_fit, Fit* best) {
+  const std::optional<std::size_t> place = freedom.pathShare();
+  if (!place || of_fit.cols() != best->covariance.cols()) return;
+  const EffectEntry* const stated = toothPathOf(nominal);
+  const double before = stated ? stated->numbers.at("share") : 0.0;
+  FitState& state = best->state;
+  const auto k = static_cast<Eigen::Index>(*place);
+  const double share = before + state.nominal[*place];
+  if (share == 0.0 || NominalFreedom::tellsPath(share, std::sqrt(best->covariance(k, k)))) return;
+  const Eigen::VectorXd by = -share / of_fit(k, k) * of_fit.col(k);
+  const double* next = by.data();
+  const auto move = [&](const std::vector<Coordinate>& coordinates, std::vector<double>* values) {
+    for (std::size_t c = 0; c < values->size(); ++c)
+      (*values)[c] = std::clamp((*values)[c] + *next++, coordinates[c].low, coordinates[c].high);
+  };
+  move(freedom.coordinates(), &state.nominal);
+  for (Member& m : state.members) move(m.hypothesis->coordinates, &m.values);
+  for (double& turn : state.turns) turn += *next++;
+  state.nominal[*place] = -before;
+}
+
 }  // namespace smartmill::discrepancy

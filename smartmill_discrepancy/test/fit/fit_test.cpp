@@ -15,6 +15,7 @@
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_discrepancy/hypotheses/hypothesis.h"
 #include "smartmill_discrepancy/hypotheses/nominal_freedom.h"
+#include "smartmill_discrepancy/search/refinement.h"
 
 namespace smartmill::discrepancy {
 namespace {
@@ -285,6 +286,23 @@ TEST(NominalFreedom, writesTheShareOfTheTeethsPath) {
   model = NominalFreedom(nominal).apply(nominal, values);
   EXPECT_EQ(model.effects.size(), 1u);
   EXPECT_NEAR(toothPathOf(model)->numbers.at("share"), 0.9, 1e-12);
+  // A share that is not told is left out, and what was fitted beside it moves to where it is best without.
+  Fit fit;
+  fit.state.nominal.assign(freedom.coordinates().size(), 0.0);
+  fit.state.nominal.front() = 0.01;
+  fit.state.nominal.back() = 0.2;
+  const auto count = static_cast<Eigen::Index>(fit.state.nominal.size());
+  fit.covariance = 0.25 * Eigen::MatrixXd::Identity(count, count);
+  Eigen::MatrixXd of_fit = 0.04 * Eigen::MatrixXd::Identity(count, count);
+  of_fit(0, count - 1) = of_fit(count - 1, 0) = 0.002;
+  Fit told = fit;
+  told.covariance = of_fit / 16.0;
+  leaveOutUntoldPath(nominal, freedom, of_fit, &told);
+  EXPECT_EQ(told.state, fit.state);
+  leaveOutUntoldPath(nominal, freedom, of_fit, &fit);
+  EXPECT_EQ(fit.state.nominal.back(), -0.2);
+  EXPECT_NEAR(fit.state.nominal.front(), 0.01 - 0.4 * 0.05, 1e-12);
+  EXPECT_NEAR(toothPathOf(freedom.apply(nominal, fit.state.nominal))->numbers.at("share"), 0.0, 1e-15);
   // What has no tool has none.
   nominal.tool.reset();
   const NominalFreedom none(nominal);

@@ -27,7 +27,10 @@ struct Scatter {
 };
 Scatter scatterOf(const std::vector<AskedTest>& tests);
 
-/// The same of what is left at random phases, or, where that is more, as the tests scatter.
+/// The same of what is left at random phases.
+double varianceOfLines(const std::vector<AskedTest>& tests);
+
+/// The larger of both.
 double varianceOfProducts(const std::vector<AskedTest>& tests);
 
 }  // namespace smartmill::discrepancy

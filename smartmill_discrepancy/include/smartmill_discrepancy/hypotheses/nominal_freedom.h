@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstddef>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "smartmill_core/model/effect_form.h"
@@ -10,7 +12,7 @@ namespace smartmill::discrepancy {
 
 /// Values of the nominal model, free within their stated uncertainty: each coordinate is the natural
 /// logarithm of value over nominal value. Of a tool there is one more, which no nominal model states: how far
-/// the surface that its teeth leave where it vibrates lies from the rule of formats.md (0) towards that of
+/// the surface that its teeth leave lies from the rule of formats.md (0) towards that of
 /// their true path (1), an entry `empirical:tooth_path`.
 class NominalFreedom {
  public:
@@ -18,8 +20,12 @@ class NominalFreedom {
   const std::vector<Coordinate>& coordinates() const { return coordinates_; }
   /// The model with these values. values.size() == coordinates().size()
   MachineModel apply(const MachineModel& nominal, const std::vector<double>& values) const;
+  /// Which coordinate is the share of the teeth's path; none without a tool.
+  std::optional<std::size_t> pathShare() const;
+  /// Whether a share is more than three of its deviations.
+  static bool tellsPath(double share, double std_dev);
   /// Writes the standard deviations that the file format has a place for (cutting coefficients, share of the
-  /// teeth's path), and leaves out a share that is no more than three of them.
+  /// teeth's path), and leaves out a share that is not told.
   void writeStdDevs(MachineModel& model, const std::vector<double>& std_devs) const;
 
  private:

@@ -21,4 +21,10 @@ bool refine(Workbench& bench, const FitState& state, const SearchOptions& option
 /// (Fitter::sandwichCovariance()).
 Eigen::MatrixXd settledCovariance(Workbench& bench, const Fit& best);
 
+/// A share of the teeth's path that is no more than three of its deviations is left out
+/// (NominalFreedom::writeStdDevs()): the fit moves to where it is best without. @param of_fit covariance with
+/// which it was fitted; the fit holds the settled one
+void leaveOutUntoldPath(const MachineModel& nominal, const NominalFreedom& freedom,
+                        const Eigen::MatrixXd& of_fit, Fit* best);
+
 }  // namespace smartmill::discrepancy
