@@ -196,6 +196,11 @@ std::vector<Record> simulated(const Dataset& data, const MachineModel& model, in
 }
 
 // What no free simulation follows tells nothing of labels.
+bool anyChatters(const Dataset& data) {
+  return std::any_of(data.tests.begin(), data.tests.end(),
+                     [](const TestData& t) { return t.chatter.has_value(); });
+}
+
 Dataset withoutChatter(const Dataset& data) {
   Dataset others = data;
   others.tests.erase(std::remove_if(others.tests.begin(), others.tests.end(),
@@ -210,17 +215,17 @@ Labels checkLabels(const Dataset& data, int threads) {
   Labels labels;
   labels.wrong = wrongSpeeds(data);
   if (!labels.wrong.empty()) return labels;
-  const Dataset free = withoutChatter(data);
-  const std::vector<Record> own = simulated(free, data.nominal, threads);
-  labels.wrong = wrongScales(free, own);
-  if (labels.wrong.empty()) labels.wrong = swappedChannels(free, own);
-  if (labels.wrong.empty()) labels.doubtful = foreignLabels(free, data.nominal, own);
+  if (anyChatters(data)) return checkLabels(withoutChatter(data), threads);
+  const std::vector<Record> own = simulated(data, data.nominal, threads);
+  labels.wrong = wrongScales(data, own);
+  if (labels.wrong.empty()) labels.wrong = swappedChannels(data, own);
+  if (labels.wrong.empty()) labels.doubtful = foreignLabels(data, data.nominal, own);
   return labels;
 }
 
 std::vector<std::string> doubtfulWith(const MachineModel& model, const Dataset& data, int threads) {
-  const Dataset free = withoutChatter(data);
-  return foreignLabels(free, model, simulated(free, model, threads));
+  if (anyChatters(data)) return doubtfulWith(model, withoutChatter(data), threads);
+  return foreignLabels(data, model, simulated(data, model, threads));
 }
 
 }  // namespace smartmill::discrepancy

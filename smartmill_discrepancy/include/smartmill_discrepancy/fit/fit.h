@@ -107,7 +107,8 @@ class Fitter {
 
   /// Covariance of a fit at its state when what is left is not noise: each value is moved by u.r, u its
   /// influence over the samples, and that has the variance of varianceOfProducts(), if not less than that of
-  /// noise. Correlations are those of the fit (inverse information with priors).
+  /// noise, with Student's t where the tests scatter by more than chance. Correlations are those of the fit
+  /// (inverse information with priors).
   /// @param tangents taken at the state @param prior_weight with which it was fitted
   /// @return as Fit::covariance; empty where the twin gives no numbers
   Eigen::MatrixXd sandwichCovariance(const FitState& state, const NominalTangents& tangents,
