@@ -95,20 +95,18 @@ void TopicBridge::discover() {
 }
 
 void TopicBridge::add(const std::string& name, const std::string& type) {
-  std::optional<Channel> news;
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    if (topics_.count(name)) return;
-    Topic& topic = topics_[name];
-    topic.id = static_cast<std::uint32_t>(topics_.size());
-    topic.type = type;
-    const auto definition = known().find(type);
-    topic.advertised = definition != known().end();
-    if (topic.advertised) news = Channel{topic.id, name, type, definition->second};
-    // Of an unknown type a stream cannot be told from the rest before the first message.
-    if (!stream(type)) topic.subscriber = subscribe(name);
-  }
-  if (news) server_.advertise(*news);
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (topics_.count(name)) return;
+  Topic& topic = topics_[name];
+  topic.id = static_cast<std::uint32_t>(topics_.size());
+  topic.type = type;
+  const auto definition = known().find(type);
+  topic.advertised = definition != known().end();
+  // Before the topic is subscribed: a latched message that came at once would have no channel yet, and be
+  // lost.
+  if (topic.advertised) server_.advertise({topic.id, name, type, definition->second});
+  // Of an unknown type a stream cannot be told from the rest before the first message.
+  if (!stream(type)) topic.subscriber = subscribe(name);
 }
 
 void TopicBridge::want(std::uint32_t channel, bool wanted) {
