@@ -177,10 +177,11 @@ void TwinRunner::whitenRecords() {
     whitening_[b].apply(whitened_.data() + blocks_[b].offset, blocks_[b].size);
 }
 
-void TwinRunner::setSubsteps(int substeps) {
-  if (substeps == substeps_) return;
+void TwinRunner::setFineness(int substeps, int corner_slices) {
+  if (substeps == substeps_ && corner_slices == corner_slices_) return;
   correction_.clear();
   substeps_ = substeps;
+  corner_slices_ = corner_slices;
   for (Kept& kept : kept_) {
     const std::lock_guard<std::mutex> lock(kept.mutex);
     kept.forget();
@@ -229,6 +230,7 @@ SimulatedBlocks TwinRunner::simulateOne(const MachineModel& model, std::size_t c
   sim::SimulationOptions options;
   options.noise = false;
   options.substeps = substeps_;
+  options.corner_slices = corner_slices_;
   options.guided = guides(chosen);
   options.phase = kept.phase;
   options.early_entry = kept.early_entry;
@@ -253,6 +255,7 @@ SimulatedBlocks TwinRunner::turned(const MachineModel& model, const SimulatedBlo
   sim::SimulationOptions options;
   options.noise = false;
   options.substeps = substeps_;
+  options.corner_slices = corner_slices_;
   options.guided = guides(chosen);
   options.phase = turnedPhase(kept.phase, by);
   options.early_entry = kept.early_entry + by.entry;

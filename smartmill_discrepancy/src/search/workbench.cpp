@@ -26,6 +26,8 @@ bool guides(const TestData& test, const MachineModel& nominal) {
          sim::Guide::canBe(test.record);
 }
 
+constexpr int QUICK_SLICES = 4;  // of a tool's corner, of the quick twin
+
 // Of the quick twin where nothing guides it: with too few steps it chatters elsewhere than the machine, and a
 // fit goes where it does not. Beyond twice the steps refineQuick() is for where it must be.
 int freeSubsteps(const Dataset& data, const WorkbenchOptions& options) {
@@ -127,6 +129,7 @@ Workbench::Workbench(const Dataset& data, const WorkbenchOptions& options)
       heldout_runner_(data_, testsOf(data_, true), options.threads, options.final_substeps),
       quick_(quick_runner_, freedom_, options.cancelled),
       exact_(exact_runner_, freedom_, options.cancelled) {
+  quick_runner_.setFineness(quick_runner_.substeps(), QUICK_SLICES);
   guided_runner_.setGuided(true);
   for (const std::size_t t : exact_runner_.tests()) loaded_.push_back(data_.tests[t]);
   FitState stated;
@@ -249,7 +252,8 @@ void Workbench::guide(bool guided) {
   readGuidance();
   quick_runner_.setGuided(guided_);
   if (!refined_)
-    quick_runner_.setSubsteps(guided_ ? options_.screening_substeps : freeSubsteps(data_, options_));
+    quick_runner_.setFineness(guided_ ? options_.screening_substeps : freeSubsteps(data_, options_),
+                              QUICK_SLICES);
   heldout_runner_.setGuided(guided_);
 }
 
@@ -281,7 +285,8 @@ bool Workbench::refineQuick() {
   constexpr int FINER = 4;
   if (quick_runner_.substeps() >= exact_runner_.substeps()) return false;
   refined_ = true;
-  quick_runner_.setSubsteps(std::min(FINER * quick_runner_.substeps(), exact_runner_.substeps()));
+  quick_runner_.setFineness(std::min(FINER * quick_runner_.substeps(), exact_runner_.substeps()),
+                            CORNER_SLICES);
   return true;
 }
 

@@ -8,9 +8,10 @@
 namespace smartmill::sim {
 
 Cutter::Cutter(const ToolGeometry& tool, const CuttingLaw& law, double time_step,
-               const std::vector<double>& radius_offset, double corner_radius, double path_share, Way way)
+               const std::vector<double>& radius_offset, double corner_radius, double path_share, Way way,
+               int corner_slices)
     : way_(way), corner_radius_(corner_radius), lag_(tool.lag()), law_(law) {
-  for (const EdgeSlice& slice : edgeSlices(tool, corner_radius)) {
+  for (const EdgeSlice& slice : edgeSlices(tool, corner_radius, corner_slices)) {
     Part part;
     part.slice = part.actual = slice;
     part.top = slice.high;
@@ -103,7 +104,7 @@ CuttingForce Cutter::force() const {
 void Cutter::yieldTo(const ToolMotion& now, const TipYield& yield) {
   const auto forceAt = [&](const Eigen::Vector2d& rate) -> Eigen::Vector2d {
     for (Part& part : parts_) {
-      if (part.arcs > 0) part.sums.rubbing.rate = part.process->rubbingRate({{rate[0], rate[1]}}, now.speed);
+      if (part.arcs > 0) part.sums.rubbing = part.process->rubbing({{rate[0], rate[1]}}, now.speed);
     }
     const CuttingForce f = force();
     return {f.fx, f.fy};

@@ -26,7 +26,7 @@ double resonated(const Resonance& resonance, ModalFilter& filter, double from) {
 
 }  // namespace
 
-CuttingMachine::CuttingMachine(const MachineModel& model, double time_step, Feed feed)
+CuttingMachine::CuttingMachine(const MachineModel& model, double time_step, Feed feed, int corner_slices)
     : effects_(model),
       model_(model),
       time_step_(time_step),
@@ -41,7 +41,7 @@ CuttingMachine::CuttingMachine(const MachineModel& model, double time_step, Feed
     nominal_.law.coefficients = model_.needCutting("simulate a cut");
     const bool tables = feed == Feed::steady && !vibrates_;
     cutter_.emplace(*model_.tool, nominal_.law, time_step, setup.radius_offset, setup.corner_radius,
-                    setup.path_share, tables ? Cutter::Way::tables : Cutter::Way::history);
+                    setup.path_share, tables ? Cutter::Way::tables : Cutter::Way::history, corner_slices);
     layers_ = EdgeLayers(setup, nominal_.law, time_step, tables);
   }
   state_ = nominal_;

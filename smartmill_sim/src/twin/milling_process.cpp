@@ -308,7 +308,7 @@ bool MillingProcess::gather(int tooth, const Stretch& cell, bool& certain) {
 }
 
 /// Adds what a stretch of an edge in contact with one shape gives, integrated over the immersion angle.
-void MillingProcess::add(const ChipShape& shape, const Stretch& over, double height, CutSums& sums) const {
+void MillingProcess::add(const ChipShape& shape, const Stretch& over, double height, CutSums& sums) {
   constexpr double LEAST_CHIP = 1e-15;  // [m] at the ends of a contact, which still rub
   gauss(over, [&](double weight, double s, double c) {
     const double chip = std::max(shape.at(s, c), LEAST_CHIP), w = height * weight;
@@ -320,12 +320,11 @@ void MillingProcess::add(const ChipShape& shape, const Stretch& over, double hei
     sums.edges.edge_cosine += e * c;
     sums.edges.edge += e;
     if (law_.damping == 0.0) return;
-    RubbingSums& r = sums.rubbing;
-    r.sine2 += w * s * s;
-    r.sine_cosine += w * s * c;
-    r.cosine2 += w * c * c;
-    r.sine += w * s;
-    r.cosine += w * c;
+    rubs_.sine2 += w * s * s;
+    rubs_.sine_cosine += w * s * c;
+    rubs_.cosine2 += w * c * c;
+    rubs_.sine += w * s;
+    rubs_.cosine += w * c;
   });
 }
 
@@ -346,7 +345,7 @@ CutSums MillingProcess::sumsAt(const ToolMotion& now) {
   if (arcs_.empty()) return sums;
   advance(now);
   if (path_share_ != 0.0) steepest_ = std::max(fastest_[0], fastest_[1]) / (now.speed * time_step_);
-  if (law_.damping != 0.0) sums.rubbing.rate = rubbingRate(now.rate, now.speed);
+  rubs_ = {};
   forEachEdgePart(arcs_, lag_, rule_.toothAngle(), now.angle, [&](const EdgePart& part) {
     if (only_tooth_ >= 0 && part.tooth != only_tooth_) return;
     // A straight edge stands at one angle: any little spread gives the same.
@@ -355,26 +354,32 @@ CutSums MillingProcess::sumsAt(const ToolMotion& now) {
     const double height = part.straight ? part.height / LEAST_LAG : part.height;
     forEachCell(from, to, [&](const Stretch& cell) { cut(part.tooth, cell, height, sums); });
   });
+  if (law_.damping != 0.0) sums.rubbing = rubbing(now.rate, now.speed);
   return sums;
+}
+
+RubbingSums MillingProcess::rubbing(const std::array<double, 2>& rate, double speed) const {
+  const double x = rate[0] / (speed * tool_.radius()), y = rate[1] / (speed * tool_.radius());
+  return {x * rubs_.sine2 + y * rubs_.sine_cosine, x * rubs_.sine_cosine + y * rubs_.cosine2,
+          x * rubs_.sine + y * rubs_.cosine};
 }
 
 CuttingForce MillingProcess::force(const CutSums& sums) const {
   const CuttingCoefficients& k = law_.coefficients;
   const EdgeSums& at = sums.edges;
   const RubbingSums& rub = sums.rubbing;
-  const double x = law_.damping * rub.rate[0], y = law_.damping * rub.rate[1];
   const double chip = law_.chip_factor, edge = law_.edge_factor;
-  const auto of = [&](double chips, double edges, double damping) {
+  const auto of = [&](double chips, double edges, double rubs) {
+    const double damping = law_.damping * rubs;
     return std::array<double, 3>{
         {chip * k.ktc * chips + edge * k.kte * edges + TANGENTIAL_DAMPING * damping,
          chip * k.krc * chips + edge * k.kre * edges + law_.damping_radial * damping,
          chip * k.kac * chips + edge * k.kae * edges + law_.damping_axial * damping}};
   };
   // Tangential, radial and axial, as in EdgeForce::add().
-  const std::array<double, 3> sine = of(at.chip_sine, at.edge_sine, x * rub.sine2 + y * rub.sine_cosine),
-                              cosine =
-                                  of(at.chip_cosine, at.edge_cosine, x * rub.sine_cosine + y * rub.cosine2),
-                              plain = of(at.chip, at.edge, x * rub.sine + y * rub.cosine);
+  const std::array<double, 3> sine = of(at.chip_sine, at.edge_sine, rub.sine),
+                              cosine = of(at.chip_cosine, at.edge_cosine, rub.cosine),
+                              plain = of(at.chip, at.edge, rub.plain);
   return {-cosine[0] - sine[1], sine[0] - cosine[1], plain[2], plain[0] * tool_.radius()};
 }
 

@@ -405,7 +405,8 @@ Record simulateOn(CuttingMachine& machine, const MachineModel& model, const Camp
 Record simulate(const MachineModel& model, const CampaignTest& test, const Record* recorded, Record record,
                 double phase, const SimulationOptions& options) {
   if (options.substeps < 1) throw Error("simulation: substeps below 1");
-  CuttingMachine machine(model, 1.0 / (test.sample_rate * options.substeps), Feed::steady);
+  CuttingMachine machine(model, 1.0 / (test.sample_rate * options.substeps), Feed::steady,
+                         options.corner_slices);
   const std::optional<Guide> guide = guideOf(test, recorded, options, machine);
   if (guide) machine.guide();
   const auto simulated = [&] {

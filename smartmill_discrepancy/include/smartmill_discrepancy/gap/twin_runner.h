@@ -73,8 +73,8 @@ class TwinRunner {
   /// Whether tools with modes are guided by the displacement that cuts' records show, see SimulationOptions.
   void setGuided(bool guided);
 
-  /// Steps of the twin a sample from here on.
-  void setSubsteps(int substeps);
+  /// Steps of the twin a sample and slices of a tool's corner from here on; all slices until then.
+  void setFineness(int substeps, int corner_slices);
   int substeps() const { return substeps_; }
 
   /// What each model says. @throws Error of the twin.
@@ -120,7 +120,7 @@ class TwinRunner {
   const Dataset& data_;
   std::vector<std::size_t> tests_;
   mutable std::deque<Kept> kept_;
-  int threads_, substeps_;
+  int threads_, substeps_, corner_slices_ = CORNER_SLICES;
   bool guided_ = false;
   std::vector<Block> blocks_;
   std::vector<std::size_t> first_block_;  // of each chosen test; one more at the end

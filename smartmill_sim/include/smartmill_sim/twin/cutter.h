@@ -29,7 +29,8 @@ class Cutter {
   /// @param radius_offset [m] of each tooth @param corner_radius [m] 0: none. @throws Error on an impossible
   /// tool or corner.
   Cutter(const ToolGeometry& tool, const CuttingLaw& law, double time_step,
-         const std::vector<double>& radius_offset, double corner_radius, double path_share, Way way);
+         const std::vector<double>& radius_offset, double corner_radius, double path_share, Way way,
+         int corner_slices = CORNER_SLICES);
 
   /// Where there is material from now on, see MillingProcess and RigidCut.
   void engage(const std::vector<ContactArc>& arcs, const ToolMotion& now);

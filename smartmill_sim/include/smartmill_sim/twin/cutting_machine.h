@@ -66,7 +66,8 @@ class CuttingMachine {
 
   /// Without tool and cutting sections nothing can be cut: engage() then refuses.
   /// @param time_step [s] > 0. @throws Error naming what of the model this twin cannot run.
-  CuttingMachine(const MachineModel& model, double time_step, Feed feed = Feed::any);
+  CuttingMachine(const MachineModel& model, double time_step, Feed feed = Feed::any,
+                 int corner_slices = CORNER_SLICES);
 
   /// As the effects left it.
   const MachineModel& model() const { return model_; }

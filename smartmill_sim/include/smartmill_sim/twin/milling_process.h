@@ -23,10 +23,10 @@ struct ToolMotion {
   std::array<double, 2> rate{{0, 0}};          ///< [m/s] of the displacement
 };
 
-/// Edges that rub on the work (process damping): sums over their length in contact [m].
+/// Edges that rub on the work (process damping): sums over their length in contact [m] of their rate across
+/// the work, over the cutting speed, times sin(phi), cos(phi), 1.
 struct RubbingSums {
-  double sine2 = 0.0, sine_cosine = 0.0, cosine2 = 0.0, sine = 0.0, cosine = 0.0;
-  std::array<double, 2> rate{{0, 0}};  ///< [1] of the displacement, over the cutting speed
+  double sine = 0.0, cosine = 0.0, plain = 0.0;
 };
 
 /// What of the edges is in contact at a step, in which the force is linear: no coefficient nor factor of the
@@ -67,10 +67,8 @@ class MillingProcess {
   /// The same in two steps.
   CutSums sumsAt(const ToolMotion& now);
   CuttingForce force(const CutSums& sums) const;
-  /// The rate of RubbingSums of a tip that moves like this [m/s] at a speed [rad/s].
-  std::array<double, 2> rubbingRate(const std::array<double, 2>& rate, double speed) const {
-    return {{rate[0] / (speed * tool_.radius()), rate[1] / (speed * tool_.radius())}};
-  }
+  /// Of the contact that sumsAt() found, with the tip at another rate [m/s] at a speed [rad/s].
+  RubbingSums rubbing(const std::array<double, 2>& rate, double speed) const;
   /// Ends the step with the tip there [m].
   void settle(const std::array<double, 2>& displacement);
 
@@ -129,7 +127,7 @@ class MillingProcess {
                   ChipShape* shape) const;
   bool gather(int tooth, const Stretch& cell, bool& certain);
   void cut(int tooth, const Stretch& cell, double height, CutSums& sums);
-  void add(const ChipShape& shape, const Stretch& over, double height, CutSums& sums) const;
+  void add(const ChipShape& shape, const Stretch& over, double height, CutSums& sums);
   void grow();
 
   ToolGeometry tool_;
@@ -158,6 +156,10 @@ class MillingProcess {
   std::vector<std::vector<Pass>> passes_;  // of each tooth
   std::vector<Delay> delays_;
   std::vector<ChipShape> shapes_;  // those that may give a cell's chip
+  // [m] Of edges that rub, over their length in contact at this step.
+  struct {
+    double sine2 = 0.0, sine_cosine = 0.0, cosine2 = 0.0, sine = 0.0, cosine = 0.0;
+  } rubs_;
 };
 
 }  // namespace smartmill::sim

@@ -7,6 +7,7 @@
 
 #include "smartmill_core/campaign/campaign.h"
 #include "smartmill_core/campaign/record.h"
+#include "smartmill_core/cutting/corner.h"
 #include "smartmill_core/model/machine_model.h"
 
 namespace smartmill::sim {
@@ -17,6 +18,7 @@ struct SimulationOptions {
   bool noise = true;       ///< sensor noise and rounding of the load meter
   std::uint64_t seed = 1;  ///< of the noise and, without recorded angle, of the phase
   int substeps = 4;        ///< integration steps a sample, >= 1
+  int corner_slices = CORNER_SLICES;
   /// [rad] spindle angle at the first sample, instead of the recorded angle's.
   std::optional<double> phase;
   /// [samples] The force of a cut comes on so much earlier, in the mean, than engage_time and
@@ -31,8 +33,8 @@ struct SimulationOptions {
   bool random_phases = false;
   /// Channels to give, of those that the record has; nullptr: all. Only where channelsApart().
   const std::vector<std::string>* channels = nullptr;
-  /// What cut and tool did in this very test (record, phase, substeps) under other models: taken from there
-  /// where the model has the same values, and put there. nullptr: each simulation by itself.
+  /// What cut and tool did in this very test (record, phase, substeps, slices) under other models: taken from
+  /// there where the model has the same values, and put there. nullptr: each simulation by itself.
   CutTraces* traces = nullptr;
 };
 

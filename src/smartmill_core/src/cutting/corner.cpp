@@ -10,7 +10,6 @@
 namespace smartmill {
 namespace {
 
-constexpr int CORNER_SLICES = 12;  // of a quarter of a circle
 constexpr double ROUNDING = 1e-9;
 
 // Closed integrals along the arc from one angle kappa to another.
@@ -37,20 +36,20 @@ double leanOf(double height, double corner_radius) {
 
 }  // namespace
 
-std::vector<EdgeSlice> edgeSlices(const ToolGeometry& tool, double corner_radius) {
+std::vector<EdgeSlice> edgeSlices(const ToolGeometry& tool, double corner_radius, int slices) {
   if (!(corner_radius >= 0.0) || corner_radius > tool.radius() * (1.0 + ROUNDING)) {
     throw Error("a corner radius of " + std::to_string(corner_radius / units::MM) +
                 " mm does not fit a tool of radius " + std::to_string(tool.radius() / units::MM) + " mm");
   }
-  std::vector<EdgeSlice> slices;
-  for (int k = 0; k < CORNER_SLICES && corner_radius > 0.0; ++k) {
-    const double step = 0.5 * units::PI / CORNER_SLICES;
-    slices.push_back(cornerSlice(corner_radius, k * step, (k + 1) * step));
+  std::vector<EdgeSlice> list;
+  for (int k = 0; k < slices && corner_radius > 0.0; ++k) {
+    const double step = 0.5 * units::PI / slices;
+    list.push_back(cornerSlice(corner_radius, k * step, (k + 1) * step));
   }
   EdgeSlice upright;
-  upright.low = slices.empty() ? 0.0 : slices.back().high;
-  slices.push_back(upright);
-  return slices;
+  upright.low = list.empty() ? 0.0 : list.back().high;
+  list.push_back(upright);
+  return list;
 }
 
 EdgeSlice upTo(double height, const EdgeSlice& slice, double corner_radius) {

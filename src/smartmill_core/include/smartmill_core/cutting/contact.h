@@ -176,21 +176,4 @@ void gauss(const Stretch& over, Point&& point) {
   point(over.half, s + across, c - along);
 }
 
-/// Adds what one edge gets over a stretch of immersion angles in contact with one shape, integrated over the
-/// angle.
-/// @param damping [N/m] radial force of process damping: x sin(phi) + y cos(phi)
-inline void addForce(const CuttingLaw& law, const ChipShape& shape, const Stretch& over, double damping_x,
-                     double damping_y, EdgeForce& sum) {
-  constexpr double LEAST_CHIP = 1e-15;  // [m] at the ends of a contact, which still rub
-  const CuttingCoefficients& k = law.coefficients;
-  gauss(over, [&](double weight, double s, double c) {
-    const double chip = std::max(shape.at(s, c), LEAST_CHIP);
-    const double h = law.chip_factor * effectiveChip(law, chip), e = law.edge_factor * edgeShare(law, chip);
-    const double damping = damping_x * s + damping_y * c;
-    sum.add(weight, k.ktc * h + k.kte * e + TANGENTIAL_DAMPING * damping,
-            k.krc * h + k.kre * e + law.damping_radial * damping,
-            k.kac * h + k.kae * e + law.damping_axial * damping, s, c);
-  });
-}
-
 }  // namespace smartmill

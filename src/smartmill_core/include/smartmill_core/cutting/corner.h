@@ -32,10 +32,12 @@ struct EdgeSlice {
   double inset = 0.0;        ///< [m] of the local radius from that of the tool
 };
 
+constexpr int CORNER_SLICES = 12;  ///< of a quarter of a circle
+
 /// The slices of a mill with a corner radius [m], from the tip; the last has no upper end. Within a slice of
 /// the corner only the turn of the edge by its helix is taken for even.
-/// @throws Error on a corner radius below 0 or above the tool's.
-std::vector<EdgeSlice> edgeSlices(const ToolGeometry& tool, double corner_radius);
+/// @param slices > 0, of the corner. @throws Error on a corner radius below 0 or above the tool's.
+std::vector<EdgeSlice> edgeSlices(const ToolGeometry& tool, double corner_radius, int slices = CORNER_SLICES);
 
 /// The part of a slice of the corner up to a height [m] within it.
 EdgeSlice upTo(double height, const EdgeSlice& slice, double corner_radius);
