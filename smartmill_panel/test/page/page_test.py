@@ -162,6 +162,7 @@ class Bench:
             self.failed[name] = ""
         except Exception:
             self.failed[name] = traceback.format_exc()
+            print(name, self.failed[name], flush=True)  # the rest may be cut short
 
 
 def equal(found, due):
