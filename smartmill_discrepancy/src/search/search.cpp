@@ -83,6 +83,8 @@ std::optional<FitState> withPiecesJoined(const FitState& state, const std::vecto
   return {};
 }
 
+constexpr FitOptions CLOSELY{8, 1e-4, true};
+
 class Search {
  public:
   Search(Workbench& bench, const std::vector<Hypothesis>& hypotheses, const SearchOptions& options)
@@ -124,8 +126,10 @@ class Search {
   bool isHint(const Round& round, const Promise& promise) const;
   bool worthFitting(const Round& round, const Promise& promise, double largest) const;
   void fitPromise(const Promise& promise, Round& round);
+  bool isAhead(const Fit& tried, const Round& round) const;
   bool isBetter(const Fit& tried) const;
   void settle(Fit best);
+  void settleFromStated();
   void dropNeedless();
   bool helpsElsewhere(const Fit& before, const Hypothesis& newest);
   // Where a round began.
@@ -292,6 +296,18 @@ bool Search::worthFitting(const Round& round, const Promise& promise, double lar
   return !(excess(round.best) < 0.02 * excess(now_) && beyond * promise.gain < 0.5 * round.best_promise);
 }
 
+// None has settled yet: of two that differ by a trifle the one with less values.
+bool Search::isAhead(const Fit& tried, const Round& round) const {
+  const auto values = [](const Fit& fit) { return fit.state.members.back().values.size(); };
+  double margin = 0.0;
+  if (round.better && values(tried) != values(round.best)) {
+    const double trifle =
+        options_.least_share * std::max(0.0, excess(tried.bic < round.best.bic ? tried : round.best));
+    margin = values(tried) < values(round.best) ? trifle : -trifle;
+  }
+  return tried.bic < round.best.bic + margin;
+}
+
 void Search::fitPromise(const Promise& promise, Round& round) {
   FitState with = now_.state;
   std::optional<std::vector<double>> in_place;
@@ -312,7 +328,7 @@ void Search::fitPromise(const Promise& promise, Round& round) {
                          newest.values});
   options_.say(formatted("  promise %.4g, gain %.4g  ", promise.gain, now_.bic - tried.bic) +
                describe(newest));
-  if (tried.bic < round.best.bic && isBetter(tried)) {
+  if (isAhead(tried, round) && isBetter(tried)) {
     round.best = tried;
     round.best_promise = promise.gain;
     round.better = true;
@@ -370,9 +386,10 @@ bool Search::isBetter(const Fit& tried) const {
   return gain > MUCH * excess(now_) || Standing::holdsInFitted(fittedShare(quick_, tried, now_));
 }
 
-// Takes a round's best fit in and fits everything anew beside it.
+// Takes a round's best fit in and fits everything anew beside it, until no more comes of it than an effect
+// must take: what is left to take by the values that are there looks like another effect.
 void Search::settle(Fit best) {
-  constexpr FitOptions CLOSELY{8, 1e-4, true};
+  constexpr int PASSES = 4;
   tangents_ = linearise(best.state);
   if (const auto one = withPiecesJoined(best.state, hypotheses_)) {
     Fit merged = quick_.fit(*one, &tangents_, CLOSELY);
@@ -388,6 +405,32 @@ void Search::settle(Fit best) {
                   ? linearise(refined.state)
                   : bench_.lineariseBy(std::move(tangents_), near(refined.state));
   now_ = withPhasesTurned(refit(refined, CLOSELY));
+  settleFromStated();
+  for (int pass = 0; pass < PASSES && !bench_.cancelled(); ++pass) {
+    tangents_ = bench_.lineariseBy(std::move(tangents_), near(now_.state));
+    const double before = now_.bic;
+    now_ = refit(now_, CLOSELY);
+    if (before - now_.bic < std::max(options_.least_gain, options_.least_share * excess(now_))) break;
+  }
+}
+
+// Beside nominal values that were pulled far away while it was missing an effect may have taken a shape that
+// goes with them, in a valley of its own: once more beside the stated ones, then with all free.
+void Search::settleFromStated() {
+  constexpr double HOPELESS = 2.0;  // times the squares that are left now
+  if (near(now_.state).nominal == now_.state.nominal) return;
+  FitState stated = now_.state;
+  stated.nominal.assign(stated.nominal.size(), 0.0);
+  const Fit beside = quick_.fit(stated, nullptr, {8, 1e-4, false});
+  if (!beside.converged || beside.chi2 > HOPELESS * now_.chi2) return;
+  NominalTangents tangents = linearise(beside.state);
+  Fit free = quick_.fit(beside.state, &tangents, CLOSELY);
+  if (free.converged && free.bic < now_.bic) {
+    tangents_ = bench_.lineariseBy(std::move(tangents), near(free.state));
+    now_ = withPhasesTurned(refit(free, CLOSELY));
+  } else {
+    tangents_ = bench_.lineariseBy(std::move(tangents_), near(now_.state));
+  }
 }
 
 // What was found earlier may have stood for what has been found now.

@@ -107,6 +107,9 @@ TEST_P(ExampleCampaign, IsExplainedAsItsMakerKnows) {
     ASSERT_EQ(namesOf(e), names);
     for (const FoundEffect& effect : e.effects) expectTrue(effect, truth.at(effect.name));
     EXPECT_TRUE(e.unexplained.empty());
+    // Nor on the way: a fit in a wrong valley makes room for others.
+    for (const TriedEffect& t : e.ladder)
+      EXPECT_TRUE(!t.taken || truth.count(t.effect) > 0) << t.effect << " in round " << t.round;
   }
   EXPECT_LE(e.after.fit, 1.05);
   EXPECT_LE(e.after.heldout, 1.05);
