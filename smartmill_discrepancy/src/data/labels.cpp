@@ -195,17 +195,18 @@ std::vector<Record> simulated(const Dataset& data, const MachineModel& model, in
   return own;
 }
 
-// What no free simulation follows tells nothing of labels.
-bool anyChatters(const Dataset& data) {
-  return std::any_of(data.tests.begin(), data.tests.end(),
-                     [](const TestData& t) { return t.chatter.has_value(); });
+bool chatters(const TestData& test) {
+  return test.chatter.has_value();
 }
 
+bool anyChatters(const Dataset& data) {
+  return std::any_of(data.tests.begin(), data.tests.end(), chatters);
+}
+
+// What no free simulation follows tells nothing of labels.
 Dataset withoutChatter(const Dataset& data) {
   Dataset others = data;
-  others.tests.erase(std::remove_if(others.tests.begin(), others.tests.end(),
-                                    [](const TestData& t) { return t.chatter.has_value(); }),
-                     others.tests.end());
+  others.tests.erase(std::remove_if(others.tests.begin(), others.tests.end(), chatters), others.tests.end());
   return others;
 }
 

@@ -406,8 +406,9 @@ void Search::settle(Fit best) {
                   : bench_.lineariseBy(std::move(tangents_), near(refined.state));
   now_ = withPhasesTurned(refit(refined, CLOSELY));
   settleFromStated();
-  for (int pass = 0; pass < PASSES && !bench_.cancelled(); ++pass) {
+  for (int pass = 0; pass < PASSES; ++pass) {
     tangents_ = bench_.lineariseBy(std::move(tangents_), near(now_.state));
+    if (bench_.cancelled()) break;
     const double before = now_.bic;
     now_ = refit(now_, CLOSELY);
     if (before - now_.bic < std::max(options_.least_gain, options_.least_share * excess(now_))) break;
@@ -415,7 +416,8 @@ void Search::settle(Fit best) {
 }
 
 // Beside nominal values that were pulled far away while it was missing an effect may have taken a shape that
-// goes with them, in a valley of its own: once more beside the stated ones, then with all free.
+// goes with them, in a valley of its own: once more beside the stated ones, then with all free. The quick
+// twin is left corrected wherever that was tried last.
 void Search::settleFromStated() {
   constexpr double HOPELESS = 2.0;  // times the squares that are left now
   if (near(now_.state).nominal == now_.state.nominal) return;
@@ -425,12 +427,9 @@ void Search::settleFromStated() {
   if (!beside.converged || beside.chi2 > HOPELESS * now_.chi2) return;
   NominalTangents tangents = linearise(beside.state);
   Fit free = quick_.fit(beside.state, &tangents, CLOSELY);
-  if (free.converged && free.bic < now_.bic) {
-    tangents_ = bench_.lineariseBy(std::move(tangents), near(free.state));
-    now_ = withPhasesTurned(refit(free, CLOSELY));
-  } else {
-    tangents_ = bench_.lineariseBy(std::move(tangents_), near(now_.state));
-  }
+  if (!free.converged || free.bic >= now_.bic) return;
+  tangents_ = bench_.lineariseBy(std::move(tangents), near(free.state));
+  now_ = withPhasesTurned(refit(free, CLOSELY));
 }
 
 // What was found earlier may have stood for what has been found now.
