@@ -121,6 +121,9 @@ class Law {
     if (onset > 0.0) model.effects.push_back(effectEntry("edge_buildup", {{"chip_um", onset / units::UM}}));
     return sum(simulated(model, test_, chip, count_), -1.0, straight);
   }
+  Lines of(const ChipLaw& law, double chip) const {
+    return sum(chips(law.exponent, chip), law.edge_share, edges(law.onset, chip, chips(0.0, chip)));
+  }
   Lines own(const MachineModel& model, double chip) const { return simulated(model, test_, chip, count_); }
 
  private:
@@ -204,39 +207,105 @@ Seen seenThrough(const std::vector<Cut>& cuts, const std::vector<Lines>& law, st
   return seen;
 }
 
-// The best of all laws, and how the straight one does.
-Seen chosenLaw(const std::vector<Cut>& cuts, const Law& law, double largest, std::size_t teeth,
-               BentLaw* found) {
-  std::vector<std::vector<Lines>> chips, edges;
-  for (const double exponent : EXPONENTS) {
-    chips.emplace_back();
-    for (const Cut& c : cuts) chips.back().push_back(law.chips(exponent, c.chip()));
+// A law by its place among those that are tried.
+struct Place {
+  std::size_t exponent = 0, onset = 0, edge = 0;
+
+  bool operator==(const Place& o) const {
+    return exponent == o.exponent && onset == o.onset && edge == o.edge;
   }
-  for (const double onset : ONSETS) {
-    edges.emplace_back();
-    for (std::size_t i = 0; i < cuts.size(); ++i)
-      edges.back().push_back(law.edges(onset * largest, cuts[i].chip(), chips.front()[i]));
+  ChipLaw law(double largest) const { return {EXPONENTS[exponent], ONSETS[onset] * largest, EDGES[edge]}; }
+};
+
+// Laws of the forces in the plane of the tool's turning and along its axis.
+struct Pair {
+  Place in_plane, axial;
+};
+
+// All laws that are tried, at the feeds of the cuts.
+class Trials {
+ public:
+  Trials(const std::vector<Cut>& cuts, const Law& law, double largest, std::size_t teeth)
+      : cuts_(cuts), teeth_(teeth), phase_(cuts.size(), 0.0) {
+    for (const double exponent : EXPONENTS) {
+      chips_.emplace_back();
+      for (const Cut& c : cuts) chips_.back().push_back(law.chips(exponent, c.chip()));
+    }
+    for (const double onset : ONSETS) {
+      edges_.emplace_back();
+      for (std::size_t i = 0; i < cuts.size(); ++i)
+        edges_.back().push_back(law.edges(onset * largest, cuts[i].chip(), chips_.front()[i]));
+    }
   }
-  Seen best;
-  std::vector<double> phase(cuts.size(), 0.0);
-  for (std::size_t e = 0; e < EXPONENTS.size(); ++e) {
-    for (std::size_t o = 0; o < ONSETS.size(); ++o) {
-      for (const double share : EDGES) {
-        std::vector<Lines> lines;
-        for (std::size_t i = 0; i < cuts.size(); ++i) lines.push_back(sum(chips[e][i], share, edges[o][i]));
-        Seen seen = seenThrough(cuts, lines, teeth, phase);
-        phase = seen.phase;
-        if (e == 0 && o == 0 && (found->straight_squares == 0.0 || seen.squares < found->straight_squares))
-          found->straight_squares = seen.squares;
-        if (!best.phase.empty() && seen.squares >= best.squares) continue;
-        best = std::move(seen);
-        found->exponent = EXPONENTS[e];
-        found->onset = ONSETS[o] * largest;
-        found->edge_share = share;
+  // Phases begin where the last trial left them.
+  Seen seen(const Pair& pair) {
+    std::vector<Lines> lines;
+    for (std::size_t i = 0; i < cuts_.size(); ++i) {
+      lines.push_back(linesOf(pair.in_plane, i));
+      if (!(pair.axial == pair.in_plane)) lines.back()[2] = linesOf(pair.axial, i)[2];
+    }
+    Seen seen = seenThrough(cuts_, lines, teeth_, phase_);
+    phase_ = seen.phase;
+    return seen;
+  }
+
+ private:
+  Lines linesOf(const Place& p, std::size_t cut) const {
+    return sum(chips_[p.exponent][cut], EDGES[p.edge], edges_[p.onset][cut]);
+  }
+
+  const std::vector<Cut>& cuts_;
+  std::size_t teeth_;
+  std::vector<double> phase_;
+  std::vector<std::vector<Lines>> chips_, edges_;  // of each exponent and onset, of each cut
+};
+
+enum class Of { all, in_plane, axial };
+
+// @param of which forces all laws are tried
+void tryAll(Of of, Trials* trials, Pair* pair, Seen* best) {
+  Pair tried = *pair;
+  Place p;
+  for (p.exponent = 0; p.exponent < EXPONENTS.size(); ++p.exponent) {
+    for (p.onset = 0; p.onset < ONSETS.size(); ++p.onset) {
+      for (p.edge = 0; p.edge < EDGES.size(); ++p.edge) {
+        if (of != Of::axial) tried.in_plane = p;
+        if (of != Of::in_plane) tried.axial = p;
+        Seen seen = trials->seen(tried);
+        if (!best->phase.empty() && seen.squares >= best->squares) continue;
+        *best = std::move(seen);
+        *pair = tried;
       }
     }
   }
+}
+
+// The best of all laws, and how the straight one does. Nothing ties the axial force to the others: its law
+// is its own where the lines ask for that.
+Seen chosenLaw(Trials* trials, double largest, BentLaw* found) {
+  constexpr int SWEEPS = 5;
+  for (std::size_t edge = 0; edge < EDGES.size(); ++edge) {
+    const double squares = trials->seen({{0, 0, edge}, {0, 0, edge}}).squares;
+    if (edge == 0 || squares < found->straight_squares) found->straight_squares = squares;
+  }
+  Pair alike;
+  Seen best;
+  tryAll(Of::all, trials, &alike, &best);
+  Pair apart = alike;
+  Seen own = best;
+  for (int sweep = 0; sweep < SWEEPS; ++sweep) {
+    const double before = own.squares;
+    tryAll(Of::axial, trials, &apart, &own);
+    tryAll(Of::in_plane, trials, &apart, &own);
+    if (own.squares >= before) break;
+  }
+  found->squares = own.squares;
+  const bool asked = best.squares - own.squares > found->costOfALaw();
+  const Pair& taken = asked ? apart : alike;
+  if (asked) best = std::move(own);
   found->squares = best.squares;
+  found->in_plane = taken.in_plane.law(largest);
+  found->axial = taken.axial.law(largest);
   return best;
 }
 
@@ -248,8 +317,8 @@ Bend bendOf(const Law& law, const MachineModel& model, const BentLaw& found, con
   for (std::size_t n = 0; n < NODES; ++n) {
     const double chip = least + (largest - least) * static_cast<double>(n) / (NODES - 1);
     bend.chips.push_back(chip);
-    Lines lines = sum(law.chips(found.exponent, chip), found.edge_share,
-                      law.edges(found.onset, chip, law.chips(0.0, chip)));
+    Lines lines = law.of(found.in_plane, chip);
+    lines[2] = law.of(found.axial, chip)[2];
     for (std::size_t axis = 0; axis < 3; ++axis) {
       for (std::size_t k = 0; k < lines[axis].size(); ++k) lines[axis][k] *= gains[axis][k];
     }
@@ -284,6 +353,11 @@ std::array<double, 2> Bend::at(double order, const std::string& channel, double 
   return two;
 }
 
+double BentLaw::costOfALaw() const {
+  constexpr double NUMBERS = 3.0;
+  return NUMBERS * std::log(lines) * squares / lines;
+}
+
 std::optional<BentLaw> bentLaw(const TwinRunner& runner, const std::vector<std::size_t>& tests,
                                const MachineModel& nominal, const MachineModel& model) {
   const auto bends = [](const EffectEntry& e) {
@@ -306,8 +380,9 @@ std::optional<BentLaw> bentLaw(const TwinRunner& runner, const std::vector<std::
   even.effects.clear();
   const Law law(even, cuts.front().test->test, 0.5 * (least + largest), count);
   BentLaw found;
-  const Seen seen = chosenLaw(cuts, law, largest, teeth, &found);
   found.lines = static_cast<double>(cuts.size() * 3 * (2 * count - 1));
+  Trials trials(cuts, law, largest, teeth);
+  const Seen seen = chosenLaw(&trials, largest, &found);
   found.turned.assign(runner.tests().size(), 0.0);
   for (std::size_t i = 0; i < cuts.size(); ++i) found.turned[cuts[i].chosen] = seen.phase[i];
   if (found.bends()) found.bend = bendOf(law, model, found, seen.gains, least, largest, teeth);

@@ -359,12 +359,15 @@ void Nameless::bendRevolution(const std::vector<std::size_t>& cuts, SearchResult
   bench_.turnTo(straight);
   const auto law = bentLaw(bench_.quick().runner(), cuts, bench_.data().nominal, bench_.quick().model(bare));
   if (!law) return;
+  const auto told = [](const ChipLaw& l) {
+    return formatted("exponent %.2g, edge force of %.2g of the model's that comes on over %.3g um",
+                     l.exponent, l.edge_share, l.onset / units::UM);
+  };
   options_.search.say(formatted(
-      "  a law that bends: exponent %.2g, edge force of %.2g of the model's that comes on over %.3g um; "
-      "weighted squares of the lines %.4g (straight %.4g)",
-      law->exponent, law->edge_share, law->onset / units::UM, law->squares, law->straight_squares));
-  const double cost = 3.0 * std::log(law->lines) * law->squares / law->lines;
-  if (!law->bends() || law->straight_squares - law->squares < cost || bench_.cancelled()) return;
+      "  a law that bends: %s; of axial forces %s; weighted squares of the lines %.4g (straight %.4g)",
+      told(law->in_plane).c_str(), told(law->axial).c_str(), law->squares, law->straight_squares));
+  const bool asked = law->straight_squares - law->squares >= law->costOfALaw();
+  if (!law->bends() || !asked || bench_.cancelled()) return;
   std::optional<Fit> with = withBend(bare, law->bend);
   if (!with || !repeats(bare, *with)) return;
   const Standing standing = weightedStanding(with->state, straight);

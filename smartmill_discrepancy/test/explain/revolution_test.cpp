@@ -19,6 +19,12 @@ namespace {
 constexpr double LARGEST = 0.105;  // [mm]
 constexpr int ORDERS = 9;
 
+// Forces of one machine, or those along its axis of another.
+struct Forces {
+  MachineModel machine = believed();
+  MachineModel axial = machine;
+};
+
 // Of order k: 1.5 N, late by 0.7 k^2, always; 2.5 N at the largest feed, early by 0.4 k^2, growing with the
 // feed.
 double overTheTurn(const CampaignTest& test, double angle) {
@@ -30,8 +36,8 @@ double overTheTurn(const CampaignTest& test, double angle) {
   return force;
 }
 
-Dataset slotsAt(const std::vector<CampaignTest>& tests, const std::string& folder,
-                const MachineModel& machine = believed(), double over_the_turn = 1.0) {
+Dataset slotsAt(const std::vector<CampaignTest>& tests, const std::string& folder, const Forces& forces = {},
+                double over_the_turn = 1.0) {
   Campaign campaign;
   campaign.folder = folder;
   campaign.model_file = "model.yaml";
@@ -44,7 +50,8 @@ Dataset slotsAt(const std::vector<CampaignTest>& tests, const std::string& folde
   options.substeps = 8;
   options.noise = false;
   for (const CampaignTest& test : campaign.tests) {
-    Record record = sim::simulateTest(machine, test, 0.15, options);
+    Record record = sim::simulateTest(forces.machine, test, 0.15, options);
+    record.add("fz") = sim::simulateTest(forces.axial, test, 0.15, options).column("fz");
     std::vector<double>& fy = record.add("fy");
     for (std::size_t i = 0; i < fy.size(); ++i) {
       if (record.time[i] >= *test.engage_time)
@@ -97,11 +104,11 @@ TEST(Revolution, theTableIsWhatWasAdded) {
 
 const std::vector<double> FEEDS{0.03, 0.045, 0.06, 0.075, 0.09, LARGEST};
 
-std::optional<BentLaw> lawOf(const MachineModel& machine) {
+std::optional<BentLaw> lawOf(const Forces& forces) {
   const TemporaryFolder folder;
   std::vector<CampaignTest> tests;
   for (const double feed : FEEDS) tests.push_back(slot("f" + std::to_string(tests.size()), 4500, feed, 90.0));
-  const Dataset data = slotsAt(tests, folder.file("."), machine, 0.0);
+  const Dataset data = slotsAt(tests, folder.file("."), forces, 0.0);
   const Workbench bench(data, {});
   const TwinRunner& runner = bench.quick().runner();
   return bentLaw(runner, cutsOfOneKind(runner), data.nominal, data.nominal);
@@ -114,10 +121,11 @@ TEST(Revolution, aLawIsToldThroughASensorThatNobodyKnows) {
   machine.effects = {effectEntry("size_effect", {{"exponent", 0.3}, {"reference_chip_um", 60.0}}),
                      effectEntry("gain_error", {{"gain", 1.5}}, {{"channel", "fx"}}),
                      effectEntry("gain_error", {{"gain", 0.8}}, {{"channel", "fy"}})};
-  const auto law = lawOf(machine);
+  const auto law = lawOf({machine});
   ASSERT_TRUE(law);
   EXPECT_TRUE(law->bends());
-  EXPECT_NEAR(law->exponent, 0.3, 0.1);
+  EXPECT_NEAR(law->in_plane.exponent, 0.3, 0.1);
+  EXPECT_EQ(law->axial.exponent, law->in_plane.exponent);
   EXPECT_LT(law->squares, 0.2 * law->straight_squares);
   // Nothing at the ends; between them the mean of fy, which goes with the feed to 0.7, lies above its chord.
   const auto level = [&](double chip) { return law->bend.at(0.0, "fy", chip)[0]; };
@@ -125,9 +133,21 @@ TEST(Revolution, aLawIsToldThroughASensorThatNobodyKnows) {
   EXPECT_GT(level(0.06e-3), 1.0);
 }
 
+// The axial force is straight over the chip, the others bend.
+TEST(Revolution, theAxialForceHasALawOfItsOwn) {
+  MachineModel machine = believed();
+  machine.effects = {effectEntry("size_effect", {{"exponent", 0.3}, {"reference_chip_um", 60.0}})};
+  const auto law = lawOf({machine, believed()});
+  ASSERT_TRUE(law);
+  EXPECT_NEAR(law->in_plane.exponent, 0.3, 0.1);
+  const auto level = [&](const char* channel) { return std::abs(law->bend.at(0.0, channel, 0.06e-3)[0]); };
+  EXPECT_GT(level("fy"), 1.0);
+  EXPECT_LT(level("fz"), 0.2);
+}
+
 // Lines of a law that is straight over the chip leave nothing for one that bends.
 TEST(Revolution, noLawWhereTheLinesAreStraight) {
-  const auto law = lawOf(believed());
+  const auto law = lawOf({});
   ASSERT_TRUE(law);
   EXPECT_LT(law->straight_squares, 1.2 * law->lines);
 }
