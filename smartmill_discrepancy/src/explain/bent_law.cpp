@@ -101,6 +101,12 @@ Lines sum(const Lines& a, double factor, const Lines& b) {
   return s;
 }
 
+// Forces in the plane from one law, along the axis from another.
+Lines withAxial(Lines lines, const Lines& axial) {
+  lines[2] = axial[2];
+  return lines;
+}
+
 // The law's forces, of chips and of edges by themselves.
 class Law {
  public:
@@ -121,8 +127,9 @@ class Law {
     if (onset > 0.0) model.effects.push_back(effectEntry("edge_buildup", {{"chip_um", onset / units::UM}}));
     return sum(simulated(model, test_, chip, count_), -1.0, straight);
   }
-  Lines of(const ChipLaw& law, double chip) const {
-    return sum(chips(law.exponent, chip), law.edge_share, edges(law.onset, chip, chips(0.0, chip)));
+  /// @param straight as edges() takes it
+  Lines of(const ChipLaw& law, double chip, const Lines& straight) const {
+    return sum(chips(law.exponent, chip), law.edge_share, edges(law.onset, chip, straight));
   }
   Lines own(const MachineModel& model, double chip) const { return simulated(model, test_, chip, count_); }
 
@@ -211,9 +218,6 @@ Seen seenThrough(const std::vector<Cut>& cuts, const std::vector<Lines>& law, st
 struct Place {
   std::size_t exponent = 0, onset = 0, edge = 0;
 
-  bool operator==(const Place& o) const {
-    return exponent == o.exponent && onset == o.onset && edge == o.edge;
-  }
   ChipLaw law(double largest) const { return {EXPONENTS[exponent], ONSETS[onset] * largest, EDGES[edge]}; }
 };
 
@@ -240,10 +244,8 @@ class Trials {
   // Phases begin where the last trial left them.
   Seen seen(const Pair& pair) {
     std::vector<Lines> lines;
-    for (std::size_t i = 0; i < cuts_.size(); ++i) {
-      lines.push_back(linesOf(pair.in_plane, i));
-      if (!(pair.axial == pair.in_plane)) lines.back()[2] = linesOf(pair.axial, i)[2];
-    }
+    for (std::size_t i = 0; i < cuts_.size(); ++i)
+      lines.push_back(withAxial(linesOf(pair.in_plane, i), linesOf(pair.axial, i)));
     Seen seen = seenThrough(cuts_, lines, teeth_, phase_);
     phase_ = seen.phase;
     return seen;
@@ -317,8 +319,8 @@ Bend bendOf(const Law& law, const MachineModel& model, const BentLaw& found, con
   for (std::size_t n = 0; n < NODES; ++n) {
     const double chip = least + (largest - least) * static_cast<double>(n) / (NODES - 1);
     bend.chips.push_back(chip);
-    Lines lines = law.of(found.in_plane, chip);
-    lines[2] = law.of(found.axial, chip)[2];
+    const Lines straight = law.chips(0.0, chip);
+    Lines lines = withAxial(law.of(found.in_plane, chip, straight), law.of(found.axial, chip, straight));
     for (std::size_t axis = 0; axis < 3; ++axis) {
       for (std::size_t k = 0; k < lines[axis].size(); ++k) lines[axis][k] *= gains[axis][k];
     }
