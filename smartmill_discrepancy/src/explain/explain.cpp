@@ -147,7 +147,7 @@ Explanation explain(const Dataset& data, const ExplainOptions& options, const st
   structure.squares_of_gap = std::max(found.null.chi2 - bench.samples(), 1.0);
   result.where = findStructure(bench.fitted(), found.null.residual, structure);
   options.search.tell(0.65);
-  SearchResult weighed = challengeWeighed(bench, searched, &found, &result.resembles);
+  SearchResult weighed = challengeWeighed(bench, hypotheses, searched, &found, &result.resembles);
   options.search.tell(0.75);
   result.unexplained = findStructure(bench.fitted(), found.best.residual, structure);
   Nameless nameless(bench, options, structure);

@@ -1,10 +1,12 @@
 #include "smartmill_discrepancy/explain/weighed.h"
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 
 #include "smartmill_discrepancy/explain/challenge.h"
 #include "smartmill_discrepancy/search/refinement.h"
+#include "smartmill_discrepancy/search/strained.h"
 
 namespace smartmill::discrepancy {
 namespace {
@@ -14,18 +16,32 @@ bool sameMembers(const FitState& a, const FitState& b) {
                     [](const Member& x, const Member& y) { return x.hypothesis == y.hypothesis; });
 }
 
+// What nominal values stand for.
+void takeStrainOff(Workbench& bench, const std::vector<Hypothesis>& hypotheses, const SearchOptions& options,
+                   SearchResult* found) {
+  const std::optional<FitState> state = relieved(bench, hypotheses, options, found);
+  SearchResult with = *found;
+  if (state && refine(bench, *state, options, &with)) *found = std::move(with);
+}
+
 }  // namespace
 
-SearchResult challengeWeighed(Workbench& bench, const SearchOptions& options, SearchResult* found,
+SearchResult challengeWeighed(Workbench& bench, const std::vector<Hypothesis>& hypotheses,
+                              const SearchOptions& options, SearchResult* found,
                               std::vector<Resemblance>* resembles) {
   if (!bench.weighBy(found->best.state)) {
+    takeStrainOff(bench, hypotheses, options, found);
     challenge(bench, options, found, resembles);
     return *found;
   }
   SearchResult weighed = *found;
   options.say("  samples count by what they tell");
   // Where the twin gives no numbers there, what was found stays without weights.
-  if (!refine(bench, found->best.state, options, &weighed)) bench.weighAlike();
+  if (refine(bench, found->best.state, options, &weighed)) {
+    takeStrainOff(bench, hypotheses, options, &weighed);
+  } else {
+    bench.weighAlike();
+  }
   challenge(bench, options, &weighed, resembles);
   bench.weighAlike();
   found->ladder = weighed.ladder;

@@ -103,7 +103,6 @@ class Search {
     double best_promise = 0.0;
     double least = 0.0;     // gain of BIC that an effect must bring
     std::size_t hints = 0;  // fitted on a hint
-    bool strained = false;  // next to nothing is left but nominal values far off
     bool better = false;    // best is one of its fits
     std::vector<Rung> rungs;
   };
@@ -285,9 +284,7 @@ bool Search::worthFitting(const Round& round, const Promise& promise, double lar
   constexpr std::size_t MOST_HINTS = 2;
   const std::size_t fitted = round.rungs.size();
   const bool hint = isHint(round, promise);
-  if (promise.gain < round.least && !hint &&
-      !(round.strained && promise.gain > 4.0 * options_.least_prior_gain))
-    return false;
+  if (promise.gain < round.least && !hint) return false;
   if (hint ? round.hints >= MOST_HINTS : fitted - round.hints >= options_.fitted_per_round) return false;
   if (fitted >= 2 && promise.gain < 0.02 * largest) return false;
   // One that leaves next to nothing can be bettered only by one that promises about as much, as far as
@@ -315,11 +312,9 @@ void Search::fitPromise(const Promise& promise, Round& round) {
   with.members.push_back({promise.hypothesis, bestStart(quick_, now_, promise, in_place)});
   const auto begin = std::chrono::steady_clock::now();
   const std::size_t simulations = quick_.runner().simulations();
-  const NominalTangents turns = tangents_.ofTurns();
   FitOptions options{6, 1e-3, true};
-  options.to_beat = round.best.chi2 + round.best.penalty;
-  if (!round.strained) options.to_beat = std::min(options.to_beat, now_.chi2 + now_.penalty - round.least);
-  const Fit tried = quick_.fit(with, round.strained ? &turns : &tangents_, options);
+  options.to_beat = std::min(round.best.chi2 + round.best.penalty, now_.chi2 + now_.penalty - round.least);
+  const Fit tried = quick_.fit(with, &tangents_, options);
   const Member& newest = tried.state.members.back();
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   round.rungs.push_back({{round.number, promise.hypothesis->effect, promise.hypothesis->variant, promise.gain,
@@ -341,11 +336,7 @@ Search::Round Search::fitPromises(std::size_t number) {
   round.best = now_;
   // A trifle beside what is left is not what is missing.
   round.least = std::max(options_.least_gain, options_.least_share * excess(now_));
-  // With next to nothing left but nominal values far off, an effect may do what they do; only all values
-  // moved together go along that valley.
-  round.strained = excess(now_) < 0.01 * bench_.samples() && now_.penalty > 4.0 * options_.least_prior_gain;
-  const double due = round.strained ? 4.0 * options_.least_prior_gain : round.least;
-  if (!stepped_back_) promises_ = screen(quick_, now_, tangents_, hypotheses_, due, &screened_);
+  if (!stepped_back_) promises_ = screen(quick_, now_, tangents_, hypotheses_, round.least, &screened_);
   stepped_back_ = false;
   for (const Promise& p : promises_) {
     if (isRefused(p.hypothesis)) continue;
@@ -381,7 +372,6 @@ bool Search::isBetter(const Fit& tried) const {
   constexpr double MUCH = 0.25;  // [1] of what is left
   if (!tried.converged) return false;
   const double gain = now_.bic - tried.bic;
-  if (excess(now_) < 0.01 * bench_.samples() && relieves(now_, tried, options_)) return true;
   if (gain <= leastGain(quick_.runner(), now_, tried, options_)) return false;
   return gain > MUCH * excess(now_) || Standing::holdsInFitted(fittedShare(quick_, tried, now_));
 }

@@ -11,10 +11,12 @@ namespace smartmill::discrepancy {
 /// looked for, and what is left at last, counts every sample alike, by its noise: only of a model that lacks
 /// no more than names can say does what it leaves tell how much a sample is worth.
 ///
+/// Where nominal values stand for an effect it is looked for here (search/strained.h).
 /// @param found of a search; receives the names that hold, fitted with every sample alike
 /// @param resembles receives the others
 /// @return the same names with their weighed values; the bench counts every sample alike again
-SearchResult challengeWeighed(Workbench& bench, const SearchOptions& options, SearchResult* found,
+SearchResult challengeWeighed(Workbench& bench, const std::vector<Hypothesis>& hypotheses,
+                              const SearchOptions& options, SearchResult* found,
                               std::vector<Resemblance>* resembles);
 
 /// The last word, by weight, and the bench stays so; but where causes without a name were taken beside the
