@@ -14,10 +14,12 @@ using Eigen::VectorXd;
 // Where the free elements want to go while the others stay.
 VectorXd wanted(const Eigen::MatrixXd& h, const VectorXd& b, const VectorXd& x,
                 const std::vector<Index>& free) {
+  const Eigen::Map<const Eigen::Matrix<Index, Eigen::Dynamic, 1>> at(free.data(),
+                                                                     static_cast<Index>(free.size()));
   VectorXd staying = x;
-  staying(free).setZero();
-  const Eigen::MatrixXd of_free = h(free, free);
-  const VectorXd right = (b - h * staying)(free);
+  staying(at).setZero();
+  const Eigen::MatrixXd of_free = h(at, at);
+  const VectorXd right = (b - h * staying)(at);
   return linear::solveSymmetric(of_free, right);
 }
 
