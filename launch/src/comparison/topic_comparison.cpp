@@ -28,8 +28,8 @@ bool TopicDifference::same() const {
 }
 
 bool TopicDifference::sameButFor(double share) const {
-  const double missing = static_cast<double>(first_only + second_only);
-  return different == 0 && contradictions == 0 && missing <= share * (static_cast<double>(common) + missing);
+  const double alone = static_cast<double>(first_only + second_only);
+  return different == 0 && contradictions == 0 && alone <= share * (static_cast<double>(common) + alone);
 }
 
 std::string TopicDifference::text(const std::string& topic) const {
