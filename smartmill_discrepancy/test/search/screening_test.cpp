@@ -100,8 +100,8 @@ TEST(Screening, runoutTakesThePlaceOfRadii) {
   const std::vector<double> expected{10.0, 0.0, -10.0, 0.0};
   for (std::size_t j = 0; j < 4; ++j) EXPECT_NEAR(radii[j], expected[j], 1e-6);
   for (const Hypothesis& h : hypotheses) {
-    if (h.effect != "tooth_radius" && h.effect != "runout")
-      EXPECT_FALSE(inPlaceOf(fitter, member, h)) << h.title();
+    if (h.effect == "tooth_radius" || h.effect == "runout") continue;
+    EXPECT_FALSE(inPlaceOf(fitter, member, h)) << h.title();
   }
 }
 
