@@ -1,12 +1,12 @@
 #include "smartmill_discrepancy/search/refinement.h"
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <optional>
 #include <utility>
 
 #include "smartmill_discrepancy/search/evidence.h"
-#include "smartmill_discrepancy/search/screening.h"
 
 namespace smartmill::discrepancy {
 namespace {
@@ -125,6 +125,19 @@ bool standsFor(const Fit& rival, const Fit& member, const Fit& lacking) {
 }
 
 }  // namespace
+
+Rung rungOf(const Fitter& fitter, const Promise& promise, std::size_t round, const Fit& now,
+            const std::function<Fit()>& fit, Fit* tried) {
+  const auto begin = std::chrono::steady_clock::now();
+  const std::size_t simulations = fitter.runner().simulations();
+  *tried = fit();
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  const Hypothesis& hypothesis = *promise.hypothesis;
+  return {{round, hypothesis.effect, hypothesis.variant, promise.gain, now.bic - tried->bic, false, seconds,
+           fitter.runner().simulations() - simulations},
+          &hypothesis,
+          tried->state.members.back().values};
+}
 
 void followSimpler(const Fitter& fitter, const Fit& now, const NominalTangents& tangents,
                    std::vector<Rung>* ladder) {

@@ -1,7 +1,6 @@
 #include "smartmill_discrepancy/search/search.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -323,19 +322,14 @@ void Search::fitPromise(const Promise& promise, Round& round) {
   std::optional<std::vector<double>> in_place;
   if (round.better) in_place = inPlaceOf(quick_, round.best.state.members.back(), *promise.hypothesis);
   with.members.push_back({promise.hypothesis, bestStart(quick_, now_, promise, in_place)});
-  const auto begin = std::chrono::steady_clock::now();
-  const std::size_t simulations = quick_.runner().simulations();
   FitOptions options{6, 1e-3, true};
   options.to_beat = std::min(round.best.chi2 + round.best.penalty, now_.chi2 + now_.penalty - round.least);
-  const Fit tried = followed(quick_.fit(with, &tangents_, options), options);
-  const Member& newest = tried.state.members.back();
-  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  round.rungs.push_back({{round.number, promise.hypothesis->effect, promise.hypothesis->variant, promise.gain,
-                          now_.bic - tried.bic, false, seconds, quick_.runner().simulations() - simulations},
-                         promise.hypothesis,
-                         newest.values});
+  Fit tried;
+  round.rungs.push_back(rungOf(
+      quick_, promise, round.number, now_,
+      [&] { return followed(quick_.fit(with, &tangents_, options), options); }, &tried));
   options_.say(formatted("  promise %.4g, gain %.4g  ", promise.gain, now_.bic - tried.bic) +
-               describe(newest));
+               describe(tried.state.members.back()));
   if (isAhead(tried, round) && isBetter(tried)) {
     round.best = tried;
     round.best_promise = promise.gain;

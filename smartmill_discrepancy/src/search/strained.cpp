@@ -1,12 +1,12 @@
 #include "smartmill_discrepancy/search/strained.h"
 
 #include <algorithm>
-#include <chrono>
 #include <utility>
 
 #include "smartmill_core/formatted.h"
 #include "smartmill_discrepancy/gap/significance.h"
 #include "smartmill_discrepancy/search/evidence.h"
+#include "smartmill_discrepancy/search/refinement.h"
 #include "smartmill_discrepancy/search/screening.h"
 #include "smartmill_discrepancy/search/standing.h"
 
@@ -24,16 +24,7 @@ bool mayRelieve(const Fitter& fitter, const Promise& promise, const SearchOption
          Standing::holdsInFitted(fittedShare(fitter, promise));
 }
 
-Rung rungOf(const Promise& promise, std::size_t round, const Fit& before, const Fit& tried, double seconds,
-            std::size_t simulations) {
-  return {{round, promise.hypothesis->effect, promise.hypothesis->variant, promise.gain,
-           before.bic - tried.bic, false, seconds, simulations},
-          promise.hypothesis,
-          tried.state.members.back().values};
-}
-
-}  // namespace
-
+// Off by more than chance lets stated values be.
 bool isStrained(const Workbench& bench, const Fit& fit) {
   constexpr double CHANCE = 1e-4;
   const std::vector<Coordinate>& free = bench.freedom().coordinates();
@@ -46,6 +37,8 @@ bool isStrained(const Workbench& bench, const Fit& fit) {
   const double variance = std::max(1.0, fit.chi2 / bench.samples());
   return chiSquareTail(squares / variance, free.size() + free.size() % 2) < CHANCE;
 }
+
+}  // namespace
 
 std::optional<FitState> relieved(Workbench& bench, const std::vector<Hypothesis>& hypotheses,
                                  const SearchOptions& options, SearchResult* found) {
@@ -72,12 +65,13 @@ std::optional<FitState> relieved(Workbench& bench, const std::vector<Hypothesis>
     if (!mayRelieve(quick, p, options)) continue;
     FitState with = now.state;
     with.members.push_back({p.hypothesis, bestStart(quick, now, p)});
-    const auto begin = std::chrono::steady_clock::now();
-    const std::size_t simulations = quick.runner().simulations();
-    Fit tried = quick.fit(with, &turns, {6, 1e-3, true});
-    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    found->ladder.push_back(
-        rungOf(p, round, now, tried, seconds, quick.runner().simulations() - simulations));
+    Fit tried;
+    found->ladder.push_back(rungOf(
+        quick, p, round, now,
+        [&] {
+          return quick.fit(with, &turns, {6, 1e-3, true});
+        },
+        &tried));
     options.say(
         formatted("  nominal values strained, promise %.4g, gain %.4g, stated values nearer by %.4g  ",
                   p.gain, now.bic - tried.bic, now.penalty - tried.penalty) +

@@ -1,8 +1,18 @@
 #pragma once
 
+#include <cstddef>
+#include <functional>
+
+#include "smartmill_discrepancy/search/screening.h"
 #include "smartmill_discrepancy/search/search.h"
 
 namespace smartmill::discrepancy {
+
+/// The rung of a promise, with what its fit took.
+/// @param now where the round stands @param fit that is run; its newest member is the promised one
+/// @param tried receives the fit
+Rung rungOf(const Fitter& fitter, const Promise& promise, std::size_t round, const Fit& now,
+            const std::function<Fit()>& fit, Fit* tried);
 
 /// Rivals of fewer values than the member that they came near to are followed to where they fit best beside
 /// the others, so that the comparison begins there: where a search is guided its squares are smooth, those of
