@@ -86,9 +86,10 @@ StabilityPoint farthestFromFlanks(const StabilityLimit& limit, const std::vector
 
 namespace {
 
-/// Without the lines at which the hammer excited too little: there noise would pass for a resonance. What the
-/// neighbours say is put in their place by the interpolation.
-FrequencyResponse certainLines(const FrequencyResponse& frf, double error) {
+/// Without the lines at which the hammer excited too little, or that do not stand above their own deviation
+/// by a factor: there noise would pass for a resonance. What the neighbours say is put in their place by the
+/// interpolation.
+FrequencyResponse certainLines(const FrequencyResponse& frf, double error, double told) {
   if (frf.std_dev.size() != frf.size()) return frf;
   double peak = 0.0;
   for (std::size_t i = 0; i < frf.size(); ++i) {
@@ -98,7 +99,7 @@ FrequencyResponse certainLines(const FrequencyResponse& frf, double error) {
   kept.unit = frf.unit;
   kept.averages = frf.averages;
   for (std::size_t i = 0; i < frf.size(); ++i) {
-    if (frf.std_dev[i] > error * peak) continue;
+    if (frf.std_dev[i] > error * peak || std::abs(frf.value[i]) < told * frf.std_dev[i]) continue;
     kept.frequency.push_back(frf.frequency[i]);
     kept.value.push_back(frf.value[i]);
   }
@@ -295,7 +296,7 @@ FrequencyResponse ChartMaker::crossFrf() const {
     const auto found = frfs_.find(direction);
     if (found != frfs_.end() && found->second.frf.unit == "m/N")
       return certainLines(found->second.frf.band(parameters_.frequency_low, parameters_.frequency_high),
-                          parameters_.line_error);
+                          parameters_.line_error, 0.0);
   }
   return {};
 }
@@ -328,9 +329,10 @@ ChartMaker::Basis ChartMaker::basis() const {
     basis.response = responseOf(modes_.at("x").model, modes_.at("y").model,
                                 std::max(1.0, parameters_.frequency_low), parameters_.frequency_high, LINES);
   } else {
+    constexpr double TOLD = 3.0;  // standard deviations
     const auto lines = [&](const char* direction) {
       return certainLines(frfs_.at(direction).frf.band(parameters_.frequency_low, parameters_.frequency_high),
-                          parameters_.line_error);
+                          parameters_.line_error, TOLD);
     };
     basis.response = responseOf(lines("x"), lines("y"));
     addCross(frfs_, basis.response);
