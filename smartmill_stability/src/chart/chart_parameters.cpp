@@ -55,7 +55,7 @@ void ChartParameters::declare(ParameterTable& table) {
   table.number(
       "line_error", line_error, "1", Range::positive(),
       "lines with a standard deviation above this share of the FRF's peak are left out: the hammer's "
-      "spectrum has zeros");
+      "spectrum has zeros; so are lines below three of their own standard deviations");
   table.choice(
       "method", method, {"zero_order", "collocation", "auto"},
       "zero_order: from the measured FRFs at once; collocation: exact, from the modes (tool/modes), takes "
