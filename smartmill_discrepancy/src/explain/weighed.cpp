@@ -20,8 +20,9 @@ bool sameMembers(const FitState& a, const FitState& b) {
 void takeStrainOff(Workbench& bench, const std::vector<Hypothesis>& hypotheses, const SearchOptions& options,
                    SearchResult* found) {
   const std::optional<FitState> state = relieved(bench, hypotheses, options, found);
+  if (!state) return;
   SearchResult with = *found;
-  if (state && refine(bench, *state, options, &with)) *found = std::move(with);
+  if (refine(bench, *state, options, &with)) *found = std::move(with);
 }
 
 }  // namespace

@@ -309,7 +309,7 @@ bool Search::isAhead(const Fit& tried, const Round& round) const {
 // tests ask for still more of what it found, it goes on with the twin corrected there.
 Fit Search::followed(Fit tried, const FitOptions& options) {
   constexpr double MORE = 1.25, WORTH = 0.1;  // [1] of it, of what is left
-  if (!tried.converged || isBetter(tried) || now_.bic - tried.bic < WORTH * excess(now_)) return tried;
+  if (!tried.converged || now_.bic - tried.bic < WORTH * excess(now_) || isBetter(tried)) return tried;
   if (fittedShare(quick_, tried, now_).share < MORE) return tried;
   NominalTangents there = bench_.lineariseBy(tangents_, near(tried.state));
   Fit on = quick_.fit(tried.state, &there, options);
