@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Who may know whom: no ROS under the core, the FOCAS wire and in the libraries of the node packages; no node package
+"""Who may know whom: no ROS under the core, the FOCAS wire, the recordings and in the libraries of the node packages; no node package
 knows another's headers. Exceptions stand here and nowhere else."""
 import re
 import sys
@@ -7,18 +7,22 @@ import sys
 from packages import includes, packages, report
 
 ROS = re.compile(r"(ros|rosbag|roslib|actionlib|tf2|tf2_\w+|diagnostic_updater|topic_tools|smartmill_ros|\w+_msgs)/")
-ROS_FREE = {"smartmill_core", "smartmill_focas"}
+ROS_FREE = {"smartmill_core", "smartmill_focas", "smartmill_recording"}
 SHELLS = {"smartmill_ros", "smartmill_msgs"}  # ROS everywhere
-COMMON = {"smartmill_core", "smartmill_focas", "smartmill_ros", "smartmill_msgs"}
+COMMON = {"smartmill_core", "smartmill_focas", "smartmill_recording", "smartmill_ros", "smartmill_msgs"}
 KNOWS = {
     "smartmill_core": set(),
     "smartmill_focas": set(),
-    "smartmill_ros": {"smartmill_core", "smartmill_msgs"},
+    "smartmill_recording": {"smartmill_core"},
+    "smartmill_ros": {"smartmill_core", "smartmill_recording", "smartmill_msgs"},
     "smartmill_discrepancy": COMMON | {"smartmill_sim"},  # runs the twin
     "smartmill_studies": None,  # every library
+    "smartmill_cli": None,  # the commands of every library
 }
 ROS_ROOMS = {"node", "apps", "test"}
-ROS_SOURCES = ("launch/src/session/", "launch/src/report/session_bag.")  # of programs, in no library
+ROS_SOURCES = ("launch/src/session/",)  # of programs, in no library
+# Of the room node, but read by offline tools too.
+ROS_FREE_FILES = {"parameters.h", "monitor_parameters.h", "rotation.h", "wiring.h"}
 
 
 def may_use_ros(package, path):
@@ -27,6 +31,8 @@ def may_use_ros(package, path):
     if package.name in SHELLS or str(path).startswith(ROS_SOURCES):
         return True
     parts = path.relative_to(package.folder).parts
+    if parts[:2] == ("src", "node") and path.name in ROS_FREE_FILES:
+        return False
     return parts[0] != "include" and bool(ROS_ROOMS.intersection(parts[:-1]))
 
 

@@ -6,19 +6,12 @@
 #include <string>
 #include <vector>
 
-#include <smartmill_msgs/ChatterState.h>
-#include <smartmill_msgs/CuttingCoefficients.h>
-#include <smartmill_msgs/ForceBlock.h>
-#include <smartmill_msgs/ForceCurve.h>
-#include <smartmill_msgs/Frf.h>
-#include <smartmill_msgs/ModalModel.h>
-#include <smartmill_msgs/StabilityChart.h>
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/names.h"
 #include "smartmill_core/program.h"
 #include "smartmill_launch/comparison/topic_comparison.h"
-#include "smartmill_ros/bag_reader.h"
+#include "smartmill_recording/recording_reader.h"
 
 namespace {
 
@@ -26,15 +19,15 @@ using namespace smartmill;
 using namespace smartmill::session;
 
 /// Keys are made of stamps with every digit, so that results of equal times meet.
-std::string keyOf(const std_msgs::Header& header, const std::string& about) {
+std::string keyOf(const plain::Header& header, const std::string& about) {
   return about + (about.empty() ? "" : " ") + "at " +
          formatted("%u.%09u", header.stamp.sec, header.stamp.nsec);
 }
 
-ResultRecord begin(const std_msgs::Header& header, const std::string& about) {
+ResultRecord begin(const plain::Header& header, const std::string& about) {
   ResultRecord record;
   record.key = keyOf(header, about);
-  record.stamp = header.stamp.toSec();
+  record.stamp = toSec(header.stamp);
   record.values = {static_cast<double>(header.stamp.sec), static_cast<double>(header.stamp.nsec)};
   record.words = {header.frame_id};
   return record;
@@ -45,7 +38,7 @@ void add(ResultRecord& record, const std::vector<double>& values) {
   record.values.insert(record.values.end(), values.begin(), values.end());
 }
 
-ResultRecord recordOf(const smartmill_msgs::ForceBlock& m) {
+ResultRecord recordOf(const plain::ForceBlock& m) {
   ResultRecord record = begin(m.header, "");
   record.key = "sample " + std::to_string(m.first_index);
   record.values.insert(record.values.end(), {m.sample_rate, static_cast<double>(m.status)});
@@ -53,7 +46,7 @@ ResultRecord recordOf(const smartmill_msgs::ForceBlock& m) {
   return record;
 }
 
-ResultRecord recordOf(const smartmill_msgs::Frf& m) {
+ResultRecord recordOf(const plain::Frf& m) {
   ResultRecord record = begin(m.header, m.tool + " " + m.point + " " + m.direction);
   record.words.push_back(m.unit);
   record.values.push_back(m.averages);
@@ -62,10 +55,10 @@ ResultRecord recordOf(const smartmill_msgs::Frf& m) {
   return record;
 }
 
-ResultRecord recordOf(const smartmill_msgs::ModalModel& m) {
+ResultRecord recordOf(const plain::ModalModel& m) {
   ResultRecord record = begin(m.header, m.tool + " " + m.point + " " + m.direction);
   record.words.push_back(m.unit);
-  for (const smartmill_msgs::Mode& mode : m.modes) {
+  for (const plain::Mode& mode : m.modes) {
     add(record, {mode.frequency, mode.damping_ratio, mode.gain, mode.frequency_std, mode.damping_ratio_std,
                  mode.gain_std});
   }
@@ -73,7 +66,7 @@ ResultRecord recordOf(const smartmill_msgs::ModalModel& m) {
   return record;
 }
 
-ResultRecord recordOf(const smartmill_msgs::CuttingCoefficients& m) {
+ResultRecord recordOf(const plain::CuttingCoefficients& m) {
   ResultRecord record = begin(m.header, m.tool + " in " + m.material);
   record.words.push_back(m.source);
   add(record,
@@ -82,7 +75,7 @@ ResultRecord recordOf(const smartmill_msgs::CuttingCoefficients& m) {
   return record;
 }
 
-ResultRecord recordOf(const smartmill_msgs::ForceCurve& m) {
+ResultRecord recordOf(const plain::ForceCurve& m) {
   ResultRecord record = begin(m.header, m.tool + " in " + m.material);
   record.words.insert(record.words.end(), m.cuts.begin(), m.cuts.end());
   for (const std::vector<double>* v : {&m.chip, &m.tangential, &m.radial, &m.tangential_std, &m.radial_std})
@@ -91,7 +84,7 @@ ResultRecord recordOf(const smartmill_msgs::ForceCurve& m) {
   return record;
 }
 
-ResultRecord recordOf(const smartmill_msgs::StabilityChart& m) {
+ResultRecord recordOf(const plain::StabilityChart& m) {
   ResultRecord record = begin(m.header, m.tool + " in " + m.material);
   record.words.push_back(m.method);
   add(record, {m.entry_angle, m.exit_angle, m.feed_per_tooth, m.absolute_depth_limit});
@@ -99,7 +92,7 @@ ResultRecord recordOf(const smartmill_msgs::StabilityChart& m) {
        {&m.spindle_speed, &m.depth_limit, &m.chatter_frequency, &m.torque_depth_limit, &m.power_depth_limit})
     add(record, *v);
   for (const auto* points : {&m.recommended, &m.unstable}) {
-    for (const smartmill_msgs::StabilityPoint& p : *points) {
+    for (const plain::StabilityPoint& p : *points) {
       add(record, {p.spindle_speed, p.axial_depth, p.depth_limit, p.chatter_frequency, p.torque, p.power,
                    p.material_removal_rate});
     }
@@ -107,7 +100,7 @@ ResultRecord recordOf(const smartmill_msgs::StabilityChart& m) {
   return record;
 }
 
-ResultRecord recordOf(const smartmill_msgs::ChatterState& m) {
+ResultRecord recordOf(const plain::ChatterState& m) {
   ResultRecord record = begin(m.header, m.condition);
   add(record, {static_cast<double>(m.valid), static_cast<double>(m.chatter), m.frequency, m.energy_ratio,
                m.severity});
@@ -118,13 +111,13 @@ ResultRecord recordOf(const smartmill_msgs::ChatterState& m) {
 struct Topic {
   std::string name;
   TopicComparison comparison;
-  std::function<void(BagReader&, bool first)> attach;
+  std::function<void(RecordingReader&, bool first)> attach;
 };
 
 template <class Message>
 std::unique_ptr<Topic> topic(const char* name, double slack) {
   auto topic = std::make_unique<Topic>(Topic{name, TopicComparison(slack), {}});
-  topic->attach = [at = topic.get()](BagReader& bag, bool first) {
+  topic->attach = [at = topic.get()](RecordingReader& bag, bool first) {
     bag.on<Message>(at->name, [at, first](const Message& message, double) {
       if (first) {
         at->comparison.addFirst(recordOf(message));
@@ -139,16 +132,16 @@ std::unique_ptr<Topic> topic(const char* name, double slack) {
 int run(const std::string& first, const std::string& second, double slack, double most_lost) {
   // A result that comes once must be in both; of what flows all the time a recorder may miss the ends.
   std::vector<std::unique_ptr<Topic>> topics;
-  topics.push_back(topic<smartmill_msgs::Frf>(names::TOOL_FRF, 0.0));
-  topics.push_back(topic<smartmill_msgs::ModalModel>(names::TOOL_MODES, 0.0));
-  topics.push_back(topic<smartmill_msgs::CuttingCoefficients>(names::COEFFICIENTS, 0.0));
-  topics.push_back(topic<smartmill_msgs::ForceCurve>(names::FORCE_CURVE, 0.0));
-  topics.push_back(topic<smartmill_msgs::StabilityChart>(names::STABILITY_CHART, 0.0));
-  topics.push_back(topic<smartmill_msgs::ForceBlock>(names::FORCE_MEASURED, slack));
-  topics.push_back(topic<smartmill_msgs::ForceBlock>(names::FORCE_COMPENSATED, slack));
-  topics.push_back(topic<smartmill_msgs::ChatterState>(names::CHATTER_STATE, slack));
+  topics.push_back(topic<plain::Frf>(names::TOOL_FRF, 0.0));
+  topics.push_back(topic<plain::ModalModel>(names::TOOL_MODES, 0.0));
+  topics.push_back(topic<plain::CuttingCoefficients>(names::COEFFICIENTS, 0.0));
+  topics.push_back(topic<plain::ForceCurve>(names::FORCE_CURVE, 0.0));
+  topics.push_back(topic<plain::StabilityChart>(names::STABILITY_CHART, 0.0));
+  topics.push_back(topic<plain::ForceBlock>(names::FORCE_MEASURED, slack));
+  topics.push_back(topic<plain::ForceBlock>(names::FORCE_COMPENSATED, slack));
+  topics.push_back(topic<plain::ChatterState>(names::CHATTER_STATE, slack));
   for (const bool is_first : {true, false}) {
-    BagReader bag(is_first ? first : second);
+    RecordingReader bag(is_first ? first : second);
     for (const auto& each : topics) each->attach(bag, is_first);
     bag.run();
   }

@@ -4,7 +4,6 @@
 
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -13,7 +12,7 @@
 
 #include "../src/report/report_pictures.h"
 #include "../src/report/session_bag.h"
-#include "../src/shell.h"
+#include "../src/session/child.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/model/machine_model.h"
@@ -38,13 +37,24 @@ class TrueLimit {
   StabilityChart over(double low, double high, std::size_t count) const {
     const std::string csv = (folder_ / "lobes_true.csv").string(),
                       log = (folder_ / "lobes_true.txt").string();
-    const std::string command =
-        "rosrun smartmill_stability lobes " + shellQuoted(model_) +
-        formatted(" --entry-deg %.12g --exit-deg %.12g --speeds %.12g:%.12g:%zu --max-depth-mm 1000",
-                  units::degFromRad(chart_.entry), units::degFromRad(chart_.exit),
-                  units::rpmFromRadPerSec(low), units::rpmFromRadPerSec(high), count) +
-        " --method collocation -o " + shellQuoted(csv) + " >" + shellQuoted(log) + " 2>&1";
-    if (std::system(command.c_str()) != 0) throw Error("lobes failed on the true machine, see " + log);
+    const session::Tool lobes{"lobes", "the stability limit of the true machine"};
+    const std::vector<std::string> arguments{
+        model_,
+        "--entry-deg",
+        formatted("%.12g", units::degFromRad(chart_.entry)),
+        "--exit-deg",
+        formatted("%.12g", units::degFromRad(chart_.exit)),
+        "--speeds",
+        formatted("%.12g:%.12g:%zu", units::rpmFromRadPerSec(low), units::rpmFromRadPerSec(high), count),
+        "--max-depth-mm",
+        "1000",
+        "--method",
+        "collocation",
+        "-o",
+        csv};
+    if (session::runTool(lobes, arguments, log) != 0) {
+      throw Error("the stability limit of the true machine was not computed, see " + log);
+    }
     return read(csv);
   }
 
@@ -68,7 +78,7 @@ class TrueLimit {
                                                 : std::stod(depth) * units::MM);
       least = std::min(least, curve.limit.depth.back());
     }
-    if (curve.limit.depth.empty()) throw Error(csv + ": no limit stands there");
+    if (curve.limit.depth.empty()) throw Error(csv + ": expected a stability limit, found no line");
     curve.absolute_depth_limit = least;
     return curve;
   }
@@ -90,6 +100,22 @@ std::string trueModel(const SessionRecording& recording, const fs::path& folder)
   const std::string file = (folder / "true_machine.yaml").string();
   writeMachineModel(model, file);
   return file;
+}
+
+/// Whatever fails here leaves its targets unchecked, not the report unwritten.
+TrueStability trueStability(const SessionRecording& recording, const TrueLimit& limit) {
+  TrueStability truth;
+  try {
+    const std::vector<double>& speeds = recording.chart->limit.spindle_speed;
+    truth.chart = limit.over(speeds.front(), speeds.back(), speeds.size());
+    for (const RecordedCut& cut : recording.cuts) {
+      const bool checks = cut.condition.name.rfind("verify_", 0) == 0;
+      truth.limits.push_back(checks ? limit.at(cut.condition.spindle_speed) : NOT_A_NUMBER);
+    }
+  } catch (const Error& error) {
+    truth.failure = error.what();
+  }
+  return truth;
 }
 
 struct Request {
@@ -130,19 +156,10 @@ int run(const Request& request) {
   fs::create_directories(data, error);
   if (error) throw Error(data.string() + ": " + error.message());
 
-  std::optional<StabilityChart> true_chart;
-  std::vector<double> true_limits;
+  TrueStability truth;
   const std::string model = recording.chart ? trueModel(recording, data) : "";
-  if (!model.empty()) {
-    const TrueLimit limit(model, data, *recording.chart);
-    const std::vector<double>& speeds = recording.chart->limit.spindle_speed;
-    true_chart = limit.over(speeds.front(), speeds.back(), speeds.size());
-    for (const RecordedCut& cut : recording.cuts) {
-      const bool checks = cut.condition.name.rfind("verify_", 0) == 0;
-      true_limits.push_back(checks ? limit.at(cut.condition.spindle_speed) : NOT_A_NUMBER);
-    }
-  }
-  const Report report = makeReport(recording, true_chart, true_limits);
+  if (!model.empty()) truth = trueStability(recording, TrueLimit(model, data, *recording.chart));
+  const Report report = makeReport(recording, truth);
   if (report.sections.empty() && report.cuts.empty()) throw Error(request.bag + ": no results are in it");
   const std::string text = markdown(report);
   write(folder / "summary.md", text);
@@ -151,7 +168,7 @@ int run(const Request& request) {
   std::string files = "summary.md, summary.json";
   if (request.pictures) {
     std::string pictures;
-    for (const std::string& picture : drawPictures(recording, report, true_chart, folder)) {
+    for (const std::string& picture : drawPictures(recording, report, truth.chart, folder)) {
       files += ", " + picture;
       pictures += "\n![" + captionOf(picture) + "](" + picture + ")\n";
     }

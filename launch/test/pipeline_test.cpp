@@ -20,8 +20,8 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/names.h"
+#include "smartmill_core/parameters/parameter_reader.h"
 #include "smartmill_ros/follower.h"
-#include "smartmill_ros/parameter_reader.h"
 
 namespace {
 

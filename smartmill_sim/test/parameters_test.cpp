@@ -1,7 +1,7 @@
 #include "../src/node/parameters.h"
 #include "../src/node/lathe_parameters.h"
 
-#include "smartmill_ros/testing/shipped_parameters.h"
+#include "smartmill_core/testing/shipped_parameters.h"
 
 namespace smartmill::sim {
 namespace {

@@ -41,7 +41,9 @@ std::string aligned(const std::vector<Row>& rows) {
   return text;
 }
 
-std::string metText(const std::optional<bool>& met) {
+std::string verdictOf(const Figure& figure) {
+  if (figure.unchecked) return "NOT CHECKED";
+  const std::optional<bool> met = figure.met();
   return !met ? "" : *met ? "met" : "MISSED";
 }
 
@@ -66,7 +68,7 @@ std::string markdown(const Report& report) {
     for (const Figure& f : section.figures) {
       rows.push_back({f.name, f.unit, shown("%.6g", f.estimate), shown("%.2g", f.std_dev),
                       shown("%.6g", f.truth), shown("%+.3f", f.percent()), shown("%+.2f", f.sigmas()),
-                      targetText(f.target), metText(f.met())});
+                      targetText(f.target), verdictOf(f)});
     }
     out << "\n## " << section.title << "\n\n" << aligned(rows);
   }
@@ -109,6 +111,7 @@ std::string json(const Report& report, const std::string& session) {
         figure[f.target.at_least ? "at_least_percent" : "at_most_percent"] = f.target.percent;
       }
       if (const auto met = f.met()) figure["met"] = *met;
+      if (f.unchecked) figure["met"] = nullptr;
       out["figures"].push_back(figure);
     }
   }

@@ -3,13 +3,9 @@
 #include <cmath>
 #include <limits>
 
-#include <smartmill_msgs/ChatterState.h>
-#include <smartmill_msgs/StabilityChart.h>
-
 #include "smartmill_core/names.h"
 #include "smartmill_core/signal/steady_path.h"
-#include "smartmill_ros/bag_reader.h"
-#include "smartmill_ros/conversions.h"
+#include "smartmill_recording/recording_reader.h"
 
 namespace smartmill::report {
 namespace {
@@ -22,29 +18,28 @@ class Gatherer {
  public:
   explicit Gatherer(SessionRecording& recording) : recording_(recording) {}
 
-  void attach(BagReader& bag) {
-    bag.on<smartmill_msgs::Frf>(names::TOOL_FRF, [this](const auto& m, double) { keep(recording_.frfs, m); });
-    bag.on<smartmill_msgs::Frf>(names::TRUE_FRF,
-                                [this](const auto& m, double) { keep(recording_.true_frfs, m); });
-    bag.on<smartmill_msgs::ModalModel>(names::TOOL_MODES,
-                                       [this](const auto& m, double) { keep(recording_.modes, m); });
-    bag.on<smartmill_msgs::ModalModel>(names::TRUE_MODES,
-                                       [this](const auto& m, double) { keep(recording_.true_modes, m); });
-    bag.on<smartmill_msgs::CuttingCoefficients>(
-        names::COEFFICIENTS, [this](const auto& m, double) { recording_.coefficients = fromMsg(m); });
-    bag.on<smartmill_msgs::CuttingCoefficients>(names::TRUE_COEFFICIENTS, [this](const auto& m, double) {
-      recording_.true_coefficients = fromMsg(m);
-    });
-    bag.on<smartmill_msgs::StabilityChart>(names::STABILITY_CHART,
-                                           [this](const auto& m, double) { recording_.chart = fromMsg(m); });
-    bag.on<smartmill_msgs::CuttingCondition>(names::CUTTING_CONDITION,
-                                             [this](const auto& m, double) { take(fromMsg(m)); });
-    bag.on<smartmill_msgs::CncState>(names::CNC_STATE, [this](const auto& m, double) { take(fromMsg(m)); });
-    bag.on<smartmill_msgs::ChatterState>(names::CHATTER_STATE, [this](const auto& m, double) { take(m); });
+  void attach(RecordingReader& bag) {
+    bag.on<MeasuredFrf>(names::TOOL_FRF, [this](const auto& frf, double) { keep(recording_.frfs, frf); });
+    bag.on<MeasuredFrf>(names::TRUE_FRF,
+                        [this](const auto& frf, double) { keep(recording_.true_frfs, frf); });
+    bag.on<MeasuredModes>(names::TOOL_MODES,
+                          [this](const auto& modes, double) { keep(recording_.modes, modes); });
+    bag.on<MeasuredModes>(names::TRUE_MODES,
+                          [this](const auto& modes, double) { keep(recording_.true_modes, modes); });
+    bag.on<CoefficientSet>(names::COEFFICIENTS,
+                           [this](const auto& set, double) { recording_.coefficients = set; });
+    bag.on<CoefficientSet>(names::TRUE_COEFFICIENTS,
+                           [this](const auto& set, double) { recording_.true_coefficients = set; });
+    bag.on<StabilityChart>(names::STABILITY_CHART,
+                           [this](const auto& chart, double) { recording_.chart = chart; });
+    bag.on<CuttingCondition>(names::CUTTING_CONDITION,
+                             [this](const auto& condition, double) { take(condition); });
+    bag.on<CncState>(names::CNC_STATE, [this](const auto& state, double) { take(state); });
+    bag.on<plain::ChatterState>(names::CHATTER_STATE, [this](const auto& state, double) { take(state); });
     const auto force = [&](const char* topic, ForceTrack RecordedCut::*track) {
-      bag.on<smartmill_msgs::ForceBlock>(topic, [this, track](const auto& m, double) {
-        RecordedCut* cut = cutAt(m.header.stamp.toSec());
-        if (cut) (cut->*track).add(fromMsg(m));
+      bag.on<ForceBlock>(topic, [this, track](const auto& block, double) {
+        RecordedCut* cut = cutAt(block.stamp);
+        if (cut) (cut->*track).add(block);
       });
     };
     force(names::FORCE_MEASURED, &RecordedCut::raw);
@@ -54,9 +49,8 @@ class Gatherer {
 
  private:
   /// The newest of each point and direction stands.
-  template <class Item, class Message>
-  static void keep(std::vector<Item>& items, const Message& message) {
-    const Item item = fromMsg(message);
+  template <class Item>
+  static void keep(std::vector<Item>& items, const Item& item) {
     for (Item& other : items) {
       if (other.point == item.point && other.direction == item.direction) {
         other = item;
@@ -87,7 +81,7 @@ class Gatherer {
     cut->steady_to = state.stamp;
   }
 
-  void take(const smartmill_msgs::ChatterState& m) {
+  void take(const plain::ChatterState& m) {
     if (!m.valid) return;
     for (RecordedCut& cut : recording_.cuts) {
       if (cut.condition.name == m.condition) {
@@ -110,7 +104,7 @@ class Gatherer {
 
 SessionRecording readSession(const std::string& bag, const std::function<void(double)>& progress) {
   SessionRecording recording;
-  BagReader reader(bag);
+  RecordingReader reader(bag);
   Gatherer gatherer(recording);
   gatherer.attach(reader);
   reader.run(progress);

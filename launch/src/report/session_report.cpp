@@ -135,8 +135,9 @@ std::string frfNote(const MeasuredFrf& measured, const MeasuredFrf* truth) {
   return note;
 }
 
-Section chartSection(const SessionRecording& recording, const std::optional<StabilityChart>& true_chart,
+Section chartSection(const SessionRecording& recording, const TrueStability& true_stability,
                      const std::vector<CutCheck>& cuts) {
+  const std::optional<StabilityChart>& true_chart = true_stability.chart;
   Section section{"Stability chart", {}};
   if (!recording.chart) return section;
   const StabilityChart& chart = *recording.chart;
@@ -176,7 +177,8 @@ Section chartSection(const SessionRecording& recording, const std::optional<Stab
                                units::rpmFromRadPerSec(pocket->spindle_speed),
                                NOT_A_NUMBER,
                                units::rpmFromRadPerSec(nearest),
-                               {POCKET_TARGET, false}});
+                               {POCKET_TARGET, false},
+                               !true_stability.failure.empty()});
   }
   return section;
 }
@@ -265,18 +267,17 @@ std::pair<std::uint64_t, std::uint64_t> judgedSamples(const RecordedCut& cut, do
   return cut.truth.empty() ? range : cut.truth.covered(range.first, range.second);
 }
 
-Report makeReport(const SessionRecording& recording, const std::optional<StabilityChart>& true_chart,
-                  const std::vector<double>& true_limits) {
+Report makeReport(const SessionRecording& recording, const TrueStability& truth) {
   Report report;
   for (std::size_t i = 0; i < recording.cuts.size(); ++i) {
     const RecordedCut& cut = recording.cuts[i];
     if (cut.condition.name.rfind("verify_", 0) != 0) continue;
-    report.cuts.push_back(checkOf(recording, cut, i < true_limits.size() ? true_limits[i] : NOT_A_NUMBER));
+    report.cuts.push_back(checkOf(recording, cut, i < truth.limits.size() ? truth.limits[i] : NOT_A_NUMBER));
   }
   report.sections.push_back(coefficientSection(recording));
   report.sections.push_back(modeSection(recording, POINT_TOOL_TIP));
   report.sections.push_back(modeSection(recording, POINT_FORCE_SENSOR));
-  report.sections.push_back(chartSection(recording, true_chart, report.cuts));
+  report.sections.push_back(chartSection(recording, truth, report.cuts));
   for (const char* axis = AXES; *axis; ++axis) {
     if (const MeasuredFrf* measured = recording.frf(false, POINT_TOOL_TIP, {*axis})) {
       report.notes.push_back(frfNote(*measured, recording.frf(true, POINT_TOOL_TIP, {*axis})));
@@ -285,6 +286,7 @@ Report makeReport(const SessionRecording& recording, const std::optional<Stabili
   if (const RecordedCut* cut = recording.cut(RESONANCE)) {
     report.sections.push_back(forceSection(*cut, report.notes));
   }
+  if (!truth.failure.empty()) report.notes.push_back("NOT CHECKED: " + truth.failure);
   report.notes.push_back("recording of" + formatted(" %.0f s", recording.duration));
   report.sections.erase(std::remove_if(report.sections.begin(), report.sections.end(),
                                        [](const Section& section) { return section.figures.empty(); }),
@@ -295,7 +297,7 @@ Report makeReport(const SessionRecording& recording, const std::optional<Stabili
 std::size_t Report::targets() const {
   std::size_t count = cuts.size();
   for (const Section& section : sections) {
-    for (const Figure& figure : section.figures) count += figure.met() ? 1 : 0;
+    for (const Figure& figure : section.figures) count += figure.met() || figure.unchecked ? 1 : 0;
   }
   return count;
 }

@@ -20,6 +20,7 @@ using Clock = std::chrono::steady_clock;
 constexpr std::chrono::milliseconds POLL(20);
 constexpr std::chrono::seconds GRACE(5);  // for what a program does on Ctrl-C
 constexpr int NOT_STARTED = 127;
+constexpr int USAGE = 2;  // exit status of a command line that a subcommand does not accept
 
 [[noreturn]] void become(const std::vector<std::string>& command, int log) {
   // A group of its own: whatever it starts hears the signals too, and no Ctrl-C but ours reaches it.
@@ -59,7 +60,26 @@ int runChild(const std::vector<std::string>& command, const std::string& log,
     std::this_thread::sleep_for(POLL);
   }
   const int code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-  if (code == NOT_STARTED) throw Error(command.front() + ": cannot be started");
+  if (code == NOT_STARTED) {
+    throw Error("program '" + command.front() +
+                "' not found on PATH; source devel/setup.bash or install the package smartmill");
+  }
+  return code;
+}
+
+int runTool(const Tool& tool, const std::vector<std::string>& arguments, const std::string& log,
+            const std::function<bool()>& stopped) {
+  std::vector<std::string> command{TOOL_PROGRAM, tool.subcommand};
+  command.insert(command.end(), arguments.begin(), arguments.end());
+  const std::string name = command[0] + " " + command[1];
+  int code = 0;
+  try {
+    code = runChild(command, log, stopped);
+  } catch (const Error& error) {
+    throw Error(name + ", needed for " + tool.purpose + ": " + error.what());
+  }
+  if (code == USAGE)
+    throw Error(name + ", needed for " + tool.purpose + ": command line refused, see " + log);
   return code;
 }
 

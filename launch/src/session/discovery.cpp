@@ -15,7 +15,7 @@
 #include "smartmill_core/model/cause_odds.h"
 #include "smartmill_core/names.h"
 #include "smartmill_ros/conversions.h"
-#include "smartmill_ros/parameter_reader.h"
+#include "smartmill_ros/parameter_server.h"
 
 namespace smartmill::session {
 namespace {
@@ -33,7 +33,7 @@ std::string joined(const std::vector<std::string>& parts) {
 
 Discovery::Discovery(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
     : nh_(std::move(nh)),
-      parameters_(ParameterReader::fromServer(private_nh).readAll<Parameters>()),
+      parameters_(parametersFromServer(private_nh).readAll<Parameters>()),
       model_(readMachineModel(parameters_.model)),
       planner_(model_, parameters_.paths),
       place_(parameters_.folder, parameters_.model),
@@ -230,13 +230,12 @@ Explained Discovery::explain(Result& result) {
   const std::string log = out + "/explain.log";
   int code = 0;
   try {
-    std::vector<std::string> command{"rosrun",    "smartmill_discrepancy",
-                                     "explain",   parameters_.record_folder,
-                                     "--model",   place_.inUse(),
-                                     "-o",        out,
-                                     "--threads", std::to_string(parameters_.threads)};
-    if (!parameters_.prior.empty()) command.insert(command.end(), {"--prior", parameters_.prior});
-    code = runChild(command, log, [&] { return cancel_ || ros::WallTime::now() > end; });
+    std::vector<std::string> arguments{
+        parameters_.record_folder,          "--model", place_.inUse(), "-o", out, "--threads",
+        std::to_string(parameters_.threads)};
+    if (!parameters_.prior.empty()) arguments.insert(arguments.end(), {"--prior", parameters_.prior});
+    code = runTool({"explain", "the cause of the disagreement"}, arguments, log,
+                   [&] { return cancel_ || ros::WallTime::now() > end; });
   } catch (const Error& error) {
     throw Failure{Result::EXPLAIN_FAILED, error.what()};
   }

@@ -15,7 +15,7 @@
 #include "smartmill_core/units.h"
 #include "smartmill_ros/conversions.h"
 #include "smartmill_ros/follower.h"
-#include "smartmill_ros/parameter_reader.h"
+#include "smartmill_ros/parameter_server.h"
 
 namespace smartmill::session {
 namespace {
@@ -52,7 +52,7 @@ std::string pointText(const Point& point) {
 Session::Session(ros::NodeHandle nh, const ros::NodeHandle& private_nh, const std::atomic<bool>& stop)
     : nh_(std::move(nh)),
       stop_(stop),
-      parameters_(ParameterReader::fromServer(private_nh).readAll<SessionParameters>()),
+      parameters_(parametersFromServer(private_nh).readAll<SessionParameters>()),
       model_(readMachineModel(parameters_.model)),
       plan_(model_, parameters_.plan),
       begin_(ros::WallTime::now()),

@@ -7,13 +7,13 @@
 #include "session/child.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/effect_catalogue.h"
+#include "smartmill_core/testing/shipped_parameters.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_core/units.h"
 #include "smartmill_launch/discovery/discovery_parameters.h"
 #include "smartmill_launch/discovery/discovery_report.h"
 #include "smartmill_launch/discovery/explained.h"
 #include "smartmill_launch/discovery/model_place.h"
-#include "smartmill_ros/testing/shipped_parameters.h"
 
 namespace smartmill::discovery {
 namespace {

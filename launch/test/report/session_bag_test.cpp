@@ -126,7 +126,7 @@ TEST_F(SessionBag, MeasuredAndTrueValuesAreKeptApart) {
   ASSERT_TRUE(recording.coefficients && recording.true_coefficients && recording.chart);
   EXPECT_DOUBLE_EQ(recording.coefficients->value.ktc, 8e8);
   EXPECT_DOUBLE_EQ(recording.true_coefficients->value.ktc, 8.1e8);
-  const Report report = makeReport(recording, std::nullopt, {});
+  const Report report = makeReport(recording, {});
   EXPECT_NEAR(report.sections.at(0).figures.at(0).percent(), -100.0 / 81.0, 1e-9);
   EXPECT_NEAR(recording.duration, 2.2, 1e-6);
 }

@@ -1,6 +1,8 @@
 #include "smartmill_launch/report/session_report.h"
 
 #include <cmath>
+#include <string>
+#include <string_view>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -97,17 +99,17 @@ SessionRecording example() {
   return recording;
 }
 
-const Figure& figure(const Report& report, const std::string& name) {
+const Figure& figure(const Report& report, std::string_view name) {
   for (const Section& section : report.sections) {
     for (const Figure& f : section.figures) {
       if (f.name == name) return f;
     }
   }
-  throw Error("no figure " + name);
+  throw Error("no figure " + std::string(name));
 }
 
 TEST(SessionReport, FiguresStandBesideTheTruth) {
-  const Report report = makeReport(example(), std::nullopt, {1.9e-3, 1.9e-3, NOT_A_NUMBER});
+  const Report report = makeReport(example(), {{}, {1.9e-3, 1.9e-3, NOT_A_NUMBER}, {}});
   const Figure& ktc = figure(report, "Ktc");
   EXPECT_NEAR(ktc.percent(), -1.0, 1e-9);
   EXPECT_NEAR(ktc.sigmas(), -2.0, 1e-9);
@@ -125,7 +127,7 @@ TEST(SessionReport, FiguresStandBesideTheTruth) {
 
 TEST(SessionReport, CutsAreHeldAgainstTheChart) {
   SessionRecording recording = example();
-  Report report = makeReport(recording, std::nullopt, {});
+  Report report = makeReport(recording, {});
   ASSERT_EQ(report.cuts.size(), 2u);
   EXPECT_EQ(report.cuts[0].due, CutVerdict::Kind::stable);
   EXPECT_EQ(report.cuts[1].due, CutVerdict::Kind::chatter);
@@ -133,7 +135,7 @@ TEST(SessionReport, CutsAreHeldAgainstTheChart) {
   EXPECT_LT(report.cuts[0].nonperiodic, 1e-3);
   EXPECT_GT(report.cuts[1].nonperiodic, 0.9);  // a line far from every harmonic
   recording.cuts[0].windows = recording.cuts[1].windows;
-  report = makeReport(recording, std::nullopt, {});
+  report = makeReport(recording, {});
   EXPECT_FALSE(report.cuts[0].met());
   EXPECT_EQ(report.met() + 1, report.targets());
 }
@@ -151,7 +153,7 @@ TEST(SessionReport, OnlySettledSamplesAreJudged) {
 TEST(SessionReport, AModeThatWasNotFoundIsAMiss) {
   SessionRecording recording = example();
   recording.true_modes[0].model.modes.push_back(modesOf("x", 3000.0, 40e6, 0.0).model.modes[0]);
-  const Report report = makeReport(recording, std::nullopt, {});
+  const Report report = makeReport(recording, {});
   EXPECT_FALSE(*figure(report, "x mode not found frequency").met());
 }
 
@@ -160,15 +162,37 @@ TEST(SessionReport, WithoutTruthItTellsWhatItHas) {
   recording.true_modes.clear();
   recording.true_coefficients.reset();
   for (RecordedCut& c : recording.cuts) c.truth = ForceTrack();
-  const Report report = makeReport(recording, std::nullopt, {});
+  const Report report = makeReport(recording, {});
   EXPECT_EQ(report.targets(), 2u);  // the cuts hold against the machine's own chart
   EXPECT_TRUE(std::isnan(figure(report, "Ktc").truth));
   EXPECT_NE(markdown(report).find("Ktc"), std::string::npos);
   EXPECT_NE(markdown(report).find("2 of 2 targets met"), std::string::npos);
 }
 
+TEST(SessionReport, ATrueLimitThatWasNotComputedLeavesItsTargetsUnchecked) {
+  SessionRecording recording = example();
+  // A pocket at 6000 rpm, four times as deep as the valleys.
+  recording.chart->limit = {};
+  for (int i = 0; i <= 20; ++i) {
+    recording.chart->limit.spindle_speed.push_back(units::radPerSecFromRpm(5000.0 + 100.0 * i));
+    recording.chart->limit.depth.push_back(std::abs(i - 10) < 3 ? 4e-3 : 1e-3);
+    recording.chart->limit.chatter_frequency.push_back(1000.0);
+  }
+  const std::size_t without_pocket = makeReport(recording, {}).targets();
+  const Report report = makeReport(recording, {{}, {}, "smartmill lobes: program not found"});
+  EXPECT_TRUE(figure(report, "pocket 1").unchecked);
+  EXPECT_EQ(report.targets(), without_pocket + 1);
+  EXPECT_LT(report.met(), report.targets());
+  EXPECT_NE(markdown(report).find("NOT CHECKED: smartmill lobes: program not found"), std::string::npos);
+  EXPECT_NE(markdown(report).find("| NOT CHECKED |"), std::string::npos);
+  const auto parsed = nlohmann::json::parse(json(report, ""));
+  for (const auto& f : parsed["figures"]) {
+    if (f["quantity"] == "pocket 1") EXPECT_TRUE(f["met"].is_null());
+  }
+}
+
 TEST(SessionReport, SummaryForPrograms) {
-  const Report report = makeReport(example(), std::nullopt, {});
+  const Report report = makeReport(example(), {});
   const auto parsed = nlohmann::json::parse(json(report, R"({"tool": "end_mill"})"));
   EXPECT_EQ(parsed["session"]["tool"], "end_mill");
   EXPECT_EQ(parsed["targets"], parsed["targets_met"]);

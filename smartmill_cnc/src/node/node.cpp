@@ -9,15 +9,15 @@
 #include <utility>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/frames.h"
 #include "smartmill_core/names.h"
 #include "smartmill_msgs/CncAlarms.h"
 #include "smartmill_msgs/CncState.h"
 #include "smartmill_msgs/CuttingCondition.h"
 #include "smartmill_msgs/LoadSample.h"
 #include "smartmill_ros/conversions.h"
-#include "smartmill_ros/frames.h"
 #include "smartmill_ros/node_main.h"
-#include "smartmill_ros/parameter_reader.h"
+#include "smartmill_ros/parameter_server.h"
 #include "smartmill_ros/run_node.h"
 
 namespace smartmill::cnc {
@@ -67,7 +67,7 @@ std::string conditionFault(const smartmill_msgs::CuttingCondition& c) {
 }  // namespace
 
 CncNode::CncNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
-    : parameters_(ParameterReader::fromServer(private_nh).readAll<NodeParameters>().completed()),
+    : parameters_(parametersFromServer(private_nh).readAll<NodeParameters>().completed()),
       stream_(makeStream(parameters_)),
       bridge_(makeController(parameters_, stream_), parameters_.reconnect_period, parameters_.motion),
       shell_(nh, private_nh, bridge_.controllerName(), 1.0),

@@ -6,7 +6,7 @@
 
 #include "node/parameters.h"
 #include "smartmill_core/error.h"
-#include "smartmill_ros/testing/shipped_parameters.h"
+#include "smartmill_core/testing/shipped_parameters.h"
 
 namespace smartmill::cnc {
 namespace {

@@ -5,10 +5,10 @@
 
 #include "node/wiring.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/frames.h"
 #include "smartmill_core/names.h"
-#include "smartmill_ros/frames.h"
 #include "smartmill_ros/node_main.h"
-#include "smartmill_ros/parameter_reader.h"
+#include "smartmill_ros/parameter_server.h"
 #include "smartmill_ros/run_node.h"
 
 namespace smartmill::discrepancy {
@@ -17,7 +17,7 @@ namespace {
 constexpr double INPUT_TIMEOUT = 1.0;  // [s]
 
 MonitorParameters read(const ros::NodeHandle& private_nh) {
-  MonitorParameters parameters = ParameterReader::fromServer(private_nh).readAll<MonitorParameters>();
+  MonitorParameters parameters = parametersFromServer(private_nh).readAll<MonitorParameters>();
   if (parameters.model.empty()) throw Error("model: the path of a smartmill-model/1 file is due");
   return parameters;
 }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <random>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -20,7 +21,7 @@
 namespace smartmill::discrepancy {
 namespace {
 
-const Hypothesis& effectOf(const std::vector<Hypothesis>& hypotheses, const std::string& effect) {
+const Hypothesis& effectOf(const std::vector<Hypothesis>& hypotheses, std::string_view effect) {
   return *std::find_if(hypotheses.begin(), hypotheses.end(),
                        [&](const Hypothesis& h) { return h.effect == effect; });
 }

@@ -141,6 +141,8 @@ std::string responseOf(const Record& record) {
   return found;
 }
 
+}  // namespace
+
 TapRecord tapOf(const Record& record, const ChannelNames& channels) {
   const std::string response = channels.response.empty() ? responseOf(record) : channels.response;
   TapRecord tap;
@@ -148,12 +150,15 @@ TapRecord tapOf(const Record& record, const ChannelNames& channels) {
   tap.hit.force = record.column(channels.force.empty() ? "hammer" : channels.force);
   tap.hit.response = record.column(response);
   tap.kind = response == "acceleration"    ? ResponseKind::acceleration
+             : response == "velocity"      ? ResponseKind::velocity
              : response.rfind('f', 0) == 0 ? ResponseKind::force
                                            : ResponseKind::displacement;
   tap.hit.sample_rate = sampleRate(record.time, record.file);
   tap.hit.pre_trigger = onset(tap.hit.force);
   return tap;
 }
+
+namespace {
 
 /// Channels by name where they are given, otherwise: the hammer's is named so, the response is the first
 /// other of a known unit.
@@ -364,7 +369,7 @@ TapFormat detectFormat(const std::string& file) {
   if (!stream) throw Error(file + ": cannot be read");
   std::string first;
   std::getline(stream, first);
-  if (first.rfind("#ROSBAG ", 0) == 0) return TapFormat::bag;
+  if (first.rfind("#ROSBAG ", 0) == 0 || first.rfind("\x89MCAP", 0) == 0) return TapFormat::bag;
   if (first.rfind("DynoWare", 0) == 0) return TapFormat::dynoware;
   if (isUff(file)) return TapFormat::uff;
   if (isSoundFile(file)) return TapFormat::sound;

@@ -11,7 +11,7 @@
 #include "smartmill_core/names.h"
 #include "smartmill_core/signal/streams.h"
 #include "smartmill_ros/node_main.h"
-#include "smartmill_ros/parameter_reader.h"
+#include "smartmill_ros/parameter_server.h"
 #include "smartmill_ros/run_node.h"
 #include "wiring.h"
 
@@ -22,7 +22,7 @@ namespace {
 constexpr double WATCH_PERIOD = 0.01;  // [s]
 
 NodeParameters read(const ros::NodeHandle& private_nh) {
-  NodeParameters parameters = ParameterReader::fromServer(private_nh).readAll<NodeParameters>();
+  NodeParameters parameters = parametersFromServer(private_nh).readAll<NodeParameters>();
   if (parameters.model.empty()) throw Error("model: the path of a smartmill-model/1 file is due");
   return parameters;
 }

@@ -1,8 +1,8 @@
 #pragma once
 
 #include "smartmill_core/names.h"
+#include "smartmill_core/signal/feed.h"
 #include "smartmill_hammer/analysis/idle_spindle.h"
-#include "smartmill_ros/feed.h"
 
 namespace smartmill {
 namespace hammer {
@@ -10,17 +10,17 @@ namespace hammer {
 /// The streams of a measurement, from a node's inputs or from a bag.
 template <class Source, class Sorted>
 void connect(Source& source, Sorted& sorted) {
-  feed<smartmill_msgs::SampleBlock>(source, names::HAMMER, sorted);
-  feed<smartmill_msgs::CncState>(source, names::CNC_STATE, sorted);
-  feed<smartmill_msgs::SpindleAngle>(source, names::SPINDLE_ANGLE, sorted);
+  feed<SampleBlock>(source, names::HAMMER, sorted);
+  feed<CncState>(source, names::CNC_STATE, sorted);
+  feed<SpindleAngle>(source, names::SPINDLE_ANGLE, sorted);
 }
 
 /// What the spindle shows in air, beside its angle.
 template <class Source>
 void connectIdle(Source& source, SortedIdle& idle) {
-  feed<smartmill_msgs::SampleBlock>(source, names::DYNAMOMETER, idle);
-  feed<smartmill_msgs::CuttingCondition>(source, names::CUTTING_CONDITION, idle);
-  feed<smartmill_msgs::LoadSample>(source, names::CNC_LOAD, idle);
+  feed<SampleBlock>(source, names::DYNAMOMETER, idle);
+  feed<CuttingCondition>(source, names::CUTTING_CONDITION, idle);
+  feed<LoadSample>(source, names::CNC_LOAD, idle);
 }
 
 }  // namespace hammer

@@ -22,8 +22,8 @@
 #include <smartmill_msgs/SpindleAngle.h>
 #include <smartmill_msgs/SpindleHealth.h>
 
-#include "../../src/node/bag_replay.h"
 #include "../closed_form_machine.h"
+#include "recordings/bag_replay.h"
 #include "smartmill_core/names.h"
 
 namespace smartmill {

@@ -1,6 +1,6 @@
 #include "../../src/node/parameters.h"
 
-#include "smartmill_ros/testing/shipped_parameters.h"
+#include "smartmill_core/testing/shipped_parameters.h"
 
 namespace smartmill {
 namespace hammer {

@@ -52,7 +52,7 @@ double LowPass::step(double sample) {
 
 std::vector<double> zeroPhaseLowPass(const std::vector<double>& signal, double corner, double sample_rate) {
   LowPass filter(corner, sample_rate);
-  if (signal.size() < 2) return signal;
+  if (signal.empty()) return {};
   const auto ring = static_cast<std::size_t>(3.0 * sample_rate / corner);  // its memory
   const std::size_t margin = std::min(signal.size() - 1, ring);
   std::vector<double> longer;

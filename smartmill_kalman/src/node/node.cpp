@@ -9,10 +9,10 @@
 #include "node/rotation.h"
 #include "node/wiring.h"
 #include "smartmill_core/error.h"
+#include "smartmill_core/frames.h"
 #include "smartmill_core/model/machine_model.h"
-#include "smartmill_ros/frames.h"
 #include "smartmill_ros/node_main.h"
-#include "smartmill_ros/parameter_reader.h"
+#include "smartmill_ros/parameter_server.h"
 #include "smartmill_ros/run_node.h"
 
 namespace smartmill::kalman {
@@ -32,7 +32,7 @@ ForceSensor sensorOf(const NodeParameters& parameters) {
 }  // namespace
 
 KalmanNode::KalmanNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
-    : parameters_(ParameterReader::fromServer(private_nh).readAll<NodeParameters>()),
+    : parameters_(parametersFromServer(private_nh).readAll<NodeParameters>()),
       listener_(transforms_),
       shell_(nh, private_nh, "force sensor", parameters_.input_timeout),
       measured_(nh.advertise<smartmill_msgs::ForceBlock>(names::FORCE_MEASURED, STREAM_QUEUE)),
@@ -90,9 +90,9 @@ void KalmanNode::listen() {
       });
   inputs.setWaiting(parameters_.force_input, [this] { return waiting_.size(); });
   connect(inputs, sorted_);
-  feed<smartmill_msgs::CuttingCondition>(inputs, names::CUTTING_CONDITION, sorted_);
+  feed<CuttingCondition>(inputs, names::CUTTING_CONDITION, sorted_);
   // A recording that began after the taps holds the modes that served in it.
-  if (!parameters_.command_machine) feed<smartmill_msgs::ModalModel>(inputs, names::TOOL_MODES, sorted_);
+  if (!parameters_.command_machine) feed<MeasuredModes>(inputs, names::TOOL_MODES, sorted_);
 }
 
 // The sensor is bolted to its table: its rotation is asked for once. Until it is known results wait, for

@@ -3,7 +3,7 @@
 #include <array>
 #include <vector>
 
-#include "smartmill_ros/frames.h"
+#include "smartmill_core/frames.h"
 
 namespace smartmill::kalman {
 

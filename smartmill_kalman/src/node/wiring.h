@@ -1,23 +1,20 @@
 #pragma once
 
-#include <smartmill_msgs/SampleBlock.h>
-
 #include "node/parameters.h"
 #include "smartmill_core/names.h"
+#include "smartmill_core/signal/feed.h"
 #include "smartmill_kalman/compensation/sorted_compensation.h"
 #include "smartmill_kalman/sensor/spindle_sensor_calibration.h"
 #include "smartmill_kalman/sensor/tap_file.h"
-#include "smartmill_ros/feed.h"
 
 namespace smartmill::kalman {
 
 /// The streams beside the sensor's own blocks, from a node's inputs or from a bag.
 template <class Source>
 void connect(Source& source, SortedCompensation& sorted) {
-  source.template on<smartmill_msgs::SampleBlock>(
-      names::HAMMER,
-      [&sorted](const smartmill_msgs::SampleBlock& m, double) { sorted.pushHammer(fromMsg(m)); });
-  feed<smartmill_msgs::SpindleAngle>(source, names::SPINDLE_ANGLE, sorted);
+  source.template on<SampleBlock>(names::HAMMER,
+                                  [&sorted](const SampleBlock& block, double) { sorted.pushHammer(block); });
+  feed<SpindleAngle>(source, names::SPINDLE_ANGLE, sorted);
 }
 
 /// What the parameters say of the sensor beyond its modes. @throws Error on a bad file.

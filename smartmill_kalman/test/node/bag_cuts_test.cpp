@@ -1,4 +1,4 @@
-#include "node/bag_cuts.h"
+#include "recordings/bag_cuts.h"
 
 #include <cmath>
 #include <complex>

@@ -27,13 +27,13 @@
 #include <tf2_msgs/TFMessage.h>
 #include <topic_tools/shape_shifter.h>
 
-#include "node/bag_compensation.h"
+#include "recordings/bag_compensation.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/names.h"
 #include "smartmill_core/units.h"
 #include "smartmill_ros/follower.h"
-#include "smartmill_ros/parameter_reader.h"
+#include "smartmill_ros/parameter_server.h"
 
 namespace smartmill::kalman {
 namespace {
@@ -199,7 +199,7 @@ TEST_F(MeasureFrf, TapsThenCutsAndReplaysToTheLastDigit) {
   // Offline, from the bag.
   // With the live node's own parameters.
   const auto parameters =
-      ParameterReader::fromServer(ros::NodeHandle("/smartmill/kalman")).readAll<NodeParameters>();
+      parametersFromServer(ros::NodeHandle("/smartmill/kalman")).readAll<NodeParameters>();
   std::vector<BagCut> cuts;
   const BagSummary summary = compensateBag(file, ForceSensor(), parameters, Method::kalman,
                                            [&](BagCut&& c) { cuts.push_back(std::move(c)); });

@@ -13,6 +13,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/model/machine_model.h"
+#include "smartmill_core/version.h"
 
 namespace smartmill::loadmeter {
 
@@ -91,7 +92,7 @@ template <typename Record>
 std::vector<Row> rowsOf(const std::string& file, const std::vector<Record>& records) {
   std::vector<Row> rows;
   for (Record record : records) {
-    if (record.version.empty()) record.version = SMARTMILL_VERSION;
+    if (record.version.empty()) record.version = smartmill::version();
     try {
       rows.push_back(rowOf(record));
     } catch (const Error& error) {

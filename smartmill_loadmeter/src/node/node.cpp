@@ -6,13 +6,12 @@
 #include "node/fleet_message.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
+#include "smartmill_core/frames.h"
 #include "smartmill_core/names.h"
 #include "smartmill_core/units.h"
 #include "smartmill_loadmeter/database/recommend.h"
-#include "smartmill_ros/force_curve_message.h"
-#include "smartmill_ros/frames.h"
 #include "smartmill_ros/node_main.h"
-#include "smartmill_ros/parameter_reader.h"
+#include "smartmill_ros/parameter_server.h"
 #include "smartmill_ros/run_node.h"
 
 namespace smartmill::loadmeter {
@@ -29,7 +28,7 @@ MachineModel modelOf(const NodeParameters& parameters) {
 }  // namespace
 
 LoadMeterNode::LoadMeterNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
-    : parameters_(ParameterReader::fromServer(private_nh).readAll<NodeParameters>()),
+    : parameters_(parametersFromServer(private_nh).readAll<NodeParameters>()),
       shell_(nh, private_nh, "spindle load meter", parameters_.input_timeout),
       identification_(modelOf(parameters_), parameters_.identification, parameters_.hold_back),
       curves_(parameters_.curve, parameters_.hold_back),

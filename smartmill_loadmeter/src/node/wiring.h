@@ -2,9 +2,9 @@
 
 #include "node/parameters.h"
 #include "smartmill_core/names.h"
+#include "smartmill_core/signal/feed.h"
 #include "smartmill_loadmeter/identification/curve_finder.h"
 #include "smartmill_loadmeter/identification/sorted_identification.h"
-#include "smartmill_ros/feed.h"
 
 namespace smartmill::loadmeter {
 
@@ -38,30 +38,29 @@ struct CutStreams {
 /// @param sorted a SortedIdentification, or what stands before it
 template <class Source, class Sorted>
 void connect(Source& source, const NodeParameters& parameters, Sorted& sorted) {
-  feed<smartmill_msgs::CncState>(source, names::CNC_STATE, sorted);
-  feed<smartmill_msgs::LoadSample>(source, names::CNC_LOAD, sorted);
-  feed<smartmill_msgs::CuttingCondition>(source, names::CUTTING_CONDITION, sorted);
+  feed<CncState>(source, names::CNC_STATE, sorted);
+  feed<LoadSample>(source, names::CNC_LOAD, sorted);
+  feed<CuttingCondition>(source, names::CUTTING_CONDITION, sorted);
   if (parameters.readsMotors())
-    feed<smartmill_msgs::SampleBlock>(
-        source, parameters.motor_servo ? names::daq("servo") : names::MOTOR_CURRENT, sorted);
-  if (parameters.force_sensor) feed<smartmill_msgs::ForceBlock>(source, names::FORCE_COMPENSATED, sorted);
+    feed<SampleBlock>(source, parameters.motor_servo ? names::daq("servo") : names::MOTOR_CURRENT, sorted);
+  if (parameters.force_sensor) feed<ForceBlock>(source, names::FORCE_COMPENSATED, sorted);
 }
 
 /// What force curves need besides.
 template <class Source>
 void connectCurves(Source& source, const NodeParameters& parameters, CutStreams& streams) {
   if (!parameters.force_curve) return;
-  feed<smartmill_msgs::SpindleAngle>(source, names::SPINDLE_ANGLE, streams);
-  if (!parameters.force_sensor) feed<smartmill_msgs::ForceBlock>(source, names::FORCE_COMPENSATED, streams);
+  feed<SpindleAngle>(source, names::SPINDLE_ANGLE, streams);
+  if (!parameters.force_sensor) feed<ForceBlock>(source, names::FORCE_COMPENSATED, streams);
 }
 
 /// The streams of force curves alone.
 template <class Source>
 void connectCurves(Source& source, SortedCurves& curves) {
-  feed<smartmill_msgs::CncState>(source, names::CNC_STATE, curves);
-  feed<smartmill_msgs::SpindleAngle>(source, names::SPINDLE_ANGLE, curves);
-  feed<smartmill_msgs::CuttingCondition>(source, names::CUTTING_CONDITION, curves);
-  feed<smartmill_msgs::ForceBlock>(source, names::FORCE_COMPENSATED, curves);
+  feed<CncState>(source, names::CNC_STATE, curves);
+  feed<SpindleAngle>(source, names::SPINDLE_ANGLE, curves);
+  feed<CuttingCondition>(source, names::CUTTING_CONDITION, curves);
+  feed<ForceBlock>(source, names::FORCE_COMPENSATED, curves);
 }
 
 }  // namespace smartmill::loadmeter

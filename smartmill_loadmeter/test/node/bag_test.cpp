@@ -7,15 +7,14 @@
 #include <gtest/gtest.h>
 #include <rosbag/bag.h>
 
-#include "../../src/node/bag_identification.h"
 #include "../curve_shop.h"
 #include "../session.h"
+#include "recordings/bag_identification.h"
 #include "smartmill_core/names.h"
+#include "smartmill_core/testing/shipped_parameters.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_msgs/IdentifyCoefficientsActionGoal.h"
 #include "smartmill_ros/conversions.h"
-#include "smartmill_ros/force_curve_message.h"
-#include "smartmill_ros/testing/shipped_parameters.h"
 
 namespace smartmill::loadmeter {
 namespace {

@@ -3,6 +3,7 @@
 #include <signal.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -13,12 +14,22 @@ namespace smartmill::loadmeter {
 
 namespace {
 
-const std::string PROGRAMS = "/usr/lib/postgresql/15/bin/";
+/// Folder of the newest PostgreSQL installed, with a slash at its end; empty without one.
+std::string programs() {
+  const std::filesystem::path root = "/usr/lib/postgresql";
+  int newest = 0;
+  std::error_code absent;
+  for (const auto& entry : std::filesystem::directory_iterator(root, absent)) {
+    const int version = std::atoi(entry.path().filename().c_str());
+    if (access((entry.path() / "bin/pg_ctl").c_str(), X_OK) == 0) newest = std::max(newest, version);
+  }
+  return newest == 0 ? "" : (root / std::to_string(newest) / "bin/").string();
+}
 
 }  // namespace
 
 bool PrivateServer::available() {
-  return access((PROGRAMS + "pg_ctl").c_str(), X_OK) == 0;
+  return !programs().empty();
 }
 
 PrivateServer::PrivateServer(bool durable, const std::string& folder)
@@ -47,7 +58,7 @@ PrivateServer::~PrivateServer() {
 
 int PrivateServer::execute(const std::string& command) const {
   const std::string as = getuid() == 0 ? "runuser -u postgres -- " : "";
-  return std::system(("cd " + folder_ + " && " + as + PROGRAMS + command + " > /dev/null 2>&1").c_str());
+  return std::system(("cd " + folder_ + " && " + as + programs() + command + " > /dev/null 2>&1").c_str());
 }
 
 std::string PrivateServer::url(const std::string& login, const std::string& password,

@@ -13,7 +13,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/names.h"
 #include "smartmill_ros/node_main.h"
-#include "smartmill_ros/parameter_reader.h"
+#include "smartmill_ros/parameter_server.h"
 #include "smartmill_ros/run_node.h"
 
 namespace smartmill::panel {
@@ -27,7 +27,7 @@ constexpr const char* PLACE = "panel_at";  // parameter that tells where a panel
 using StripMessage = smartmill_msgs::ForceStrip;
 
 PanelParameters read(const ros::NodeHandle& private_nh) {
-  PanelParameters parameters = ParameterReader::fromServer(private_nh).readAll<PanelParameters>();
+  PanelParameters parameters = parametersFromServer(private_nh).readAll<PanelParameters>();
   if (parameters.page.empty()) throw Error("page: the folder of the page is due");
   return parameters;
 }

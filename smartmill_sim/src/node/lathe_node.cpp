@@ -14,7 +14,7 @@
 #include "smartmill_ros/conversions.h"
 #include "smartmill_ros/node_main.h"
 #include "smartmill_ros/node_shell.h"
-#include "smartmill_ros/parameter_reader.h"
+#include "smartmill_ros/parameter_server.h"
 #include "smartmill_ros/run_node.h"
 #include "smartmill_sim/turning/lathe.h"
 
@@ -29,7 +29,7 @@ class LatheNode {
   using Parameters = LatheParameters;
   /// @throws Error on bad parameters.
   LatheNode(ros::NodeHandle nh, const ros::NodeHandle& private_nh)
-      : parameters_(ParameterReader::fromServer(private_nh).readAll<LatheParameters>()),
+      : parameters_(parametersFromServer(private_nh).readAll<LatheParameters>()),
         lathe_(parameters_.lathe),
         displacement_(nh.advertise<smartmill_msgs::SampleBlock>(names::DISPLACEMENT, STREAM_QUEUE)),
         vibration_(nh.advertise<smartmill_msgs::SampleBlock>(names::daq("vibration"), STREAM_QUEUE)),

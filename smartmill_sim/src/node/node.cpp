@@ -11,12 +11,12 @@
 #include <smartmill_msgs/SpindleAngle.h>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/frames.h"
 #include "smartmill_core/modal/results.h"
 #include "smartmill_core/names.h"
 #include "smartmill_ros/conversions.h"
-#include "smartmill_ros/frames.h"
 #include "smartmill_ros/node_main.h"
-#include "smartmill_ros/parameter_reader.h"
+#include "smartmill_ros/parameter_server.h"
 #include "smartmill_ros/run_node.h"
 
 namespace smartmill::sim {
@@ -28,7 +28,7 @@ constexpr double LOOK_AGAIN = 2e-3;  // [s]
 constexpr double MOST_WAIT = 0.8;    // [1] of most_behind, for where the axes are led
 
 NodeParameters read(const ros::NodeHandle& private_nh) {
-  NodeParameters parameters = ParameterReader::fromServer(private_nh).readAll<NodeParameters>();
+  NodeParameters parameters = parametersFromServer(private_nh).readAll<NodeParameters>();
   if (parameters.model.empty()) throw Error("model: the path of a smartmill-model/1 file is due");
   if (ros::Time::isSimTime())
     throw Error("/use_sim_time is set: the simulated machine runs by the real clock");

@@ -6,14 +6,14 @@
 namespace smartmill::stability {
 
 void CutRequest::addTo(CommandLine& line, const std::string& form) {
-  line.option("model", model, "machine model file with tool, cutting and tool_tip").required();
+  line.option("MODEL", model, "machine model file with tool, cutting and tool_tip").required();
   line.option("--entry-deg", entry_deg, "immersion angle at which a tooth enters [deg]").required();
   line.option("--exit-deg", exit_deg, "immersion angle at which a tooth leaves [deg]").required();
   line.option("--speeds", speeds, form + " [rpm]").required();
 }
 
 void CutRequest::addOutTo(CommandLine& line, const std::string& what) {
-  line.option("-o,--out", out, "CSV file; " + what + " of the same name with .png stands beside it")
+  line.option("-o,--out", out, "CSV file; " + what + " of the same name with .png is drawn")
       .required();
 }
 

@@ -9,7 +9,7 @@
 #include "smartmill_core/names.h"
 #include "smartmill_core/units.h"
 #include "smartmill_ros/node_main.h"
-#include "smartmill_ros/parameter_reader.h"
+#include "smartmill_ros/parameter_server.h"
 #include "smartmill_ros/run_node.h"
 
 namespace smartmill::stability {
@@ -21,7 +21,7 @@ constexpr double INPUT_TIMEOUT = 1.0;  // [s]
 
 ControlNode::ControlNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
     : shell_(nh, private_nh, "none", INPUT_TIMEOUT),
-      stream_(ParameterReader::fromServer(private_nh).readAll<ControlStreamParameters>(),
+      stream_(parametersFromServer(private_nh).readAll<ControlStreamParameters>(),
               [this](const LearntMachine& learnt) { publish(learnt); }),
       command_(nh.advertise<smartmill_msgs::SampleBlock>(names::CONTROL_COMMAND, STREAM_QUEUE)),
       machine_(nh.advertise<smartmill_msgs::ModalModel>(names::CONTROL_MACHINE, 10, true)) {

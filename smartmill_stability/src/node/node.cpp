@@ -13,7 +13,7 @@
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/names.h"
 #include "smartmill_ros/node_main.h"
-#include "smartmill_ros/parameter_reader.h"
+#include "smartmill_ros/parameter_server.h"
 #include "smartmill_ros/run_node.h"
 
 namespace smartmill::stability {
@@ -23,7 +23,7 @@ constexpr double WATCH_PERIOD = 0.2;      // [s]
 constexpr double OVERRIDE_PERIOD = 0.02;  // [s]
 
 NodeParameters read(const ros::NodeHandle& private_nh) {
-  NodeParameters parameters = ParameterReader::fromServer(private_nh).readAll<NodeParameters>();
+  NodeParameters parameters = parametersFromServer(private_nh).readAll<NodeParameters>();
   if (parameters.model.empty()) throw Error("model: the path of a smartmill-model/1 file is due");
   return parameters;
 }

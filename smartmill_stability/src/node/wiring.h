@@ -1,9 +1,11 @@
 #pragma once
 
 #include "node/parameters.h"
+#include "smartmill_core/cutting/coefficient_set.h"
+#include "smartmill_core/cutting/force_curve.h"
+#include "smartmill_core/modal/results.h"
 #include "smartmill_core/names.h"
-#include "smartmill_ros/feed.h"
-#include "smartmill_ros/force_curve_message.h"
+#include "smartmill_core/signal/feed.h"
 
 namespace smartmill::stability {
 
@@ -11,26 +13,25 @@ namespace smartmill::stability {
 /// @param detection a SortedDetection, or what stands before it
 template <class Source, class Detection>
 void connect(Source& source, const NodeParameters& parameters, Detection& detection) {
-  feed<smartmill_msgs::CncState>(source, names::CNC_STATE, detection);
-  feed<smartmill_msgs::SpindleAngle>(source, names::SPINDLE_ANGLE, detection);
+  feed<CncState>(source, names::CNC_STATE, detection);
+  feed<SpindleAngle>(source, names::SPINDLE_ANGLE, detection);
   if (parameters.chatter_signal == "force") {
-    feed<smartmill_msgs::ForceBlock>(source, names::FORCE_COMPENSATED, detection);
+    feed<ForceBlock>(source, names::FORCE_COMPENSATED, detection);
   } else {
-    feed<smartmill_msgs::SampleBlock>(source, names::daq(parameters.chatter_signal), detection);
+    feed<SampleBlock>(source, names::daq(parameters.chatter_signal), detection);
   }
 }
 
 /// What a chart is made of. @param use gets it as its core type
 template <class Source, class Use>
 void connectMeasured(Source& source, Use use) {
-  const auto on = [&](const char* topic, auto message) {
-    using Message = decltype(message);
-    source.template on<Message>(topic, [use](const Message& m, double) { use(fromMsg(m)); });
-  };
-  on(names::TOOL_FRF, smartmill_msgs::Frf());
-  on(names::TOOL_MODES, smartmill_msgs::ModalModel());
-  on(names::COEFFICIENTS, smartmill_msgs::CuttingCoefficients());
-  on(names::FORCE_CURVE, smartmill_msgs::ForceCurve());
+  source.template on<MeasuredFrf>(names::TOOL_FRF, [use](const MeasuredFrf& frf, double) { use(frf); });
+  source.template on<MeasuredModes>(names::TOOL_MODES,
+                                    [use](const MeasuredModes& modes, double) { use(modes); });
+  source.template on<CoefficientSet>(names::COEFFICIENTS,
+                                     [use](const CoefficientSet& set, double) { use(set); });
+  source.template on<FoundCurves>(names::FORCE_CURVE,
+                                  [use](const FoundCurves& curves, double) { use(curves); });
 }
 
 }  // namespace smartmill::stability

@@ -6,12 +6,11 @@
 #include <gtest/gtest.h>
 #include <rosbag/bag.h>
 
-#include "node/bag_charts.h"
+#include "recordings/bag_charts.h"
 #include "smartmill_core/names.h"
+#include "smartmill_core/testing/shipped_parameters.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_ros/conversions.h"
-#include "smartmill_ros/force_curve_message.h"
-#include "smartmill_ros/testing/shipped_parameters.h"
 #include "smartmill_stability/control/control_stream.h"
 #include "smartmill_stability_testing/benchmark.h"
 #include "smartmill_stability_testing/cutting_scene.h"

@@ -2,21 +2,20 @@
 
 #include "fuzz/input_file.h"
 #include "fuzz/targets.h"
-#include "smartmill_ros/bag_reader.h"
-#include "smartmill_ros/conversions.h"
+#include "smartmill_recording/recording_reader.h"
 
 namespace smartmill::fuzz {
 namespace {
 
-template <class Message>
-void hear(BagReader& reader, const char* topic) {
-  reader.on<Message>(topic, [](const Message& message, double) { told([&] { fromMsg(message); }); });
+template <class Data>
+void hear(RecordingReader& reader, const char* topic) {
+  reader.on<Data>(topic, [](const Data&, double) {});
 }
 
 }  // namespace
 
 void bag(const std::uint8_t* data, std::size_t size) {
-  BagBytes bytes;
+  RecordingBytes bytes;
   bytes.size = size;
   bytes.read = [data](std::uint64_t at, char* to, std::size_t count) {
     if (count > 0) {
@@ -24,17 +23,17 @@ void bag(const std::uint8_t* data, std::size_t size) {
     }
   };
   told([&] {
-    BagReader reader(bytes, "fuzzed");
-    hear<smartmill_msgs::SampleBlock>(reader, names::HAMMER);
-    hear<smartmill_msgs::SpindleAngle>(reader, names::SPINDLE_ANGLE);
-    hear<smartmill_msgs::CncState>(reader, names::CNC_STATE);
-    hear<smartmill_msgs::LoadSample>(reader, names::CNC_LOAD);
-    hear<smartmill_msgs::CuttingCondition>(reader, names::CUTTING_CONDITION);
-    hear<smartmill_msgs::ForceBlock>(reader, names::FORCE_COMPENSATED);
-    hear<smartmill_msgs::Frf>(reader, names::TOOL_FRF);
-    hear<smartmill_msgs::ModalModel>(reader, names::TOOL_MODES);
-    hear<smartmill_msgs::CuttingCoefficients>(reader, names::COEFFICIENTS);
-    hear<smartmill_msgs::StabilityChart>(reader, names::STABILITY_CHART);
+    RecordingReader reader(bytes, "fuzzed");
+    hear<SampleBlock>(reader, names::HAMMER);
+    hear<SpindleAngle>(reader, names::SPINDLE_ANGLE);
+    hear<CncState>(reader, names::CNC_STATE);
+    hear<LoadSample>(reader, names::CNC_LOAD);
+    hear<CuttingCondition>(reader, names::CUTTING_CONDITION);
+    hear<ForceBlock>(reader, names::FORCE_COMPENSATED);
+    hear<MeasuredFrf>(reader, names::TOOL_FRF);
+    hear<MeasuredModes>(reader, names::TOOL_MODES);
+    hear<CoefficientSet>(reader, names::COEFFICIENTS);
+    hear<StabilityChart>(reader, names::STABILITY_CHART);
     reader.run();
     reader.duration();
   });

@@ -149,12 +149,15 @@ void run(const Options& o) {
   }
   std::printf("%zu causes, %d shops, %d machines explained in each, %d more to tell\n%-44s %6s %6s %6s %8s\n",
               causes.size(), o.shops, o.explained, o.newcomers, "", "all", "right", "wrong", "tests");
-  for (auto& [name, counts] :
-       {std::make_pair("all", &all), std::make_pair("the two most frequent causes", &frequent),
-        std::make_pair("rarer ones", &rare), std::make_pair("never met before", &unmet)}) {
-    (*counts)[Way::fleet].print((std::string(name) + ", tests by the fleet's prior").c_str());
-    (*counts)[Way::alone].print((std::string(name) + ", each cause as likely").c_str());
-    (*counts)[Way::plan].print((std::string(name) + ", in the plan's order").c_str());
+  struct Group {
+    std::string name;
+    std::map<Way, Count>& counts;
+  };
+  for (const Group& group : {Group{"all", all}, Group{"the two most frequent causes", frequent},
+                             Group{"rarer ones", rare}, Group{"never met before", unmet}}) {
+    group.counts[Way::fleet].print((group.name + ", tests by the fleet's prior").c_str());
+    group.counts[Way::alone].print((group.name + ", each cause as likely").c_str());
+    group.counts[Way::plan].print((group.name + ", in the plan's order").c_str());
   }
 }
 

@@ -1,6 +1,6 @@
 // Bags with damaged bytes: every one is read, or refused with a line that names the file; none takes memory
 // for a length that it does not have.
-#include "smartmill_ros/bag_reader.h"
+#include "smartmill_recording/recording_reader.h"
 
 #include <gtest/gtest.h>
 #include <rosbag/bag.h>
@@ -16,6 +16,7 @@
 #include <random>
 #include <vector>
 
+#include "smartmill_core/error.h"
 #include "smartmill_core/names.h"
 #include "smartmill_ros/conversions.h"
 
@@ -43,10 +44,10 @@ class DamagedBag : public ::testing::Test {
   std::string fault(const std::vector<char>& bytes) const {
     std::ofstream(file_, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
     try {
-      BagReader reader(file_);
-      reader.on<smartmill_msgs::SampleBlock>(names::DYNAMOMETER, [](const auto& m, double) { fromMsg(m); });
-      reader.on<smartmill_msgs::CncState>(names::CNC_STATE, [](const auto& m, double) { fromMsg(m); });
-      reader.on<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE, [](const auto&, double) {});
+      RecordingReader reader(file_);
+      reader.on<SampleBlock>(names::DYNAMOMETER, [](const auto&, double) {});
+      reader.on<CncState>(names::CNC_STATE, [](const auto&, double) {});
+      reader.on<SpindleAngle>(names::SPINDLE_ANGLE, [](const auto&, double) {});
       reader.run();
     } catch (const Error& e) {
       return e.what();
@@ -82,9 +83,9 @@ TEST_F(DamagedBag, PackedBagsAreReadTheSame) {
       bag.close();
     }
     // In the order of their reception, not of the file.
-    BagReader reader(file_);
+    RecordingReader reader(file_);
     std::vector<double> seen;
-    reader.on<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE, [&](const auto& m, double time) {
+    reader.on<SpindleAngle>(names::SPINDLE_ANGLE, [&](const auto& m, double time) {
       EXPECT_EQ(time, 2.0 + static_cast<double>(seen.size()) - 1.0);
       seen.push_back(m.angle);
     });

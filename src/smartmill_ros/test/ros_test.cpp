@@ -4,16 +4,17 @@
 #include <string>
 #include <vector>
 
+#include <geometry_msgs/Quaternion.h>
 #include <gtest/gtest.h>
 #include <rosbag/bag.h>
 
 #include "smartmill_core/error.h"
+#include "smartmill_core/frames.h"
 #include "smartmill_core/names.h"
+#include "smartmill_core/parameters/parameter_reader.h"
 #include "smartmill_core/testing/temporary_folder.h"
-#include "smartmill_ros/bag_reader.h"
+#include "smartmill_recording/recording_reader.h"
 #include "smartmill_ros/conversions.h"
-#include "smartmill_ros/frames.h"
-#include "smartmill_ros/parameter_reader.h"
 
 namespace smartmill {
 namespace {
@@ -177,10 +178,10 @@ TEST_F(Files, bagsAreReadInOrderAndDamagedOnesRefused) {
       bag.write(names::absolute(names::DYNAMOMETER), ros::Time(100.0 + i), m);
     }
   }
-  BagReader reader(path);
+  RecordingReader reader(path);
   std::vector<std::uint64_t> seen;
-  reader.on<smartmill_msgs::SampleBlock>(names::DYNAMOMETER, [&](const smartmill_msgs::SampleBlock& m,
-                                                                 double) { seen.push_back(m.first_index); });
+  reader.on<SampleBlock>(names::DYNAMOMETER,
+                         [&](const SampleBlock& m, double) { seen.push_back(m.first_index); });
   reader.run();
   ASSERT_EQ(seen.size(), 200u);
   EXPECT_EQ(seen.back(), 199u);
@@ -190,13 +191,13 @@ TEST_F(Files, bagsAreReadInOrderAndDamagedOnesRefused) {
 
   std::filesystem::resize_file(path, std::filesystem::file_size(path) / 2);
   const std::string message = errorOf([&] {
-    BagReader cut(path);
+    RecordingReader cut(path);
     cut.run();
   });
   EXPECT_NE(message.find("a.bag"), std::string::npos) << message;
   EXPECT_EQ(message.find('\n'), std::string::npos);
-  EXPECT_THROW(BagReader(folder_.file("none.bag")), Error);
-  EXPECT_THROW(BagReader(folder_.write("text.bag", "no bag at all")), Error);
+  EXPECT_THROW(RecordingReader(folder_.file("none.bag")), Error);
+  EXPECT_THROW(RecordingReader(folder_.write("text.bag", "no bag at all")), Error);
 }
 
 }  // namespace

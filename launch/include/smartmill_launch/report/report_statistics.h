@@ -28,6 +28,7 @@ struct Figure {
   double std_dev = NOT_A_NUMBER;  ///< NaN: not known
   double truth = NOT_A_NUMBER;    ///< NaN: not known, a real machine
   Target target;
+  bool unchecked = false;  ///< the truth exists, but was not computed
 
   double percent() const;           ///< [percent] (estimate - truth) / |truth|; NaN where not known
   double sigmas() const;            ///< [1] (estimate - truth) / std_dev; NaN where not known

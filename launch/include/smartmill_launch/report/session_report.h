@@ -54,11 +54,18 @@ struct Section {
   std::vector<Figure> figures;
 };
 
+/// Stability limit computed from the truth that a simulator has recorded.
+struct TrueStability {
+  std::optional<StabilityChart> chart;  ///< empty: no truth recorded, or not computed
+  std::vector<double> limits;           ///< [m] at the speed of each recorded cut; NaN or empty: not known
+  std::string failure;                  ///< why it was not computed although the truth is known; empty: it was
+};
+
 struct Report {
   std::vector<Section> sections;
   std::vector<CutCheck> cuts;
   std::vector<std::string> notes;
-  std::size_t targets() const;  ///< figures with a verdict, and cuts
+  std::size_t targets() const;  ///< figures with a verdict or not checked, and cuts
   std::size_t met() const;      ///< of these
 };
 
@@ -66,10 +73,7 @@ struct Report {
 /// settled. Empty (first == second) when there are none.
 std::pair<std::uint64_t, std::uint64_t> judgedSamples(const RecordedCut& cut, double settle_revolutions);
 
-/// @param true_chart limit computed from the truth; empty without truth
-/// @param true_limits [m] the same at the speed of each cut in recording.cuts; NaN or empty: not known
-Report makeReport(const SessionRecording& recording, const std::optional<StabilityChart>& true_chart,
-                  const std::vector<double>& true_limits);
+Report makeReport(const SessionRecording& recording, const TrueStability& truth);
 
 /// Tables for people, in markdown with aligned columns.
 std::string markdown(const Report& report);

@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "smartmill_core/campaign/record.h"
 #include "smartmill_core/modal/hit_judge.h"
 #include "smartmill_core/modal/impact_analysis.h"
 #include "smartmill_core/modal/modal_estimate.h"
@@ -57,6 +58,9 @@ struct TapFile {
 TapFile readTapFile(const std::string& file, TapFormat format, const ChannelNames& channels);
 TapRecord readTapCsv(const std::string& file, const ChannelNames& channels = {});
 TapRecord readTapText(const std::string& file);
+/// A hit of a record's columns: hammer and, unless the names say otherwise, displacement, acceleration or the
+/// largest force. @throws Error naming record.file and the missing column.
+TapRecord tapOf(const Record& record, const ChannelNames& channels = {});
 FrequencyResponse readFrfText(const std::string& file);
 
 /// Whether a hit takes part, and why not.

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 #include <type_traits>
@@ -21,14 +22,40 @@ class UsageError : public Error {
   using Error::Error;
 };
 
+/// An option or an argument as completion scripts and manual pages show it.
+struct OptionEntry {
+  std::vector<std::string> names;   ///< "-o", "--out"; the place's name alone, e.g. "MODEL", of an argument
+  std::string help, initial;        ///< initial: the default that --help shows, or empty
+  std::string value;                ///< TEXT, FLOAT, INT or UINT; empty for a flag
+  std::string allowed;              ///< values, e.g. "1 to 64"; empty: any
+  std::vector<std::string> choice;  ///< the values, where they are words
+  bool argument = false;            ///< given by its place
+  bool required = false;
+  bool several = false;  ///< takes more than one value
+};
+
+/// A command line, or one of its commands.
+struct CommandEntry {
+  std::string name, help;
+  std::vector<OptionEntry> options;
+  std::vector<CommandEntry> commands;
+};
+
 /// Options and arguments of a program, or of one of its commands; by CLI11, whose header takes 4 s of compile
 /// time.
 class CommandOptions {
  public:
+  /// What CLI11 does not hand back: the allowed values of an option.
+  struct Allowed {
+    std::string text;
+    std::vector<std::string> choice;
+  };
+  using AllowedValues = std::map<const CLI::Option*, Allowed>;
+
   /// One of them, with what it must fulfil.
   class Option {
    public:
-    explicit Option(CLI::Option* option) : option_(option) {}
+    Option(CLI::Option* option, AllowedValues* allowed) : option_(option), allowed_(allowed) {}
     const Option& required() const;
     const Option& showDefault() const;  ///< the value's present content, in --help
     const Option& within(double low, double high) const;
@@ -42,10 +69,14 @@ class CommandOptions {
     const Option& excludes(const Option& other) const;
 
    private:
+    const Option& number(const std::string& allowed, const std::function<bool(double)>& good) const;
+
     CLI::Option* option_;
+    AllowedValues* allowed_;
   };
 
-  explicit CommandOptions(CLI::App* app) : app_(app) {}
+  CommandOptions(CLI::App* app, std::shared_ptr<AllowedValues> allowed)
+      : app_(app), allowed_(std::move(allowed)) {}
 
   /// @param name "-o,--out" or, for an argument by its place, "MODEL". @param value keeps its content where
   /// it is not given: std::string, double, int, unsigned, std::uint64_t, or a std::vector of strings or
@@ -59,34 +90,41 @@ class CommandOptions {
 
  protected:
   CLI::App* app_;
+  std::shared_ptr<AllowedValues> allowed_;
 };
 
 class CommandLine : public CommandOptions {
  public:
-  explicit CommandLine(const std::string& description = "");
+  /// @param program how messages and --help name it; empty: as it was started
+  explicit CommandLine(const std::string& description = "", const std::string& program = "");
   CommandLine(const CommandLine&) = delete;
   CommandLine& operator=(const CommandLine&) = delete;
   ~CommandLine();
 
-  /// A command with options of its own; one of them is due.
+  /// A command with options of its own; one of them must be given.
   CommandOptions command(const std::string& name, const std::string& help);
-  /// Behind the options in --help.
+  /// Text after the options in --help; replaces the one before.
   void footer(const std::string& text);
+  std::string footer() const;
   std::string help() const;
+  /// The name in messages; known from the start or once the command line is parsed.
+  const std::string& program() const { return program_; }
+  CommandEntry entry() const;
 
   struct Stop {
-    bool stop = false;  ///< the complaint or the help has been printed, the program is to end
+    bool stop = false;  ///< the error or the help has been printed, the program must end
     int code = 0;       ///< with this exit code
   };
   Stop parse(int argc, const char* const* argv);
 
  private:
   std::unique_ptr<CLI::App> root_;
+  std::string program_;
 };
 
 /// Body of a command-line program's main: parses the command line, then runs. @return the exit code: what
-/// `run` returns; 1 after an exception, said in one line "PROGRAM: what" on standard error; 2 for a refused
-/// command line.
+/// `run` returns; 1 after an exception, reported in one line "PROGRAM: what" on standard error; 2 for a
+/// refused command line, reported in the same way.
 int runProgram(CommandLine& line, int argc, const char* const* argv, const std::function<int()>& run);
 
 /// The same for a `run` that returns nothing: 0 when it ends.

@@ -7,35 +7,17 @@
 #include <cstdio>
 #include <string_view>
 
+#include "smartmill_core/campaign/record_columns.h"
 #include "smartmill_core/campaign/sound_record.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/io/csv.h"
 #include "smartmill_core/io/text_file.h"
 #include "smartmill_core/signal/force_channels.h"
-#include "smartmill_core/units.h"
 
 namespace smartmill {
 
 namespace {
-
-struct ColumnKind {
-  const char* name;
-  const char* unit;  // in the file
-  double si;         // SI value of one in the file
-};
-
-constexpr ColumnKind COLUMNS[] = {{"time", "s", 1.0},
-                                  {"spindle_angle", "rad", 1.0},
-                                  {"fx", "N", 1.0},
-                                  {"fy", "N", 1.0},
-                                  {"fz", "N", 1.0},
-                                  {"load_meter", "V", 1.0},
-                                  {"hammer", "N", 1.0},
-                                  {"tool_x", "um", units::UM},
-                                  {"tool_y", "um", units::UM},
-                                  {"displacement", "m", 1.0},
-                                  {"acceleration", "m/s2", 1.0}};
 
 constexpr double POWERS[] = {1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12};
 
@@ -69,13 +51,6 @@ void appendGeneral(std::string& text, double value, int digits) {
   text.append(written, std::to_chars(written, end, value, std::chars_format::general, digits).ptr);
 }
 
-const ColumnKind* kindOf(std::string_view name) {
-  for (const ColumnKind& kind : COLUMNS) {
-    if (name == kind.name) return &kind;
-  }
-  return nullptr;
-}
-
 /// Where a column of the file goes; nullptr: it is left out.
 struct Target {
   std::string name;
@@ -101,32 +76,16 @@ void readRows(CsvReader& reader, const std::vector<Target>& targets) {
   }
 }
 
-// Times are printed with a few digits: a sample may stand a quarter of a step beside its place on the even
-// grid, a lost one moves its neighbours by half a step or more.
 void checkTime(const Record& record, int first_line, double sample_rate) {
   const std::vector<double>& t = record.time;
   if (t.empty()) throw Error(record.file + ": no samples");
   if (t.size() < 2) return;
-  const std::size_t n = t.size();
-  const double step = (t.back() - t.front()) / static_cast<double>(n - 1);
-  bool even = step > 0.0;
-  for (std::size_t i = 0; i < n && even; ++i) {
-    even = std::abs(t[i] - t.front() - static_cast<double>(i) * step) <= 0.25 * step;
-  }
-  if (!even) {
-    std::vector<double> steps(n - 1);
-    for (std::size_t i = 0; i + 1 < n; ++i) steps[i] = t[i + 1] - t[i];
-    std::vector<double> sorted = steps;
-    std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2),
-                     sorted.end());
-    const double usual = sorted[sorted.size() / 2];
-    const auto worst = std::max_element(steps.begin(), steps.end(), [usual](double l, double r) {
-      return std::abs(l - usual) < std::abs(r - usual);
-    });
+  if (const std::optional<UnevenStep> worst = unevenStep(t)) {
     throw Error(record.file + formatted(": line %d: column time: a step of %g s, %g s are due",
-                                        first_line + 1 + static_cast<int>(worst - steps.begin()), *worst,
-                                        usual));
+                                        first_line + 1 + static_cast<int>(worst->sample), worst->step,
+                                        worst->usual));
   }
+  const double step = (t.back() - t.front()) / static_cast<double>(t.size() - 1);
   if (sample_rate > 0.0 && std::abs(step * sample_rate - 1.0) > 1e-3) {
     throw Error(record.file +
                 formatted(": samples come at %.6g Hz, but the campaign's sample_rate_hz is %.6g", 1.0 / step,
@@ -135,9 +94,10 @@ void checkTime(const Record& record, int first_line, double sample_rate) {
 }
 
 // Which column each cell of the header names; nullptr: one that is not used, with a note.
-std::vector<const ColumnKind*> readHeader(const CsvReader& reader, const std::vector<std::string_view>& cells,
-                                          std::vector<std::string>* notes) {
-  std::vector<const ColumnKind*> kinds;
+std::vector<const RecordColumn*> readHeader(const CsvReader& reader,
+                                            const std::vector<std::string_view>& cells,
+                                            std::vector<std::string>* notes) {
+  std::vector<const RecordColumn*> kinds;
   for (const std::string_view cell : cells) {
     const std::size_t open = cell.find('[');
     if (open == std::string_view::npos || cell.back() != ']') {
@@ -145,7 +105,7 @@ std::vector<const ColumnKind*> readHeader(const CsvReader& reader, const std::ve
     }
     const std::string_view name = cell.substr(0, cell.find_last_not_of(" \t", open - 1) + 1);
     const std::string_view unit = cell.substr(open + 1, cell.size() - open - 2);
-    const ColumnKind* kind = kindOf(name);
+    const RecordColumn* kind = recordColumn(name);
     if (!kind) {
       notes->push_back(reader.file() + ": column " + std::string(cell) + " is not used");
     } else if (unit != kind->unit) {
@@ -165,18 +125,19 @@ Record readCsvAt(const std::string& file, double sample_rate) {
   if (!reader.next(&header)) throw Error(file + ": is empty");
   Record record;
   record.file = file;
-  const std::vector<const ColumnKind*> kinds = readHeader(reader, header, &record.notes);
-  if (std::none_of(kinds.begin(), kinds.end(), [](const ColumnKind* k) { return k && k == &COLUMNS[0]; })) {
+  const std::vector<const RecordColumn*> kinds = readHeader(reader, header, &record.notes);
+  if (std::none_of(kinds.begin(), kinds.end(),
+                   [](const RecordColumn* k) { return k && k == &RECORD_COLUMNS[0]; })) {
     throw Error(file + ": column time is missing");
   }
   std::size_t used = 0;
-  for (const ColumnKind* kind : kinds) used += kind && kind != &COLUMNS[0] ? 1 : 0;
+  for (const RecordColumn* kind : kinds) used += kind && kind != &RECORD_COLUMNS[0] ? 1 : 0;
   record.columns.resize(used);
   std::vector<Target> targets;
-  for (const ColumnKind* kind : kinds) {
+  for (const RecordColumn* kind : kinds) {
     if (!kind) {
       targets.push_back({"", nullptr, 1.0});
-    } else if (kind == &COLUMNS[0]) {
+    } else if (kind == &RECORD_COLUMNS[0]) {
       targets.push_back({"time", &record.time, 1.0});
     } else {
       targets.push_back({kind->name, &record.columns[record.names.size()], kind->si});
@@ -225,7 +186,7 @@ Record readDynowareAt(const std::string& file, const std::map<std::string, std::
   for (const auto& [name, channel] : channels) {
     const auto at = std::find(names.begin(), names.end(), channel);
     if (at == names.end()) throw Error(file + ": column " + channel + " is missing");
-    const ColumnKind* kind = kindOf(name);
+    const RecordColumn* kind = recordColumn(name);
     if (!kind) throw Error(file + ": channels: '" + name + "' is no column name");
     const std::size_t c = static_cast<std::size_t>(at - names.begin());
     check(c, kind->unit);
@@ -239,6 +200,33 @@ Record readDynowareAt(const std::string& file, const std::map<std::string, std::
 }
 
 }  // namespace
+
+const RecordColumn* recordColumn(std::string_view name) {
+  const auto at = std::find_if(RECORD_COLUMNS.begin(), RECORD_COLUMNS.end(),
+                               [&](const RecordColumn& column) { return name == column.name; });
+  return at == RECORD_COLUMNS.end() ? nullptr : &*at;
+}
+
+std::optional<UnevenStep> unevenStep(const std::vector<double>& t) {
+  const std::size_t n = t.size();
+  if (n < 2) return std::nullopt;
+  const double step = (t.back() - t.front()) / static_cast<double>(n - 1);
+  bool even = step > 0.0;
+  for (std::size_t i = 0; i < n && even; ++i) {
+    even = std::abs(t[i] - t.front() - static_cast<double>(i) * step) <= 0.25 * step;
+  }
+  if (even) return std::nullopt;
+  std::vector<double> steps(n - 1);
+  for (std::size_t i = 0; i + 1 < n; ++i) steps[i] = t[i + 1] - t[i];
+  std::vector<double> sorted = steps;
+  std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2),
+                   sorted.end());
+  const double usual = sorted[sorted.size() / 2];
+  const auto worst = std::max_element(steps.begin(), steps.end(), [usual](double l, double r) {
+    return std::abs(l - usual) < std::abs(r - usual);
+  });
+  return UnevenStep{static_cast<std::size_t>(worst - steps.begin()), *worst, usual};
+}
 
 bool Record::has(const std::string& name) const {
   return std::find(names.begin(), names.end(), name) != names.end();
@@ -286,7 +274,7 @@ Record readSoundRecord(const std::string& file, const std::vector<SoundChannel>&
   Record record;
   record.file = file;
   for (const SoundChannel& channel : channels) {
-    if (!kindOf(channel.name) || channel.name == "time")
+    if (!recordColumn(channel.name) || channel.name == "time")
       throw Error(file + ": channel '" + channel.name + "' is no column of a record");
     if (record.has(channel.name)) throw Error(file + ": channel '" + channel.name + "' stands twice");
     if (channel.number > sound.channels.size())
@@ -309,11 +297,11 @@ Record readDynoware(const std::string& file, const std::map<std::string, std::st
   return readDynowareAt(file, channels, 0.0);
 }
 
-void writeCsv(const Record& record, const std::string& file) {
+void writeCsv(const Record& record, const std::string& file, int digits) {
   std::string text = "time[s]";
   std::vector<double> si;
   for (std::size_t c = 0; c < record.names.size(); ++c) {
-    const ColumnKind* kind = kindOf(record.names[c]);
+    const RecordColumn* kind = recordColumn(record.names[c]);
     if (!kind) throw Error(file + ": '" + record.names[c] + "' is no column name");
     if (record.columns[c].size() != record.size())
       throw Error(file + ": column " + record.names[c] + " is short");
@@ -321,12 +309,12 @@ void writeCsv(const Record& record, const std::string& file) {
     si.push_back(kind->si);
   }
   text += "\n";
-  text.reserve(text.size() + record.size() * (12 + 9 * si.size()));
+  text.reserve(text.size() + record.size() * (12 + (static_cast<std::size_t>(digits) + 3) * si.size()));
   for (std::size_t i = 0; i < record.size(); ++i) {
     appendGeneral(text, record.time[i], 9);
     for (std::size_t c = 0; c < si.size(); ++c) {
       text += ',';
-      appendGeneral(text, record.columns[c][i] / si[c], 6);
+      appendGeneral(text, record.columns[c][i] / si[c], digits);
     }
     text += '\n';
   }

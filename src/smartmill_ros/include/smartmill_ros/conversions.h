@@ -6,6 +6,7 @@
 #include <smartmill_msgs/CuttingCoefficients.h>
 #include <smartmill_msgs/CuttingCondition.h>
 #include <smartmill_msgs/ForceBlock.h>
+#include <smartmill_msgs/ForceCurve.h>
 #include <smartmill_msgs/Frf.h>
 #include <smartmill_msgs/LoadSample.h>
 #include <smartmill_msgs/ModalModel.h>
@@ -14,6 +15,7 @@
 #include <smartmill_msgs/StabilityChart.h>
 
 #include "smartmill_core/cutting/coefficient_set.h"
+#include "smartmill_core/cutting/force_curve.h"
 #include "smartmill_core/cutting/stability_chart.h"
 #include "smartmill_core/modal/results.h"
 #include "smartmill_core/signal/streams.h"
@@ -50,5 +52,57 @@ StabilityPoint fromMsg(const smartmill_msgs::StabilityPoint& message);
 smartmill_msgs::StabilityPoint toMsg(const StabilityPoint& point);
 StabilityChart fromMsg(const smartmill_msgs::StabilityChart& message);
 smartmill_msgs::StabilityChart toMsg(const StabilityChart& chart);
+FoundCurves fromMsg(const smartmill_msgs::ForceCurve& message);
+smartmill_msgs::ForceCurve toMsg(const FoundCurves& curves);
+
+/// The message that carries a core type on a topic: MessageOf<SampleBlock>::Type; messages carry themselves.
+template <class Data>
+struct MessageOf {
+  using Type = Data;
+};
+template <>
+struct MessageOf<SampleBlock> {
+  using Type = smartmill_msgs::SampleBlock;
+};
+template <>
+struct MessageOf<SpindleAngle> {
+  using Type = smartmill_msgs::SpindleAngle;
+};
+template <>
+struct MessageOf<CncState> {
+  using Type = smartmill_msgs::CncState;
+};
+template <>
+struct MessageOf<LoadSample> {
+  using Type = smartmill_msgs::LoadSample;
+};
+template <>
+struct MessageOf<CuttingCondition> {
+  using Type = smartmill_msgs::CuttingCondition;
+};
+template <>
+struct MessageOf<ForceBlock> {
+  using Type = smartmill_msgs::ForceBlock;
+};
+template <>
+struct MessageOf<MeasuredFrf> {
+  using Type = smartmill_msgs::Frf;
+};
+template <>
+struct MessageOf<MeasuredModes> {
+  using Type = smartmill_msgs::ModalModel;
+};
+template <>
+struct MessageOf<CoefficientSet> {
+  using Type = smartmill_msgs::CuttingCoefficients;
+};
+template <>
+struct MessageOf<StabilityChart> {
+  using Type = smartmill_msgs::StabilityChart;
+};
+template <>
+struct MessageOf<FoundCurves> {
+  using Type = smartmill_msgs::ForceCurve;
+};
 
 }  // namespace smartmill

@@ -5,6 +5,7 @@
 #include <deque>
 #include <functional>
 #include <string>
+#include <type_traits>
 #include <utility>
 
 #include <diagnostic_updater/DiagnosticStatusWrapper.h>
@@ -52,20 +53,28 @@ class InputHealth {
   std::function<std::size_t()> waiting_;
 };
 
-/// What a node listens to. on() has the signature of BagReader's, so that one function can connect either to
-/// the class that thinks. A handler that throws leaves one line in the log and in the diagnostics, and the
-/// node goes on.
+/// What a node listens to. on() has the signature of RecordingReader's, so that one function can connect
+/// either to the class that thinks. A handler that throws leaves one line in the log and in the diagnostics,
+/// and the node goes on.
 class Inputs {
  public:
   /// @param timeout [s] of ticks without a message after which an input counts as dead
   Inputs(ros::NodeHandle nh, double timeout);
 
-  /// The handler gets the message and the time of its reception [s].
-  template <class Message>
-  void on(const std::string& topic, std::function<void(const Message&, double)> handler) {
+  /// @param Data a core type, converted from its message (a message that contradicts itself counts as
+  /// refused), or a message. The handler gets the data and the time of their reception [s].
+  template <class Data>
+  void on(const std::string& topic, std::function<void(const Data&, double)> handler) {
+    using Message = typename MessageOf<Data>::Type;
     InputHealth& health = add(topic);
     const boost::function<void(const Message&)> callback = [this, &health, handler](const Message& message) {
-      take(health, [&] { handler(message, toSec(ros::Time::now())); });
+      take(health, [&] {
+        if constexpr (std::is_same_v<Message, Data>) {
+          handler(message, toSec(ros::Time::now()));
+        } else {
+          handler(fromMsg(message), toSec(ros::Time::now()));
+        }
+      });
     };
     subscribers_.push_back(nh_.subscribe<Message>(topic, STREAM_QUEUE, callback, ros::VoidConstPtr(),
                                                   ros::TransportHints().tcpNoDelay()));

@@ -35,7 +35,8 @@ Record readRecord(const Campaign& campaign, const CampaignTest& test, const Mach
 Record readCsv(const std::string& file);
 Record readDynoware(const std::string& file, const std::map<std::string, std::string>& channels);
 
-/// Writes name[unit] columns of formats.md, six significant digits (time: nine). @throws Error.
-void writeCsv(const Record& record, const std::string& file);
+/// Writes name[unit] columns of formats.md; time with nine significant digits. @param digits significant ones
+/// of the other columns, at most 9. @throws Error.
+void writeCsv(const Record& record, const std::string& file, int digits = 6);
 
 }  // namespace smartmill

@@ -1,0 +1,472 @@
+"""What the functions of smartmill take and return: frozen dataclasses in SI units, and the exceptions.
+
+A quantity that was estimated is an `Estimate`: a float that also knows its standard deviation.
+"""
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Callable, Dict, Mapping, Optional, Tuple
+
+import numpy as np
+import numpy.typing as npt
+
+if TYPE_CHECKING:
+    from ._smartmill import Model
+
+FloatArray = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
+#: Called as progress(share, line): share of the work done 0..1, and a line of text that may be empty.
+Progress = Callable[[float, str], Optional[bool]]
+
+_RPM = 2.0 * math.pi / 60.0  # [rad/s]
+
+
+class Error(RuntimeError):
+    """Bad file, bad data or bad parameter: one line that says what is wrong and where, as the programs print it."""
+
+
+class UsageError(Error, ValueError):
+    """An argument that cannot be used."""
+
+
+class Estimate(float):
+    """A float with a standard deviation in the same unit; NaN where it is not known.
+
+    Arithmetic gives plain floats. `str()` and an empty format show both: 1074.2 +- 0.3.
+    """
+
+    __slots__ = ("std",)
+    std: float
+
+    def __new__(cls, value: float, std: float = math.nan) -> "Estimate":
+        self = super().__new__(cls, value)
+        self.std = float(std)
+        return self
+
+    @property
+    def value(self) -> float:
+        """The value as a plain float."""
+        return float(self)
+
+    def __repr__(self) -> str:
+        return f"Estimate({float(self)!r}, std={self.std!r})"
+
+    def __str__(self) -> str:
+        if not math.isfinite(self.std):
+            return f"{float(self):g}"
+        digits = max(0, 1 - math.floor(math.log10(self.std))) if self.std > 0.0 else 6
+        if digits > 6 or abs(self) >= 1e7:
+            return f"{float(self):.6g} +- {self.std:.2g}"
+        return f"{float(self):.{digits}f} +- {self.std:.{digits}f}"
+
+    def __format__(self, spec: str) -> str:
+        return float(self).__format__(spec) if spec else str(self)
+
+    def __reduce__(self) -> Tuple[type, Tuple[float, float]]:
+        return (type(self), (float(self), self.std))
+
+
+def _estimates(result: object, *names: str) -> None:
+    """Plain numbers given by the user become estimates without a standard deviation."""
+    for name in names:
+        value = getattr(result, name)
+        if not isinstance(value, Estimate):
+            object.__setattr__(result, name, Estimate(value))
+
+
+@dataclass(frozen=True)
+class Mode:
+    """One vibration mode: gain w^2 / (w^2 - W^2 + 2 i zeta w W)."""
+
+    frequency: Estimate  #: [Hz] natural frequency
+    damping_ratio: Estimate  #: [1]
+    gain: Estimate  #: static share: of a receptance [m/N], of a force sensor [1]
+    phase: float = 0.0  #: [rad] of the gain; 0: proportional damping
+    evidence: float = math.nan  #: [1] Wald's statistic over what chance gives; proven from 2.5 on; NaN: not known
+
+    def __post_init__(self) -> None:
+        _estimates(self, "frequency", "damping_ratio", "gain")
+
+    @property
+    def stiffness(self) -> Estimate:
+        """1 / gain; of a receptance [N/m]."""
+        return Estimate(1.0 / self.gain, self.gain.std / self.gain**2)
+
+    def response(self, frequency: npt.ArrayLike) -> ComplexArray:
+        """Its frequency response without the phase, in the unit of the gain, at frequencies [Hz]."""
+        ratio = np.asarray(frequency, dtype=float) / float(self.frequency)
+        return np.asarray(self.gain / (1.0 - ratio**2 + 2j * self.damping_ratio * ratio))
+
+
+@dataclass(frozen=True)
+class Tool:
+    """A cylindrical end mill."""
+
+    teeth: int  #: 1..20
+    diameter: float  #: [m]
+    helix: float = 0.0  #: [rad]
+    pitch: Tuple[float, ...] = ()  #: [rad] tooth k to tooth k + 1, summing to 2 pi; empty: even
+
+
+@dataclass(frozen=True)
+class Cut:
+    """Engagement, feed and speed. Angles are immersion angles: clockwise from +y, x is the feed direction."""
+
+    spindle_speed: float  #: [rad/s]
+    feed_per_tooth: float  #: [m]
+    axial_depth: float  #: [m]
+    entry: float = 0.0  #: [rad]
+    exit: float = math.pi  #: [rad]
+
+    @classmethod
+    def of(cls, *, speed_rpm: float, feed_mm: float, depth_mm: float, entry_deg: float = 0.0,
+           exit_deg: float = 180.0) -> "Cut":
+        """From shop units: speed [rpm], feed per tooth and axial depth [mm], immersion angles [deg]; default a slot."""
+        return cls(speed_rpm * _RPM, 1e-3 * feed_mm, 1e-3 * depth_mm, math.radians(entry_deg), math.radians(exit_deg))
+
+
+@dataclass(frozen=True)
+class Coefficients:
+    """Cutting coefficients of the linear edge-force model, per tooth, acting on the tool."""
+
+    ktc: Estimate  #: [N/m2] tangential
+    krc: Estimate  #: [N/m2] radial
+    kac: Estimate = Estimate(0.0)  #: [N/m2] axial
+    kte: Estimate = Estimate(0.0)  #: [N/m] tangential edge
+    kre: Estimate = Estimate(0.0)  #: [N/m] radial edge
+    kae: Estimate = Estimate(0.0)  #: [N/m] axial edge
+
+    def __post_init__(self) -> None:
+        _estimates(self, "ktc", "krc", "kac", "kte", "kre", "kae")
+
+    def __str__(self) -> str:
+        """Values in N/mm2 and N/mm."""
+        lines = []
+        for name in ("ktc", "krc", "kac", "kte", "kre", "kae"):
+            unit, text = (1e6, "N/mm2") if name.endswith("c") else (1e3, "N/mm")
+            of_one = getattr(self, name)
+            if math.isfinite(of_one):
+                lines.append(f"{name.capitalize()} {Estimate(of_one / unit, of_one.std / unit)} {text}")
+        return "\n".join(lines)
+
+
+@dataclass(frozen=True)
+class CoefficientResult:
+    """Identified cutting coefficients."""
+
+    source: str  #: force or load_meter
+    coefficients: Coefficients
+    tests: int  #: cuts used
+    covariance: Optional[FloatArray] = None  #: 6x6 in the order of Coefficients, SI; load meter: None
+    r_squared: Optional[Tuple[float, float, float]] = None  #: [1] of the mean forces x, y, z; load meter: None
+    friction_viscous: float = math.nan  #: [N m s/rad] found in air cuts; NaN: the model's
+    friction_coulomb: float = math.nan  #: [N m] found in air cuts; NaN: the model's
+    misfit: float = math.nan  #: [1] load meter: chi2 per degree of freedom between the records
+    terms: Tuple[str, ...] = ()  #: load meter: added by evidence, such as Stribeck friction
+    notes: Tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        return f"from the {self.source.replace('_', ' ')} in {self.tests} cuts:\n{self.coefficients}"
+
+
+@dataclass(frozen=True)
+class Record:
+    """One test: its channels over time, measured, simulated or compensated."""
+
+    name: str
+    kind: str  #: cut, air or tap
+    rate: float  #: [Hz] sample rate
+    spindle_speed: float  #: [rad/s]
+    cut: Optional[Cut]  #: of a cut
+    direction: str  #: of a tap: x, y or z
+    time: FloatArray  #: [s]
+    #: fx, fy, fz [N]; spindle_angle [rad]; load_meter [V]; hammer [N]; tool_x, tool_y [m]; acceleration [m/s2]
+    channels: Mapping[str, FloatArray] = field(repr=False)
+
+    def __getitem__(self, channel: str) -> FloatArray:
+        return self.channels[channel]
+
+    @property
+    def speed_rpm(self) -> float:
+        """Spindle speed [rpm]."""
+        return self.spindle_speed / _RPM
+
+
+@dataclass(frozen=True)
+class ChannelGap:
+    """Gap of one channel of one test."""
+
+    test: str
+    channel: str
+    gap: float  #: [1] RMS of (measured - simulated) over the noise; 1 is the noise floor
+    residual_rms: float  #: unit of the channel
+
+
+@dataclass(frozen=True)
+class GapResult:
+    """Difference between a campaign's records and the twin."""
+
+    overall: float  #: [1] RMS over all samples and channels, each over its noise
+    channels: Tuple[ChannelGap, ...]
+    noise: Dict[str, float]  #: RMS by channel, in its unit
+    notes: Tuple[str, ...]
+
+    @property
+    def largest(self) -> Dict[str, float]:
+        """[1] Largest gap of each channel."""
+        return {c: max(row.gap for row in self.channels if row.channel == c) for c in
+                dict.fromkeys(row.channel for row in self.channels)}
+
+    def __str__(self) -> str:
+        rows = [f"{row.test:24s} {row.channel:12s} {row.gap:8.3f}" for row in self.channels]
+        return "\n".join(rows + [f"overall gap {self.overall:.4f}"])
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Gap over all tests of a kind [1]; 1 is the noise floor."""
+
+    fit: float  #: tests that the model was fitted to
+    heldout: float  #: tests that took no part in any fit
+
+
+@dataclass(frozen=True)
+class Effect:
+    """An effect that the model lacked."""
+
+    name: str  #: as in the catalogue (docs/effects.md)
+    variant: str
+    words: Dict[str, str]  #: channel, axis
+    parameters: Dict[str, Estimate]  #: by key of the model file, in the unit that the key names
+    confidence: float  #: [1] that it reduces the gap of held-out tests, compared with none and with its rivals
+    delta_bic: float  #: [1] BIC that is lost without it
+    heldout_gap_reduction: float  #: [1] share of the held-out squares above the noise that it removes
+    alternatives: Dict[str, float]  #: other effects in its place: delta_bic of each
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Structure in the residual that is not noise."""
+
+    channel: str
+    tests: Tuple[str, ...]
+    domain: str  #: order, frequency, level or time
+    location: Dict[str, float]  #: order [1], frequency_hz [Hz] or time_s [s]
+    depends_on: Tuple[str, ...]  #: cutting, speed, chip_load, depth, immersion, time
+    amplitude: float  #: unit of the channel
+    share_of_gap: float  #: [1]
+    p_value: float  #: [1]
+
+
+@dataclass(frozen=True)
+class Resemblance:
+    """An effect of the catalogue that comes near to the residual and was rejected."""
+
+    name: str
+    variant: str
+    reason: str
+    confidence: Optional[float]  #: [1]
+
+
+@dataclass(frozen=True)
+class TestGap:
+    """Gap of one channel of one test before and after."""
+
+    __test__ = False  # no test case
+    test: str
+    channel: str
+    heldout: bool
+    before: float  #: [1]
+    after: float  #: [1]
+    std: float  #: [1] of a gap at the noise floor, by chance alone
+
+
+@dataclass(frozen=True)
+class ChannelShare:
+    """One channel over all cuts: how much of its variance the models explain."""
+
+    channel: str
+    explained_before: float  #: [1]
+    explained_after: float  #: [1]
+    explained_heldout: Optional[float]  #: [1] after, held-out cuts alone
+    repeats: Optional[float]  #: [1] share that is synchronous with the spindle
+    floor: float  #: unit of the channel: RMS of what is not synchronous
+    floor_gap: float  #: [1] the same over the noise
+
+
+@dataclass(frozen=True)
+class RevolutionCurve:
+    """One channel of one test over the spindle angle, mean of the revolutions; in the unit of the channel."""
+
+    test: str
+    channel: str
+    angle_deg: FloatArray  #: [deg]
+    measured: FloatArray
+    nominal: FloatArray
+    improved: FloatArray
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """Why measurement and model differ."""
+
+    verdict: str  #: no_disagreement, explained, partly_explained or unknown_effect
+    sentence: str  #: for the machinist; may be empty
+    effects: Tuple[Effect, ...]
+    gap_before: Gap
+    gap_after: Gap
+    gap_named_only: Optional[Gap]  #: without the effects that have no name, where there are any
+    where: Tuple[Finding, ...]  #: where measurement and nominal model differ
+    unexplained: Tuple[Finding, ...]  #: and where they still do
+    resembles: Tuple[Resemblance, ...]
+    not_separable: Tuple[Tuple[str, ...], ...]  #: effects that these tests cannot distinguish
+    suggested_test: Optional[str]
+    gaps: Tuple[TestGap, ...]
+    channels: Tuple[ChannelShare, ...]
+    revolutions: Tuple[RevolutionCurve, ...]
+    model: "Model" = field(repr=False)  #: the improved model
+    notes: Tuple[str, ...]
+    interrupted: bool  #: progress returned False: found until then
+    seconds: float  #: [s] of computing
+    summary: str = field(repr=False)  #: as the program prints it
+
+    def __str__(self) -> str:
+        return self.summary
+
+
+@dataclass(frozen=True)
+class Lobes:
+    """First loss of stability over spindle speed."""
+
+    speed: FloatArray  #: [rad/s]
+    depth: FloatArray  #: [m] limit; inf: stable to the largest depth asked for
+    frequency: FloatArray  #: [Hz] of the chatter; NaN without a limit
+    kind: Tuple[str, ...]  #: none, hopf or flip
+    error: FloatArray  #: [m] numerical error of the limit; NaN where it was not asked for
+
+    @property
+    def speed_rpm(self) -> FloatArray:
+        """Spindle speed [rpm]."""
+        return self.speed / _RPM
+
+    @property
+    def depth_mm(self) -> FloatArray:
+        """Limit [mm]."""
+        return 1e3 * self.depth
+
+
+@dataclass(frozen=True)
+class RobustPoint:
+    """A cut whose probability of chatter stays below the risk, also for speeds within the margin."""
+
+    speed: float  #: [rad/s]
+    depth: float  #: [m]
+    probability: float  #: [1] largest within the margin
+
+    @property
+    def speed_rpm(self) -> float:
+        """Spindle speed [rpm]."""
+        return self.speed / _RPM
+
+    @property
+    def depth_mm(self) -> float:
+        """Axial depth [mm]."""
+        return 1e3 * self.depth
+
+
+@dataclass(frozen=True)
+class ChatterRisk:
+    """Probability of chatter, from the standard deviations of modes and coefficients."""
+
+    speed: FloatArray  #: [rad/s]
+    depth: FloatArray  #: [m]
+    probability: FloatArray  #: [1] by speed and depth
+    nominal: FloatArray  #: [m] limit of the model itself
+    points: Tuple[RobustPoint, ...]  #: largest speed x depth first, one a pocket
+
+    @property
+    def speed_rpm(self) -> FloatArray:
+        """Spindle speed [rpm]."""
+        return self.speed / _RPM
+
+    @property
+    def depth_std(self) -> FloatArray:
+        """[m] Standard deviation of the limit at each speed, within the depths of the chart."""
+        stable = 1.0 - self.probability
+        low = self.depth[0] * np.ones(len(self.speed))
+        mean = low + np.trapz(stable, self.depth, axis=1)
+        square = low**2 + np.trapz(2.0 * self.depth * stable, self.depth, axis=1)
+        return np.asarray(np.sqrt(np.maximum(square - mean**2, 0.0)))
+
+
+@dataclass(frozen=True)
+class Hit:
+    """Whether a hammer hit takes part in the average, and why not."""
+
+    name: str
+    accepted: bool
+    reason: str  #: empty where accepted
+
+
+@dataclass(frozen=True)
+class Frf:
+    """A frequency response function and the modes fitted to it."""
+
+    frequency: FloatArray  #: [Hz]
+    value: ComplexArray  #: [m/N] of a motion, [1] of a force
+    std: FloatArray  #: unit of the value: root of E|error|^2; NaN: not known
+    coherence: FloatArray  #: [1]; NaN with a single hit
+    unit: str  #: m/N or 1
+    modes: Tuple[Mode, ...]  #: proven, lowest frequency first
+    doubts: Tuple[Mode, ...]  #: seen, not proven
+    fitted: ComplexArray  #: modes, doubts and flanks at each frequency; empty without a fit
+    hits: Tuple[Hit, ...]
+
+
+@dataclass(frozen=True)
+class Compensated:
+    """Force on the tool, recovered from a force sensor that vibrates [N]."""
+
+    fx: FloatArray
+    fy: FloatArray
+    fz: FloatArray
+
+
+@dataclass(frozen=True)
+class CompensatedCampaign:
+    """Force on the tool of each cut of a campaign, and the sensor's modes that were used."""
+
+    sensor: Dict[str, Tuple[Mode, ...]]  #: by axis x, y, z; gains [1]
+    records: Dict[str, Record]  #: by name of the test: fx, fy, fz [N]
+
+    def __getitem__(self, test: str) -> Record:
+        return self.records[test]
+
+
+@dataclass(frozen=True)
+class Chatter:
+    """Verdict on a recorded cut."""
+
+    chatter: bool
+    cut: bool  #: something is being cut
+    frequency: float  #: [Hz] strongest line of the chatter; NaN without
+    spindle_speed: float  #: [rad/s] that the harmonics show
+    start: float  #: [s] of the first cut
+    end: float  #: [s] of the last cut
+    over_noise: float  #: [dB] of the chatter line over its surroundings
+    over_air: float  #: [dB] and over the same line out of the cut; NaN: the whole recording is cut
+    companions: int  #: lines an integer number of tooth passings away
+    share: float  #: [1] of the chatter's lines over those of the spindle's harmonics
+    mode: float  #: [Hz] mode that it is near; NaN: none is known
+    reason: str
+    text: str = field(repr=False)  #: one line, as the program prints it
+    time: FloatArray = field(repr=False)  #: [s] of the spectrogram's windows
+    line: FloatArray = field(repr=False)  #: [Hz] of the spectrogram's lines
+    power: FloatArray = field(repr=False)  #: spectrogram by window and line, each channel over its mean square
+
+    def __str__(self) -> str:
+        return self.text
+
+    def __bool__(self) -> bool:
+        return self.chatter

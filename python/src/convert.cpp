@@ -1,0 +1,144 @@
+#include "convert.h"
+
+#include <algorithm>
+#include <limits>
+#include <memory>
+
+namespace smartmill::python {
+namespace {
+
+constexpr double NOT_KNOWN = std::numeric_limits<double>::quiet_NaN();
+
+double number(const py::object& object, const char* name) {
+  return object.attr(name).cast<double>();
+}
+
+/// ktc of Ktc_n_per_mm2
+std::string nameOf(const CuttingKey& k) {
+  std::string name = k.key;
+  name.erase(name.find('_'));
+  name.front() = 'k';
+  return name;
+}
+
+double stdOf(const py::object& object, const char* name) {
+  return object.attr(name).attr("std").cast<double>();
+}
+
+std::vector<Mode> modesOf(const py::object& modes) {
+  std::vector<Mode> result;
+  for (const py::handle& handle : modes) {
+    const py::object mode = py::reinterpret_borrow<py::object>(handle);
+    result.push_back({number(mode, "frequency"), number(mode, "damping_ratio"), number(mode, "gain"),
+                      stdOf(mode, "frequency"), stdOf(mode, "damping_ratio"), stdOf(mode, "gain")});
+  }
+  return result;
+}
+
+}  // namespace
+
+std::vector<double> vectorOf(const Array& array) {
+  return {array.data(), array.data() + array.size()};
+}
+
+py::array arrayOf(std::vector<double> values) {
+  auto owned = std::make_unique<std::vector<double>>(std::move(values));
+  std::vector<double>* const data = owned.release();
+  const py::capsule owner(data, [](void* p) { delete static_cast<std::vector<double>*>(p); });
+  return py::array_t<double>(static_cast<py::ssize_t>(data->size()), data->data(), owner);
+}
+
+py::array arrayOf(const std::vector<std::vector<double>>& rows) {
+  const std::size_t columns = rows.empty() ? 0 : rows.front().size();
+  py::array_t<double> array({static_cast<py::ssize_t>(rows.size()), static_cast<py::ssize_t>(columns)});
+  double* out = array.mutable_data();
+  for (const std::vector<double>& row : rows) out = std::copy(row.begin(), row.end(), out);
+  return array;
+}
+
+py::object estimate(double value, double std_dev) {
+  return make("Estimate", value, std_dev);
+}
+
+py::object toPython(const Mode& mode) {
+  return make("Mode", estimate(mode.frequency, mode.frequency_std),
+              estimate(mode.damping_ratio, mode.damping_ratio_std), estimate(mode.gain, mode.gain_std));
+}
+
+py::object toPython(const std::vector<Mode>& modes) {
+  return tupleOf(modes, [](const Mode& mode) { return toPython(mode); });
+}
+
+py::object toPython(const ToolGeometry& tool) {
+  return make("Tool", tool.teeth, tool.diameter, tool.helix,
+              tupleOf(tool.pitch, [](double pitch) { return py::float_(pitch); }));
+}
+
+py::object toPython(const CuttingCoefficients& value, const CuttingCoefficients* std_dev) {
+  py::dict fields;
+  for (const CuttingKey& k : cuttingKeys()) {
+    fields[nameOf(k).c_str()] =
+        estimate(value.*k.coefficient, std_dev != nullptr ? std_dev->*k.coefficient : NOT_KNOWN);
+  }
+  return make("Coefficients", **fields);
+}
+
+py::object toPython(const Engagement& engagement, double spindle_speed) {
+  return make("Cut", spindle_speed, engagement.feed_per_tooth, engagement.axial_depth, engagement.entry,
+              engagement.exit);
+}
+
+py::object toPython(const CampaignTest& test, Record record) {
+  const char* const kind = test.kind == TestKind::cut ? "cut" : test.kind == TestKind::air ? "air" : "tap";
+  py::dict channels;
+  for (std::size_t c = 0; c < record.names.size(); ++c)
+    channels[record.names[c].c_str()] = arrayOf(std::move(record.columns[c]));
+  const py::object cut =
+      test.engagement ? toPython(*test.engagement, test.spindle_speed) : py::object(py::none());
+  return make("Record", test.name, kind, test.sample_rate, test.spindle_speed, cut, test.direction,
+              arrayOf(std::move(record.time)), channels);
+}
+
+ModalModel receptanceOf(const py::object& modes) {
+  ModalModel model;
+  model.modes = modesOf(modes);
+  return model;
+}
+
+ModalModel sensorOf(const py::object& modes) {
+  ModalModel model;
+  model.direct = 1.0;
+  if (modes.is_none()) return model;
+  model.modes = modesOf(modes);
+  for (const Mode& mode : model.modes) model.direct -= mode.gain;
+  return model;
+}
+
+ToolGeometry toolOf(const py::object& tool) {
+  ToolGeometry geometry;
+  geometry.teeth = tool.attr("teeth").cast<int>();
+  geometry.diameter = number(tool, "diameter");
+  geometry.helix = number(tool, "helix");
+  geometry.pitch = tool.attr("pitch").cast<std::vector<double>>();
+  return geometry;
+}
+
+CuttingCoefficients coefficientsOf(const py::object& coefficients, bool std_dev) {
+  CuttingCoefficients result;
+  for (const CuttingKey& k : cuttingKeys()) {
+    const std::string name = nameOf(k);
+    result.*k.coefficient = std_dev ? stdOf(coefficients, name.c_str()) : number(coefficients, name.c_str());
+  }
+  return result;
+}
+
+Engagement engagementOf(const py::object& cut) {
+  return {number(cut, "entry"), number(cut, "exit"), number(cut, "axial_depth"),
+          number(cut, "feed_per_tooth")};
+}
+
+MachineModel modelOf(const Campaign& campaign, const std::optional<MachineModel>& model) {
+  return model ? *model : readMachineModel(campaign.modelPath());
+}
+
+}  // namespace smartmill::python

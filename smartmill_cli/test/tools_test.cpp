@@ -1,0 +1,145 @@
+// The command of the program and the tool of the same code do the same to the byte: output, exit code, files.
+
+#include <regex>
+
+#include <gmock/gmock.h>
+
+#include "shell.h"
+#include "smartmill_core/campaign/campaign.h"
+#include "smartmill_core/testing/shared_data.h"
+
+namespace smartmill {
+namespace {
+
+using ::testing::HasSubstr;
+
+/// The program of a command's old name.
+std::string toolOf(const std::string& command) {
+  std::istringstream tools(TOOLS);
+  for (std::string tool; std::getline(tools, tool, ' ');)
+    if (tool.rfind(command + "=", 0) == 0) return tool.substr(command.size() + 1);
+  ADD_FAILURE() << "no tool of command " << command;
+  return "false";
+}
+
+/// Without wall times: "seconds" in report.json, their column and sum in report.html.
+std::string withoutTimes(const std::string& file, std::string text) {
+  if (file.find("report.json") != std::string::npos)
+    text = std::regex_replace(text, std::regex("\"seconds\": [-+.e0-9]+"), "\"seconds\"");
+  if (file.find("report.html") != std::string::npos) {
+    text = std::regex_replace(text, std::regex("<p>[0-9]+ s\\.</p>"), "");
+    text = std::regex_replace(text, std::regex("<td>[0-9]+<td>[0-9]+\\.[0-9]</tr>"), "");
+  }
+  return text;
+}
+
+void expectSame(const std::string& command, const std::string& arguments, int code = 0) {
+  const Outcome old = shell(toolOf(command) + " " + arguments);
+  const Outcome now = shell(SMARTMILL " " + command + " " + arguments);
+  EXPECT_EQ(now.code, code) << command << " " << arguments << "\n" << now.error;
+  EXPECT_EQ(old.code, code) << command << " " << arguments << "\n" << old.error;
+  EXPECT_EQ(now.out, old.out) << command << " " << arguments;
+  ASSERT_EQ(now.files.size(), old.files.size()) << command << " " << arguments;
+  for (const auto& [name, content] : now.files) {
+    ASSERT_EQ(old.files.count(name), 1u) << command << ": " << name;
+    EXPECT_TRUE(withoutTimes(name, content) == withoutTimes(name, old.files.at(name)))
+        << command << " " << arguments << ": " << name << " differs";
+  }
+}
+
+/// The air cuts of a campaign: a search through them takes a second.
+std::string airCuts(const std::string& from, const TemporaryFolder& to) {
+  Campaign campaign = readCampaign(from);
+  std::vector<CampaignTest> air;
+  for (const CampaignTest& test : campaign.tests) {
+    if (test.kind != TestKind::air) continue;
+    std::filesystem::copy_file(from + "/" + test.file, to.file(test.file));
+    air.push_back(test);
+  }
+  campaign.tests = air;
+  std::filesystem::copy_file(campaign.modelPath(), to.file("model.yaml"));
+  campaign.model_file = "model.yaml";
+  writeCampaign(campaign, to.file("."));
+  return to.file(".");
+}
+
+TEST(Tools, DoWhatTheirCommandsDoToACampaign) {
+  SMARTMILL_SHARED_DATA(campaign, "campaigns/none");
+  const std::string model = campaign + "/model.yaml";
+  expectSame("gap", campaign);
+  expectSame("simulate", model + " " + campaign + " -o out --seed 3");
+  expectSame("hide", model + " -o hidden.yaml --seed 7");
+  expectSame("compensate", campaign + " --identify -o out");
+  expectSame("cutting-frf", campaign + " --of sensor --speed-width-percent 40 --no-picture -o out");
+  expectSame("coefficients", campaign + " --source force --means revolutions -o cutting.yaml");
+  expectSame("coefficients", campaign + " --source load_meter");
+  expectSame("force-law", campaign + " --curve curve.yaml");
+  expectSame("calibrate", campaign);
+  expectSame("plan-cuts", model +
+                              " --speeds 3000 6000 --feeds 0.05 0.1 0.2 --depths 0.5 1 --ktc-std 100 "
+                              "--kte-std 5 --torque 10 --power 5000");
+}
+
+TEST(Tools, DoWhatTheirCommandsDoToMeasuredRecords) {
+  SMARTMILL_SHARED_DATA(hits, "measured/five_hits");
+  SMARTMILL_SHARED_DATA(sound, "measured/sound_mill/chatter.wav");
+  SMARTMILL_SHARED_DATA(taps, "campaigns/cross_talk");
+  expectSame("frf", hits + "/*.csv -o out --no-picture");
+  expectSame("detect", sound + " --speed 8018 --teeth 4 -o picture.png");
+  expectSame("sensor-report", taps + " -o matrix.csv");
+}
+
+TEST(Tools, DoWhatTheirCommandsDoToAModel) {
+  const std::string cut = " " MODEL " --entry-deg 0 --exit-deg 180 ";
+  expectSame("lobes", cut + "--speeds 4000:6000:11 --max-depth-mm 2 -o chart.csv");
+  expectSame("lobes", cut + "--speeds 4000:6000:11 --max-depth-mm 0 -o chart.csv", 1);
+  expectSame("chatter-probability", cut + "--speeds 4000:6000:5 --depths-mm 0.1:1:3 --draws 3 -o grid.csv");
+}
+
+TEST(Tools, DoWhatTheirCommandsDoToADatabase) {
+  SMARTMILL_SHARED_DATA(campaign, "campaigns/none");
+  for (const char* query :
+       {"list", "find --tool mill --material steel", "export all.csv", "health",
+        "answer --tool mill --material brass", "predict --material steel --rake 5 --helix 30"}) {
+    const std::string fill = campaign + " --source force --database d.sqlite --tool mill --material steel";
+    const Outcome old =
+        shell(toolOf("coefficients") + " " + fill + "\n" + toolOf("database") + " d.sqlite " + query);
+    const Outcome now =
+        shell(SMARTMILL " coefficients " + fill + "\n" SMARTMILL " database d.sqlite " + query);
+    EXPECT_EQ(now.code, old.code) << query;
+    EXPECT_EQ(now.out, old.out) << query;
+    EXPECT_TRUE(now.files == old.files) << query;
+  }
+}
+
+TEST(Tools, DoWhatTheirCommandsDoWithASpindleSensor) {
+  expectSame("spindle-sensor", "apply nowhere.yaml nowhere.csv -o forces.csv", 1);
+  expectSame("capture", "127.0.0.1 --port 1 --timeout 0.2", 1);
+}
+
+// The search itself, in a campaign of air cuts.
+TEST(Tools, ExplainWhatTheirCommandExplains) {
+  SMARTMILL_SHARED_DATA(campaign, "campaigns/stribeck_friction");
+  const TemporaryFolder folder;
+  expectSame("explain", airCuts(campaign, folder) + " -o out --threads 1");
+}
+
+// Ctrl-C ends the search; what was found until then is in the report.
+TEST(Explain, EndsWithItsReportWhenItIsInterrupted) {
+  SMARTMILL_SHARED_DATA(campaign, "campaigns/stribeck_friction");
+  // Once the search has said something, it listens to Ctrl-C.
+  const Outcome ended =
+      shell(std::string("set -m; " SMARTMILL " explain ") + campaign +
+            " -o out 2>progress & process=$!\n"
+            "for _ in $(seq 600); do grep -q 's\\]' progress && break; sleep 0.05; done\n"
+            "sleep 0.2; kill -INT $process; wait $process; code=$?; cat progress >&2; exit $code");
+  EXPECT_EQ(ended.code, 130) << ended.error;
+  EXPECT_THAT(ended.error, HasSubstr("cancelled"));
+  EXPECT_EQ(ended.files.count("out/report.json"), 1u);
+  EXPECT_EQ(ended.files.count("out/report.html"), 1u);
+  EXPECT_EQ(ended.files.count("out/model.yaml"), 1u);
+  EXPECT_THAT(ended.files.at("out/report.json"), HasSubstr("\"interrupted\": true"));
+}
+
+}  // namespace
+}  // namespace smartmill

@@ -1,0 +1,5 @@
+#include "smartmill_discrepancy/commands.h"
+
+int main(int argc, char** argv) {
+  return smartmill::runCommand(smartmill::discrepancy::campaignCommand(), argc, argv);
+}

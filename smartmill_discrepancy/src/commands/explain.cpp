@@ -1,0 +1,118 @@
+#include "smartmill_discrepancy/commands.h"
+
+#include <atomic>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <filesystem>
+#include <functional>
+#include <iostream>
+#include <memory>
+#include <string>
+
+#include <unistd.h>
+
+#include "recordings/bag_campaign.h"
+#include "smartmill_core/error.h"
+#include "smartmill_discrepancy/explain/explain.h"
+#include "smartmill_discrepancy/report/pictures.h"
+#include "smartmill_discrepancy/report/report_html.h"
+#include "smartmill_discrepancy/report/report_json.h"
+#include "smartmill_discrepancy/report/summary.h"
+#include "smartmill_recording/recording_file.h"
+
+namespace {
+
+using namespace smartmill;
+using namespace smartmill::discrepancy;
+
+constexpr int INTERRUPTED = 130;  // exit status
+
+std::atomic<bool> interrupted{false};
+static_assert(std::atomic<bool>::is_always_lock_free);
+
+// The first Ctrl-C asks for what has been found, the second ends at once.
+void interrupt(int) {
+  constexpr char HEARD[] = "cancelled: what was found until now is judged and written (again: end at once)\n";
+  [[maybe_unused]] const auto written = write(STDERR_FILENO, HEARD, sizeof(HEARD) - 1);
+  interrupted = true;
+  std::signal(SIGINT, SIG_DFL);
+}
+
+struct Arguments {
+  std::string campaign, model, prior, out;
+  int threads = 2;
+};
+
+Campaign load(const Arguments& arguments, const std::function<void(const std::string&)>& progress) {
+  if (!isRecording(arguments.campaign)) return readCampaign(arguments.campaign);
+  if (arguments.model.empty())
+    throw Error(arguments.campaign + ": a bag holds no model, give one with --model");
+  std::error_code failed;
+  std::filesystem::remove_all(arguments.out + "/campaign", failed);
+  return campaignOfBag(arguments.campaign, arguments.model, arguments.out + "/campaign", progress);
+}
+
+// @return exit status
+int run(const Arguments& arguments) {
+  const auto begin = std::chrono::steady_clock::now();
+  ExplainOptions options;
+  options.bench.threads = arguments.threads;
+  if (!arguments.prior.empty()) options.search.prior = readCauseOdds(arguments.prior);
+  options.bench.cancelled = [] { return interrupted.load(); };
+  const auto elapsed = [&] {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  };
+  options.search.progress = [&](const std::string& line) {
+    std::fprintf(stderr, "[%5.1f s] %s\n", elapsed(), line.c_str());
+  };
+  options.search.course = [&](double share) {
+    const double t = elapsed();
+    std::fprintf(stderr, "[%5.1f s] about %.0f s more, should nothing else be found\n", t, t / share - t);
+  };
+  std::error_code failed;
+  std::filesystem::create_directories(arguments.out, failed);
+  if (failed) throw Error(arguments.out + ": " + failed.message());
+  const Campaign campaign = load(arguments, options.search.progress);
+  const Dataset data = loadDataset(
+      campaign, readMachineModel(arguments.model.empty() ? campaign.modelPath() : arguments.model));
+  std::signal(SIGINT, interrupt);
+  const Explanation explanation = explain(data, options, arguments.out);
+  writeReport(explanation, arguments.out);
+  writeHtml(explanation, std::filesystem::path(arguments.campaign).filename().string(),
+            drawPictures(explanation, arguments.out), arguments.out);
+  std::cout << summaryOf(explanation);
+  return explanation.interrupted ? INTERRUPTED : 0;
+}
+
+}  // namespace
+
+namespace smartmill::discrepancy {
+
+Command explainCommand() {
+  Command command;
+  command.name = command.tool = "explain";
+  command.summary = "finds which effects a machine model lacks, from a campaign or a bag";
+  command.description =
+      "Finds where the twin and the records of a campaign disagree and which effects the model lacks.";
+  command.examples = {
+      {"campaigns/runout -o report", "searches a campaign; report/report.html shows what was found"},
+      {"session.bag --model mill.yaml -o report", "the same for a recorded session"}};
+  command.files = {{"OUT/report.html", "the report with its pictures"},
+                   {"OUT/report.json", "the report for programs"},
+                   {"OUT/model.yaml", "the model with the effects found"}};
+  command.exits = {{INTERRUPTED, "interrupted by Ctrl-C; the report holds what was found until then"}};
+  command.declare = [](CommandLine& line) -> std::function<int()> {
+    const auto arguments = std::make_shared<Arguments>();
+    line.option("CAMPAIGN", arguments->campaign, "campaign folder, or a bag").required();
+    line.option("--model", arguments->model, "machine model file (default: the campaign's)");
+    line.option("--prior", arguments->prior,
+                "odds of each effect from other machines (`database proposals --prior` writes them)");
+    line.option("-o,--out", arguments->out, "folder of the report").required();
+    line.option("--threads", arguments->threads, "threads").within(1, 64).showDefault();
+    return [arguments] { return run(*arguments); };
+  };
+  return command;
+}
+
+}  // namespace smartmill::discrepancy

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <vector>
+
+#include "commands/frf_results.h"
+#include "smartmill_hammer/analysis/tap_records.h"
+
+namespace smartmill::hammer {
+
+struct Frfs {
+  std::vector<NamedFrf> frfs;
+  double ringing_length = 0.0;  // [s] of hits, see TapFrf
+};
+
+/// The formats of the input files. @throws Error where a bag is among others.
+std::vector<TapFormat> formatsOf(const FrfOptions& options);
+
+/// Hits become one FRF; FRFs stay as they are. Writes the verdicts on the hits.
+Frfs readFrfs(const FrfOptions& options, const std::vector<TapFormat>& formats);
+
+}  // namespace smartmill::hammer

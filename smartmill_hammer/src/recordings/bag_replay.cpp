@@ -1,0 +1,34 @@
+#include "recordings/bag_replay.h"
+
+#include <cstdio>
+
+#include "node/wiring.h"
+#include "smartmill_hammer/sequence/sorted_sequence.h"
+#include "smartmill_recording/recording_reader.h"
+
+namespace smartmill {
+namespace hammer {
+
+std::vector<MeasureFrfResult> replayBag(const std::string& bag, const std::string& model,
+                                        const NodeParameters& parameters) {
+  std::vector<MeasureFrfResult> results;
+  // The recorded streams answer the commands.
+  SortedSequence sorted(
+      parameters.measurement, readMachineModel(model), parameters.hold_back,
+      {{},
+       [](const Feedback& feedback) { std::fprintf(stderr, "%s\n", feedback.stage.c_str()); },
+       [&results](const MeasureFrfResult& result) { results.push_back(result); },
+       {}});
+  RecordingReader reader(bag);
+  connect(reader, sorted);
+  reader.on<plain::MeasureFrfActionGoal>(names::goals(names::MEASURE_TOOL_FRF),
+                                         [&sorted](const plain::MeasureFrfActionGoal& m, double received) {
+                                           sorted.push(goalFromMsg(m.goal, received));
+                                         });
+  reader.run();
+  sorted.flush();
+  return results;
+}
+
+}  // namespace hammer
+}  // namespace smartmill

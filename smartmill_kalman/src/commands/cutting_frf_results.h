@@ -1,0 +1,39 @@
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "smartmill_core/io/csv.h"
+#include "smartmill_kalman/in_cut/cutting_frf.h"
+
+namespace smartmill::kalman {
+
+constexpr std::array<const char*, 3> AXIS_NAMES{{"x", "y", "z"}};
+
+struct CuttingFrfRequest {
+  std::string campaign, out, model, of = "tool", response, spindle_sensor;
+  double length = 0.139;     // [m]
+  double force_error = 1.0;  // [%]
+  bool identify = false, no_picture = false;
+  CuttingFrfOptions options;
+};
+
+/// An axis: its lines in the cuts, and the tap at rest.
+struct CuttingFrfAxis {
+  std::size_t axis = 0;
+  std::vector<CuttingLine> lines;
+  ModalModel rest;
+  std::vector<SpeedFrf> found;
+};
+
+/// What the tap shows at rest.
+void printRest(const CuttingFrfAxis& axis, bool receptance);
+/// The modes at a speed, and their rows in the table.
+void printFrf(const CuttingFrfAxis& axis, const SpeedFrf& frf, bool receptance, CsvWriter& table);
+/// Ending of the files of an axis at a speed, e.g. "_x_6000".
+std::string suffixOf(const CuttingFrfAxis& axis, const SpeedFrf& frf);
+/// Magnitude over frequency at every speed, with the tap at rest.
+void drawAxis(const CuttingFrfAxis& axis, const CuttingFrfRequest& request);
+
+}  // namespace smartmill::kalman

@@ -1,0 +1,18 @@
+#pragma once
+
+#include "smartmill_core/command.h"
+
+namespace smartmill::loadmeter {
+
+/// Cutting coefficients from forces or the load meter.
+Command coefficientsCommand();
+/// The database of cutting coefficients of a machine.
+Command databaseCommand();
+/// The fewest test cuts for given standard deviations.
+Command planCutsCommand();
+/// Friction and load-meter constants of a machine.
+Command calibrateCommand();
+/// The force law that force records prefer.
+Command forceLawCommand();
+
+}  // namespace smartmill::loadmeter

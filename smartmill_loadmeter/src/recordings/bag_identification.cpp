@@ -1,0 +1,67 @@
+#include "recordings/bag_identification.h"
+
+#include <map>
+#include <utility>
+
+#include "node/wiring.h"
+#include "smartmill_core/error.h"
+#include "smartmill_loadmeter/identification/sorted_identification.h"
+#include "smartmill_recording/recording_reader.h"
+
+namespace smartmill::loadmeter {
+
+std::vector<IdentifyResult> identifyFromBag(const std::string& path, const MachineModel& model,
+                                            const NodeParameters& parameters, const BagListeners& listeners) {
+  SortedIdentification identification(model, parameters.identification, parameters.hold_back);
+  if (parameters.motor_learn) identification.identification().learnMotors();
+  if (!parameters.motor_calibration.empty())
+    identification.identification().setMotors(readMotorCalibration(parameters.motor_calibration));
+  if (parameters.readsMotors()) {
+    if (listeners.motors) identification.identification().onMotorForce(listeners.motors);
+  }
+  if (listeners.force) identification.identification().onForce(listeners.force);
+  if (listeners.cut) identification.identification().onCut(listeners.cut);
+  std::vector<IdentifyResult> results;
+  identification.identification().onResult([&](const IdentifyResult& result) {
+    if (!result.reset) results.push_back(result);
+  });
+  RecordingReader bag(path);
+  if (!bag.has(names::CNC_LOAD)) throw Error(path + ": holds no " + names::CNC_LOAD);
+  connect(bag, parameters, identification);
+  bag.on<plain::IdentifyCoefficientsActionGoal>(
+      names::goals(names::IDENTIFY_COEFFICIENTS),
+      [&](const plain::IdentifyCoefficientsActionGoal& m, double) {
+        const double stamped = toSec(m.goal.header.stamp);
+        const double stamp = stamped == 0.0 ? toSec(m.goal_id.stamp) : stamped;
+        identification.push(IdentifyGoal{stamp, m.goal.tool, m.goal.material, m.goal.reset != 0, 0});
+      });
+  bag.run(listeners.progress);
+  identification.flush();
+  if (results.empty()) {
+    identification.push(IdentifyGoal{identification.newest(), "", "", false, 0});
+    identification.flush();
+  }
+  return results;
+}
+
+std::vector<FoundCurves> curvesFromBag(const std::string& path, const NodeParameters& parameters,
+                                       const std::function<void(double)>& progress) {
+  SortedCurves curves(parameters.curve, parameters.hold_back);
+  std::map<std::pair<std::string, std::string>, FoundCurves> last;
+  std::string left_out;
+  curves.finder().onCurves([&](const FoundCurves& found) { last[{found.tool, found.material}] = found; });
+  curves.finder().onLeftOut([&](const std::string& why) { left_out += "; " + why; });
+  RecordingReader bag(path);
+  for (const char* topic : {names::FORCE_COMPENSATED, names::SPINDLE_ANGLE}) {
+    if (!bag.has(topic)) throw Error(path + ": holds no " + topic);
+  }
+  connectCurves(bag, curves);
+  bag.run(progress);
+  curves.flush();
+  if (last.empty()) throw Error(path + ": no cut makes a force curve" + left_out);
+  std::vector<FoundCurves> found;
+  for (auto& [of, one] : last) found.push_back(std::move(one));
+  return found;
+}
+
+}  // namespace smartmill::loadmeter

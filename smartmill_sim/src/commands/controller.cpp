@@ -1,0 +1,108 @@
+#include "smartmill_sim/commands.h"
+
+#include <chrono>
+#include <csignal>
+#include <cstdint>
+#include <cstdio>
+#include <map>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "smartmill_core/model/machine_model.h"
+#include "smartmill_focas/server.h"
+#include "smartmill_sim/controller/controller.h"
+
+namespace {
+
+using namespace smartmill;
+using Clock = std::chrono::steady_clock;
+
+constexpr double STEP = 1e-3;  // [s]
+// [s] After a longer pause of the computer the machine goes on where it was.
+constexpr double MOST_BEHIND = 0.5;
+
+const std::map<std::string, int> MODES{{"mdi", focas::AUT_MDI},       {"mem", focas::AUT_MEM},
+                                       {"edit", focas::AUT_EDIT},     {"handle", focas::AUT_HANDLE},
+                                       {"jog", focas::AUT_JOG},       {"inc", focas::AUT_INC},
+                                       {"reference", focas::AUT_REF}, {"dnc", focas::AUT_REMOTE}};
+
+struct Arguments {
+  std::string mode = "dnc", model, type = "30";
+  focas::ServerOptions server;
+};
+
+volatile std::sig_atomic_t stop_requested = 0;
+
+extern "C" void requestStop(int) {
+  stop_requested = 1;
+}
+
+void run(sim::Controller& controller) {
+  std::vector<sim::MotionState> states;
+  Clock::time_point done = Clock::now();
+  while (stop_requested == 0) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    const Clock::time_point now = Clock::now();
+    if (std::chrono::duration<double>(now - done).count() > MOST_BEHIND) {
+      done = now;
+    }
+    const auto count = static_cast<std::size_t>(std::chrono::duration<double>(now - done).count() / STEP);
+    controller.advance(STEP, count, states);
+    done += std::chrono::milliseconds(1) * count;
+  }
+}
+
+void run(const Arguments& a) {
+  std::signal(SIGINT, requestStop);
+  std::signal(SIGTERM, requestStop);
+  sim::ControllerOptions options =
+      sim::ControllerOptions::ofModel(a.model.empty() ? MachineModel{} : readMachineModel(a.model));
+  options.mode = MODES.at(a.mode);
+  options.info.cnc_type = a.type;
+  sim::Controller controller(options);
+  const focas::Server server(a.server, controller);
+  std::printf("controller: listens on %s:%d, mode %s\n", a.server.bind_address.c_str(), server.port(),
+              a.mode.c_str());
+  std::fflush(stdout);
+  run(controller);
+}
+
+}  // namespace
+
+namespace smartmill::sim {
+
+Command controllerCommand() {
+  Command command;
+  command.name = command.tool = "controller";
+  command.summary = "runs the simulated Fanuc controller until Ctrl-C";
+  command.description =
+      "Simulated Fanuc controller of a three-axis mill: FOCAS2 over Ethernet, in wall-clock time, until "
+      "Ctrl-C.\n"
+      "Without a model: travel x -250..250, y -200..200, z -300..0 mm, start at 0 0 0, rapid 30 m/min, 5 "
+      "m/s2,\n"
+      "spindle to 20000 rpm at 10000 rpm/s.";
+  command.examples = {{"--port 8193 --mode dnc", "listens on loopback; clients may run programs"},
+                      {"--port 0 --model mill.yaml", "any free port, axes and spindle of a model"}};
+  command.files = {{"MODEL", "machine model file: its sections axes and spindle"}};
+  command.exits = {{0, "stopped by Ctrl-C or SIGTERM"}};
+  command.declare = [](CommandLine& line) -> std::function<int()> {
+    const auto a = std::make_shared<Arguments>();
+    std::vector<std::string> modes;
+    for (const auto& [name, code] : MODES) modes.push_back(name);
+    line.option("--port", a->server.port, "TCP port, 0: any free one").showDefault();
+    line.option("--bind", a->server.bind_address, "address to listen on").showDefault();
+    line.option("--mode", a->mode,
+                "mode at the panel: mdi, mem, edit, handle, jog, inc, reference, dnc (the one that runs "
+                "programs)")
+        .oneOf(modes)
+        .showDefault();
+    line.option("--type", a->type, "type of control that it reports").oneOf({"30", "31"}).showDefault();
+    line.option("--model", a->model, "machine model file: its sections axes and spindle");
+    return commandBody(a, run);
+  };
+  return command;
+}
+
+}  // namespace smartmill::sim

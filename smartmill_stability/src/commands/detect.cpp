@@ -1,0 +1,122 @@
+#include "smartmill_stability/commands.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "commands/recording_file.h"
+#include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
+#include "smartmill_core/io/gnuplot.h"
+#include "smartmill_core/model/machine_model.h"
+#include "smartmill_core/units.h"
+
+namespace {
+
+using namespace smartmill;             // NOLINT
+using namespace smartmill::stability;  // NOLINT
+
+std::vector<double> modesOf(const std::string& file) {
+  std::vector<double> modes;
+  if (file.empty()) return modes;
+  const MachineModel model = readMachineModel(file);
+  for (const ModalModel* axis : {&model.tool_tip.x, &model.tool_tip.y})
+    for (const Mode& mode : axis->modes) modes.push_back(mode.frequency);
+  if (modes.empty()) throw Error(file + ": expected tool_tip with modes");
+  return modes;
+}
+
+/// Time and frequency in dB, tooth passings as thin lines, the chatter as an arrow.
+void draw(const RecordingVerdict& verdict, const RecordingOptions& o) {
+  constexpr std::size_t MOST = 400;
+  const Spectrogram& s = verdict.spectrogram;
+  const std::size_t across = std::max<std::size_t>(1, s.frequency.size() / MOST);
+  const std::size_t along = std::max<std::size_t>(1, s.time.size() / MOST);
+  std::vector<std::vector<double>> rows;
+  for (std::size_t w = 0; w < s.time.size(); w += along)
+    for (std::size_t k = 0; k + across <= s.frequency.size(); k += across) {
+      double most = 1e-30;
+      for (std::size_t i = k; i < k + across; ++i) most = std::max(most, s.power[w][i]);
+      rows.push_back({s.time[w], s.frequency[k], 10.0 * std::log10(most)});
+    }
+  Gnuplot plot(o.picture, 1100, 650, 12);
+  plot.block("levels", rows);
+  const double passing = o.teeth * verdict.speed / units::TWO_PI, end = s.time.back();
+  for (double f = passing; f < s.frequency.back(); f += passing)
+    plot << formatted("set arrow from %g,%g to %g,%g nohead front lc rgb '#ffffff' dt 3 lw 0.5\n", s.time[0],
+                      f, end, f);
+  if (verdict.chatter)
+    plot << formatted("set arrow from %g,%g to %g,%g nohead front lc rgb '#ff2020' lw 1.5\n", s.time[0],
+                      verdict.frequency, end, verdict.frequency)
+         << formatted("set label 'chatter %.0f Hz' at %g,%g front tc rgb '#ff2020' offset 0,0.6\n",
+                      verdict.frequency, s.time[0], verdict.frequency);
+  plot << "set title " << Gnuplot::quoted(verdict.text()) << " font ',10'\nset xlabel "
+       << Gnuplot::quoted("Time [s] of " + std::filesystem::path(o.file).filename().string())
+       << "\nset ylabel 'Frequency [Hz] (dotted: tooth passings)'\nset cblabel 'Power [dB]'\n"
+       << formatted("set xrange [%g:%g]\nset yrange [0:%g]\n", s.time[0], end, s.frequency.back())
+       << "set palette defined (0 '#000020', 1 '#203080', 2 '#3090a0', 3 '#e0d060', 4 '#ffffff')\n"
+       << "plot $levels using 1:2:3 with image notitle\n";
+  plot.draw();
+}
+
+void run(const RecordingOptions& given) {
+  RecordingOptions o = given;
+  RecordingRequest request;
+  request.speed = units::radPerSecFromRpm(o.rpm);
+  request.teeth = o.teeth;
+  request.speed_error = 0.01 * o.speed_error;
+  request.modes = modesOf(o.model);
+  if (o.picture.empty()) o.picture = std::filesystem::path(o.file).stem().string() + "_spectrogram.png";
+  request.validate();
+  const Recording recording = loadRecording(o);
+  const RecordingVerdict verdict = [&] {
+    try {
+      return judgeRecording(recording, request);
+    } catch (const Error& error) {
+      throw Error(o.file + ": " + error.what());
+    }
+  }();
+  draw(verdict, o);
+  std::printf("%s\n", verdict.text().c_str());
+}
+
+}  // namespace
+
+namespace smartmill::stability {
+
+Command detectCommand() {
+  Command command;
+  command.name = command.tool = "detect";
+  command.summary = "detects chatter in a recorded cut (sound, vibration, force)";
+  command.description =
+      "Decides whether a recording of a cut (sound, vibration, displacement or force; WAV, FLAC, CSV or bag) "
+      "shows chatter, in one line, and draws its spectrogram.";
+  command.examples = {{"cut.wav --speed 8000 --teeth 4", "all channels of a sound file"},
+                      {"cut.csv --speed 8000 --teeth 4 --channels fx,fy --model mill.yaml",
+                       "two columns; chatter must lie near a mode of the model"}};
+  command.files = {{"FILE", "the recording: WAV, FLAC, AIFF, CSV with a column time[s], or a bag"},
+                   {"NAME_spectrogram.png", "the picture, unless -o names another"}};
+  command.declare = [](CommandLine& line) -> std::function<int()> {
+    const auto o = std::make_shared<RecordingOptions>();
+    line.option("FILE", o->file, "the recording").required();
+    line.option("--speed", o->rpm, "spindle speed of the cut [rpm]").required().positive();
+    line.option("--teeth", o->teeth, "teeth of the tool").required();
+    line.option("--speed-error", o->speed_error, "largest error of the speed [percent]").showDefault();
+    line.option("--model", o->model, "machine model with the modes of tool_tip: chatter must lie near one");
+    line.option("--channels", o->channels, "numbers of a sound file's channels, or columns of a CSV (all)")
+        .commas();
+    line.option("--topic", o->topic,
+                "topic of a bag (default: the first present of daq/sound, daq/vibration, force/compensated)");
+    line.option("--from", o->from, "start of the part to use [s]").notNegative();
+    line.option("--to", o->to, "end of the part to use [s]");
+    line.option("-o,--out", o->picture, "picture of the spectrogram (default: NAME_spectrogram.png)");
+    return commandBody(o, run);
+  };
+  return command;
+}
+
+}  // namespace smartmill::stability

@@ -1,0 +1,239 @@
+#include "smartmill_stability/commands.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "smartmill_core/cutting/force_curve.h"
+#include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
+#include "smartmill_core/io/csv.h"
+#include "smartmill_core/model/machine_model.h"
+#include "smartmill_core/units.h"
+#include "smartmill_stability/chart/bistable.h"
+#include "smartmill_stability/chart/cut_request.h"
+#include "smartmill_stability/chart/picture.h"
+#include "smartmill_stability/solvers/boundary.h"
+#include "smartmill_stability/solvers/model_system.h"
+#include "smartmill_stability/solvers/solver.h"
+
+namespace {
+
+using namespace smartmill;
+
+struct Request : stability::CutRequest {
+  std::string method = "collocation", boundary, serration, force_curve;
+  double max_depth_mm = 0.0, feed_mm = 0.0;
+  bool errors = false;
+};
+
+std::string axes(double max_depth_mm) {
+  return "set xlabel 'Spindle speed [rpm]'\nset ylabel 'Axial depth [mm]'\nset yrange [0:" +
+         std::to_string(max_depth_mm) + "]\n";
+}
+
+/// [s] a limit may take before progress is shown.
+constexpr double QUIET = 1.0;
+
+std::vector<stability::Limit> limitsOf(const stability::StabilitySolver& solver,
+                                       const std::vector<double>& speeds, double max_depth) {
+  // In pieces that overlap by one speed, so that neighbours are compared across them.
+  constexpr std::size_t PIECE = 25;
+  const auto begin = std::chrono::steady_clock::now();
+  std::vector<stability::Limit> limits;
+  bool shown = false;
+  for (std::size_t i = 0; i < speeds.size(); i += PIECE) {
+    const std::size_t from = i > 0 ? i - 1 : 0, to = std::min(i + PIECE + 1, speeds.size());
+    const std::vector<double> part(speeds.begin() + static_cast<std::ptrdiff_t>(from),
+                                   speeds.begin() + static_cast<std::ptrdiff_t>(to));
+    const std::vector<stability::Limit> found = solver.limits(part, max_depth);
+    for (std::size_t k = i; k < std::min(i + PIECE, speeds.size()); ++k) limits.push_back(found[k - from]);
+    const std::chrono::duration<double> passed = std::chrono::steady_clock::now() - begin;
+    if (passed.count() > QUIET || shown) {
+      std::fprintf(stderr, "\r%3zu %% of the speeds", 100 * limits.size() / speeds.size());
+      shown = true;
+    }
+  }
+  if (shown) std::fprintf(stderr, "\n");
+  return limits;
+}
+
+void traceAll(const Request& request, const stability::FloquetSolver& solver,
+              const std::vector<double>& speeds) {
+  if (speeds.size() < 2) throw Error("--boundary: expected a range of speeds");
+  stability::TraceOptions options;
+  options.speed_low = speeds.front();
+  options.speed_high = speeds.back();
+  options.max_depth = request.max_depth_mm * units::MM;
+  options.levels = 3;  // tips of pockets down to 1/480 of the range of speeds
+  const auto curves = stability::traceBoundary(solver, options);
+  CsvWriter csv("curve,rpm,depth_mm,chatter_hz,kind", 8);
+  for (std::size_t c = 0; c < curves.size(); ++c) {
+    // A blank line parts the curves for gnuplot.
+    if (c > 0) csv.gap();
+    for (const stability::BoundaryPoint& p : curves[c].points)
+      csv.row(c, units::rpmFromRadPerSec(p.speed), p.depth / units::MM, p.frequency, nameOf(p.kind));
+  }
+  csv.save(request.boundary);
+  stability::drawBeside(request.boundary,
+                        axes(request.max_depth_mm) +
+                            "plot %FILE skip 1 using 2:3 with lines lw 2 title 'boundary', "
+                            "%FILE skip 1 using 2:(strcol(5) eq 'flip' ? $3 : NaN) with points "
+                            "pt 7 ps 0.4 title 'flip'");
+  std::size_t islands = 0;
+  for (const auto& curve : curves) islands += curve.closed;
+  std::printf("%zu boundary curves, %zu of them islands\n", curves.size(), islands);
+}
+
+/// Contact of the teeth as it is, where a feed is given.
+void addChips(const Request& request, stability::RegenerativeSystem& system) {
+  if (request.feed_mm == 0.0 && request.serration.empty()) return;
+  if (!(request.feed_mm > 0.0)) throw Error("--feed-mm: must be above 0 (with --serration-mm as well)");
+  stability::ChipGeometry chip;
+  chip.feed = request.feed_mm * units::MM;
+  if (!request.serration.empty()) {
+    double amplitude = 0.0, wavelength = 0.0;
+    char rest = 0;
+    if (std::sscanf(request.serration.c_str(), "%lf:%lf%c", &amplitude, &wavelength, &rest) != 2 ||
+        !(amplitude > 0.0) || !(wavelength > 0.0))
+      throw Error("--serration-mm " + request.serration + ": expected AMPLITUDE:WAVELENGTH, both above 0");
+    chip.serration_amplitude = amplitude * units::MM;
+    chip.serration_wavelength = wavelength * units::MM;
+  }
+  system.chip = chip;
+}
+
+/// Both limits of a force law that is no straight line, and the range between them.
+void bistable(const Request& request, stability::Method method) {
+  if (!(request.feed_mm > 0.0)) throw Error("--force-curve: needs --feed-mm, above 0");
+  if (!request.serration.empty() || !request.boundary.empty() || request.errors)
+    throw Error("--force-curve: cannot be combined with --serration-mm, --boundary or --errors");
+  const ForceCurves law = readForceCurves(request.force_curve);
+  const stability::RegenerativeSystem system = request.system(readMachineModel(request.model));
+  const auto found = stability::bistableLimits(system, law, request.feed_mm * units::MM, method, {},
+                                               request.speedRange(), request.max_depth_mm * units::MM);
+  CsvWriter csv("rpm,limit_mm,chatter_hz,kind,large_limit_mm,secant_limit_mm", 8);
+  double range = 0.0, widest = 0.0;
+  const auto cell = [](double depth) {
+    return std::isfinite(depth) ? formatted("%.8g", depth / units::MM) : std::string();
+  };
+  for (const stability::BistableLimit& b : found) {
+    const bool limited = std::isfinite(b.small.depth);
+    csv.row(units::rpmFromRadPerSec(b.speed), cell(b.small.depth),
+            limited ? formatted("%.8g", b.small.frequency) : "", limited ? nameOf(b.small.kind) : "",
+            cell(b.large.depth), cell(b.secant.depth));
+    const double share = limited ? std::max(0.0, 1.0 - b.large.depth / b.small.depth) : 0.0;
+    range += share / static_cast<double>(found.size());
+    widest = std::max(widest, share);
+  }
+  csv.save(request.out);
+  stability::drawBeside(request.out,
+                        axes(request.max_depth_mm) +
+                            "plot %FILE skip 1 using 1:5:2 with filledcurves lc 'gold' title 'still or "
+                            "chatter', %FILE skip 1 using 1:2 with lines lw 2 lc 'black' title 'the least "
+                            "vibration grows', %FILE skip 1 using 1:5 with lines lw 2 lc 'red' title 'a "
+                            "large vibration stays'");
+  const double chip = stability::meanChip(system, request.feed_mm * units::MM);
+  std::printf(
+      "mean chip %.4f mm: %.2f +- %.2f N/mm tangential, %.2f +- %.2f N/mm radial; slopes %.1f, %.1f "
+      "N/mm2\n",
+      chip / units::MM, law.tangential.at(chip) / units::N_PER_MM,
+      law.tangential.stdAt(chip) / units::N_PER_MM, law.radial.at(chip) / units::N_PER_MM,
+      law.radial.stdAt(chip) / units::N_PER_MM, law.tangential.slope(chip) / units::N_PER_MM2,
+      law.radial.slope(chip) / units::N_PER_MM2);
+  std::printf("a large vibration stays from %.1f %% (mean) below the limit of a small one, at most %.1f %%\n",
+              100.0 * range, 100.0 * widest);
+}
+
+void run(const Request& request) {
+  const stability::Method method = stability::methodOf(request.method);
+  if (!(request.max_depth_mm > 0.0)) throw Error("--max-depth-mm: must be above 0");
+  if (!request.force_curve.empty()) {
+    bistable(request, method);
+    return;
+  }
+  const std::vector<double> speeds = request.speedRange();
+  stability::RegenerativeSystem system = request.system(readMachineModel(request.model));
+  addChips(request, system);
+  stability::SolverOptions options;
+  options.estimate_error = request.errors;
+  const auto solver = stability::makeSolver(method, system, options);
+  const double max_depth = request.max_depth_mm * units::MM;
+  const std::vector<stability::Limit> limits = limitsOf(*solver, speeds, max_depth);
+
+  CsvWriter csv("rpm,limit_mm,chatter_hz,kind", 8);
+  double least = max_depth, error = 0.0;
+  for (std::size_t i = 0; i < speeds.size(); ++i) {
+    const double rpm = units::rpmFromRadPerSec(speeds[i]);
+    const stability::Limit& limit = limits[i];
+    if (std::isfinite(limit.depth)) {
+      csv.row(rpm, limit.depth / units::MM, limit.frequency, nameOf(limit.kind));
+      least = std::min(least, limit.depth);
+      if (std::isfinite(limit.error)) error = std::max(error, limit.error / limit.depth);
+    } else {
+      csv.row(rpm, "", "", "");
+    }
+  }
+  csv.save(request.out);
+  stability::drawBeside(
+      request.out, axes(request.max_depth_mm) +
+                       "plot %FILE skip 1 using 1:2 with lines lw 2 title 'first loss of stability (" +
+                       std::string(nameOf(method)) +
+                       ")', %FILE skip 1 using 1:(strcol(4) eq 'flip' ? $2 : NaN) with points pt 7 ps 0.4 "
+                       "title 'flip'");
+  std::printf("stable at every one of these speeds below %.4f mm (%s)\n", least / units::MM, nameOf(method));
+  if (request.errors) std::printf("largest estimated error of a limit %.2g %%\n", 100.0 * error);
+  if (!request.boundary.empty())
+    traceAll(request, *stability::makeFloquetSolver(method, system, options), speeds);
+}
+
+}  // namespace
+
+namespace smartmill::stability {
+
+Command lobesCommand() {
+  Command command;
+  command.name = command.tool = "lobes";
+  command.summary = "computes stability lobes of a machine model";
+  command.description =
+      "Stability lobes of a machine model: the first loss of stability with growing depth, over spindle "
+      "speed.";
+  command.examples = {
+      {"mill.yaml --entry-deg 0 --exit-deg 180 --speeds 2000:12000:201 --max-depth-mm 5 -o chart.csv",
+       "a slot, 201 speeds"},
+      {"mill.yaml --entry-deg 90 --exit-deg 180 --speeds 2000:12000:101 --max-depth-mm 8 -o chart.csv "
+       "--boundary all.csv",
+       "down-milling; the whole boundary with its islands as well"}};
+  command.files = {{"OUT", "CSV rpm,limit_mm,chatter_hz,kind; a picture of the same name with .png"},
+                   {"BOUNDARY", "CSV curve,rpm,depth_mm,chatter_hz,kind"}};
+  command.declare = [](CommandLine& line) -> std::function<int()> {
+    const auto request = std::make_shared<Request>();
+    request->addTo(line, "LO:HI:N");
+    line.option("--method", request->method,
+                "solver: collocation, semi_discretization, multi_frequency, zero_order")
+        .showDefault();
+    line.option("--max-depth-mm", request->max_depth_mm, "largest depth [mm]").required();
+    request->addOutTo(line);
+    line.option("--boundary", request->boundary,
+                "CSV of the whole boundary with its islands, in addition to the first loss; a picture of the "
+                "same name with .png");
+    line.option("--feed-mm", request->feed_mm,
+                "feed per tooth [mm]: takes the contact of the teeth in the forced vibration into account "
+                "(uneven pitch, serration); without it every tooth cuts along its whole arc");
+    line.option("--serration-mm", request->serration,
+                "AMPLITUDE:WAVELENGTH [mm] of a serrated edge, evenly shifted from tooth to tooth; needs "
+                "--feed-mm");
+    line.option("--force-curve", request->force_curve,
+                "force over chip thickness in place of the model's coefficients (`force-law --curve` writes "
+                "it): limits of small and of large vibrations; needs --feed-mm");
+    line.flag("--errors", request->errors, "estimate the error of each limit by a refined solution");
+    return commandBody(request, run);
+  };
+  return command;
+}
+
+}  // namespace smartmill::stability

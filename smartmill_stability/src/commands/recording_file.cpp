@@ -1,0 +1,152 @@
+#include "commands/recording_file.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <optional>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/formatted.h"
+#include "smartmill_core/io/csv.h"
+#include "smartmill_core/io/sound_file.h"
+#include "smartmill_recording/recording_file.h"
+#include "smartmill_recording/recording_reader.h"
+
+namespace smartmill::stability {
+namespace {
+
+Recording fromSound(const RecordingOptions& o) {
+  SoundFile sound = readSoundFile(o.file);
+  Recording recording;
+  recording.sample_rate = sound.sample_rate;
+  if (o.channels.empty()) {
+    recording.channels = std::move(sound.channels);
+    return recording;
+  }
+  for (const std::string& channel : o.channels) {
+    std::size_t number = 0;
+    char rest = 0;
+    if (std::sscanf(channel.c_str(), "%zu%c", &number, &rest) != 1 || number < 1 ||
+        number > sound.channels.size())
+      throw Error(o.file + ": channel '" + channel + "': expected 1 to " +
+                  std::to_string(sound.channels.size()));
+    recording.channels.push_back(sound.channels[number - 1]);
+  }
+  return recording;
+}
+
+bool isTime(const std::string& name) {
+  return name == "t" || name == "t[s]" || name == "time" || name == "time[s]";
+}
+
+Recording fromTable(const RecordingOptions& o) {
+  const NumberTable table = readNumberTable(o.file);
+  const auto time = std::find_if(table.names.begin(), table.names.end(), isTime);
+  if (time == table.names.end()) throw Error(o.file + ": expected a column time[s] (or t[s])");
+  const std::vector<double>& t = table.columns[static_cast<std::size_t>(time - table.names.begin())];
+  if (t.size() < 2 || !(t.back() > t.front())) throw Error(o.file + ": column time does not increase");
+  Recording recording;
+  recording.sample_rate = static_cast<double>(t.size() - 1) / (t.back() - t.front());
+  for (std::size_t i = 1; i < t.size(); ++i) {
+    if (!std::isfinite(t[i])) throw Error(o.file + formatted(": no time after %.6f s", t[i - 1]));
+    if (std::abs((t[i] - t[i - 1]) * recording.sample_rate - 1.0) > 0.1)
+      throw Error(o.file + formatted(": samples are not equally spaced at %.6f s", t[i]));
+  }
+  std::vector<std::string> names = o.channels;
+  for (const std::string& name : table.names)
+    if (o.channels.empty() && !isTime(name) && name.rfind("spindle_angle", 0) != 0) names.push_back(name);
+  for (const std::string& name : names) {
+    recording.channels.push_back(table.column(name));
+    for (std::size_t i = 0; i < t.size(); ++i)
+      if (!std::isfinite(recording.channels.back()[i]))
+        throw Error(o.file + ": column " + name + formatted(" has no number at %.6f s", t[i]));
+  }
+  return recording;
+}
+
+/// The longest stretch of a topic without lost samples.
+class Stretch {
+ public:
+  explicit Stretch(const RecordingOptions& o) : o_(o) {}
+  void add(const SampleBlock& block) {
+    if (!begun_) begun_ = block.stamp;
+    if (block.stamp - *begun_ < o_.from || block.stamp - *begun_ > o_.to) return;
+    if (block.first_index != next_ || now_.channels.size() != block.channels.size()) restart(block);
+    next_ = block.first_index + block.size();
+    for (std::size_t c = 0; c < block.channels.size(); ++c)
+      for (std::size_t i = 0; i < block.size(); ++i) now_.channels[c].push_back(block.at(i, c));
+  }
+  Recording longest() {
+    keep();
+    if (best_.channels.empty()) throw Error(o_.file + ": topic " + o_.topic + " holds no samples");
+    for (const std::vector<double>& channel : best_.channels)
+      for (const double v : channel)
+        if (!std::isfinite(v))
+          throw Error(o_.file + ": topic " + o_.topic + " holds a value that is not a finite number");
+    return best_;
+  }
+
+ private:
+  void keep() {
+    if (!now_.channels.empty() &&
+        (best_.channels.empty() || now_.channels[0].size() > best_.channels[0].size()))
+      best_ = now_;
+  }
+  void restart(const SampleBlock& block) {
+    keep();
+    now_ = Recording();
+    now_.sample_rate = block.sample_rate;
+    now_.channels.resize(block.channels.size());
+  }
+
+  const RecordingOptions& o_;
+  std::optional<double> begun_;
+  std::uint64_t next_ = 0;
+  Recording now_, best_;
+};
+
+Recording fromBag(RecordingOptions o) {
+  RecordingReader bag(o.file);
+  for (const char* topic : {"daq/sound", "daq/vibration", names::FORCE_COMPENSATED, names::DYNAMOMETER})
+    if (o.topic.empty() && bag.has(topic)) o.topic = topic;
+  if (o.topic.empty() || !bag.has(o.topic))
+    throw Error(o.file + ": topic " +
+                (o.topic.empty() ? "daq/sound, daq/vibration or force/compensated" : o.topic) + " not found");
+  Stretch stretch(o);
+  if (o.topic.find("force/") != std::string::npos) {
+    bag.on<ForceBlock>(o.topic, [&](const ForceBlock& force, double) {
+      SampleBlock block;
+      block.stamp = force.stamp;
+      block.sample_rate = force.sample_rate;
+      block.first_index = force.first_index;
+      block.channels = {"fx", "fy", "fz"};
+      for (std::size_t i = 0; i < force.force[0].size(); ++i)
+        for (const std::vector<double>& axis : force.force) block.samples.push_back(axis[i]);
+      stretch.add(block);
+    });
+  } else {
+    bag.on<SampleBlock>(o.topic, [&](const SampleBlock& block, double) { stretch.add(block); });
+  }
+  bag.run();
+  return stretch.longest();
+}
+
+}  // namespace
+
+Recording loadRecording(const RecordingOptions& o) {
+  if (isRecording(o.file)) return fromBag(o);
+  Recording recording = isSoundFile(o.file) ? fromSound(o) : fromTable(o);
+  const auto size = recording.channels.empty() ? 0 : recording.channels[0].size();
+  const auto at = [&](double seconds) {
+    return static_cast<std::size_t>(
+        std::clamp(seconds * recording.sample_rate, 0.0, static_cast<double>(size)));
+  };
+  const std::size_t from = at(o.from), to = at(o.to);
+  if (from >= to) throw Error(o.file + formatted(": nothing between %.2f and %.2f s", o.from, o.to));
+  for (std::vector<double>& channel : recording.channels)
+    channel = {channel.begin() + static_cast<std::ptrdiff_t>(from),
+               channel.begin() + static_cast<std::ptrdiff_t>(to)};
+  return recording;
+}
+
+}  // namespace smartmill::stability

@@ -1,0 +1,100 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "smartmill_core/program.h"
+
+namespace smartmill {
+
+/// A command line that works, without the program's name, and what it does.
+struct CommandExample {
+  std::string arguments, what;
+};
+
+/// An exit code and its meaning.
+struct ExitCode {
+  int code = 0;
+  std::string meaning;
+};
+
+/// A file that a command reads or writes.
+struct CommandFile {
+  std::string name, what;
+};
+
+/// A tool: a program of its own (runCommand) and a command of the program `smartmill`.
+struct Command {
+  std::string name;         ///< of the command, e.g. "cutting-frf"
+  std::string tool;         ///< of the program in its package, e.g. "cutting_frf"
+  std::string summary;      ///< one line without a full stop
+  std::string description;  ///< one paragraph, the first thing in --help
+  std::vector<CommandExample> examples;
+  std::vector<CommandFile> files;
+  std::vector<ExitCode> exits;  ///< where they differ from exitCodes(), or are added to them
+  /// Declares the options. @return the body, which owns what the options are read into; it runs after the
+  /// command line was parsed and returns the exit code.
+  std::function<std::function<int()>(CommandLine&)> declare;
+};
+
+/// The body of a command that runs with its options and ends with exit code 0.
+template <class Options>
+std::function<int()> commandBody(std::shared_ptr<Options> options, void (*run)(const Options&)) {
+  return [options = std::move(options), run] {
+    run(*options);
+    return 0;
+  };
+}
+
+/// Exit codes of a command in rising order: 0 done, 1 error, 2 bad command line, 130 interrupted, and its
+/// own.
+std::vector<ExitCode> exitCodes(const Command& command);
+
+/// A command line with the command's options, its examples and exit codes at the end of --help.
+class CommandRun {
+ public:
+  /// @param program the name in messages, e.g. "explain" or "smartmill explain"
+  CommandRun(const Command& command, const std::string& program);
+  CommandLine& line() { return line_; }
+  /// What the command itself put at the end of --help: its parameters.
+  const std::string& notes() const { return notes_; }
+  /// As runProgram: argv[0] is skipped. @return the exit code
+  int run(int argc, const char* const* argv);
+
+ private:
+  CommandLine line_;
+  std::function<int()> body_;
+  std::string notes_;
+};
+
+/// main of a program that is one command, named as it was started.
+int runCommand(const Command& command, int argc, const char* const* argv);
+
+/// Commands of one subject, under its heading in --help.
+struct CommandTopic {
+  std::string title;
+  std::vector<Command> commands;
+};
+
+/// A program made of commands.
+struct CommandProgram {
+  std::string name, summary, version;
+  std::vector<CommandTopic> topics;
+  std::vector<Command> hidden;  ///< run like the others, missing from --help
+
+  /// nullptr if no command has the name.
+  const Command* find(const std::string& command) const;
+  /// The command whose name, or whose tool's name, is nearest to a word that names none; empty if all are
+  /// far.
+  std::string nearest(const std::string& word) const;
+  /// The text of --help.
+  std::string help() const;
+};
+
+/// main of a program made of commands. @return the exit code
+int runCommands(const CommandProgram& program, int argc, const char* const* argv);
+
+}  // namespace smartmill

@@ -1,0 +1,62 @@
+#include "smartmill_core/parameters/parameter_options.h"
+
+#include <stdexcept>
+
+#include "smartmill_core/error.h"
+#include "smartmill_core/parameters/parameter_reader.h"
+
+namespace smartmill {
+namespace {
+
+void set(const Parameter& parameter, const std::string& option, const std::string& text) {
+  std::size_t used = 0;
+  double number = 0.0;
+  try {
+    number = std::stod(text, &used);
+  } catch (const std::exception&) {
+    used = 0;
+  }
+  if (used != text.size()) throw Error(option + ": '" + text + "' is not a number");
+  if (const auto* place = std::get_if<double*>(&parameter.place)) {
+    **place = number;
+  } else {
+    int* const place_of_int = std::get<int*>(parameter.place);
+    *place_of_int = static_cast<int>(number);
+    if (*place_of_int != number) throw Error(option + ": '" + text + "' is not a whole number");
+  }
+}
+
+}  // namespace
+
+ParameterOptions::ParameterOptions(CommandLine& line, const ParameterTable& table, const std::string& shipped)
+    : line_(line), table_(table) {
+  line.option("--params", file_, "parameter file, as the node's (" + shipped + "; its keys below)");
+  line.footer("\n" + table.yaml());
+}
+
+void ParameterOptions::add(const std::string& option, const std::string& key) {
+  const Parameter* parameter = table_.find(key);
+  if (!parameter) throw std::logic_error("no parameter " + key);
+  given_.push_back({option, key});
+  line_.option(option, *given_.back().text, parameter->description() + " (" + parameter->value() + ")");
+}
+
+void ParameterOptions::apply() {
+  if (!file_.empty()) {
+    ParameterReader reader = ParameterReader::fromFile(file_);
+    reader.read(table_);
+    reader.finish();
+  }
+  for (const Given& given : given_) {
+    if (given.text->empty()) continue;
+    const Parameter& parameter = *table_.find(given.key);
+    set(parameter, given.option, *given.text);
+    try {
+      parameter.check();
+    } catch (const Error& error) {
+      throw Error(given.option + ": " + error.what());
+    }
+  }
+}
+
+}  // namespace smartmill

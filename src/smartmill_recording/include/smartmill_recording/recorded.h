@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <type_traits>
+
+#include "smartmill_recording/conversions.h"
+#include "smartmill_recording/message_codec.h"
+
+namespace smartmill {
+
+/// How recorded bytes become a Data: its message type, and decode(), whose result is valid until the next
+/// call. @throws Error on bytes that end too early and on data that contradict themselves.
+template <class Data, class = void>
+class Recorded;
+
+/// Messages themselves.
+template <class Message>
+class Recorded<Message, std::void_t<decltype(Message::LEAST_SIZE)>> {
+ public:
+  static const char* type() { return Message::TYPE; }
+  static const char* md5() { return Message::MD5; }
+  const Message& decode(const std::uint8_t* data, std::size_t size) {
+    readMessage(data, size, message_);
+    return message_;
+  }
+
+ private:
+  Message message_;
+};
+
+/// Core types, by the message that carries them.
+template <class Data>
+class Recorded<Data, std::void_t<typename PlainOf<Data>::Type>> {
+ public:
+  static const char* type() { return PlainOf<Data>::Type::TYPE; }
+  static const char* md5() { return PlainOf<Data>::Type::MD5; }
+  const Data& decode(const std::uint8_t* data, std::size_t size) {
+    return data_ = fromMsg(message_.decode(data, size));
+  }
+
+ private:
+  Recorded<typename PlainOf<Data>::Type> message_;
+  Data data_;
+};
+
+}  // namespace smartmill

@@ -1,0 +1,74 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+
+namespace smartmill {
+
+/// Where the bytes of a recording come from.
+struct RecordingBytes {
+  std::uint64_t size = 0;
+  /// Copies bytes that lie within size; may be called by two threads at once. @throws Error when they cannot
+  /// be read.
+  std::function<void(std::uint64_t at, char* to, std::size_t count)> read;
+};
+
+/// The bytes of a file. @throws Error when it cannot be opened.
+RecordingBytes bytesOfFile(const std::string& path);
+
+/// A recorded topic of one publisher.
+struct RecordedConnection {
+  std::string topic, type, md5sum, definition;
+  std::string encoding = "ros1";            ///< of its messages
+  std::map<std::string, std::string> more;  ///< other fields of its header: callerid, latching
+};
+
+/// The messages of a recording in the order of their reception. No length that the file states is believed
+/// before it was compared with the bytes that are there: a damaged file is refused with one line, never with
+/// a read beyond a buffer or an allocation that the file's bytes do not fill.
+class RecordingFile {
+ public:
+  /// Of one message.
+  struct Entry {
+    std::uint64_t time = 0;  ///< [ns] of its reception since 1970-01-01
+    std::uint32_t chunk = 0, offset = 0, size = 0;
+    std::uint32_t connection = 0;
+    double seconds() const;  ///< [s] as ros::Time::toSec()
+  };
+
+  RecordingFile() = default;
+  RecordingFile(const RecordingFile&) = delete;
+  RecordingFile& operator=(const RecordingFile&) = delete;
+  virtual ~RecordingFile() = default;
+
+  /// By number.
+  virtual const std::map<std::uint32_t, RecordedConnection>& connections() const = 0;
+  /// The next message in the order of reception; messages of one instant in the order of the file.
+  /// @return false behind the last. @throws Error.
+  virtual bool next(Entry* entry) = 0;
+  /// The message's bytes, valid until the next call of next() or data(). @throws Error.
+  virtual const std::uint8_t* data(const Entry& entry) = 0;
+  /// Share of the file that next() has gone through. [1]
+  virtual double share() const = 0;
+  /// @throws std::out_of_range
+  const RecordedConnection& connection(const Entry& entry) const {
+    return connections().at(entry.connection);
+  }
+};
+
+/// Opens a bag of format 2.0 (wiki.ros.org/Bags/Format/2.0) or an MCAP file (mcap.dev/spec) with messages of
+/// ROS 1; which of both is told by its first bytes, not by its name.
+/// @throws Error of one line: missing, neither format, cut off, damaged, without index.
+std::unique_ptr<RecordingFile> openRecording(const std::string& path);
+/// @param name for messages
+std::unique_ptr<RecordingFile> openRecording(RecordingBytes bytes, const std::string& name);
+
+/// Whether a tool should take this as a recording: its first bytes or, where it cannot be read, its name say
+/// so.
+bool isRecording(const std::string& path);
+
+}  // namespace smartmill

@@ -1,0 +1,178 @@
+#include "chunked_file.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <limits>
+#include <stdexcept>
+#include <utility>
+
+#include "checksum.h"
+#include "smartmill_core/error.h"
+
+namespace smartmill {
+namespace {
+
+constexpr std::size_t WINDOW = 4096;          // [byte]
+constexpr std::size_t KEPT = 4;               // chunks, since neighbours overlap in time
+constexpr std::uint64_t SECOND = 1000000000;  // [ns]
+
+}  // namespace
+
+double RecordingFile::Entry::seconds() const {
+  return static_cast<double>(time / SECOND) + 1e-9 * static_cast<double>(time % SECOND);
+}
+
+void ChunkedFile::fail(const std::string& what) const {
+  throw Error(name_ + ": " + what);
+}
+
+void ChunkedFile::look(std::uint64_t at, std::uint8_t* to, std::size_t count) const {
+  if (count > WINDOW) {
+    bytes_.read(at, reinterpret_cast<char*>(to), count);
+    return;
+  }
+  if (at < window_at_ || at + count > window_at_ + window_.size()) {
+    window_.resize(static_cast<std::size_t>(std::min<std::uint64_t>(WINDOW, bytes_.size - at)));
+    bytes_.read(at, reinterpret_cast<char*>(window_.data()), window_.size());
+    window_at_ = at;
+  }
+  std::copy_n(window_.begin() + static_cast<std::ptrdiff_t>(at - window_at_), count, to);
+}
+
+std::string ChunkedFile::word(std::uint64_t at, std::size_t count) const {
+  std::string bytes(count, '\0');
+  look(at, reinterpret_cast<std::uint8_t*>(bytes.data()), count);
+  return bytes;
+}
+
+void ChunkedFile::finishChunks() {
+  std::uint64_t least = std::numeric_limits<std::uint64_t>::max();
+  for (auto chunk = chunks_.rbegin(); chunk != chunks_.rend(); ++chunk) {
+    chunk->first_behind = least;
+    least = std::min(least, chunk->first);
+  }
+  window_.clear();
+}
+
+bool ChunkedFile::next(Entry* entry) {
+  const auto waits = [this] {
+    return waiting_.empty() || waiting_.top().entry.time > chunks_[indexed_ - 1].first_behind;
+  };
+  while (indexed_ < chunks_.size() && waits()) {
+    index(indexed_, load(indexed_));
+    if (++indexed_ == chunks_.size()) checkEnd(arrivals_);
+  }
+  if (waiting_.empty()) return false;
+  *entry = waiting_.top().entry;
+  waiting_.pop();
+  if (connections_.count(entry->connection) == 0)
+    fail("is damaged: a message of connection " + std::to_string(entry->connection) +
+         ", which is not declared");
+  return true;
+}
+
+double ChunkedFile::share() const {
+  return chunks_.empty() ? 1.0 : static_cast<double>(indexed_) / static_cast<double>(chunks_.size());
+}
+
+void ChunkedFile::addMessage(const Entry& entry) {
+  if (entry.time < chunks_[entry.chunk].first)
+    fail("is damaged: a message is older than the first time that is stated of its chunk");
+  waiting_.push({arrivals_++, entry});
+}
+
+/// Memory that was used before is at hand already.
+ChunkedFile::Loaded ChunkedFile::spare() {
+  Loaded loaded;
+  if (loaded_.size() >= KEPT) {
+    loaded = std::move(loaded_.back());
+    loaded_.pop_back();
+  }
+  return loaded;
+}
+
+/// @throws std::exception
+void ChunkedFile::unpackInto(const Chunk& chunk, Loaded* loaded) const {
+  const bool packed = chunk.packing != Packing::none;
+  std::vector<std::uint8_t>& stored = packed ? loaded->stored : loaded->bytes;
+  stored.resize(static_cast<std::size_t>(chunk.stored));
+  bytes_.read(chunk.at, reinterpret_cast<char*>(stored.data()), stored.size());
+  if (packed) unpack(chunk.packing, stored, chunk.size, chunk.seen, loaded->bytes);
+  if (chunk.checksum != 0 && !chunk.seen &&
+      crc32(loaded->bytes.data(), loaded->bytes.size()) != chunk.checksum)
+    throw std::runtime_error("checksum mismatch");
+}
+
+/// Begins to unpack a chunk that will be asked for.
+void ChunkedFile::ahead(std::uint32_t number) {
+  if (number >= chunks_.size()) return;
+  Loaded loaded = spare();
+  loaded.chunk = number;
+  coming_ =
+      std::async(std::launch::async, [this, chunk = chunks_[number], loaded = std::move(loaded)]() mutable {
+        unpackInto(chunk, &loaded);
+        return std::move(loaded);
+      });
+}
+
+const std::vector<std::uint8_t>& ChunkedFile::load(std::uint32_t number) {
+  const auto kept = std::find_if(loaded_.begin(), loaded_.end(),
+                                 [number](const Loaded& loaded) { return loaded.chunk == number; });
+  if (kept != loaded_.end()) return kept->bytes;
+  try {
+    // Only next() goes on to a chunk that was never seen.
+    if (!chunks_[number].seen && coming_.valid()) {
+      loaded_.push_front(coming_.get());
+    } else {
+      Loaded loaded = spare();
+      loaded.chunk = number;
+      unpackInto(chunks_[number], &loaded);
+      loaded_.push_front(std::move(loaded));
+    }
+  } catch (const Error&) {
+    throw;
+  } catch (const std::exception& e) {
+    fail("is damaged: the chunk at byte " + std::to_string(chunks_[number].begin) +
+         " cannot be unpacked: " + e.what());
+  }
+  if (!chunks_[number].seen) {
+    chunks_[number].seen = true;
+    ahead(number + 1);
+  }
+  return loaded_.front().bytes;
+}
+
+const std::uint8_t* ChunkedFile::data(const Entry& entry) {
+  return load(entry.chunk).data() + entry.offset;
+}
+
+RecordingBytes bytesOfFile(const std::string& path) {
+  const auto unread = [path] {
+    return Error(path + ": cannot be read: not found, no permission, or cut off while it is read");
+  };
+  const int opened = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  const std::shared_ptr<const int> file(new int(opened), [](const int* number) {
+    if (*number >= 0) ::close(*number);
+    delete number;
+  });
+  const off_t size = opened < 0 ? -1 : ::lseek(opened, 0, SEEK_END);
+  if (size < 0) throw unread();
+  RecordingBytes bytes;
+  bytes.size = static_cast<std::uint64_t>(size);
+  bytes.read = [file, unread](std::uint64_t at, char* to, std::size_t count) {
+    while (count > 0) {
+      const ssize_t got = ::pread(*file, to, count, static_cast<off_t>(at));
+      if (got < 0 && errno == EINTR) continue;
+      if (got <= 0) throw unread();
+      at += static_cast<std::uint64_t>(got);
+      to += got;
+      count -= static_cast<std::size_t>(got);
+    }
+  };
+  return bytes;
+}
+
+}  // namespace smartmill

@@ -1,0 +1,90 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <future>
+#include <map>
+#include <queue>
+#include <string>
+#include <vector>
+
+#include "packing.h"
+#include "smartmill_recording/recording_file.h"
+
+namespace smartmill {
+
+/// What bags and MCAP files share: messages in chunks, each of which is read and decompressed once, ahead of
+/// the reader by a thread of its own, and put in the order of reception. Of the file's index only the time of
+/// each chunk's first message is used, and compared when the chunk is read.
+class ChunkedFile : public RecordingFile {
+ public:
+  const std::map<std::uint32_t, RecordedConnection>& connections() const override { return connections_; }
+  bool next(Entry* entry) override;
+  const std::uint8_t* data(const Entry& entry) override;
+  double share() const override;
+
+ protected:
+  struct Chunk {
+    std::uint64_t begin = 0;   // of its record
+    std::uint64_t at = 0;      // of its packed bytes
+    std::uint64_t stored = 0;  // [byte]
+    std::uint32_t size = 0;    // [byte] when unpacked
+    Packing packing = Packing::none;
+    std::uint64_t first = 0;         // [ns] none of its messages is older
+    std::uint64_t first_behind = 0;  // [ns] nor of the chunks behind it
+    std::uint32_t checksum = 0;      // CRC-32 of the unpacked bytes; 0: not stated
+    bool seen = false;               // unpacked before, its checksum was right
+  };
+
+  ChunkedFile(RecordingBytes bytes, std::string name) : bytes_(std::move(bytes)), name_(std::move(name)) {}
+
+  /// One line that names the file. @throws Error
+  [[noreturn]] void fail(const std::string& what) const;
+  /// Copies bytes that lie within the file; small ones by a window, since records lie side by side.
+  void look(std::uint64_t at, std::uint8_t* to, std::size_t count) const;
+  /// Bytes that lie within the file, as a word.
+  std::string word(std::uint64_t at, std::size_t count) const;
+  /// After the last chunk was added.
+  void finishChunks();
+  /// Calls addMessage() for each message of an unpacked chunk. @throws Error
+  virtual void index(std::uint32_t number, const std::vector<std::uint8_t>& bytes) = 0;
+  /// After the last chunk was read. @throws Error
+  virtual void checkEnd(std::size_t messages) const { (void)messages; }
+  /// @param entry whose connection may not be known yet
+  void addMessage(const Entry& entry);
+  const std::vector<std::uint8_t>& load(std::uint32_t number);
+
+  RecordingBytes bytes_;
+  std::string name_;
+  std::vector<Chunk> chunks_;
+  std::map<std::uint32_t, RecordedConnection> connections_;
+
+ private:
+  struct Loaded {
+    std::uint32_t chunk = 0;
+    std::vector<std::uint8_t> bytes, stored;
+  };
+  struct Waiting {
+    std::size_t arrival = 0;
+    Entry entry;
+    bool operator>(const Waiting& other) const {
+      return entry.time != other.entry.time ? entry.time > other.entry.time : arrival > other.arrival;
+    }
+  };
+
+  Loaded spare();
+  void unpackInto(const Chunk& chunk, Loaded* loaded) const;
+  void ahead(std::uint32_t number);
+
+  mutable std::vector<std::uint8_t> window_;  // of the file, while its records are gone through
+  mutable std::uint64_t window_at_ = 0;
+  std::uint32_t indexed_ = 0;  // chunks
+  std::size_t arrivals_ = 0;   // messages
+  std::priority_queue<Waiting, std::vector<Waiting>, std::greater<>> waiting_;
+  std::deque<Loaded> loaded_;   // the newest in front
+  std::future<Loaded> coming_;  // is waited for before anything else here goes
+};
+
+}  // namespace smartmill
