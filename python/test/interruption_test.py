@@ -31,8 +31,9 @@ class FifoCampaignTest(FolderTest):
     def run_calls(self, script):
         """The output of the script for each call, which has the names campaign and record."""
         for call in self.CALLS:
-            text = f"import smartmill\ncampaign, record = {str(self.campaign)!r}, {str(self.record)!r}\n" + script.format(call)
-            done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, timeout=TIMEOUT)
+            names = f"import smartmill\ncampaign, record = {str(self.campaign)!r}, {str(self.record)!r}\n"
+            done = subprocess.run([sys.executable, "-c", names + script.format(call)], capture_output=True, text=True,
+                                  timeout=TIMEOUT)
             yield call, (done.returncode, done.stdout, done.stderr)
 
 
@@ -103,8 +104,8 @@ class ProgressTest(FolderTest):
         self.calls.append((share, line))
 
     def air_cuts(self):
-        return subset(shared("campaigns/stribeck_friction"), self.folder / "campaign", "air_1000", "air_3000", "air_6000",
-                      "air_9000", "air_12000", "air_18000")
+        return subset(shared("campaigns/stribeck_friction"), self.folder / "campaign", "air_1000", "air_3000",
+                      "air_6000", "air_9000", "air_12000", "air_18000")
 
     def expect_rising_to_one(self):
         shares = [share for share, _ in self.calls]
