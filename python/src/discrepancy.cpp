@@ -112,10 +112,7 @@ py::object explainCampaign(const std::string& path, const std::optional<MachineM
     ExplainOptions options;
     options.bench.threads = threads;
     if (prior) options.search.prior = readCauseOdds(*prior);
-    options.bench.cancelled = [&work] {
-      work.check();
-      return work.stopped();
-    };
+    options.bench.cancelled = [&work] { return work.cancelled(); };
     options.search.progress = [&](const std::string& line) { work.progress(done, line); };
     options.search.course = [&](double share) { work.progress(done = share); };
     std::error_code failed;

@@ -32,8 +32,9 @@ class Work {
   void check() const {
     if (abandoned_) throw Abandoned();
   }
-  /// The progress callback returned False: the work ends and returns what it has found.
-  bool stopped() const { return stopped_; }
+  /// The work should end: the caller has gone, or the progress callback returned False. For code that no
+  /// exception may pass through, as Ceres.
+  bool cancelled() const { return abandoned_ || stopped_; }
   /// @param share [1] done, 0..1 @param line may be empty. @throws Abandoned as check()
   void progress(double share, const std::string& line = {});
 
