@@ -15,7 +15,7 @@
 namespace smartmill {
 namespace hammer {
 
-/// The spindle's angle serves the measurement and the watch in air; one subscription.
+/// Inputs of the measurement and of the air cuts, which share the spindle angle.
 struct Streams {
   HammerPipeline& sequence;
   IdleSpindlePipeline& idle;
@@ -28,8 +28,8 @@ struct Streams {
   }
 };
 
-/// Shell around HammerPipeline: goals and streams in, commands to the CNC bridge's actions and to daq/strike,
-/// results out. All callbacks run in one thread.
+/// ROS interface of HammerPipeline: goals and streams in, commands to the actions of the CNC bridge and to
+/// daq/strike, results out. All callbacks run in one thread.
 class HammerServer {
  public:
   using Parameters = NodeParameters;
@@ -38,14 +38,14 @@ class HammerServer {
 
  private:
   void finish(const MeasureFrfResult& result);
-  void tell(const std::optional<HealthReport>& report);
-  void watch();
+  void publish(const std::optional<HealthReport>& report);
+  void checkInputs();
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
   NodeParameters parameters_;
   NodeShell shell_;
   std::optional<MachineCommands> machine_;  // none in a replay
-  HammerPipeline sorted_;
+  HammerPipeline pipeline_;
   IdleSpindlePipeline idle_;
   Streams streams_;
   FrfServer server_;

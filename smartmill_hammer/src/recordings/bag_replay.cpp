@@ -13,20 +13,20 @@ std::vector<MeasureFrfResult> replayBag(const std::string& bag, const std::strin
                                         const NodeParameters& parameters) {
   std::vector<MeasureFrfResult> results;
   // The recorded streams answer the commands.
-  HammerPipeline sorted(
+  HammerPipeline pipeline(
       parameters.measurement, readMachineModel(model), parameters.hold_back,
       {{},
        [](const Feedback& feedback) { std::fprintf(stderr, "%s\n", feedback.stage.c_str()); },
        [&results](const MeasureFrfResult& result) { results.push_back(result); },
        {}});
   RecordingReader reader(bag);
-  connect(reader, sorted);
+  connect(reader, pipeline);
   reader.on<plain::MeasureFrfActionGoal>(names::goals(names::MEASURE_TOOL_FRF),
-                                         [&sorted](const plain::MeasureFrfActionGoal& m, double received) {
-                                           sorted.push(goalFromMsg(m.goal, received));
+                                         [&pipeline](const plain::MeasureFrfActionGoal& m, double received) {
+                                           pipeline.push(goalFromMsg(m.goal, received));
                                          });
   reader.run();
-  sorted.flush();
+  pipeline.flush();
   return results;
 }
 

@@ -42,15 +42,15 @@ void HammerPipeline::push(const SpindleAngle& angle) {
 
 void HammerPipeline::push(const MeasureFrfGoal& goal, std::function<bool(bool)> begin) {
   sorter_.push(events_, goal.stamp, [this, goal, begin = std::move(begin)] {
-    if (begin && !begin(!sequence_.active())) return;
+    if (begin && !begin(!sequence_.isActive())) return;
     sequence_.handle(goal);
     drain();
   });
 }
 
-void HammerPipeline::cancel(std::function<bool()> due) {
-  sorter_.pushNow(events_, [this, due = std::move(due)] {
-    if (due()) sequence_.cancel(sorter_.newest());
+void HammerPipeline::cancel(std::function<bool()> applies) {
+  sorter_.pushNow(events_, [this, applies = std::move(applies)] {
+    if (applies()) sequence_.cancel(sorter_.newest());
     drain();
   });
 }
@@ -62,9 +62,9 @@ void HammerPipeline::commandFailed(const std::string& text) {
   });
 }
 
-void HammerPipeline::lost(const std::string& text) {
-  if (!sequence_.active()) return;
-  sequence_.lost(sorter_.newest(), text);
+void HammerPipeline::inputLost(const std::string& text) {
+  if (!sequence_.isActive()) return;
+  sequence_.inputLost(sorter_.newest(), text);
   drain();
 }
 

@@ -1,5 +1,4 @@
-// The closed-form machine as a ROS node, in the place of the CNC bridge and the sensors' driver, for the
-// wiring test.
+// The closed-form machine as a ROS node that replaces the CNC bridge and the sensor driver in tests.
 
 #include <optional>
 #include <sstream>
@@ -46,7 +45,7 @@ std::vector<Waypoint> parse(const std::string& program, Axes3 at) {
   return path;
 }
 
-/// One action of the bridge: obeys, succeeds when the machine stands still.
+/// One action of the bridge: succeeds when the machine is at rest.
 template <class Action, class Result>
 class Motion {
  public:

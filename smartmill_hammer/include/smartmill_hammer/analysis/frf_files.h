@@ -12,7 +12,8 @@ namespace hammer {
 /// Universal file, dataset 58 (58b with `binary`): every FRF with its coherence. @throws Error.
 void writeFrfUff(const std::vector<NamedFrf>& frfs, const std::string& file, bool binary);
 
-/// Frequency [Hz], Re and Im a line between tabs, the first line labelled, as CutPro reads it. @throws Error.
+/// Lines of frequency [Hz], Re and Im between tabs, the first one labelled, as CutPro reads it. @throws
+/// Error.
 void writeCutPro(const FrequencyResponse& frf, const std::string& file);
 
 /// Columns file,accepted,reason. @throws Error.

@@ -9,8 +9,8 @@
 namespace smartmill {
 namespace hammer {
 
-/// A HammerSequence behind a StreamSorter: what node and offline tool both feed, so that the same streams
-/// give the same result. A jump back of time starts it afresh.
+/// A HammerSequence behind a StreamSorter, for node and offline tool alike: the same streams give the same
+/// result. A backward jump of time resets it.
 class HammerPipeline {
  public:
   struct Outputs {
@@ -27,18 +27,19 @@ class HammerPipeline {
   void push(const SampleBlock& hammer);
   void push(const CncState& state);
   void push(const SpindleAngle& angle);
-  /// @param begin called at the goal's turn with whether no measurement runs; false: leave it. Absent: begin.
+  /// @param begin called when the goal's turn has come, with whether no measurement runs; false: the goal is
+  /// discarded. Absent: it begins.
   void push(const MeasureFrfGoal& goal, std::function<bool(bool free)> begin = {});
 
-  /// @param due asked at its turn: is the measurement still the one meant?
-  void cancel(std::function<bool()> due);
+  /// @param applies called when the request's turn has come: whether it still applies to the measurement
+  void cancel(std::function<bool()> applies);
   void commandFailed(const std::string& text);
-  /// A stream has died: ends at once.
-  void lost(const std::string& text);
+  /// A stream has ended: the measurement ends at once.
+  void inputLost(const std::string& text);
   void flush() { sorter_.flush(); }  ///< end of data
 
-  bool measuring() const { return sequence_.active(); }
-  std::size_t late() const { return sorter_.late(); }
+  bool isMeasuring() const { return sequence_.isActive(); }
+  std::size_t lateMessages() const { return sorter_.late(); }
   std::string waitingFor() const { return sorter_.waitingFor(); }
 
  private:
@@ -49,7 +50,7 @@ class HammerPipeline {
   HammerSequence sequence_;
   Outputs outputs_;
   StreamSorter sorter_;
-  // In this order: equal stamps come out in it.
+  // Equal stamps are passed on in this order.
   StreamSorter::Stream events_, blocks_, states_, angles_;
 };
 
