@@ -25,7 +25,8 @@ StepOutcome HitStep::reject(double now, const HitFault& fault) {
   if (++measurement_.bad_hits > measurement_.parameters.max_bad_hits)
     return tooManyRejected(fault.bad_data ? FrfCode::bad_data : FrfCode::no_hit,
                            std::to_string(measurement_.bad_hits) + " rejected hits, the last: " + fault.text);
-  measurement_.report("hit rejected: " + fault.text, measurement_.hitProgress());
+  // The panel recognises a rejected hit by this prefix.
+  measurement_.report("hit thrown away: " + fault.text, measurement_.hitProgress());
   control_.strikeAfterRest(now);
   return StepOutcome::running();
 }
