@@ -16,8 +16,7 @@
 #include "smartmill_hammer/search/flute_search.h"
 #include "smartmill_hammer/sequence/hammer_sequence.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 /// Gap [m] between sensor and a cutter of N flutes, closed form: zero retreat at a flute, floor of depth
 /// between flutes, flanks of different width on the rake and on the relief side.
@@ -265,5 +264,4 @@ class ClosedFormMachine {
   bool orienting = false;
 };
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -6,8 +6,7 @@
 #include "smartmill_core/io/gnuplot.h"
 #include "smartmill_core/units.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 using Rows = std::vector<std::vector<double>>;
@@ -133,5 +132,4 @@ void drawHits(const std::vector<TapRecord>& taps, const std::vector<TapVerdict>&
   plot.draw();
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -5,8 +5,7 @@
 
 #include "smartmill_core/formatted.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 /// Standard deviations of a drift: by chance alone some dozens of quantities exceed it once in a thousand
@@ -97,5 +96,4 @@ std::string driftText(const std::vector<HealthChange>& changes) {
                    100.0 * worst->relative, std::abs(worst->sigmas));
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

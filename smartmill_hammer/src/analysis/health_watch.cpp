@@ -2,8 +2,7 @@
 
 #include "smartmill_hammer/analysis/health.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 namespace {
 
@@ -52,5 +51,4 @@ std::vector<std::string> HealthWatch::warnings() const {
   return all;
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

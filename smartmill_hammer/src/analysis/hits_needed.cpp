@@ -7,8 +7,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/parameters/parameter_table.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 constexpr double MOST_HITS = 1e9;  // fits in an int
@@ -34,5 +33,4 @@ HitsNeeded hitsNeeded(const FrequencyResponse& frf, double low, double high, dou
   return result;
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -12,8 +12,7 @@
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/units.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 using Complex = std::complex<double>;
@@ -307,5 +306,4 @@ std::vector<HealthChange> airCutChanges(const AirCutRecord& before, const AirCut
   return changes;
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -3,8 +3,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/formatted.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 double offsetFactor(double stickout, double offset) {
   if (!(offset >= 0.0 && offset < stickout)) {
@@ -16,5 +15,4 @@ double offsetFactor(double stickout, double offset) {
   return 2.0 * stickout * stickout * stickout / (l * l * (3.0 * stickout - l));
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -10,8 +10,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/math/linear_algebra.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 using Complex = std::complex<double>;
 using Eigen::Index;
@@ -142,5 +141,4 @@ FrequencyResponse crossTipResponse(const FrequencyResponse& cross, const TipCorr
   return frf;
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

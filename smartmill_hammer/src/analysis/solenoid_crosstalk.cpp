@@ -7,8 +7,7 @@
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/signal/window.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 /// Least samples of a level; standard deviations of a significant difference; share of the ringing amplitude
@@ -120,5 +119,4 @@ void removeSolenoidCrosstalk(Hit& hit, double largest_share) {
   subtractDecay(hit.response, response, largest_share, contact_start, time * hit.sample_rate);
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -10,8 +10,7 @@
 #include "smartmill_core/units.h"
 #include "smartmill_hammer/analysis/tap_records.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 /// A record is truncated when its end exceeds this share of its beginning, and this multiple of the noise.
@@ -149,5 +148,4 @@ void correctTruncation(std::vector<EstimatedMode>& modes, double truncated_lengt
   }
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -21,8 +21,7 @@
 #include "smartmill_core/signal/statistics.h"
 #include "smartmill_core/units.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 /// Largest step of the first column of a record; frequencies of an FRF have larger steps.
@@ -381,5 +380,4 @@ FrequencyResponse readFrfText(const std::string& file) {
   return frf;
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -16,8 +16,7 @@
 #include "smartmill_core/signal/statistics.h"
 #include "tool_in_holder.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 using Complex = std::complex<double>;
@@ -525,5 +524,4 @@ FrequencyResponse tipResponse(const FrequencyResponse& measured, const TipCorrec
   return frf;
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -8,8 +8,7 @@
 #include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_core/units.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 using Eigen::Index;
@@ -138,5 +137,4 @@ std::vector<HeldMode> HeldTool::modesOf(const ToolInHolder& near) const {
   return found;
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

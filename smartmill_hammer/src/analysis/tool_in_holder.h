@@ -4,8 +4,7 @@
 
 #include <Eigen/Core>
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 /// A mode of spindle and holder with a rigid massless tool, at its tip.
 struct SpindleMode {
@@ -51,5 +50,4 @@ class HeldTool {
   std::vector<HeldMode> modes_;
 };
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -15,8 +15,7 @@
 #include "smartmill_ros/run_node.h"
 #include "wiring.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 constexpr double CHECK_PERIOD = 0.01;  // [s]
@@ -112,8 +111,7 @@ void HammerServer::diagnose(diagnostic_updater::DiagnosticStatusWrapper& status)
   status.add("last measurement", server_.lastMessage());
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer
 
 int smartmill::nodeMain(int argc, char** argv) {
   return runNode<hammer::HammerServer>(argc, argv, "hammer");

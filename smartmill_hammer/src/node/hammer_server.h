@@ -12,8 +12,7 @@
 #include "smartmill_ros/frf_server.h"
 #include "smartmill_ros/node_shell.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 /// Inputs of the measurement and of the air cuts, which share the spindle angle.
 struct Streams {
@@ -53,5 +52,4 @@ class HammerServer {
   ros::Publisher health_publisher_;
 };
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -5,8 +5,7 @@
 #include "smartmill_core/names.h"
 #include "smartmill_ros/conversions.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 MachineCommands::MachineCommands(ros::NodeHandle nh, std::function<void(const std::string&)> failed)
     : failed_(std::move(failed)),
@@ -81,5 +80,4 @@ void MachineCommands::actionDone(const std::string& name, bool good, const std::
   stopping_ = false;
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -13,8 +13,7 @@
 #include "smartmill_hammer/sequence/hammer_sequence.h"
 #include "smartmill_ros/strike_client.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 /// Sends the commands of a measurement to the actions of the CNC bridge, one motion at a time, and to
 /// daq/strike.
@@ -48,5 +47,4 @@ class MachineCommands {
   bool stopping_ = false;  // a failure is expected
 };
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

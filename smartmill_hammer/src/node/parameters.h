@@ -5,8 +5,7 @@
 #include "smartmill_core/parameters/parameter_table.h"
 #include "smartmill_hammer/sequence/hammer_sequence.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 /// Parameters of hammer_node, and of `frf` for a bag.
 struct NodeParameters {
@@ -37,5 +36,4 @@ struct NodeParameters {
   }
 };
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

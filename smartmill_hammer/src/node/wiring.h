@@ -4,8 +4,7 @@
 #include "smartmill_core/signal/feed.h"
 #include "smartmill_hammer/analysis/idle_spindle.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 /// Connects the streams of a measurement, from a node's inputs or from a bag.
 template <class Source, class Pipeline>
@@ -23,5 +22,4 @@ void connectIdle(Source& source, IdleSpindlePipeline& idle) {
   feed<LoadSample>(source, names::CNC_LOAD, idle);
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

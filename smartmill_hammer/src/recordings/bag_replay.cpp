@@ -6,8 +6,7 @@
 #include "smartmill_hammer/sequence/hammer_pipeline.h"
 #include "smartmill_recording/recording_reader.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 std::vector<MeasureFrfResult> replayBag(const std::string& bag, const std::string& model,
                                         const NodeParameters& parameters) {
@@ -30,5 +29,4 @@ std::vector<MeasureFrfResult> replayBag(const std::string& bag, const std::strin
   return results;
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -9,8 +9,7 @@
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/units.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 const double GOLDEN_RATIO = 0.5 * (1.0 + std::sqrt(5.0));
@@ -193,5 +192,4 @@ void FluteSearch::fail(std::string reason) {
   state_ = State::no_flute;
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -6,8 +6,7 @@
 
 #include "smartmill_core/units.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 /// Points checked over the face's radius; [rad] between two angles checked of the tool; equal angles.
@@ -179,5 +178,4 @@ double SensorApproach::safeTravel(const Pose& pose) const {
   return fluteGap() - options_.min_gap + behind;
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -11,8 +11,7 @@
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/math/linear_algebra.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 /// Share of the range from which a voltage does not depend on the distance.
@@ -329,5 +328,4 @@ void SensorCalibration::fail(std::string reason) {
   state_ = State::failed;
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

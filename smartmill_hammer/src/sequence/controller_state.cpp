@@ -5,8 +5,7 @@
 
 #include "station_paths.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 std::optional<AxesPosition> axesPosition(const CncState& state) {
   AxesPosition result;
@@ -31,5 +30,4 @@ std::string motionFault(const CncState& state) {
   return {};
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -6,8 +6,7 @@
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/signal/streams.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 /// Position of x, y and z as the controller displays it.
 struct AxesPosition {
@@ -21,5 +20,4 @@ std::optional<AxesPosition> axesPosition(const CncState& state);
 /// Why no motion may be commanded, one line; empty: it may.
 std::string motionFault(const CncState& state);
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

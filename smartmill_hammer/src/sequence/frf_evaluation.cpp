@@ -13,8 +13,7 @@
 #include "smartmill_hammer/analysis/offset_factor.h"
 #include "smartmill_hammer/analysis/pole_gains.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 /// Of fewer hits no outlier can be identified; nor, for the jackknife, their scatter.
@@ -284,5 +283,4 @@ void FrfEvaluation::evaluate() {
   addCommonError(result_.frf.frf, relativeStd(first.sensor));
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -7,8 +7,7 @@
 #include "smartmill_core/modal/impact_analysis.h"
 #include "smartmill_hammer/analysis/tip_correction.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 /// FRF and modes of the hits of a measurement, and both at the tip.
 class FrfEvaluation {
@@ -41,5 +40,4 @@ class FrfEvaluation {
   MeasureFrfResult& result_;
 };
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

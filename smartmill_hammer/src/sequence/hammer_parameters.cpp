@@ -3,8 +3,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/units.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 constexpr double BLOCK = 0.02;  // [s] longest sample block of a stream
@@ -156,5 +155,4 @@ void HammerParameters::validate() const {
   need(check_jog == 0.0 || check_jog >= least_jog, "check_jog", check_jog, "0 or at least least_jog");
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

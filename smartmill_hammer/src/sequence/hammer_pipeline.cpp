@@ -4,8 +4,7 @@
 
 #include "smartmill_core/names.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 HammerPipeline::HammerPipeline(const HammerParameters& parameters, const MachineModel& model,
                                double hold_back, Outputs outputs)
@@ -77,5 +76,4 @@ void HammerPipeline::drain() {
   if (const auto result = sequence_.takeResult(); result && outputs_.result) outputs_.result(*result);
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -13,8 +13,7 @@
 #include "stamp_tolerance.h"
 #include "station_control.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 std::string goalFault(const MeasureFrfGoal& goal, const HammerParameters& parameters,
@@ -230,5 +229,4 @@ void HammerSequence::finish() {
   result_ = std::move(measurement_->result);
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

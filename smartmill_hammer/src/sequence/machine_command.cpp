@@ -5,8 +5,7 @@
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/units.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 std::string moveProgram(const Axes3& from, const std::vector<Waypoint>& path) {
   std::string text = "G91\n";
@@ -28,5 +27,4 @@ std::string moveProgram(const Axes3& from, const std::vector<Waypoint>& path) {
   return text + "G90\n";
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -4,8 +4,7 @@
 
 #include "smartmill_core/units.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 constexpr int SECOND_HEIGHT_HITS = 3;         // at least
@@ -76,5 +75,4 @@ void Measurement::report(const std::string& stage, double progress) {
   feedback = Feedback{stage, progress, static_cast<int>(first.hits.size() + second.hits.size())};
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -12,8 +12,7 @@
 #include "smartmill_hammer/sequence/measure_frf_result.h"
 #include "station_paths.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 /// Share of the sensor's range from which a voltage counts as its end.
 constexpr double RANGE_SHARE = 0.98;
@@ -82,5 +81,4 @@ class Measurement {
   int bad_hits = 0;
 };
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

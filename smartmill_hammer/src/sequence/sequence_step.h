@@ -7,8 +7,7 @@
 #include "measurement.h"
 #include "station_control.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 /// What follows an input that a step has handled.
 struct StepOutcome {
@@ -72,5 +71,4 @@ using StepPtr = std::unique_ptr<SequenceStep>;
 /// All steps of a measurement in their order.
 std::vector<StepPtr> sequenceSteps(Measurement& measurement, StationControl& control);
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -8,12 +8,10 @@
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/units.h"
 #include "smartmill_hammer/analysis/solenoid_crosstalk.h"
-#include "smartmill_hammer/search/flute_search.h"
 #include "stamp_tolerance.h"
 #include "station_paths.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 /// Angles of M119: 0..4095 (thesis eq. 6.1).
@@ -23,8 +21,6 @@ constexpr double AVERAGE_TIMEOUT = 1.0;  // [s]
 /// Share of the sensor's range, and consecutive samples above it, that mean the tool is too near.
 constexpr double NEAR_SHARE = 0.98;
 constexpr int NEAR_SAMPLES = 8;
-/// The distance to go is zero between two blocks too: two states in a row.
-constexpr int REST_STATES = 2;
 
 Command commandOf(Command::Kind kind, double now) {
   Command command;
@@ -38,6 +34,7 @@ Command commandOf(Command::Kind kind, double now) {
 StationControl::StationControl(const HammerParameters& parameters, double range_volt)
     : parameters_(parameters),
       range_volt_(range_volt),
+      motion_(parameters),
       average_(parameters.averaging_time),
       collector_({parameters.trigger_force, parameters.pre_trigger, parameters.record_length}),
       cross_collector_({parameters.trigger_force, parameters.pre_trigger, parameters.record_length}) {
@@ -61,7 +58,6 @@ void StationControl::send(Command command, Wait wait, double timeout) {
   sent_ = command.stamp;
   deadline_ = command.stamp + timeout;
   wait_ = wait;
-  rest_count_ = 0;
   commanded_ = true;
   commands_.push_back(std::move(command));
 }
@@ -70,8 +66,7 @@ void StationControl::orient(double now, double angle) {
   Command c = commandOf(Command::Kind::orient, now);
   const double counts = std::round(angle / units::TWO_PI * COUNTS);
   c.angle = (counts - COUNTS * std::floor(counts / COUNTS)) * units::TWO_PI / COUNTS;
-  target_angle_ = c.angle;
-  angle_sum_ = 0.0;
+  motion_.expectAngle(c.angle);
   ++spindle_moves_;
   send(std::move(c), Wait::angle, parameters_.orient_timeout);
 }
@@ -82,8 +77,9 @@ void StationControl::jog(double now, std::size_t axis, double distance, double f
   c.distance = distance;
   c.feed = feed;
   // From the commanded position, not the displayed one, so that the display's rounding does not accumulate.
-  target_[axis] += distance;
-  target_tolerance_ = std::min(parameters_.position_tolerance, 0.25 * std::abs(distance));
+  Axes3 target = motion_.position();
+  target[axis] += distance;
+  motion_.expectPosition(target, std::min(parameters_.position_tolerance, 0.25 * std::abs(distance)));
   send(std::move(c), Wait::position, parameters_.motion_timeout);
 }
 
@@ -97,8 +93,7 @@ void StationControl::move(double now, const Axes3& from, std::vector<Waypoint> p
       position[i] += roundTo(w.position[i] - position[i], parameters_.resolution);
     w.position = position;
   }
-  target_ = position;
-  target_tolerance_ = parameters_.position_tolerance;
+  motion_.expectPosition(position, parameters_.position_tolerance);
   c.path = std::move(path);
   send(std::move(c), Wait::position, parameters_.motion_timeout);
 }
@@ -123,6 +118,7 @@ void StationControl::measureVoltage(double from) {
 }
 
 void StationControl::stop(double now) {
+  motion_.expectStandstill();
   send(commandOf(Command::Kind::stop, now), Wait::standstill, STOP_TIMEOUT);
 }
 
@@ -154,26 +150,18 @@ ControlEvent StationControl::handle(const CncState& state) {
   const std::optional<AxesPosition> axes = axesPosition(state);
   if (!axes)
     return ControlFault{FrfCode::motion_failed, "cnc/state: expected the axes x, y and z, one is missing"};
-  if (!(state.stamp > sent_ + parameters_.command_delay + SAME_TIME)) return {};
-  if (wait_ != Wait::position && wait_ != Wait::standstill) return {};
-  bool resting = !state.motion && axes->to_go <= (wait_ == Wait::position ? target_tolerance_ : 0.0);
-  for (std::size_t i = 0; i < 3 && wait_ == Wait::position; ++i)
-    resting = resting && std::abs(axes->position[i] - target_[i]) <= target_tolerance_;
-  rest_count_ = resting ? rest_count_ + 1 : 0;
-  return rest_count_ >= REST_STATES ? complete() : ControlEvent();
+  const bool waits = wait_ == Wait::position || wait_ == Wait::standstill;
+  return waits && canComplete(state.stamp) && motion_.isComplete(state, *axes) ? complete() : ControlEvent();
 }
 
 ControlEvent StationControl::handle(const SpindleAngle& angle) {
-  if (wait_ != Wait::angle || !(angle.stamp > sent_ + parameters_.command_delay + SAME_TIME)) return {};
-  const double off = nearAngle(angle.angle, target_angle_) - target_angle_;
-  if (!(std::abs(off) <= parameters_.angle_tolerance && std::abs(angle.speed) <= parameters_.zero_speed)) {
-    rest_count_ = 0;
-    return {};
-  }
-  angle_sum_ = rest_count_ == 0 ? off : angle_sum_ + off;
-  if (++rest_count_ < parameters_.rest_readings) return {};
-  reached_angle_ = target_angle_ + angle_sum_ / rest_count_;
-  return complete();
+  return wait_ == Wait::angle && canComplete(angle.stamp) && motion_.isComplete(angle) ? complete()
+                                                                                       : ControlEvent();
+}
+
+/// The controller starts with a delay: an earlier input may still be from before the motion.
+bool StationControl::canComplete(double stamp) const {
+  return stamp > sent_ + parameters_.command_delay + SAME_TIME;
 }
 
 bool StationControl::isTooNear(double volt) {
@@ -224,7 +212,7 @@ ControlEvent StationControl::checkDeadline(double now) {
     case Wait::angle:
       return ControlFault{FrfCode::motion_failed,
                           formatted("the spindle did not reach %.2f deg within %.1f s",
-                                    units::degFromRad(target_angle_), waited)};
+                                    units::degFromRad(motion_.angle()), waited)};
     case Wait::position:
       return ControlFault{FrfCode::motion_failed,
                           formatted("the axes did not reach their target within %.1f s", waited)};
@@ -245,5 +233,4 @@ ControlEvent StationControl::checkDeadline(double now) {
   }
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

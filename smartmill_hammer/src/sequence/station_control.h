@@ -6,6 +6,7 @@
 #include <variant>
 #include <vector>
 
+#include "motion_check.h"
 #include "smartmill_core/modal/results.h"
 #include "smartmill_core/signal/hit_collector.h"
 #include "smartmill_core/signal/streams.h"
@@ -13,8 +14,7 @@
 #include "smartmill_hammer/sequence/machine_command.h"
 #include "voltage_average.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 /// The commanded motion is complete.
 struct MotionDone {};
@@ -81,8 +81,8 @@ class StationControl {
   bool hasCrossSensor() const { return has_cross_; }
   bool hasCommanded() const { return commanded_; }
   bool isWaitingForHit() const { return wait_ == Wait::hit; }
-  const Axes3& target() const { return target_; }         ///< [m] commanded position
-  double reachedAngle() const { return reached_angle_; }  ///< [rad] after an orientation
+  const Axes3& target() const { return motion_.position(); }      ///< [m] commanded position
+  double reachedAngle() const { return motion_.reachedAngle(); }  ///< [rad] after an orientation
   int spindleMoves() const { return spindle_moves_; }
   std::vector<Command> takeCommands();
 
@@ -91,6 +91,7 @@ class StationControl {
 
   void send(Command command, Wait wait, double timeout);
   bool isTooNear(double volt);
+  bool canComplete(double stamp) const;
   ControlEvent complete();
   ControlEvent hitOf(HitCollector::Record record, std::optional<HitCollector::Record> cross);
 
@@ -103,12 +104,9 @@ class StationControl {
   std::optional<CncState> state_;
 
   Wait wait_ = Wait::nothing;
-  double sent_ = 0.0, deadline_ = 0.0;                                 // [s]
-  double target_angle_ = 0.0, angle_sum_ = 0.0, reached_angle_ = 0.0;  // [rad]
-  Axes3 target_{{0, 0, 0}};                                            // [m]
-  double target_tolerance_ = 0.0;                                      // [m]
-  int rest_count_ = 0;                                                 // readings at the target in a row
-  double rest_until_ = 0.0;                                            // [s]
+  double sent_ = 0.0, deadline_ = 0.0;  // [s]
+  MotionCheck motion_;
+  double rest_until_ = 0.0;  // [s]
 
   VoltageAverage average_;
   HitCollector collector_, cross_collector_;
@@ -116,5 +114,4 @@ class StationControl {
   int near_samples_ = 0;
 };
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

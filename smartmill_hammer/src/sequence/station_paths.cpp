@@ -4,8 +4,7 @@
 #include <cctype>
 #include <cmath>
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 int axisIndex(const std::string& name) {
   if (name.size() != 1) return -1;
@@ -64,5 +63,4 @@ std::vector<Waypoint> StationPaths::retract(const Axes3& here) const {
   return {{off, parameters_.approach_feed}, {away, parameters_.approach_feed}, {up, 0.0}};
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

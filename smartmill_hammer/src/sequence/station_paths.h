@@ -7,8 +7,7 @@
 #include "smartmill_hammer/sequence/hammer_parameters.h"
 #include "smartmill_hammer/sequence/machine_command.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 constexpr const char* AXIS_NAMES[] = {"x", "y", "z"};
 
@@ -41,5 +40,4 @@ class StationPaths {
   double safe_height_;  // [m]
 };
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

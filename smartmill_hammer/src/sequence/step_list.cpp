@@ -1,7 +1,6 @@
 #include "steps/steps.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 std::vector<StepPtr> sequenceSteps(Measurement& measurement, StationControl& control) {
   std::vector<StepPtr> steps;
@@ -13,5 +12,4 @@ std::vector<StepPtr> sequenceSteps(Measurement& measurement, StationControl& con
   return steps;
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -7,8 +7,7 @@
 #include "smartmill_core/signal/statistics.h"
 #include "stamp_tolerance.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 constexpr int MAX_RESTARTS = 3;
@@ -43,5 +42,4 @@ std::optional<MeanVoltage> VoltageAverage::add(double time, std::uint64_t index,
   return MeanVoltage{mean(all), standardDeviation(all) / std::sqrt(static_cast<double>(all.size()))};
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

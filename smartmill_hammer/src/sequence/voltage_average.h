@@ -5,8 +5,7 @@
 #include <string>
 #include <vector>
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 /// Mean of the displacement sensor's voltage.
 struct MeanVoltage {
@@ -37,5 +36,4 @@ class VoltageAverage {
   std::string fault_;
 };
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -5,8 +5,7 @@
 
 #include <gtest/gtest.h>
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 constexpr HealthAllowance NONE{0.0, 0.0, 0.0, 0.0, 0.0};
@@ -46,5 +45,4 @@ TEST(Health, ReportsNewAndMissingModes) {
 }
 
 }  // namespace
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -3,8 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 using ::testing::HasSubstr;
@@ -114,5 +113,4 @@ TEST(HealthWatch, WarnsOfTheAirCutLoadAtTheSameSpeed) {
 }
 
 }  // namespace
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

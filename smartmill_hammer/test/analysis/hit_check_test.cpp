@@ -5,8 +5,7 @@
 #include "smartmill_core/modal/hit_check.h"
 #include "smartmill_hammer_testing/hit_records.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 // A sample of `rosrun smartmill_studies hammer_hit_gate`, with its own seeds. Required there: 99 % of clean
@@ -34,5 +33,4 @@ TEST(HitCheck, AcceptsCleanHitsAndRejectsEachFault) {
 }
 
 }  // namespace
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

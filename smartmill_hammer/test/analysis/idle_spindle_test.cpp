@@ -7,8 +7,7 @@
 
 #include "smartmill_core/units.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 constexpr double RATE = 10000.0, TIME = 1.5, SETTLE = 0.2;
@@ -115,5 +114,4 @@ TEST(IdleSpindle, DistinguishesDriftFromChance) {
 }
 
 }  // namespace
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -14,8 +14,7 @@
 #include "smartmill_hammer/analysis/offset_factor.h"
 #include "smartmill_hammer/analysis/tap_records.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 constexpr double RATE = 25600.0;
@@ -239,5 +238,4 @@ TEST(HitCollector, CutsRecordsAndNamesLostSamples) {
 }
 
 }  // namespace
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

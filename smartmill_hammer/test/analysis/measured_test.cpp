@@ -12,8 +12,7 @@
 #include "smartmill_core/testing/shared_data.h"
 #include "smartmill_hammer/analysis/tap_records.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 // The one mode nearest to a published frequency [Hz].
@@ -204,5 +203,4 @@ TEST(TapRecords, ErrorsNameTheFault) {
 }
 
 }  // namespace
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

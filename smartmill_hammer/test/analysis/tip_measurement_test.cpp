@@ -14,8 +14,7 @@
 #include "smartmill_hammer/analysis/pole_gains.h"
 #include "smartmill_hammer/analysis/solenoid_crosstalk.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 using Complex = std::complex<double>;
@@ -152,5 +151,4 @@ TEST(HeldTool, ModesOfASimilarToolAreOfFirstOrder) {
 }
 
 }  // namespace
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -25,8 +25,7 @@
 #include "recordings/bag_replay.h"
 #include "smartmill_core/names.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 using Client = actionlib::SimpleActionClient<smartmill_msgs::MeasureFrfAction>;
@@ -202,8 +201,7 @@ TEST_F(HammerNode, RefusesABadGoalInOneLine) {
 }
 
 }  // namespace
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer
 
 int main(int argc, char** argv) {
   testing::InitGoogleTest(&argc, argv);

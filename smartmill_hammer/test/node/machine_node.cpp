@@ -18,8 +18,7 @@
 #include "smartmill_core/names.h"
 #include "smartmill_ros/conversions.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 /// Incremental G0 and G1 blocks from a position.
@@ -139,8 +138,7 @@ void run() {
 }
 
 }  // namespace
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer
 
 int main(int argc, char** argv) {
   ros::init(argc, argv, "machine");

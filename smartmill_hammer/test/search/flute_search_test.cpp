@@ -7,8 +7,7 @@
 
 #include "../closed_form_machine.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 double curve(double gap) {
@@ -206,5 +205,4 @@ TEST(FluteSearch, AnglesAreModuloARevolution) {
 }
 
 }  // namespace
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

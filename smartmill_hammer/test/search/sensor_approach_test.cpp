@@ -8,8 +8,7 @@
 #include "../closed_form_machine.h"
 #include "smartmill_core/units.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 constexpr double FACE = 6.4e-3, READ = 2e-3, HALF_GAP = 250e-6;
@@ -149,5 +148,4 @@ TEST(SensorApproach, WithoutFlanksTheToolIsRound) {
 }
 
 }  // namespace
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

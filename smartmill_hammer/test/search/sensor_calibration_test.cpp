@@ -8,8 +8,7 @@
 
 #include "smartmill_core/testing/coverage.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 struct Sensor {
@@ -183,5 +182,4 @@ TEST(SensorCalibration, NeverJogsBelowTheLeastGap) {
 }
 
 }  // namespace
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -13,8 +13,7 @@
 #include "smartmill_core/testing/coverage.h"
 #include "smartmill_hammer/sequence/hammer_pipeline.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 MeasureFrfGoal goalFor(const std::string& direction, double stamp) {
@@ -460,5 +459,4 @@ TEST(MoveProgram, IsIncrementalInMillimetres) {
 }
 
 }  // namespace
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

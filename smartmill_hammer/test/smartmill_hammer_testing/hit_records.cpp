@@ -6,8 +6,7 @@
 #include <functional>
 #include <random>
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 using Random = std::mt19937_64;
@@ -483,5 +482,4 @@ HitCase drawHitCase(HitClass kind, std::uint64_t seed) {
   }
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

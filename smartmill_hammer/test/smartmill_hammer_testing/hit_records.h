@@ -7,8 +7,7 @@
 
 #include "smartmill_core/signal/hit.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 /// Fault of a drawn record.
 enum class HitClass {
@@ -43,5 +42,4 @@ struct HitCase {
 /// same library of distributions.
 HitCase drawHitCase(HitClass kind, std::uint64_t seed);
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -6,8 +6,7 @@
 #include "smartmill_core/modal/frf_files.h"
 #include "smartmill_hammer/analysis/tap_records.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 /// Universal file, dataset 58 (58b with `binary`): every FRF with its coherence. @throws Error.
 void writeFrfUff(const std::vector<NamedFrf>& frfs, const std::string& file, bool binary);
@@ -19,5 +18,4 @@ void writeCutPro(const FrequencyResponse& frf, const std::string& file);
 /// Columns file,accepted,reason. @throws Error.
 void writeHitsCsv(const std::vector<TapVerdict>& hits, const std::string& file);
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

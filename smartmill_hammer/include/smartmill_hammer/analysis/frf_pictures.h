@@ -6,8 +6,7 @@
 #include "smartmill_core/modal/modal_estimate.h"
 #include "smartmill_hammer/analysis/tap_records.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 /// Magnitude, phase, coherence where known, and the fit. All @throw Error when gnuplot fails.
 void drawFrf(const FrequencyResponse& frf, const ModalEstimate& estimate, std::size_t index,
@@ -22,5 +21,4 @@ void drawStabilization(const std::vector<NamedFrf>& frfs, const ModalEstimate& e
 void drawHits(const std::vector<TapRecord>& taps, const std::vector<TapVerdict>& verdicts,
               const std::string& png);
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

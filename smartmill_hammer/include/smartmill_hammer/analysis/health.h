@@ -5,8 +5,7 @@
 
 #include "smartmill_core/modal/results.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 /// Normal relative changes from day to day (tool seat, temperature), one standard deviation, added to the
 /// stated standard deviations.
@@ -37,5 +36,4 @@ HealthChange valueChange(const std::string& quantity, const ValueWithStd& before
 /// The largest drift in one line; empty: none.
 std::string driftText(const std::vector<HealthChange>& changes);
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

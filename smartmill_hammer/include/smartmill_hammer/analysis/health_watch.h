@@ -9,8 +9,7 @@
 #include "smartmill_hammer/analysis/health.h"
 #include "smartmill_hammer/analysis/idle_spindle.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 /// A measurement compared with the first of its kind.
 struct HealthReport {
@@ -48,5 +47,4 @@ class HealthWatch {
   std::map<std::string, AirCut> air_cuts_;  // by tool
 };
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

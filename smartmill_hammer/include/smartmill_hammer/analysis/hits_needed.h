@@ -2,8 +2,7 @@
 
 #include "smartmill_core/signal/frequency_response.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 /// Precision of an FRF averaged over several hits, and the number of hits that a required precision needs.
 struct HitsNeeded {
@@ -17,5 +16,4 @@ struct HitsNeeded {
 /// @throws Error when no line of the band states a standard deviation.
 HitsNeeded hitsNeeded(const FrequencyResponse& frf, double low, double high, double required_std);
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

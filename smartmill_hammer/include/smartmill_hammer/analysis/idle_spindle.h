@@ -14,8 +14,7 @@
 #include "smartmill_core/signal/streams.h"
 #include "smartmill_hammer/analysis/health.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 /// Once-per-revolution component of a force channel over a segment of an air cut at steady speed.
 struct SynchronousForce {
@@ -140,5 +139,4 @@ std::vector<HealthChange> airCutChanges(const AirCutRecord& before, const AirCut
                                         const std::map<std::string, ModalModel>& sensors,
                                         const HealthAllowance& allowance = {});
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

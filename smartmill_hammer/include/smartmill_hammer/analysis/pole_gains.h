@@ -7,8 +7,7 @@
 #include "smartmill_core/signal/frequency_response.h"
 #include "smartmill_hammer/analysis/tip_correction.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 /// The gains of modes of known frequency and damping in an FRF of the same structure struck or measured at
 /// other points, together with the residual terms of modes outside the band (a constant, and one proportional
@@ -27,5 +26,4 @@ ModalModel modeShifts(const FrequencyResponse& frf, const std::vector<std::compl
 FrequencyResponse crossTipResponse(const FrequencyResponse& cross, const TipCorrection& correction,
                                    double low, double high);
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -2,8 +2,7 @@
 
 #include "smartmill_core/signal/hit.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 /// Subtracts the crosstalk of the solenoid's current from both channels of a hit: constant until contact,
 /// then decaying with one time constant, which is fitted to the force after the contact. Its size is the
@@ -12,5 +11,4 @@ namespace hammer {
 /// @param largest_share [1] 0: no correction
 void removeSolenoidCrosstalk(Hit& hit, double largest_share);
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -9,8 +9,7 @@
 #include "smartmill_core/modal/modal_estimate.h"
 #include "smartmill_core/signal/frequency_response.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 /// Formats of files with hammer tests.
 enum class TapFormat {
@@ -93,5 +92,4 @@ void correctTruncation(std::vector<EstimatedMode>& modes, double truncated_lengt
 /// response.
 TapFrf averageTaps(const std::vector<TapRecord>& taps, const TapFrfOptions& options);
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -6,8 +6,7 @@
 #include "smartmill_core/modal/modal_model.h"
 #include "smartmill_core/signal/frequency_response.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 /// A value with its standard deviation.
 struct UncertainValue {
@@ -85,5 +84,4 @@ TipCorrection withoutBeyond(TipCorrection correction);
 /// deviations of lines include that of the correction.
 FrequencyResponse tipResponse(const FrequencyResponse& measured, const TipCorrection& correction);
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -3,8 +3,7 @@
 #include <string>
 #include <vector>
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 /// Angles and steps of a flute search.
 struct FluteSearchOptions {
@@ -93,5 +92,4 @@ class FluteSearch {
 /// [rad] the angle shifted by full turns to within half a turn of a reference.
 double nearAngle(double angle, double reference);
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

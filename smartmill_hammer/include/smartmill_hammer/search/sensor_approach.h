@@ -7,8 +7,7 @@
 #include "smartmill_hammer/search/flute_search.h"
 #include "smartmill_hammer/search/sensor_calibration.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 struct SensorApproachOptions {
   double face = 8e-3;  ///< [m] diameter of the sensor's face
@@ -92,5 +91,4 @@ class SensorApproach {
   double flute_volt_ = 0.0;       // [V] of the flute that was found
 };
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -5,8 +5,7 @@
 #include <string>
 #include <vector>
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 /// Calibration of the displacement sensor in the machine (Dunwoody section 4.2). All distances [m] are
 /// positive towards the sensor.
@@ -118,5 +117,4 @@ class SensorCalibration {
   std::size_t samples_away_ = 0;  // samples still to be taken away from the sensor
 };
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -4,8 +4,7 @@
 
 #include "smartmill_core/modal/hit_test_parameters.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 /// Parameters of a measurement; declare() states units, bounds and meaning. The defaults are those of the
 /// thesis where it gives one.
@@ -76,5 +75,4 @@ struct HammerParameters : HitTestParameters {
   void validate() const;
 };
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

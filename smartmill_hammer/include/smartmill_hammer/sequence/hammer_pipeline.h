@@ -6,8 +6,7 @@
 #include "smartmill_core/signal/stream_sorter.h"
 #include "smartmill_hammer/sequence/hammer_sequence.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 /// A HammerSequence behind a StreamSorter, for node and offline tool alike: the same streams give the same
 /// result. A backward jump of time resets it.
@@ -54,5 +53,4 @@ class HammerPipeline {
   StreamSorter::Stream events_, blocks_, states_, angles_;
 };
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

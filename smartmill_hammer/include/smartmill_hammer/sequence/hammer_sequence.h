@@ -11,8 +11,7 @@
 #include "smartmill_hammer/sequence/machine_command.h"
 #include "smartmill_hammer/sequence/measure_frf_result.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 class Measurement;
 class SequenceStep;
@@ -77,5 +76,4 @@ class HammerSequence {
   std::optional<MeasureFrfResult> result_;
 };
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -5,8 +5,7 @@
 
 #include "smartmill_core/model/machine_model.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 struct Waypoint {
   Axes3 position{{0, 0, 0}};  ///< [m] machine
@@ -31,5 +30,4 @@ struct Command {
 /// used without the work offset.
 std::string moveProgram(const Axes3& from, const std::vector<Waypoint>& path);
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -5,8 +5,7 @@
 #include "smartmill_core/modal/results.h"
 #include "smartmill_core/signal/streams.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 struct MeasureFrfResult {
   FrfCode code = FrfCode::ok;
@@ -34,5 +33,4 @@ struct Feedback {
   int hits_done = 0;
 };
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -4,8 +4,7 @@
 #include "smartmill_core/formatted.h"
 #include "smartmill_hammer/search/sensor_calibration.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 /// [1] of the gap at zero volt by which a flank measured at the same angle may be nearer at the second
@@ -210,5 +209,4 @@ StepPtr calibrateAtSecondHeight(Measurement& measurement, StationControl& contro
   return std::make_unique<CalibrateAtSecondHeight>(measurement, control);
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

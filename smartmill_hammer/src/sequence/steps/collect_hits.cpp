@@ -4,8 +4,7 @@
 #include "sequence/frf_evaluation.h"
 #include "sequence/steps/steps.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 /// Strikes until the goal's hits are accepted or the FRF is as precise as required.
@@ -67,5 +66,4 @@ StepPtr collectHitsAtSecondHeight(Measurement& measurement, StationControl& cont
   return std::make_unique<CollectHitsAtSecondHeight>(measurement, control);
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -2,8 +2,7 @@
 
 #include <utility>
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 StepOutcome HitStep::begin(double now) {
   control_.strike(now);
@@ -35,5 +34,4 @@ StepOutcome HitStep::tooManyRejected(FrfCode code, const std::string& reason) {
   return StepOutcome::failed(code, reason);
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -5,8 +5,7 @@
 #include "sequence/sequence_step.h"
 #include "smartmill_core/modal/hit_check.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 /// A step that strikes: a rejected hit is repeated after the rest time, up to `max_bad_hits` of them.
 class HitStep : public SequenceStep {
@@ -25,5 +24,4 @@ class HitStep : public SequenceStep {
   StepOutcome reject(double now, const HitFault& fault);
 };
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -3,8 +3,7 @@
 
 #include "sequence/steps/steps.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 /// Begins with the voltage of the flank that faces the sensor. If the flanks measured so far permit too short
@@ -65,5 +64,4 @@ StepPtr measureFlanks(Measurement& measurement, StationControl& control) {
   return std::make_unique<MeasureFlanks>(measurement, control);
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -1,8 +1,7 @@
 #include "sequence/controller_state.h"
 #include "sequence/steps/steps.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 class OrientSpindle : public SequenceStep {
@@ -46,5 +45,4 @@ StepPtr moveToStation(Measurement& measurement, StationControl& control) {
   return std::make_unique<MoveToStation>(measurement, control);
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -5,8 +5,7 @@
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/units.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 /// First step of the second search over that of the first: the helix predicts where the flute is.
@@ -169,5 +168,4 @@ StepPtr turnFluteToHammer(Measurement& measurement, StationControl& control) {
   return std::make_unique<TurnFluteToHammer>(measurement, control);
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -1,8 +1,7 @@
 #include "sequence/controller_state.h"
 #include "sequence/steps/steps.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 class LowerToSecondHeight : public SequenceStep {
@@ -48,5 +47,4 @@ StepPtr turnFluteAtSecondHeight(Measurement& measurement, StationControl& contro
   return std::make_unique<TurnFluteAtSecondHeight>(measurement, control);
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -2,8 +2,7 @@
 
 #include "sequence/sequence_step.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 
 /// Waits until the axes rest and stops the spindle at `start_angle`.
 StepPtr orientSpindle(Measurement& measurement, StationControl& control);
@@ -38,5 +37,4 @@ StepPtr turnFluteAtSecondHeight(Measurement& measurement, StationControl& contro
 StepPtr calibrateAtSecondHeight(Measurement& measurement, StationControl& control);
 StepPtr collectHitsAtSecondHeight(Measurement& measurement, StationControl& control);
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer

@@ -5,8 +5,7 @@
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/signal/statistics.h"
 
-namespace smartmill {
-namespace hammer {
+namespace smartmill::hammer {
 namespace {
 
 /// Largest swing of a later hit over that of the trial hit.
@@ -55,5 +54,4 @@ StepPtr trialHit(Measurement& measurement, StationControl& control) {
   return std::make_unique<TrialHit>(measurement, control);
 }
 
-}  // namespace hammer
-}  // namespace smartmill
+}  // namespace smartmill::hammer
