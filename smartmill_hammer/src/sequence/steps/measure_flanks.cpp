@@ -35,8 +35,8 @@ class MeasureFlanks : public SequenceStep {
     if (surveyed_ || !approachIsTooShort(voltage.volt)) return StepOutcome::done();
     surveyed_ = true;
     const double face = measurement_.parameters.sensor_face;
-    const double beside = 0.5 * std::asin(std::min(0.9, 0.5 * face / measurement_.tool.radius()));
-    offsets_ = {beside, -beside};
+    const double flank_step = 0.5 * std::asin(std::min(0.9, 0.5 * face / measurement_.tool.radius()));
+    offsets_ = {flank_step, -flank_step};
     measurement_.report("measuring the flanks that the sensor's face will meet", 0.56);
     return orient(now);
   }
