@@ -1,4 +1,4 @@
-#include "smartmill_kalman/filter/innovation_watch.h"
+#include "smartmill_kalman/filter/adaptive_memory.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,33 +8,33 @@ namespace {
 
 /// A window whose mean square exceeds the largest of the revolution before by this is a change of the force.
 constexpr double OUT_OF_LINE = 5.0;
-/// Windows after a start that tell what is usual.
+/// Windows after a start that give the reference power.
 constexpr std::size_t LEAST_WINDOWS = 12;
-/// Revolutions at a memory before a longer one is tried.
+/// Revolutions at a level before the next is tried.
 constexpr std::size_t DWELL = 2;
-/// The mean square of a revolution that still falls below this share of the last one's: not settled.
+/// A revolution with a mean square below this share of the previous one has not settled.
 constexpr double STILL_FALLING = 0.8;
-/// The mean square that a longer memory may have over the one at which it was accepted.
+/// Largest mean square at a longer memory, relative to that at the shortest.
 constexpr double MEMORY_TOO_LONG = 1.5;
 
 }  // namespace
 
-InnovationWatch::InnovationWatch(std::size_t levels, double revolution) : levels_(levels) {
+AdaptiveMemory::AdaptiveMemory(std::size_t levels, double revolution) : levels_(levels) {
   setRevolution(revolution);
 }
 
-void InnovationWatch::setRevolution(double revolution) {
+void AdaptiveMemory::setRevolution(double revolution) {
   windows_a_revolution_ = std::max<std::size_t>(
       4, static_cast<std::size_t>(std::lround(revolution / static_cast<double>(WINDOW))));
 }
 
-void InnovationWatch::reset() {
+void AdaptiveMemory::reset() {
   level_ = 0;
   window_count_ = windows_ = dwell_ = 0;
   window_sum_ = revolution_sum_ = peak_ = last_peak_ = last_mean_ = accepted_mean_ = 0.0;
 }
 
-void InnovationWatch::judgeWindow() {
+void AdaptiveMemory::checkWindow() {
   const double mean = window_sum_ / static_cast<double>(WINDOW);
   window_count_ = 0;
   window_sum_ = 0.0;
@@ -49,10 +49,10 @@ void InnovationWatch::judgeWindow() {
   }
   revolution_sum_ += mean;
   peak_ = std::max(peak_, mean);
-  if (++windows_ == windows_a_revolution_) judgeRevolution();
+  if (++windows_ == windows_a_revolution_) checkRevolution();
 }
 
-void InnovationWatch::judgeRevolution() {
+void AdaptiveMemory::checkRevolution() {
   const double mean = revolution_sum_ / static_cast<double>(windows_);
   const bool settled = mean > STILL_FALLING * last_mean_;
   if (level_ > 0 && mean > MEMORY_TOO_LONG * accepted_mean_) {

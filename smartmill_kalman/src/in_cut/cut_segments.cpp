@@ -1,4 +1,4 @@
-#include "smartmill_kalman/in_cut/campaign_lines.h"
+#include "smartmill_kalman/in_cut/cut_segments.h"
 
 #include <cmath>
 
@@ -12,9 +12,9 @@ namespace {
 constexpr double SETTLING = 0.03;  // [s] after the entry: tool, sensor and the first marks on the surface
 constexpr const char* TOOL[] = {"tool_x", "tool_y"};
 
-/// What of a record is steady, without force and response.
-CutStretch steady(const Record& record, const CampaignTest& test, std::size_t* from) {
-  CutStretch cut;
+/// Start of the steady part of a record; force and response are not set.
+CutSegment steady(const Record& record, const CampaignTest& test, std::size_t* from) {
+  CutSegment cut;
   cut.name = test.name;
   cut.sample_rate = test.sample_rate;
   cut.speed = test.spindle_speed;
@@ -31,10 +31,10 @@ std::vector<double> behind(const std::vector<double>& values, std::size_t from) 
 
 }  // namespace
 
-CutStretch toolStretch(const Record& record, const CampaignTest& test, std::size_t axis,
+CutSegment toolSegment(const Record& record, const CampaignTest& test, std::size_t axis,
                        const ModalModel& sensor) {
   std::size_t from = 0;
-  CutStretch cut = steady(record, test, &from);
+  CutSegment cut = steady(record, test, &from);
   if (record.has("spindle_angle")) cut.angle = behind(record.column("spindle_angle"), from);
   cut.force = behind(record.column(FORCE_CHANNELS[axis]), from);
   cut.response = behind(record.column(TOOL[axis]), from);
@@ -42,17 +42,18 @@ CutStretch toolStretch(const Record& record, const CampaignTest& test, std::size
   return cut;
 }
 
-CutStretch sensorStretch(const Record& record, const CampaignTest& test, std::size_t axis,
+CutSegment sensorSegment(const Record& record, const CampaignTest& test, std::size_t axis,
                          const MachineModel& model, double relative_std) {
   std::size_t from = 0;
-  CutStretch cut = steady(record, test, &from);
+  CutSegment cut = steady(record, test, &from);
   cut.angle = behind(record.column("spindle_angle"), from);
   cut.response = behind(record.column(FORCE_CHANNELS[axis]), from);
   if (!model.tool_tip.x.modes.empty() || !model.tool_tip.y.modes.empty())
-    throw Error(model.file + ": tool_tip: the force of a tool that vibrates is not told by its coefficients");
-  const ToolGeometry& tool = model.needTool("tell the force of a cut");
+    throw Error(model.file +
+                ": tool_tip: has modes, expected a rigid tool (the predicted force excludes vibration)");
+  const ToolGeometry& tool = model.needTool("predict the cutting force");
   CuttingLaw law;
-  law.coefficients = model.needCutting("tell the force of a cut");
+  law.coefficients = model.needCutting("predict the cutting force");
   if (!test.engagement) throw Error(test.name + ": no engagement");
   RigidCut rigid(tool, law, *test.engagement);
   cut.force.reserve(cut.angle.size());
