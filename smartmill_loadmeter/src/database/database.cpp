@@ -19,9 +19,9 @@ namespace smartmill::loadmeter {
 
 namespace {
 
-// 1: coefficients. 2: improvements and health beside them, and what was handed on, each kind by itself.
+// 1: coefficients. 2: adds improvements and health, and the state of synchronisation of each kind.
 constexpr int SCHEMA = 2;
-constexpr int BUSY_TIMEOUT = 30000;  // [ms] that a writer waits for others
+constexpr int BUSY_TIMEOUT = 30000;  // [ms] longest wait for other writers
 
 class Statement {
  public:
@@ -43,7 +43,7 @@ class Statement {
   void bind(int at, std::int64_t number) {
     if (sqlite3_bind_int64(statement_, at, number) != SQLITE_OK) fail();
   }
-  /// @return a row is there.
+  /// @return whether there is a row.
   bool step() {
     const int code = sqlite3_step(statement_);
     if (code != SQLITE_ROW && code != SQLITE_DONE) fail();
@@ -71,12 +71,12 @@ class Statement {
 CoefficientRecord recordOf(const Statement& row) {
   CoefficientRecord record;
   int column = 0;
-  for (const WordField& f : wordFields()) f.at(record) = row.word(column++);
+  for (const TextField& f : textFields()) f.at(record) = row.word(column++);
   for (const NumberField& f : numberFields()) f.set(record, f.index, row.number(column++));
   return record;
 }
 
-// Of RecordKind::columns().
+// From the columns of RecordKind::columns().
 Row rowOf(const RecordKind& kind, const Statement& s) {
   Row row;
   int column = 0;
@@ -87,7 +87,7 @@ Row rowOf(const RecordKind& kind, const Statement& s) {
   return row;
 }
 
-// What was identified is kept with the version of the software that did it.
+// Records carry the version of the software.
 template <typename Record>
 std::vector<Row> rowsOf(const std::string& file, const std::vector<Record>& records) {
   std::vector<Row> rows;
@@ -105,7 +105,7 @@ std::vector<Row> rowsOf(const std::string& file, const std::vector<Record>& reco
 template <typename Record>
 std::vector<Record> recordsOf(const std::vector<Row>& rows) {
   std::vector<Record> records(rows.size());
-  for (std::size_t i = 0; i < rows.size(); ++i) take(rows[i], &records[i]);
+  for (std::size_t i = 0; i < rows.size(); ++i) readRow(rows[i], &records[i]);
   return records;
 }
 
@@ -114,10 +114,10 @@ std::vector<Record> recordsOf(const std::vector<Row>& rows) {
 struct CoefficientDatabase::Impl {
   std::string file;
   sqlite3* db = nullptr;
-  std::unique_ptr<FleetServer> fleet;  // in the file's place
+  std::unique_ptr<FleetServer> fleet;  // used instead of the file
 
   explicit Impl(const std::string& path) : file(path.empty() ? ":memory:" : path) {
-    if (isFleet(path)) {
+    if (isServerUrl(path)) {
       fleet = connectFleet(path);
       return;
     }
@@ -150,7 +150,7 @@ struct CoefficientDatabase::Impl {
   }
 
   void prepare() const {
-    // The mode is kept in the file, so that one process only has to switch it.
+    // The journal mode is stored in the file, so that only one process switches it.
     Statement mode(db, file, "PRAGMA journal_mode");
     const bool is_wal = mode.step() && mode.word(0) == "wal";
     mode.reset();
@@ -159,7 +159,7 @@ struct CoefficientDatabase::Impl {
         execute("PRAGMA journal_mode=WAL");
         break;
       } catch (const Error&) {
-        // Switching does not wait for other processes by itself.
+        // SQLite does not wait for other processes when it switches the mode.
         if (tries == 200 || sqlite3_errcode(db) != SQLITE_BUSY) throw;
         sqlite3_sleep(20);
       }
@@ -167,14 +167,14 @@ struct CoefficientDatabase::Impl {
     execute("PRAGMA synchronous=FULL");
     if (version() < SCHEMA) {
       transaction([this] {
-        // Another process may have been first.
+        // Another process may have done it meanwhile.
         if (version() == 0) makeFirst();
         if (version() == 1) makeSecond();
       });
     }
     if (version() != SCHEMA) {
-      throw Error(file + ": schema " + std::to_string(version()) + " is not one this version knows (" +
-                  std::to_string(SCHEMA) + ")");
+      throw Error(file + ": schema " + std::to_string(version()) + ", expected at most " +
+                  std::to_string(SCHEMA));
     }
   }
 
@@ -191,7 +191,7 @@ struct CoefficientDatabase::Impl {
     {
       Statement tables(db, file, "SELECT count(*) FROM sqlite_master");
       if (tables.step() && tables.integer(0) > 0) {
-        throw Error(file + ": a database, but not of cutting coefficients");
+        throw Error(file + ": not a database of cutting coefficients");
       }
     }
     execute(createOf(coefficientKind()));
@@ -204,7 +204,7 @@ struct CoefficientDatabase::Impl {
     execute("PRAGMA user_version=1");
   }
 
-  // Some of version 1 have the table `sent`, of coefficients only.
+  // Some files of version 1 have the table `sent`, for coefficients only.
   void makeSecond() const {
     execute(createOf(improvementKind()));
     execute(createOf(healthKind()));
@@ -366,14 +366,14 @@ std::string CoefficientDatabase::contents() const {
     Statement s(impl_->db, impl_->file, "SELECT DISTINCT tool, material FROM coefficients ORDER BY 1, 2");
     while (s.step()) add(s.word(0), s.word(1));
   }
-  return text.empty() ? "nothing" : text;
+  return text.empty() ? "no records" : text;
 }
 
 const std::string& CoefficientDatabase::file() const {
   return impl_->file;
 }
 
-// Numbers of records follow the order in which they were kept: a file has one writer at a time.
+// The numbers of records follow the order of insertion, because a file has one writer at a time.
 std::int64_t CoefficientDatabase::Impl::sentUpTo(const std::string& to, const RecordKind& kind) const {
   Statement s(db, file, "SELECT last FROM handed WHERE fleet = ?1 AND kind = ?2");
   s.bind(1, to);
@@ -458,7 +458,7 @@ double distance(const CoefficientRecord& record, const CoefficientQuery& query, 
   return std::sqrt(sum);
 }
 
-// Newest records of a pair about the asked cutting speed; any speed where there is none near.
+// Newest records of a pair near the cutting speed; of any speed if there is none.
 std::vector<CoefficientRecord> CoefficientDatabase::near(const std::string& tool,
                                                          const CoefficientQuery& query) const {
   if (impl_->fleet) return impl_->fleet->near(tool, query);
@@ -492,7 +492,7 @@ std::vector<CoefficientRecord> CoefficientDatabase::near(const std::string& tool
 namespace {
 
 // One coefficient from all records, each widened by its distance. @return {value, standard deviation}; NaN:
-// none has it.
+// in no record.
 std::array<double, 2> combine(const std::vector<CoefficientRecord>& near,
                               const std::vector<double>& distances, double CuttingCoefficients::*coefficient,
                               double growth) {
@@ -504,7 +504,7 @@ std::array<double, 2> combine(const std::vector<CoefficientRecord>& near,
   for (std::size_t i = 0; i < near.size(); ++i) {
     const double v = near[i].set.value.*coefficient, s = near[i].set.std_dev.*coefficient;
     if (!std::isfinite(v)) continue;
-    // A set without a standard deviation counts as known to the growth of one distance.
+    // A set without a standard deviation has the uncertainty of distance 1.
     const double own = std::isfinite(s) ? s : growth * std::abs(v), widened = growth * distances[i] * v;
     terms.push_back({v, own * own + widened * widened, widened});
     const double variance = std::max(terms.back().variance, 1e-12 * v * v + 1e-300);
@@ -514,12 +514,12 @@ std::array<double, 2> combine(const std::vector<CoefficientRecord>& near,
   }
   if (!(weight > 0.0)) return {CoefficientRecord::UNKNOWN, CoefficientRecord::UNKNOWN};
   const double value = sum / weight;
-  // Sets of one pair differ by more than their own noise when the process changes between them.
+  // Scatter beyond the standard deviations: the process changed between the sets.
   double scatter = 0.0;
   for (const Term& t : terms) scatter += (t.value - value) * (t.value - value) / (t.variance + 1e-300);
   const double freedom = static_cast<double>(terms.size()) - 1.0;
   const double factor = freedom > 0.0 ? std::max(1.0, scatter / freedom) : 1.0;
-  // All of them share the distance: averaging does not take it away.
+  // The smallest widening is common to all and is not reduced by averaging.
   return {value, std::sqrt(factor / weight + fade * fade)};
 }
 
@@ -561,7 +561,7 @@ FoundCoefficients findCoefficients(const CoefficientDatabase& database, const st
                                    const std::string& material) {
   FoundCoefficients found;
   found.set = database.find(tool, material);
-  // A cut of production is one among many: together they say more than the newest.
+  // Production cuts are combined, which is more certain than the newest.
   if (found.set && found.set->source != SOURCE_PRODUCTION) {
     found.message = "source " + found.set->source + ", " + std::to_string(found.set->tests) + " tests";
     return found;
@@ -572,14 +572,14 @@ FoundCoefficients findCoefficients(const CoefficientDatabase& database, const st
   if (const auto estimate = database.estimate(query)) {
     found.set = estimate->set;
     if (!estimate->other_tool) {
-      found.message = std::to_string(estimate->records) + " identifications and cuts together";
+      found.message = std::to_string(estimate->records) + " identifications and cuts combined";
       return found;
     }
-    found.message = "nothing with '" + tool + "' yet: from " + std::to_string(estimate->records) + " of '" +
+    found.message = "no records with '" + tool + "': from " + std::to_string(estimate->records) + " of '" +
                     estimate->set.tool + "' and other tools, uncertainty widened";
     return found;
   }
-  found.message = "nothing for '" + tool + "' in '" + material + "'; known: " + database.contents();
+  found.message = "no records for '" + tool + "' in '" + material + "'; known: " + database.contents();
   return found;
 }
 
