@@ -48,14 +48,14 @@ CauseTable::CauseTable(const FleetCauses& fleet) : count_(fleet.tests.size()) {
 
 void CauseTable::addCause(const FleetCause& cause, std::size_t hypothesis) {
   // The ratio of two sizes that are uniform in the logarithm has a triangular distribution.
-  for (const EvidenceProfile& seen : cause.profiles) {
+  for (const EvidenceProfile& profile : cause.profiles) {
     for (int k = 1 - SIZE_STEPS; k < SIZE_STEPS; ++k) {
       const double factor = std::pow(LARGEST_SIZE_RATIO, static_cast<double>(k) / SIZE_STEPS);
       const double triangle = (1.0 - std::abs(static_cast<double>(k)) / SIZE_STEPS) / SIZE_STEPS;
       Component component{hypothesis, triangle / static_cast<double>(cause.profiles.size()), {}};
       for (std::size_t t = 0; t < count_; ++t) {
         component.shows.emplace_back(channels.size(), 0.5);  // unknown for channels that were not measured
-        for (const auto& [channel, squares] : seen[t]) {
+        for (const auto& [channel, squares] : profile[t]) {
           const auto at = std::lower_bound(channels.begin(), channels.end(), channel) - channels.begin();
           component.shows.back()[static_cast<std::size_t>(at)] = profile(squares, factor);
         }

@@ -44,16 +44,6 @@ struct WeightedMean {
 
 }  // namespace
 
-ShearZone shearZoneOf(double rake, double chip_ratio, double power_force, double thrust_force,
-                      double chip_area) {
-  ShearZone zone;
-  zone.shear_angle = std::atan2(chip_ratio * std::cos(rake), 1.0 - chip_ratio * std::sin(rake));
-  zone.friction_angle = rake + std::atan2(thrust_force, power_force);
-  const double along = power_force * std::cos(zone.shear_angle) - thrust_force * std::sin(zone.shear_angle);
-  zone.shear_stress = along * std::sin(zone.shear_angle) / chip_area;
-  return zone;
-}
-
 CuttingCoefficients obliqueCoefficients(const ShearZone& zone, double rake, double inclination) {
   const double t = std::tan(inclination),
                normal = std::atan(std::tan(zone.friction_angle) * std::cos(inclination));

@@ -214,22 +214,22 @@ struct CombinedKtc {
 CombinedKtc combineKtc(const std::vector<MethodEstimate>& estimates) {
   constexpr auto KTC = &CuttingCoefficients::ktc;
   CombinedKtc all;
-  const auto updateSurest = [&](const MethodEstimate& method) {
-    const double share = relativeStd(method.set, KTC);
-    if (!all.surest || share < relativeStd(all.surest->set, KTC)) all.surest = &method;
+  const auto updateSurest = [&](const MethodEstimate& estimate) {
+    const double share = relativeStd(estimate.set, KTC);
+    if (!all.surest || share < relativeStd(all.surest->set, KTC)) all.surest = &estimate;
   };
   double weight = 0.0, sum = 0.0, shares = 0.0;
   const MethodEstimate* own = nullptr;
-  for (const MethodEstimate& method : estimates) {
+  for (const MethodEstimate& estimate : estimates) {
     // Other tools are the last resort and are not compared with the others.
-    if (method.method == EstimationMethod::other_tool) continue;
-    updateSurest(method);
-    if (method.method == EstimationMethod::pair) {
-      own = &method;
+    if (estimate.method == EstimationMethod::other_tool) continue;
+    updateSurest(estimate);
+    if (estimate.method == EstimationMethod::pair) {
+      own = &estimate;
       continue;
     }
-    const double share = relativeStd(method.set, KTC), one = 1.0 / (share * share);
-    weight += one, sum += one * std::log(method.set.value.ktc), shares += one * share;
+    const double share = relativeStd(estimate.set, KTC), one = 1.0 / (share * share);
+    weight += one, sum += one * std::log(estimate.set.value.ktc), shares += one * share;
   }
   if (!all.surest) updateSurest(estimates.front());
   if (!(weight > 0.0)) {
@@ -238,10 +238,10 @@ CombinedKtc combineKtc(const std::vector<MethodEstimate>& estimates) {
   }
   double log = sum / weight;
   all.share = shares / weight;
-  for (const MethodEstimate& method : estimates) {
-    if (&method == all.surest || method.method == EstimationMethod::other_tool) continue;
-    const double off = std::abs(std::log(method.set.value.ktc / all.surest->set.value.ktc)) /
-                       std::hypot(relativeStd(method.set, KTC), relativeStd(all.surest->set, KTC));
+  for (const MethodEstimate& estimate : estimates) {
+    if (&estimate == all.surest || estimate.method == EstimationMethod::other_tool) continue;
+    const double off = std::abs(std::log(estimate.set.value.ktc / all.surest->set.value.ktc)) /
+                       std::hypot(relativeStd(estimate.set, KTC), relativeStd(all.surest->set, KTC));
     if (!(off <= all.disagreement)) all.disagreement = off;
   }
   if (own) {

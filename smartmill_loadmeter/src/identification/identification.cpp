@@ -61,9 +61,7 @@ void LoadMeterIdentification::reset() {
   at_speed_since_.reset();
   on_path_since_.reset();
   last_load_ = last_state_ = next_window_ = 0.0;
-  readings_.clear();
-  motor_record_.clear();
-  force_record_.clear();
+  steady_.clear();
   path_first_.reset();
   path_last_.reset();
   air_cuts_.clear();
@@ -90,11 +88,9 @@ void LoadMeterIdentification::handle(const CncState& state) {
   moves_.handle(state);
   if (!condition_ || condition_->kind == CuttingCondition::Kind::none) return;
   // In air the tool may be at rest; if it moves, the feed drives show their friction.
-  const bool on_path = onPath(state);
+  const bool on_path = onPath(state), is_cut = condition_->kind == CuttingCondition::Kind::cut;
   if (on_path_since_ && (!on_path || gap)) {
-    if (condition_->kind == CuttingCondition::Kind::cut) dropAfter(state.stamp - parameters_.guard_time);
-    motor_record_.dropAfter(state.stamp - parameters_.guard_time);
-    force_record_.dropAfter(state.stamp - parameters_.guard_time);
+    steady_.dropAfter(state.stamp - parameters_.guard_time, is_cut);
     on_path_since_.reset();
   }
   if (!on_path) return;
@@ -110,9 +106,7 @@ void LoadMeterIdentification::handle(const CncState& state) {
                       (entered && path_first_->stamp == path_last_->stamp)))
     path_first_.reset();
   if (!path_first_) {
-    if (condition_->kind == CuttingCondition::Kind::cut) readings_.clear();
-    motor_record_.clear();
-    force_record_.clear();
+    if (condition_->kind == CuttingCondition::Kind::cut) steady_.clear();
     path_first_ = point;
     on_path_since_ = state.stamp;
   }
@@ -134,11 +128,11 @@ bool LoadMeterIdentification::isSteadyAt(double stamp) const {
 void LoadMeterIdentification::handle(const SampleBlock& block) {
   if (!usesMotors()) return;
   if (!isServoRecord(block)) moves_.handle(block);
-  if (isSteadyAt(block.stamp)) motor_record_.add(block);
+  if (isSteadyAt(block.stamp)) steady_.motor.add(block);
 }
 
 void LoadMeterIdentification::handle(const ForceBlock& block) {
-  if (isSteadyAt(block.stamp)) force_record_.add(block);
+  if (isSteadyAt(block.stamp)) steady_.force.add(block);
 }
 
 void LoadMeterIdentification::addMotorMeasurement(LoadTest* test, const MotorRecord& record,
@@ -181,9 +175,7 @@ void LoadMeterIdentification::handle(const LoadSample& sample) {
   const bool steady = std::abs(sample.spindle_speed - condition_->spindle_speed) <=
                       parameters_.speed_tolerance * condition_->spindle_speed;
   if (at_speed_since_ && (!steady || gap)) {
-    dropAfter(sample.stamp - parameters_.guard_time);
-    motor_record_.dropAfter(sample.stamp - parameters_.guard_time);
-    force_record_.dropAfter(sample.stamp - parameters_.guard_time);
+    steady_.dropAfter(sample.stamp - parameters_.guard_time);
     at_speed_since_.reset();
   }
   if (!steady) return;
@@ -195,7 +187,7 @@ void LoadMeterIdentification::handle(const LoadSample& sample) {
   }
   const double settle = parameters_.settle_time_constants * timeConstant(spindle_.load_meter_bandwidth);
   if (sample.stamp < since + settle) return;
-  readings_.push_back(
+  steady_.readings.push_back(
       {sample.stamp, sample.spindle_load * *spindle_.load_meter_full_scale, sample.spindle_speed});
   if (on_window_ && parameters_.force.period > 0.0 && condition_->kind == CuttingCondition::Kind::cut)
     estimateWindow(sample.stamp);
@@ -204,12 +196,12 @@ void LoadMeterIdentification::handle(const LoadSample& sample) {
 // Force over the last window of a steady cut.
 void LoadMeterIdentification::estimateWindow(double now) {
   const double since = now - parameters_.force.window;
-  if (now < next_window_ || readings_.front().stamp > since) return;
+  if (now < next_window_ || steady_.readings.front().stamp > since) return;
   next_window_ = now + parameters_.force.period - 1e-6;
   LoadTest part = steadyTest(since);
   if (part.readings < FEWEST_IN_WINDOW) return;
-  addMotorMeasurement(&part, motor_record_.last(parameters_.force.window), true);
-  part.sensor = force_record_.measurement(since);
+  addMotorMeasurement(&part, steady_.motor.last(parameters_.force.window), true);
+  part.sensor = steady_.force.measurement(since);
   if (const auto found = estimate(part)) on_window_(*found);
 }
 
@@ -222,25 +214,30 @@ void LoadMeterIdentification::handle(const CuttingCondition& condition) {
   on_path_since_.reset();
 }
 
-void LoadMeterIdentification::dropAfter(double stamp) {
-  while (!readings_.empty() && readings_.back().stamp > stamp) readings_.pop_back();
+void LoadMeterIdentification::SteadyRecord::dropAfter(double stamp, bool with_readings) {
+  while (with_readings && !readings.empty() && readings.back().stamp > stamp) readings.pop_back();
+  motor.dropAfter(stamp);
+  force.dropAfter(stamp);
+}
+
+void LoadMeterIdentification::SteadyRecord::clear(bool with_readings) {
+  if (with_readings) readings.clear();
+  motor.clear();
+  force.clear();
 }
 
 void LoadMeterIdentification::closeTest() {
   if (condition_ && condition_->kind != CuttingCondition::Kind::none) {
-    dropAfter(last_load_ - parameters_.guard_time);
-    motor_record_.dropAfter(last_load_ - parameters_.guard_time);
-    force_record_.dropAfter(last_load_ - parameters_.guard_time);
-    if (readings_.size() < static_cast<std::size_t>(parameters_.minimum_readings)) {
-      rejected_tests_.push_back("'" + condition_->name + "': " + countOf(readings_.size(), "steady reading") +
-                                ", expected " + std::to_string(parameters_.minimum_readings) + " or more");
+    steady_.dropAfter(last_load_ - parameters_.guard_time);
+    if (steady_.readings.size() < static_cast<std::size_t>(parameters_.minimum_readings)) {
+      rejected_tests_.push_back("'" + condition_->name +
+                                "': " + countOf(steady_.readings.size(), "steady reading") + ", expected " +
+                                std::to_string(parameters_.minimum_readings) + " or more");
     } else {
       storeTest(steadyTest());
     }
   }
-  readings_.clear();
-  motor_record_.clear();
-  force_record_.clear();
+  steady_.clear();
   path_first_.reset();
   path_last_.reset();
 }
@@ -248,19 +245,19 @@ void LoadMeterIdentification::closeTest() {
 LoadTest LoadMeterIdentification::steadyTest(double since) const {
   LoadTest test;
   test.condition = *condition_;
-  const auto first = std::find_if(readings_.begin(), readings_.end(),
-                                  [since](const VoltageSample& r) { return r.stamp >= since; });
-  const std::vector<VoltageSample> steady(first, readings_.end());
+  const auto first = std::find_if(steady_.readings.begin(), steady_.readings.end(),
+                                  [since](const SteadyRecord::Sample& r) { return r.stamp >= since; });
+  const std::vector<SteadyRecord::Sample> steady(first, steady_.readings.end());
   test.readings = static_cast<int>(steady.size());
   if (test.readings < 2) return test;
   const double n = static_cast<double>(steady.size());
-  for (const VoltageSample& r : steady) {
+  for (const SteadyRecord::Sample& r : steady) {
     test.voltages.push_back(r.voltage);
     test.times.push_back(r.stamp - steady.front().stamp);
     test.speed += r.speed / n;
   }
   double speed2 = 0.0;
-  for (const VoltageSample& r : steady) speed2 += (r.speed - test.speed) * (r.speed - test.speed);
+  for (const SteadyRecord::Sample& r : steady) speed2 += (r.speed - test.speed) * (r.speed - test.speed);
   test.speed_std = std::sqrt(speed2 / (n * (n - 1.0)));
   test.stamp = steady.back().stamp;
   test.duration = steady.back().stamp - steady.front().stamp;
@@ -269,14 +266,14 @@ LoadTest LoadMeterIdentification::steadyTest(double since) const {
 }
 
 void LoadMeterIdentification::storeTest(LoadTest test) {
-  addMotorMeasurement(&test, motor_record_, false);
-  test.sensor = force_record_.measurement();
+  addMotorMeasurement(&test, steady_.motor, false);
+  test.sensor = steady_.force.measurement();
   const bool cut = test.condition.kind == CuttingCondition::Kind::cut;
   (cut ? cuts_ : air_cuts_).push_back(test);
   if (cut) updateProduction(test);
   if (self_calibration_ && test.motor && !cut) self_calibration_->air(*test.motor, test.stamp);
   if (self_calibration_ && test.motor && cut) {
-    if (const auto seen = estimate(test, true)) self_calibration_->cut(*test.motor, *seen);
+    if (const auto reference = estimate(test, true)) self_calibration_->cut(*test.motor, *reference);
   }
   if (on_test_) on_test_(test);
   if (on_motor_force_ && test.force) on_motor_force_(*test.force);
@@ -390,9 +387,7 @@ void LoadMeterIdentification::reportCut(const LoadTest& cut) {
 void LoadMeterIdentification::handle(const IdentifyGoal& goal) {
   if (goal.reset) {
     // The present condition remains: its test starts again.
-    readings_.clear();
-    motor_record_.clear();
-    force_record_.clear();
+    steady_.clear();
     air_cuts_.clear();
     cuts_.clear();
     if (self_calibration_) self_calibration_->clear();

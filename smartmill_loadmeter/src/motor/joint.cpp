@@ -19,23 +19,6 @@ constexpr double LEAST_SINGULAR_VALUE = 1e-7;  // [1] smallest singular value ov
 constexpr double LARGEST_NULL_SPACE_SHARE =
     1e-3;  // [1] largest share of an observable coefficient in the null space
 
-}  // namespace
-
-Estimate FeedDrive::opposing(double current) const {
-  const double rise = current - air_current;
-  return {newton_per_ampere * rise,
-          std::hypot(newton_per_ampere_std * rise, newton_per_ampere * current_std)};
-}
-
-std::optional<Estimate> axisForce(const FeedDrive& drive, double current, double velocity, double smallest) {
-  if (std::abs(velocity) < smallest) return std::nullopt;
-  Estimate force = drive.opposing(current);
-  if (velocity > 0.0) force.value = -force.value;
-  return force;
-}
-
-namespace {
-
 // Torques and axis forces over their standard deviations; rows x coefficients in units of UNIT.
 struct Observations {
   std::vector<Eigen::Matrix<double, 1, 6>> rows;

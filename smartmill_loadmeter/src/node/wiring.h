@@ -35,14 +35,15 @@ struct CutStreams {
 };
 
 /// Connects the streams of the identification to a node's inputs or a bag.
-template <class Source, class Sorted>
-void connect(Source& source, const NodeParameters& parameters, Sorted& sorted) {
-  feed<CncState>(source, names::CNC_STATE, sorted);
-  feed<LoadSample>(source, names::CNC_LOAD, sorted);
-  feed<CuttingCondition>(source, names::CUTTING_CONDITION, sorted);
+/// @param pipeline an IdentificationPipeline, or CutStreams
+template <class Source, class Pipeline>
+void connect(Source& source, const NodeParameters& parameters, Pipeline& pipeline) {
+  feed<CncState>(source, names::CNC_STATE, pipeline);
+  feed<LoadSample>(source, names::CNC_LOAD, pipeline);
+  feed<CuttingCondition>(source, names::CUTTING_CONDITION, pipeline);
   if (parameters.usesMotors())
-    feed<SampleBlock>(source, parameters.motor_servo ? names::daq("servo") : names::MOTOR_CURRENT, sorted);
-  if (parameters.force_sensor) feed<ForceBlock>(source, names::FORCE_COMPENSATED, sorted);
+    feed<SampleBlock>(source, parameters.motor_servo ? names::daq("servo") : names::MOTOR_CURRENT, pipeline);
+  if (parameters.force_sensor) feed<ForceBlock>(source, names::FORCE_COMPENSATED, pipeline);
 }
 
 /// Connects the additional streams of force curves.

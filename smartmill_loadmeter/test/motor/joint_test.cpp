@@ -20,6 +20,31 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
+/// A feed drive: F = m (I - Ia), Cheng & Venuvinod eq. 3; m is negative when the weight aids the motion more
+/// than friction opposes it.
+struct FeedDrive {
+  double newton_per_ampere = 0.0;      ///< [N/A] m, per range of the current
+  double newton_per_ampere_std = 0.0;  ///< [N/A]
+  double air_current = 0.0;            ///< [A] range in air, same direction of motion
+  double current_std = 0.0;            ///< [A] of a mean current
+
+  /// Cutting force that opposes the drive's motion [N].
+  Estimate opposing(double current) const;
+};
+
+Estimate FeedDrive::opposing(double current) const {
+  const double rise = current - air_current;
+  return {newton_per_ampere * rise,
+          std::hypot(newton_per_ampere_std * rise, newton_per_ampere * current_std)};
+}
+
+std::optional<Estimate> axisForce(const FeedDrive& drive, double current, double velocity, double smallest) {
+  if (std::abs(velocity) < smallest) return std::nullopt;
+  Estimate force = drive.opposing(current);
+  if (velocity > 0.0) force.value = -force.value;
+  return force;
+}
+
 /// Machine whose feed drives draw current for friction, weight and cutting force, without information at
 /// rest.
 struct Machine {

@@ -145,7 +145,6 @@ class CoefficientDatabase {
  private:
   std::size_t add(const RecordKind& kind, const std::vector<Row>& rows);
   std::vector<Row> rows(const RecordKind& kind) const;
-  std::size_t unsentCount(const std::string& fleet, const RecordKind& kind) const;
   std::vector<CoefficientRecord> near(const std::string& tool, const CoefficientQuery& query) const;
 
   struct Impl;

@@ -14,14 +14,6 @@ struct ShearZone {
   double friction_angle = 0.0;  ///< [rad] mean, on the rake face
 };
 
-/// Shear zone of an orthogonal cut by the thin-shear-zone analysis (Armarego), tan(phi) = r cos(rake) / (1 -
-/// r sin(rake)).
-/// @param chip_ratio [1] uncut over cut chip thickness.
-/// @param power_force, thrust_force [N], without edge forces.
-/// @param chip_area [m2] width x uncut thickness.
-ShearZone shearZoneOf(double rake, double chip_ratio, double power_force, double thrust_force,
-                      double chip_area);
-
 /// Cutting coefficients (edge terms zero) of an edge with normal rake [rad] and inclination (helix) [rad]:
 /// Budak, Altintas, Armarego 1996, chip flow angle = inclination (Stabler), tan(bn) = tan(ba)
 /// cos(inclination):

@@ -155,11 +155,19 @@ class LoadMeterIdentification {
   const std::vector<LoadTest>& cuts() const { return cuts_; }
 
  private:
-  struct VoltageSample {
-    double stamp, voltage, speed;
+  /// Data of the steady state of the present test.
+  struct SteadyRecord {
+    struct Sample {
+      double stamp, voltage, speed;
+    };
+    std::vector<Sample> readings;  // of the load meter
+    MotorRecord motor;
+    ForceRecord force;
+
+    void dropAfter(double stamp, bool with_readings = true);
+    void clear(bool with_readings = true);
   };
   bool onPath(const CncState& state) const;
-  void dropAfter(double stamp);
   bool isSteadyAt(double stamp) const;
   std::optional<Estimate> cuttingTorqueOf(const LoadTest& cut) const;
   std::optional<ForceEstimate> estimate(const LoadTest& cut, bool without_motors = false) const;
@@ -187,9 +195,7 @@ class LoadMeterIdentification {
   std::optional<CuttingCondition> condition_;
   std::optional<double> at_speed_since_, on_path_since_;  // [s] start of the steady state
   double last_load_ = 0.0, last_state_ = 0.0;             // [s]
-  std::vector<VoltageSample> readings_;
-  MotorRecord motor_record_;
-  ForceRecord force_record_;
+  SteadyRecord steady_;
   std::function<void(const ForceEstimate&)> on_force_, on_window_;
   double next_window_ = 0.0;  // [s]
   std::optional<MotorCalibration> motors_;

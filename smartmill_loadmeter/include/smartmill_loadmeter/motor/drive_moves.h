@@ -26,7 +26,6 @@ class DriveMoves {
 
   /// Bandwidth [Hz] from the moves so far; empty: none.
   const std::optional<Estimate>& bandwidth(std::size_t axis) const { return axes_[axis].bandwidth; }
-  int moves(std::size_t axis) const { return static_cast<int>(axes_[axis].bandwidths.size()); }
 
  private:
   struct Move {
@@ -40,7 +39,6 @@ class DriveMoves {
     std::vector<Estimate> bandwidths;
     std::optional<Estimate> bandwidth;
   };
-  void rested(Axis& axis, double stamp);
   void evaluateWaiting();
   void identifyMove(std::size_t axis, const Move& move);
 

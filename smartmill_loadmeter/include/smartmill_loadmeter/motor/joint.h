@@ -10,18 +10,6 @@
 
 namespace smartmill::loadmeter {
 
-/// A feed drive: F = m (I - Ia), Cheng & Venuvinod eq. 3; m is negative when the weight aids the motion more
-/// than friction opposes it.
-struct FeedDrive {
-  double newton_per_ampere = 0.0;      ///< [N/A] m, per range of the current
-  double newton_per_ampere_std = 0.0;  ///< [N/A]
-  double air_current = 0.0;            ///< [A] range in air, same direction of motion
-  double current_std = 0.0;            ///< [A] of a mean current
-
-  /// Cutting force that opposes the drive's motion [N].
-  Estimate opposing(double current) const;
-};
-
 /// Measurements of one cut. The force of an axis acts on the tool along the machine axis; empty for an axis
 /// at rest, whose motor current does not show the load: the passive component is unknown and no value is
 /// assumed.
@@ -32,9 +20,6 @@ struct JointMeasurement {
   std::optional<Estimate> torque;  ///< [N m] mean cutting torque
   std::array<std::optional<Estimate>, 3> axis_force;  ///< [N] mean, X, Y, Z
 };
-
-/// Force on the tool along an axis from its drive; empty below the speed of an axis at rest.
-std::optional<Estimate> axisForce(const FeedDrive& drive, double current, double velocity, double smallest);
 
 struct JointResult {
   CuttingCoefficients value, std_dev;  ///< NaN where not observable
