@@ -65,7 +65,7 @@ class Shop {
     query.helix = tool.geometry.helix;
     if (const auto answer = recommendCut(database_, query)) {
       job.answered = true;
-      job.way = answer->way;
+      job.way = answer->method;
       job.error = std::abs(answer->set.value.ktc / truth.ktc - 1.0);
       job.inside = truth.ktc >= answer->ktc_lower && truth.ktc <= answer->ktc_upper;
       job.width = answer->ktc_upper / answer->ktc_lower;

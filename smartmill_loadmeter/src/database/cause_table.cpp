@@ -22,7 +22,7 @@ constexpr double SHOWS_PROBABILITY =
 
 // Probability that a channel shows a cause whose size is larger by a factor. @param squares squared-gap
 // reduction over the threshold
-double profile(double squares, double factor) {
+double showProbability(double squares, double factor) {
   if (squares <= 0.0) return CHANNEL_ERROR;
   const double distance = std::log(squares * factor * factor) / PROFILE_STD;
   return CHANNEL_ERROR + (1.0 - 2.0 * CHANNEL_ERROR) * 0.5 * std::erfc(-distance / std::sqrt(2.0));
@@ -57,7 +57,7 @@ void CauseTable::addCause(const FleetCause& cause, std::size_t hypothesis) {
         component.shows.emplace_back(channels.size(), 0.5);  // unknown for channels that were not measured
         for (const auto& [channel, squares] : profile[t]) {
           const auto at = std::lower_bound(channels.begin(), channels.end(), channel) - channels.begin();
-          component.shows.back()[static_cast<std::size_t>(at)] = profile(squares, factor);
+          component.shows.back()[static_cast<std::size_t>(at)] = showProbability(squares, factor);
         }
       }
       components.push_back(component);
