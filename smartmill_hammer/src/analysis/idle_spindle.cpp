@@ -6,6 +6,7 @@
 
 #include <Eigen/Core>
 
+#include "smartmill_core/cutting/friction.h"
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/math/linear_algebra.h"
 #include "smartmill_core/names.h"
@@ -239,7 +240,7 @@ std::optional<IdleFriction> frictionOf(const std::vector<AirCutLoad>& loads) {
   f.viscous = (a * q - b * p) / determinant;
   double chi2 = 0.0;
   for (const AirCutLoad& l : loads)
-    chi2 += std::pow((l.load - (f.coulomb + f.viscous * l.speed) * l.speed) / l.std, 2);
+    chi2 += std::pow((l.load - LinearFriction{f.viscous, f.coulomb}.at(l.speed) * l.speed) / l.std, 2);
   const double freedom = static_cast<double>(loads.size()) - 2.0;
   // The residual of the law counts as noise.
   const double wide = freedom > 0.0 ? std::max(1.0, chi2 / freedom) : 1.0;

@@ -22,11 +22,11 @@
 
 namespace smartmill::loadmeter {
 
-/// Shell around IdentificationPipeline: topics in, action and service at the front, coefficients out.
+/// ROS interface of IdentificationPipeline and ForceCurvePipeline.
 class LoadMeterNode {
  public:
   using Parameters = NodeParameters;
-  /// @throws Error on a wrong parameter, model or database.
+  /// @throws Error for an invalid parameter, model or database.
   LoadMeterNode(ros::NodeHandle nh, ros::NodeHandle private_nh);
 
  private:
@@ -40,15 +40,15 @@ class LoadMeterNode {
             smartmill_msgs::FindCoefficients::Response& response);
   bool recommend(smartmill_msgs::RecommendCut::Request& request,
                  smartmill_msgs::RecommendCut::Response& response);
-  void keep(CoefficientRecord cut);
-  void keep(const smartmill_msgs::DiscoverActionResult& discovered);
-  void keep(const smartmill_msgs::SpindleHealth& health);
+  void store(CoefficientRecord cut);
+  void store(const smartmill_msgs::DiscoverActionResult& discovered);
+  void store(const smartmill_msgs::SpindleHealth& health);
   void publish(const MotorForce& force);
   void publish(const ForceEstimate& force);
-  void tell(const ForceEstimate& force);
+  void report(const ForceEstimate& force);
   void publish(const IdentifiedForceCurves& found);
   void watch();
-  void tellFleet();
+  void publishFleetState();
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
   NodeParameters parameters_;
@@ -61,8 +61,8 @@ class LoadMeterNode {
   std::map<std::uint64_t, Server::GoalHandle> waiting_;
   std::uint64_t next_id_ = 1;
   std::string last_message_, last_force_, last_curve_;
-  std::size_t kept_cuts_ = 0, kept_explanations_ = 0, kept_health_ = 0;
-  std::uint64_t fleet_told_ = 0;
+  std::size_t stored_cuts_ = 0, stored_explanations_ = 0, stored_health_ = 0;
+  std::uint64_t published_fleet_state_ = 0;
 
   ros::Publisher publisher_, force_publisher_, estimate_publisher_, curve_publisher_, fleet_publisher_;
   ros::Subscriber discovered_, health_;

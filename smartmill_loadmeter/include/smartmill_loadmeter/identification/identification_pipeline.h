@@ -10,30 +10,30 @@
 
 namespace smartmill::loadmeter {
 
-/// LoadMeterIdentification behind the sorter: takes inputs in any order of arrival. The node and the tool
-/// that reads bags both feed this class.
+/// Puts the streams into stamp order and passes them to LoadMeterIdentification; used by the node and for
+/// bags.
 class IdentificationPipeline {
  public:
   /// @param hold_back [s], see StreamSorter. @throws Error as LoadMeterIdentification.
   IdentificationPipeline(const MachineModel& model, const IdentificationParameters& parameters,
                          double hold_back);
 
-  /// Coefficients, or why there are none; callbacks run inside push() and flush().
+  /// Callbacks run inside push() and flush().
   LoadMeterIdentification& identification() { return identification_; }
 
   void push(const CncState& state);
   void push(const LoadSample& sample);
-  /// daq/motor_current: may be absent; from its first block on it is waited for as the others are.
+  /// daq/motor_current: optional; waited for like the others after its first block.
   void push(const SampleBlock& block);
-  /// force/compensated: likewise.
+  /// force/compensated: optional, likewise.
   void push(const ForceBlock& block);
   void push(const CuttingCondition& condition);
   void push(const IdentifyGoal& goal);
 
-  /// End of data: everything left, in order.
+  /// End of data: passes on everything that waits.
   void flush() { sorter_.flush(); }
 
-  double newest() const { return newest_; }  ///< [s] newest stamp seen; 0 before any
+  double newest() const { return newest_; }  ///< [s] newest stamp; 0: none
   std::size_t late() const { return sorter_.late(); }
   std::string waitingFor() const { return sorter_.waitingFor(); }
 

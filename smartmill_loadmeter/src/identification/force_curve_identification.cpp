@@ -1,4 +1,4 @@
-#include "smartmill_loadmeter/identification/curve_finder.h"
+#include "smartmill_loadmeter/identification/force_curve_identification.h"
 
 #include <algorithm>
 #include <cmath>
@@ -12,7 +12,7 @@
 namespace smartmill::loadmeter {
 namespace {
 
-constexpr double MAXIMUM_GAP = 0.2;      // [s] longer without state or angle: not steady
+constexpr double MAXIMUM_GAP = 0.2;      // [s] longest time without state or angle in a steady cut
 constexpr double PATH_TOLERANCE = 1e-3;  // [m]
 
 }  // namespace
@@ -22,7 +22,7 @@ void MeanRevolution::add(double angle, double fx, double fy) {
   if (turn < 0.0) turn += 1.0;
   Bin& bin = bins_[std::min(static_cast<std::size_t>(turn * BINS), BINS - 1)];
   bin.count += 1.0;
-  bin.place += turn * units::TWO_PI;
+  bin.angle += turn * units::TWO_PI;
   bin.fx += fx;
   bin.fy += fy;
   bin.square += fx * fx + fy * fy;
@@ -33,7 +33,7 @@ AngleRecord MeanRevolution::record() const {
   AngleRecord record;
   for (const Bin& bin : bins_) {
     if (bin.count == 0.0) continue;
-    record.angle.push_back(bin.place / bin.count);
+    record.angle.push_back(bin.angle / bin.count);
     record.fx.push_back(bin.fx / bin.count);
     record.fy.push_back(bin.fy / bin.count);
   }
@@ -53,47 +53,48 @@ double MeanRevolution::restless() const {
   return variance > 0.0 ? (all - repeated) / variance : 0.0;
 }
 
-CurveFinder::CurveFinder(const CurveParameters& parameters) : parameters_(parameters) {
+ForceCurveIdentification::ForceCurveIdentification(const CurveParameters& parameters)
+    : parameters_(parameters) {
   checkBounds(parameters_);
 }
 
-void CurveFinder::reset() {
+void ForceCurveIdentification::reset() {
   condition_.reset();
   samples_.clear();
   angles_.clear();
   steady_since_.reset();
   steady_until_.reset();
-  last_state_ = last_used_ = turned_ = 0.0;
+  last_state_ = last_sample_ = rotation_ = 0.0;
   revolution_ = {};
   cuts_.clear();
 }
 
-void CurveFinder::handle(const CuttingCondition& condition) {
-  // A latched condition comes again when a subscriber connects anew.
+void ForceCurveIdentification::handle(const CuttingCondition& condition) {
+  // A latched condition is received again when a subscriber reconnects.
   if (condition_ && condition_->stamp == condition.stamp && condition_->name == condition.name) return;
-  close();
+  closeCut();
   condition_ = condition;
-  // Turns are counted from here on: digits must not depend on how long the node has run.
+  // The rotation is counted from here, so that its rounding does not depend on the uptime.
   if (!angles_.empty()) angles_.assign(1, {angles_.back().time, angles_.back().shown, angles_.back().shown});
 }
 
-void CurveFinder::handle(const CncState& state) {
+void ForceCurveIdentification::handle(const CncState& state) {
   const bool gap = state.stamp - last_state_ > MAXIMUM_GAP;
   last_state_ = state.stamp;
   const bool steady = condition_ && condition_->kind == CuttingCondition::Kind::cut && state.connected &&
                       state.feed > 0.0 && onSteadyPath(*condition_, state, PATH_TOLERANCE);
   if (!steady || gap) steady_since_.reset();
   if (!steady) {
-    // What waits may yet be told steady by no later state.
+    // No later state can mark these samples as steady.
     while (!samples_.empty() && samples_.front().time < state.stamp - MAXIMUM_GAP) samples_.pop_front();
     return;
   }
   if (!steady_since_) steady_since_ = state.stamp;
   steady_until_ = state.stamp;
-  use();
+  accumulate();
 }
 
-void CurveFinder::handle(const SpindleAngle& angle) {
+void ForceCurveIdentification::handle(const SpindleAngle& angle) {
   if (!std::isfinite(angle.angle) || !std::isfinite(angle.speed)) return;
   if (!angles_.empty() && angle.stamp - angles_.back().time > MAXIMUM_GAP) angles_.clear();
   if (angles_.empty()) {
@@ -106,7 +107,7 @@ void CurveFinder::handle(const SpindleAngle& angle) {
     angles_.pop_front();
 }
 
-void CurveFinder::handle(const ForceBlock& block) {
+void ForceCurveIdentification::handle(const ForceBlock& block) {
   if (block.status != ForceBlock::Status::compensated) {
     samples_.clear();
     return;
@@ -119,7 +120,7 @@ void CurveFinder::handle(const ForceBlock& block) {
 }
 
 // Samples between two steady states, away from the ends of the engagement.
-void CurveFinder::use() {
+void ForceCurveIdentification::accumulate() {
   if (angles_.size() < 2) return;
   const double from = std::max(*steady_since_ + parameters_.settle_time, angles_.front().time);
   const double to = std::min(*steady_until_ - parameters_.settle_time, angles_.back().time);
@@ -134,53 +135,54 @@ void CurveFinder::use() {
     samples_.pop_front();
     if (sample.time < from) continue;
     while (at + 1 < angles_.size() && angles_[at].time < sample.time) ++at;
-    const double turned = angles_[at - 1].between(angles_[at], sample.time);
-    // Immersion counts from the normal of the feed; force along and across it.
-    revolution_.add(turned + heading, c * sample.fx + s * sample.fy, -s * sample.fx + c * sample.fy);
-    if (!any) first = turned;
+    const double rotation = angles_[at - 1].between(angles_[at], sample.time);
+    // The immersion angle is measured from the normal of the feed; forces along and across the feed.
+    revolution_.add(rotation + heading, c * sample.fx + s * sample.fy, -s * sample.fx + c * sample.fy);
+    if (!any) first = rotation;
     any = true;
-    last = turned;
-    last_used_ = sample.time;
+    last = rotation;
+    last_sample_ = sample.time;
   }
-  turned_ += last - first;
+  rotation_ += last - first;
 }
 
-void CurveFinder::close() {
+void ForceCurveIdentification::closeCut() {
   const MeanRevolution revolution = revolution_;
-  const double turns = turned_ / units::TWO_PI;
+  const double revolutions = rotation_ / units::TWO_PI;
   revolution_ = {};
-  turned_ = 0.0;
+  rotation_ = 0.0;
   samples_.clear();
   steady_since_.reset();
   steady_until_.reset();
   if (!condition_ || condition_->kind != CuttingCondition::Kind::cut) return;
-  const auto leave = [&](const std::string& why) {
-    if (left_out_) left_out_("'" + condition_->name + "': " + why);
+  const auto reject = [&](const std::string& why) {
+    if (on_rejected_) on_rejected_("'" + condition_->name + "': " + why);
   };
-  if (turns < parameters_.least_revolutions) {
+  if (revolutions < parameters_.least_revolutions) {
     if (revolution.count() > 0.0)
-      leave(formatted("%.1f steady revolutions, %d are due", turns, parameters_.least_revolutions));
+      reject(formatted("%.1f steady revolutions, expected at least %d", revolutions,
+                       parameters_.least_revolutions));
     return;
   }
   if (revolution.restless() > parameters_.restless) {
-    leave(formatted("%.0f %% of the force does not repeat with the revolution (chatter?)",
-                    100.0 * revolution.restless()));
+    reject(formatted("%.0f %% of the force is not synchronous with the spindle (chatter?)",
+                     100.0 * revolution.restless()));
     return;
   }
-  Cut cut{last_used_, condition_->name, revolution.record()};
+  Cut cut{last_sample_, condition_->name, revolution.record()};
   cut.record.engagement = condition_->engagement;
   std::vector<Cut>& cuts = cuts_[{condition_->tool_name, condition_->material}];
   if (cuts.size() >= static_cast<std::size_t>(parameters_.most_cuts)) cuts.erase(cuts.begin());
   cuts.push_back(std::move(cut));
   try {
-    fit(cuts);
+    fitCurves(cuts);
   } catch (const Error& error) {
-    leave(error.what());
+    reject(error.what());
   }
 }
 
-void CurveFinder::fit(const std::vector<Cut>& cuts) {
-  if (!found_) return;
+void ForceCurveIdentification::fitCurves(const std::vector<Cut>& cuts) {
+  if (!on_curves_) return;
   IdentifiedForceCurves found;
   std::vector<AngleRecord> records;
   for (const Cut& cut : cuts) {
@@ -193,31 +195,31 @@ void CurveFinder::fit(const std::vector<Cut>& cuts) {
   found.teeth = condition_->tool.teeth;
   found.curves = fitForceCurves(records, condition_->tool, parameters_.pieces);
   widen(found.curves, parameters_.gain_error);
-  found_(found);
+  on_curves_(found);
 }
 
-// Without force or angle nothing may be held for them.
+// Force and angle are optional, so that nothing waits for them when they are missing.
 ForceCurvePipeline::ForceCurvePipeline(const CurveParameters& parameters, double hold_back)
-    : finder_(parameters),
+    : identification_(parameters),
       sorter_(hold_back),
       conditions_(sorter_.addLatched(names::CUTTING_CONDITION)),
       states_(sorter_.addRegular(names::CNC_STATE)),
       angles_(sorter_.addOptional(names::SPINDLE_ANGLE)),
       blocks_(sorter_.addOptional(names::FORCE_COMPENSATED)) {
-  sorter_.onRestart([this] { finder_.reset(); });
+  sorter_.onRestart([this] { identification_.reset(); });
 }
 
 void ForceCurvePipeline::push(const CuttingCondition& condition) {
-  sorter_.push(conditions_, condition.stamp, [this, condition] { finder_.handle(condition); });
+  sorter_.push(conditions_, condition.stamp, [this, condition] { identification_.handle(condition); });
 }
 void ForceCurvePipeline::push(const CncState& state) {
-  sorter_.push(states_, state.stamp, [this, state] { finder_.handle(state); });
+  sorter_.push(states_, state.stamp, [this, state] { identification_.handle(state); });
 }
 void ForceCurvePipeline::push(const SpindleAngle& angle) {
-  sorter_.push(angles_, angle.stamp, [this, angle] { finder_.handle(angle); });
+  sorter_.push(angles_, angle.stamp, [this, angle] { identification_.handle(angle); });
 }
 void ForceCurvePipeline::push(const ForceBlock& block) {
-  sorter_.push(blocks_, block.stamp, [this, block] { finder_.handle(block); });
+  sorter_.push(blocks_, block.stamp, [this, block] { identification_.handle(block); });
 }
 
 }  // namespace smartmill::loadmeter

@@ -29,52 +29,55 @@ struct CurveParameters {
   double gain_error = 0.005;
 
   void declare(ParameterTable& table) {
-    table.number("pieces", pieces, "1", Range::closed(2, 30), "of the splines");
+    table.number("pieces", pieces, "1", Range::closed(2, 30), "segments of each spline");
     table.number("most_cuts", most_cuts, "1", Range::closed(1, 100),
-                 "the last so many of a tool in a material");
+                 "newest cuts of a tool in a material that are fitted together");
     table.number("settle_time", settle_time, "s", Range::closed(0.0, 10.0),
-                 "after full engagement, and before it ends, that does not count");
-    table.number("least_revolutions", least_revolutions, "1", Range::closed(2, 1000), "of a cut that counts");
-    table.number(
-        "restless", restless, "1", Range::open(0.0, 1.0),
-        "share of the force that does not repeat with the revolution (chatter): a cut with more is left "
-        "out");
+                 "ignored after the begin and before the end of full engagement");
+    table.number("least_revolutions", least_revolutions, "1", Range::closed(2, 1000),
+                 "steady revolutions that a cut must have");
+    table.number("restless", restless, "1", Range::open(0.0, 1.0),
+                 "largest share of the force's variance that is not synchronous with the spindle; a cut with "
+                 "more (chatter) is "
+                 "rejected");
     table.number("gain_error", gain_error, "1", Range::closed(0.0, 0.5),
-                 "share by which the force sensor's gain may be wrong in all cuts alike: part of the band");
+                 "standard deviation of the force sensor's gain, common to all cuts; part of the band");
   }
 };
 
-/// Mean force of a cut over the spindle's angle, as samples come.
+/// Mean force of a cut over the spindle angle, accumulated sample by sample.
 class MeanRevolution {
  public:
   void add(double angle, double fx, double fy);
-  /// Angles that were met, each with its mean. Engagement is left to the caller.
+  /// Mean force at each angle with samples. The caller sets the engagement.
   AngleRecord record() const;
   double count() const { return count_; }
-  /// [1] of the variance of fx and fy, what does not repeat.
+  /// Share of the variance of fx and fy that is not synchronous with the spindle [1].
   double restless() const;
 
  private:
   static constexpr std::size_t BINS = 360;
   struct Bin {
-    double count = 0.0, place = 0.0, fx = 0.0, fy = 0.0, square = 0.0;
+    double count = 0.0, angle = 0.0, fx = 0.0, fy = 0.0, square = 0.0;
   };
   std::array<Bin, BINS> bins_{};
   double count_ = 0.0;
 };
 
-/// Force over chip thickness from running cuts: force/compensated over spindle/angle while the tool is fully
-/// engaged, each cut its mean revolution, the cuts of one tool in one material together. Inputs in stamp
-/// order; what comes out follows from them alone.
-class CurveFinder {
+/// Identifies force over chip thickness during cuts: force/compensated over spindle/angle at full engagement,
+/// averaged over the revolutions of each cut and fitted to all cuts of one tool in one material. Inputs in
+/// stamp order determine the result.
+class ForceCurveIdentification {
  public:
-  /// @throws Error naming key and value.
-  explicit CurveFinder(const CurveParameters& parameters);
+  /// @throws Error with key and value.
+  explicit ForceCurveIdentification(const CurveParameters& parameters);
 
-  /// After each cut that counts.
-  void onCurves(std::function<void(const IdentifiedForceCurves&)> callback) { found_ = std::move(callback); }
-  /// Why a cut did not count, or no curve came of it: one line.
-  void onLeftOut(std::function<void(const std::string&)> callback) { left_out_ = std::move(callback); }
+  /// Called after each accepted cut.
+  void onCurves(std::function<void(const IdentifiedForceCurves&)> callback) {
+    on_curves_ = std::move(callback);
+  }
+  /// Called with the reason, in one line, when a cut is rejected.
+  void onRejected(std::function<void(const std::string&)> callback) { on_rejected_ = std::move(callback); }
 
   void handle(const CuttingCondition& condition);
   void handle(const CncState& state);
@@ -91,29 +94,29 @@ class CurveFinder {
     std::string name;
     AngleRecord record;
   };
-  void use();
-  void close();
-  void fit(const std::vector<Cut>& cuts);
+  void accumulate();
+  void closeCut();
+  void fitCurves(const std::vector<Cut>& cuts);
 
   CurveParameters parameters_;
-  std::function<void(const IdentifiedForceCurves&)> found_;
-  std::function<void(const std::string&)> left_out_;
+  std::function<void(const IdentifiedForceCurves&)> on_curves_;
+  std::function<void(const std::string&)> on_rejected_;
   std::optional<CuttingCondition> condition_;
   std::deque<Sample> samples_;
   std::deque<UnwrappedAngle> angles_;
   std::optional<double> steady_since_, steady_until_;  // [s]
-  double last_state_ = 0.0, last_used_ = 0.0;          // [s]
-  double turned_ = 0.0;                                // [rad] of what was used
+  double last_state_ = 0.0, last_sample_ = 0.0;        // [s]
+  double rotation_ = 0.0;                              // [rad] rotation of the accumulated samples
   MeanRevolution revolution_;
   std::map<std::pair<std::string, std::string>, std::vector<Cut>> cuts_;  // by tool and material
 };
 
-/// The same behind the sorter: node and tool that reads bags both feed this class.
+/// Puts the streams into stamp order; used by the node and for bags.
 class ForceCurvePipeline {
  public:
   /// @param hold_back [s], see StreamSorter.
   ForceCurvePipeline(const CurveParameters& parameters, double hold_back);
-  CurveFinder& finder() { return finder_; }
+  ForceCurveIdentification& identification() { return identification_; }
 
   void push(const CuttingCondition& condition);
   void push(const CncState& state);
@@ -122,7 +125,7 @@ class ForceCurvePipeline {
   void flush() { sorter_.flush(); }  ///< end of data
 
  private:
-  CurveFinder finder_;
+  ForceCurveIdentification identification_;
   StreamSorter sorter_;
   StreamSorter::Stream conditions_, states_, angles_, blocks_;
 };

@@ -14,15 +14,15 @@ constexpr double SPEED = 400.0;                // [rad/s]
 constexpr double KTC = 800e6, KRC = 250e6, KTE = 20e3, KRE = 15e3;
 
 /// Streams of cuts with straight teeth along a heading, forces in closed form.
-/// @param Take gets each input, in stamp order
-template <class Take>
-class Shop {
+/// @param Consumer receives each input in stamp order
+template <class Consumer>
+class CutSimulator {
  public:
-  explicit Shop(Take take) : take_(take) {}
+  explicit CutSimulator(Consumer consumer) : consumer_(consumer) {}
 
-  double heading = 0.0;   // [rad]
-  double noise = 1.0;     // [N]
-  double restless = 0.0;  // [N] of a vibration that does not repeat
+  double heading = 0.0;    // [rad]
+  double noise = 1.0;      // [N]
+  double vibration = 0.0;  // [N] of a vibration that is not synchronous with the spindle
 
   void cut(const std::string& name, double feed_per_tooth, double seconds = 1.5) {
     CuttingCondition c;
@@ -36,7 +36,7 @@ class Shop {
     c.spindle_speed = SPEED;
     const double feed = feed_per_tooth * 2.0 * SPEED / units::TWO_PI, length = feed * seconds;
     c.steady_to = {length * std::cos(heading), length * std::sin(heading), 0.0};
-    take_(c);
+    consumer_(c);
     const double begin = now_;
     for (; now_ < begin + seconds; now_ += 0.01) {
       const double along = feed * (now_ - begin);
@@ -47,9 +47,9 @@ class Shop {
       state.axes = {"X", "Y", "Z"};
       state.position = {along * std::cos(heading), along * std::sin(heading), 0.0};
       state.distance_to_go = {0.0, 0.0, 0.0};
-      take_(state);
-      take_(SpindleAngle{now_, std::fmod(SPEED * now_, units::TWO_PI), SPEED});
-      take_(block(c.engagement));
+      consumer_(state);
+      consumer_(SpindleAngle{now_, std::fmod(SPEED * now_, units::TWO_PI), SPEED});
+      consumer_(block(c.engagement));
     }
     now_ = std::round(100.0 * now_) / 100.0;
   }
@@ -57,7 +57,7 @@ class Shop {
     CuttingCondition none;
     none.stamp = now_;
     none.name = "end";
-    take_(none);
+    consumer_(none);
   }
 
  private:
@@ -70,7 +70,7 @@ class Shop {
       const double time = now_ + i / SAMPLE_RATE;
       double along = 0.0, across = 0.0;
       for (int tooth = 0; tooth < 2; ++tooth) {
-        // The angle counts from the machine's +y, the immersion from the feed's.
+        // The spindle angle is measured from the machine's +y, the immersion from the normal of the feed.
         const double phi =
             std::fmod(SPEED * time + heading + units::PI * tooth + units::TWO_PI, units::TWO_PI);
         if (phi >= units::PI) continue;
@@ -79,7 +79,7 @@ class Shop {
         along += -t * std::cos(phi) - r * std::sin(phi);
         across += t * std::sin(phi) - r * std::cos(phi);
       }
-      along += restless * std::sin(1.37 * SPEED * time);
+      along += vibration * std::sin(1.37 * SPEED * time);
       block.force[0].push_back(along * std::cos(heading) - across * std::sin(heading) +
                                noise * normal_(random_));
       block.force[1].push_back(along * std::sin(heading) + across * std::cos(heading) +
@@ -89,7 +89,7 @@ class Shop {
     return block;
   }
 
-  Take take_;
+  Consumer consumer_;
   double now_ = 10.0;
   std::mt19937 random_{3};
   std::normal_distribution<double> normal_;

@@ -1,9 +1,9 @@
-#include "smartmill_loadmeter/identification/curve_finder.h"
+#include "smartmill_loadmeter/identification/force_curve_identification.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "../curve_shop.h"
+#include "../cut_simulator.h"
 
 namespace smartmill::loadmeter {
 namespace {
@@ -11,12 +11,12 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-TEST(CurveFinder, TellsTheLawOfTheCutsWhateverTheirHeading) {
+TEST(ForceCurveIdentification, IdentifiesTheLawForAnyHeading) {
   for (const double heading : {0.0, 2.1}) {
-    CurveFinder finder({});
+    ForceCurveIdentification identification({});
     std::vector<IdentifiedForceCurves> found;
-    finder.onCurves([&](const IdentifiedForceCurves& f) { found.push_back(f); });
-    Shop shop([&](const auto& input) { finder.handle(input); });
+    identification.onCurves([&](const IdentifiedForceCurves& f) { found.push_back(f); });
+    CutSimulator shop([&](const auto& input) { identification.handle(input); });
     shop.heading = heading;
     for (const double feed : {5e-5, 1e-4, 2e-4}) shop.cut("feed " + std::to_string(found.size()), feed);
     shop.end();
@@ -32,23 +32,23 @@ TEST(CurveFinder, TellsTheLawOfTheCutsWhateverTheirHeading) {
   }
 }
 
-TEST(CurveFinder, LeavesOutChatterAndCutsThatAreTooShort) {
-  CurveFinder finder({});
+TEST(ForceCurveIdentification, RejectsChatterAndShortCuts) {
+  ForceCurveIdentification identification({});
   int found = 0;
-  std::vector<std::string> left_out;
-  finder.onCurves([&](const IdentifiedForceCurves&) { ++found; });
-  finder.onLeftOut([&](const std::string& why) { left_out.push_back(why); });
-  Shop shop([&](const auto& input) { finder.handle(input); });
-  shop.restless = 400.0;
+  std::vector<std::string> rejected;
+  identification.onCurves([&](const IdentifiedForceCurves&) { ++found; });
+  identification.onRejected([&](const std::string& why) { rejected.push_back(why); });
+  CutSimulator shop([&](const auto& input) { identification.handle(input); });
+  shop.vibration = 400.0;
   shop.cut("loud", 1e-4);
-  shop.restless = 0.0;
+  shop.vibration = 0.0;
   shop.cut("short", 1e-4, 0.3);
   shop.end();
   EXPECT_EQ(found, 0);
-  ASSERT_EQ(left_out.size(), 2u);
-  EXPECT_THAT(left_out[0], HasSubstr("'loud': "));
-  EXPECT_THAT(left_out[0], HasSubstr("does not repeat"));
-  EXPECT_THAT(left_out[1], HasSubstr("'short': "));
+  ASSERT_EQ(rejected.size(), 2u);
+  EXPECT_THAT(rejected[0], HasSubstr("'loud': "));
+  EXPECT_THAT(rejected[0], HasSubstr("not synchronous with the spindle"));
+  EXPECT_THAT(rejected[1], HasSubstr("'short': "));
 }
 
 }  // namespace
