@@ -26,7 +26,9 @@ std::uint32_t RecordingWriter::numberOf(const std::string& topic, const char* ty
 }
 
 std::unique_ptr<RecordingWriter> createRecording(const std::string& path, RecordingCompression compression) {
-  const bool bag = std::filesystem::path(path).extension() == ".bag";
+  const std::string ending = std::filesystem::path(path).extension().string();
+  const bool bag = ending == ".bag";
+  if (!bag && ending != ".mcap") throw Error(path + ": expected a name that ends in .bag or .mcap");
   if (bag && compression == RecordingCompression::zstd)
     throw Error(path + ": a bag is compressed by lz4 or not at all, zstd is for MCAP files");
   const Packing packing = compression == RecordingCompression::zstd  ? Packing::zstd
