@@ -82,7 +82,7 @@ class Formats : public ::testing::Test {
                                  {"Fz_N", MatWriter::numbers("z", record.column("fz"))}}));
   }
 
-  /// The output of a command that must end well. The models of campaigns stand where the campaign is.
+  /// What a command did that must succeed.
   Outcome done(const std::string& arguments) {
     Outcome outcome = shell(SMARTMILL " " + arguments);
     EXPECT_EQ(outcome.code, 0) << arguments << "\n" << outcome.error;

@@ -79,10 +79,12 @@ const std::string& recording(const std::string& ending, RecordingCompression com
   return path;
 }
 
-void counters(benchmark::State& state, const std::string& path, std::size_t messages) {
+/// @param samples that were decoded, all channels
+void counters(benchmark::State& state, const std::string& path, std::size_t messages, std::size_t samples) {
   const auto size = static_cast<double>(std::filesystem::file_size(path));
   state.counters["file_MB"] = size / 1e6;
   state.counters["messages"] = static_cast<double>(messages);
+  state.counters["samples_MB"] = 1e-6 * static_cast<double>(samples * sizeof(double));
   state.counters["MB_per_s"] =
       benchmark::Counter(size / 1e6 * static_cast<double>(state.iterations()), benchmark::Counter::kIsRate);
 }
@@ -90,36 +92,39 @@ void counters(benchmark::State& state, const std::string& path, std::size_t mess
 /// This project's reader; blocks become those of the core.
 void smartmillReader(benchmark::State& state, const std::string& ending, RecordingCompression compression) {
   const std::string& path = recording(ending, compression);
-  std::size_t messages = 0;
+  std::size_t messages = 0, samples = 0;
   for (auto _ : state) {
-    messages = 0;
+    messages = samples = 0;
     double sum = 0.0;
     RecordingReader reader(path);
     reader.on<SampleBlock>(names::DYNAMOMETER, [&](const SampleBlock& block, double) {
       ++messages;
+      samples += block.samples.size();
       sum += block.samples.back();
     });
     reader.run();
     benchmark::DoNotOptimize(sum);
   }
-  counters(state, path, messages);
+  counters(state, path, messages, samples);
 }
 
 /// The reader of ROS; blocks become messages.
 void rosbagView(benchmark::State& state, RecordingCompression compression) {
   const std::string& path = recording(".bag", compression);
-  std::size_t messages = 0;
+  std::size_t messages = 0, samples = 0;
   for (auto _ : state) {
-    messages = 0;
+    messages = samples = 0;
     double sum = 0.0;
     rosbag::Bag bag(path, rosbag::bagmode::Read);
     for (const rosbag::MessageInstance& message : rosbag::View(bag)) {
+      const auto block = message.instantiate<smartmill_msgs::SampleBlock>();
       ++messages;
-      sum += message.instantiate<smartmill_msgs::SampleBlock>()->samples.back();
+      samples += block->samples.size();
+      sum += block->samples.back();
     }
     benchmark::DoNotOptimize(sum);
   }
-  counters(state, path, messages);
+  counters(state, path, messages, samples);
 }
 
 constexpr int REPEATS = 3;
@@ -128,6 +133,7 @@ constexpr int REPEATS = 3;
   BENCHMARK_CAPTURE(function, name, __VA_ARGS__) \
       ->Unit(benchmark::kMillisecond)            \
       ->UseRealTime()                            \
+      ->MeasureProcessCPUTime()                  \
       ->Iterations(1)                            \
       ->Repetitions(REPEATS)                     \
       ->ReportAggregatesOnly()

@@ -30,7 +30,7 @@ void ChunkedFile::fail(const std::string& what) const {
   throw Error(name_ + ": " + what);
 }
 
-void ChunkedFile::look(std::uint64_t at, std::uint8_t* to, std::size_t count) const {
+void ChunkedFile::copy(std::uint64_t at, std::uint8_t* to, std::size_t count) const {
   if (count > WINDOW) {
     bytes_.read(at, reinterpret_cast<char*>(to), count);
     return;
@@ -43,9 +43,9 @@ void ChunkedFile::look(std::uint64_t at, std::uint8_t* to, std::size_t count) co
   std::copy_n(window_.begin() + static_cast<std::ptrdiff_t>(at - window_at_), count, to);
 }
 
-std::string ChunkedFile::word(std::uint64_t at, std::size_t count) const {
+std::string ChunkedFile::textAt(std::uint64_t at, std::size_t count) const {
   std::string bytes(count, '\0');
-  look(at, reinterpret_cast<std::uint8_t*>(bytes.data()), count);
+  copy(at, reinterpret_cast<std::uint8_t*>(bytes.data()), count);
   return bytes;
 }
 

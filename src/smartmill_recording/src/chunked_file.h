@@ -47,10 +47,10 @@ class ChunkedFile : public RecordingFile {
 
   /// One line that names the file. @throws Error
   [[noreturn]] void fail(const std::string& what) const;
-  /// Copies bytes that lie within the file; small ones by a window, since records lie side by side.
-  void look(std::uint64_t at, std::uint8_t* to, std::size_t count) const;
-  /// Bytes that lie within the file, as a word.
-  std::string word(std::uint64_t at, std::size_t count) const;
+  /// Copies bytes that lie within the file; few of them by a window, since records are next to each other.
+  void copy(std::uint64_t at, std::uint8_t* to, std::size_t count) const;
+  /// Bytes that lie within the file, as a string.
+  std::string textAt(std::uint64_t at, std::size_t count) const;
   /// After the last chunk was added.
   void finishChunks();
   /// Calls addMessage() for each message of an unpacked chunk. @throws Error
@@ -84,7 +84,7 @@ class ChunkedFile : public RecordingFile {
   void unpackInto(const Chunk& chunk, Loaded* loaded) const;
   void ahead(std::uint32_t number);
 
-  mutable std::vector<std::uint8_t> window_;  // of the file, while its records are gone through
+  mutable std::vector<std::uint8_t> window_;  // of the file, while its records are scanned
   mutable std::uint64_t window_at_ = 0;
   std::uint32_t indexed_ = 0;  // chunks
   std::size_t arrivals_ = 0;   // messages

@@ -129,7 +129,7 @@ std::uint16_t McapWriter::schemaOf(const RecordedConnection& connection) {
 
 std::uint32_t McapWriter::connect(const RecordedConnection& connection) {
   if (channels_.size() >= std::numeric_limits<std::uint16_t>::max())
-    throw Error(path_ + ": an MCAP file holds up to 65535 channels");
+    throw Error(path_ + ": expected at most 65535 channels in an MCAP file");
   if (connection.encoding != MCAP_MESSAGE_ENCODING)
     throw Error(path_ + ": topic " + connection.topic + " is encoded as " + connection.encoding +
                 ", expected ros1");

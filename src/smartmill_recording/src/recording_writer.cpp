@@ -9,7 +9,7 @@
 namespace smartmill {
 namespace {
 
-constexpr std::size_t TELL_EVERY = 1000;  // messages
+constexpr std::size_t REPORT_EVERY = 1000;  // messages
 
 }  // namespace
 
@@ -53,7 +53,7 @@ std::size_t convertRecording(const std::string& from, const std::string& to, Rec
     if (number == numbers.end())
       number = numbers.emplace(entry.connection, writer->connect(file->connection(entry))).first;
     writer->write(number->second, entry.time, file->data(entry), entry.size);
-    if (++messages % TELL_EVERY == 0 && progress) progress(file->share());
+    if (++messages % REPORT_EVERY == 0 && progress) progress(file->share());
   }
   writer->close();
   if (progress) progress(1.0);

@@ -193,7 +193,7 @@ TEST_P(Reference, AFlippedBitGivesAnErrorOrTheSameMessages) {
     flipped[at] = static_cast<char>(flipped[at] ^ (1 << at % 8));
     try {
       const std::vector<Held> held = messagesOf(*openRecording(bytesOf(flipped), "flipped.mcap"));
-      // Without checksums nothing tells a damaged sample.
+      // Without checksums a damaged sample goes unnoticed.
       if (kind != "bare") EXPECT_EQ(held, whole) << at;
       ++same;
     } catch (const Error& error) {
@@ -226,7 +226,7 @@ TEST_F(Recordings, OfAnotherTypeOrEncodingAreRefused) {
   EXPECT_THROW(createRecording(folder_.file("b.bag"), RecordingCompression::zstd), Error);
 }
 
-TEST_F(Recordings, TheFormatIsToldByTheContent) {
+TEST_F(Recordings, TheFormatIsFoundByTheContent) {
   const std::string path = reference("chunks");
   const std::string renamed = folder_.file("renamed.bag");
   std::filesystem::rename(path, renamed);
@@ -380,7 +380,7 @@ TEST_F(Recordings, DamagedAnywhereGiveAnErrorOrTheSameMessages) {
   }
 }
 
-// What tells of more memory than the file can fill.
+// A chunk that states more bytes than the file can fill.
 TEST_F(Recordings, AClaimedSizeTakesNoMemory) {
   std::string content = contentOf(written("a.mcap", RecordingCompression::zstd, 10));
   // The first chunk: after magic, header record, and its own head the times (16), then the size.

@@ -128,7 +128,7 @@ ImportPlan readImport(const std::string& file) {
     tool->finish();
   }
   if (root.has("measures")) {
-    if (!plan.model.empty()) root.fail("measures", "contradicts model, whose force_sensor.measures holds");
+    if (!plan.model.empty()) root.fail("measures", "contradicts model, whose force_sensor.measures is used");
     plan.measures = root.oneOf("measures", {"force_on_tool", "force_on_workpiece"});
   }
   if (const auto defaults = root.optionalMap("defaults")) {
