@@ -8,7 +8,7 @@ from packages import includes, packages, report, system_includes, text
 # First folder of a header, or name that CMake finds: name in package.xml. None: no package has to be declared.
 HEADERS = {
     "Eigen": "eigen", "ceres": "libceres-dev", "fftw3.h": "fftw3", "sndfile.h": "libsndfile1-dev", "hdf5.h": "libhdf5-dev",
-    "matio.h": "libmatio-dev", "lz4frame.h": "lz4", "xxhash.h": "libxxhash-dev", "bzlib.h": "bzip2", "zstd.h": "libzstd-dev",
+    "matio.h": "libmatio-dev", "lz4frame.h": "lz4", "xxhash.h": "libxxhash-dev", "bzlib.h": "bzip2", "zstd.h": "libzstd-dev", "zlib.h": "zlib",
     "gsl": "libgsl", "yaml-cpp": "yaml-cpp",
     "nlohmann": "nlohmann-json-dev", "CLI": "cli11", "sqlite3.h": "sqlite3", "benchmark": "benchmark",
     "rapidcheck": "rapidcheck", "rapidcheck.h": "rapidcheck", "ros": "roscpp", "boost": "boost",
@@ -18,7 +18,7 @@ HEADERS = {
 }
 FOUND = {
     "Eigen3": "eigen", "Ceres": "libceres-dev", "GSL": "libgsl", "SQLite3": "sqlite3", "CLI11": "cli11", "liblz4": "lz4",
-    "libxxhash": "libxxhash-dev", "libzstd": "libzstd-dev", "BZip2": "bzip2", "hdf5-serial": "libhdf5-dev", "matio": "libmatio-dev",
+    "libxxhash": "libxxhash-dev", "libzstd": "libzstd-dev", "BZip2": "bzip2", "ZLIB": "zlib", "hdf5-serial": "libhdf5-dev", "matio": "libmatio-dev",
     "nlohmann_json": "nlohmann-json-dev", "PkgConfig": None, "Threads": None, "GTest": None, "catkin": None,
 }
 ROS_PACKAGES = {"actionlib", "tf2", "tf2_ros", "roslib", "rosbag", "rosbag_storage", "diagnostic_updater", "topic_tools",

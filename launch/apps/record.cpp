@@ -1,4 +1,4 @@
-// rosrun smartmill_launch record -o BAG PATTERN...
+// rosrun smartmill_launch record -o FILE PATTERN...
 
 #include <atomic>
 #include <string>
@@ -33,8 +33,8 @@ int main(int argc, char** argv) {
   std::string path;
   std::vector<std::string> patterns;
   smartmill::CommandLine line(
-      "Records topics into a bag without losing messages on a busy computer; Ctrl-C ends it.");
-  line.option("-o,--out", path, "bag file to write").required();
+      "Records topics to a bag or an MCAP file without losing messages on a busy computer; Ctrl-C ends it.");
+  line.option("-o,--out", path, "file to write, *.bag or *.mcap").required();
   line.option("patterns", patterns, "regular expressions of whole topic names").required();
   return smartmill::runProgram(line, argc, argv, [&] { run(path, patterns, ended); });
 }

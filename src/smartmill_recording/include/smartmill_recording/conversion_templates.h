@@ -20,10 +20,10 @@
 /// holds.
 namespace smartmill::conversion {
 
-inline void requireLength(const char* field, std::size_t length, std::size_t due) {
-  if (length != due) {
+inline void requireLength(const char* field, std::size_t length, std::size_t expected) {
+  if (length != expected) {
     throw Error(std::string(field) + ": " + std::to_string(length) + " values, expected " +
-                std::to_string(due));
+                std::to_string(expected));
   }
 }
 

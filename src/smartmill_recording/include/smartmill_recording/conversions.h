@@ -5,6 +5,7 @@
 #include "smartmill_core/cutting/coefficient_set.h"
 #include "smartmill_core/cutting/force_curve.h"
 #include "smartmill_core/cutting/stability_chart.h"
+#include "smartmill_core/frames.h"
 #include "smartmill_core/modal/results.h"
 #include "smartmill_core/signal/streams.h"
 #include "smartmill_recording/messages.h"
@@ -29,7 +30,7 @@ plain::LoadSample toPlain(const LoadSample& load);
 CuttingCondition fromMsg(const plain::CuttingCondition& message);
 plain::CuttingCondition toPlain(const CuttingCondition& condition);
 ForceBlock fromMsg(const plain::ForceBlock& message);
-plain::ForceBlock toPlain(const ForceBlock& block, const std::string& frame_id);
+plain::ForceBlock toPlain(const ForceBlock& block, const std::string& frame_id = frames::MACHINE);
 MeasuredFrf fromMsg(const plain::Frf& message);
 plain::Frf toPlain(const MeasuredFrf& measured);
 MeasuredModes fromMsg(const plain::ModalModel& message);

@@ -58,8 +58,8 @@ class RecordingWriter {
   std::map<std::string, std::uint32_t> numbers_;  // of written topics
 };
 
-/// A bag of format 2.0 where the name ends in .bag, else an MCAP file of the profile ros1.
-/// @throws Error when the file cannot be written, or a bag is to be compressed by zstd.
+/// A bag of format 2.0 where the name ends in .bag, an MCAP file of the profile ros1 where it ends in .mcap.
+/// @throws Error on another name, when the file cannot be written, or a bag is to be compressed by zstd.
 std::unique_ptr<RecordingWriter> createRecording(const std::string& path, RecordingCompression compression);
 
 /// Copies a recording into the other format, or the same: messages, times, definitions and connections stay.

@@ -54,15 +54,21 @@ const Known& known(const std::string& column) {
                        [&](const Known& k) { return column == k.column; });
 }
 
-std::string listOf(const ChannelFile& file) {
+std::string listOf(const std::vector<const FileChannel*>& channels) {
   constexpr std::size_t MOST = 12;
   std::string text;
-  for (std::size_t i = 0; i < file.channels.size() && i < MOST; ++i) {
-    const FileChannel& c = file.channels[i];
+  for (std::size_t i = 0; i < channels.size() && i < MOST; ++i) {
+    const FileChannel& c = *channels[i];
     text += (i ? ", " : "") + c.name + (c.unit.empty() ? "" : "[" + c.unit + "]");
   }
-  if (file.channels.size() > MOST) text += ", ...";
-  return file.channels.empty() ? "none" : text;
+  if (channels.size() > MOST) text += ", ...";
+  return channels.empty() ? "none" : text;
+}
+
+std::string listOf(const ChannelFile& file) {
+  std::vector<const FileChannel*> channels;
+  for (const FileChannel& channel : file.channels) channels.push_back(&channel);
+  return listOf(channels);
 }
 
 class Mapper {
@@ -79,11 +85,13 @@ class Mapper {
       if (column != "time") takeColumn(column, *channel);
     }
     needed();
+    std::vector<const FileChannel*> unused;
     for (const FileChannel& channel : file_.channels) {
       const bool used = std::any_of(found_.begin(), found_.end(),
                                     [&](const auto& entry) { return entry.second == &channel; });
-      if (!used) result_.report.push_back("channel " + channel.name + " is not used");
+      if (!used) unused.push_back(&channel);
     }
+    if (!unused.empty()) result_.report.push_back("not used: " + listOf(unused));
     if (result_.faults.empty() && result_.record.names.empty())
       fault("no channel is used; the file has " + listOf(file_));
     return std::move(result_);

@@ -72,7 +72,13 @@ class Importer {
       : plan_(plan), folder_(folder), recordings_(recordings) {}
 
   ImportResult run(const std::vector<std::string>& files) {
-    for (const std::string& file : files) guarded(file);
+    std::set<std::string> given;
+    for (const std::string& file : files) {
+      if (given.insert(canonicalPath(file)).second)
+        guarded(file);
+      else
+        result_.faults.push_back(file + ": given twice");
+    }
     bool needs_tool = false;
     for (const CampaignTest& test : campaign_.tests) needs_tool = needs_tool || test.kind == TestKind::cut;
     writeModel(needs_tool || a_cut_);

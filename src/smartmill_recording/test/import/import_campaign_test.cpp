@@ -251,8 +251,14 @@ TEST_F(Import, nothingIsLeftAfterAFault) {
   std::filesystem::create_directory(place);
   EXPECT_EQ(importCampaign(slotPlan(), {good, bad}, place + "/out").faults.size(), 1u);
   EXPECT_EQ(leftIn(place), "");
-  EXPECT_THAT(importCampaign(slotPlan(), {good, good}, place + "/out").faults,
-              ElementsAre(HasSubstr("a second test named good")));
+  EXPECT_THAT(importCampaign(slotPlan(), {good, place + "/../good.csv"}, place + "/out").faults,
+              ElementsAre(place + "/../good.csv: given twice"));
+  std::filesystem::create_directory(folder_.file("other"));
+  const std::string other = folder_.file("other") + "/good.csv";
+  std::filesystem::copy_file(good, other);
+  EXPECT_THAT(
+      importCampaign(slotPlan(), {good, other}, place + "/out").faults,
+      ElementsAre(other + ": a second test named good; expected different names (name in import.yaml)"));
   EXPECT_EQ(leftIn(place), "");
   EXPECT_THAT(importCampaign(slotPlan(), {good}, place + "/out").faults, IsEmpty());
   EXPECT_EQ(leftIn(place), "out ");
