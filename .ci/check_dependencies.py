@@ -13,12 +13,14 @@ HEADERS = {
     "nlohmann": "nlohmann-json-dev", "CLI": "cli11", "sqlite3.h": "sqlite3", "benchmark": "benchmark",
     "rapidcheck": "rapidcheck", "rapidcheck.h": "rapidcheck", "ros": "roscpp", "boost": "boost",
     "glog": "libgoogle-glog-dev", "unsupported": "eigen", "gtest": None, "gmock": None,
+    "pybind11": "pybind11-dev",
     "libpq-fe.h": None,  # optional: ./setup --with-fleet
     "arpa": None, "netinet": None, "sys": None, "linux": None,
 }
 FOUND = {
     "Eigen3": "eigen", "Ceres": "libceres-dev", "GSL": "libgsl", "SQLite3": "sqlite3", "CLI11": "cli11", "liblz4": "lz4",
     "libxxhash": "libxxhash-dev", "libzstd": "libzstd-dev", "BZip2": "bzip2", "ZLIB": "zlib", "hdf5-serial": "libhdf5-dev", "matio": "libmatio-dev",
+    "pybind11": "pybind11-dev", "Python": "python3-dev", "Interpreter": None, "Development.Module": None,
     "nlohmann_json": "nlohmann-json-dev", "PkgConfig": None, "Threads": None, "GTest": None, "catkin": None,
 }
 ROS_PACKAGES = {"actionlib", "tf2", "tf2_ros", "roslib", "rosbag", "rosbag_storage", "diagnostic_updater", "topic_tools",

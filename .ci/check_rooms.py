@@ -18,6 +18,7 @@ KNOWS = {
     "smartmill_discrepancy": COMMON | {"smartmill_sim"},  # runs the twin
     "smartmill_studies": None,  # every library
     "smartmill_cli": None,  # the commands of every library
+    "smartmill_python": None,  # every library
 }
 ROS_ROOMS = {"node", "apps", "test"}
 ROS_SOURCES = ("launch/src/session/",)  # of programs, in no library

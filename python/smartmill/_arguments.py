@@ -3,12 +3,13 @@ from __future__ import annotations
 
 import math
 import os
-from typing import Any, List, Optional, Sequence, Union
+from numbers import Real
+from typing import Dict, List, Mapping, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
 from ._smartmill import Model
-from .results import FloatArray, UsageError
+from .results import ComplexArray, FloatArray, Mode, UsageError
 
 Path = Union[str, "os.PathLike[str]"]
 
@@ -34,10 +35,9 @@ def model_or_none(value: Union[None, Path, Model]) -> Optional[Model]:
 def number(name: str, value: object, *, low: float = -math.inf, high: float = math.inf, unit: str = "",
            low_open: bool = False) -> float:
     """A finite number between bounds; low_open: low itself is not allowed."""
-    try:
-        result = float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError):
-        raise UsageError(f"{name}: expected a number, got {type(value).__name__}") from None
+    if not isinstance(value, Real) or isinstance(value, bool):
+        raise UsageError(f"{name}: expected a number, got {type(value).__name__}")
+    result = float(value)
     if not math.isfinite(result) or result < low or result > high or (low_open and result == low):
         if high < math.inf:
             expected = f"{low:g}..{high:g}"
@@ -70,20 +70,20 @@ def choice(name: str, value: object, words: Sequence[str]) -> str:
 def real_array(name: str, value: object) -> FloatArray:
     """A C-contiguous float64 array; one that already is stays as it is, without a copy."""
     try:
-        array: Any = np.asarray(value)
+        array = np.asarray(value)
     except ValueError:
         raise UsageError(f"{name}: expected an array of numbers, got rows of different lengths") from None
     if array.dtype.kind not in "fiu":
         raise UsageError(f"{name}: expected an array of real numbers (float64), got dtype {array.dtype}")
-    return np.ascontiguousarray(array, dtype=np.float64) if array.ndim > 0 else np.float64(array)  # type: ignore
+    return np.asarray(array, dtype=np.float64, order="C")
 
 
-def check_finite(name: str, array: Any) -> None:
-    finite = np.isfinite(array)
-    if not finite.all():
-        place = np.argwhere(~finite)[0]
+def check_finite(name: str, array: Union[FloatArray, ComplexArray]) -> None:
+    places = np.argwhere(~np.isfinite(array))
+    if len(places) > 0:
+        place = tuple(int(i) for i in places[0])
         where = ", ".join(str(i) for i in place)
-        raise UsageError(f"{name}: {array[tuple(place)]} at index {where}, expected finite numbers")
+        raise UsageError(f"{name}: {array[place]} at index {where}, expected finite numbers")
 
 
 def series(name: str, value: object, *, least: int = 2, size: Optional[int] = None) -> FloatArray:
@@ -100,7 +100,7 @@ def series(name: str, value: object, *, least: int = 2, size: Optional[int] = No
 
 
 def rising(name: str, value: object, *, least: int = 1) -> FloatArray:
-    """A 1-D array of rising positive numbers."""
+    """A 1-D array of increasing positive numbers."""
     array = series(name, value, least=least)
     if array[0] <= 0.0 or (np.diff(array) <= 0.0).any():
         raise UsageError(f"{name}: expected positive numbers, each above the one before")
@@ -119,7 +119,20 @@ def series_list(name: str, value: object, *, least: int = 2) -> List[FloatArray]
     return [series(name, array, least=least)]
 
 
-def progress_function(value: object) -> object:
+def modes(name: str, value: Optional[Mapping[str, Sequence[Mode]]], axes: str) -> Dict[str, Tuple[Mode, ...]]:
+    """Modes by axis."""
+    result = {}
+    for axis, of_axis in (value or {}).items():
+        choice(f"{name} axis", axis, tuple(axes))
+        result[axis] = tuple(of_axis)
+        for i, mode in enumerate(of_axis):
+            place = f"{name}[{axis!r}][{i}]"
+            positive(f"{place}.frequency", mode.frequency, "Hz")
+            number(f"{place}.damping_ratio", mode.damping_ratio, low=0.0, high=1.0, low_open=True)
+            number(f"{place}.gain", mode.gain)
+    return result
+
+
+def progress_function(value: object) -> None:
     if value is not None and not callable(value):
         raise UsageError(f"progress: expected a function of share and line, got {type(value).__name__}")
-    return value

@@ -4,14 +4,14 @@ from __future__ import annotations
 import os
 from typing import Mapping, Optional, Sequence, Union, overload
 
-import numpy as np
 import numpy.typing as npt
 
 from . import _arguments as check
 from . import _smartmill
 from ._arguments import Path
 from ._smartmill import Model
-from .results import CoefficientResult, Compensated, CompensatedCampaign, Cut, Mode, Progress, Tool, UsageError
+from .results import (RPM, CoefficientResult, Compensated, CompensatedCampaign, Cut, FloatArray, Mode, Progress, Tool,
+                      UsageError)
 
 COMPENSATIONS = ("kalman", "delay", "smoother", "fixed-lag", "inverse")
 
@@ -40,12 +40,15 @@ def coefficients_of_means(tool: Tool, cuts: Sequence[Cut], force: npt.ArrayLike,
     std: standard deviations of the means [N], the same shape; None: unweighted, from the residuals.
     Raises Error when the cuts do not separate the coefficients.
     """
-    rows = [check.real_array(name, value) for name, value in (("force", force), ("std", std)) if value is not None]
-    for name, array in zip(("force", "std"), rows):
+    def rows(name: str, value: npt.ArrayLike) -> FloatArray:
+        array = check.real_array(name, value)
         if array.shape != (len(cuts), 3):
             raise UsageError(f"{name}: expected an array of shape {(len(cuts), 3)} (cuts, 3), got {array.shape}")
         check.check_finite(name, array)
-    return _smartmill.coefficients_of_means(tool, list(cuts), rows[0], rows[1] if len(rows) > 1 else None)
+        return array
+
+    return _smartmill.coefficients_of_means(tool, list(cuts), rows("force", force),
+                                            None if std is None else rows("std", std))
 
 
 @overload
@@ -87,8 +90,7 @@ def compensate(fx: Union[Path, npt.ArrayLike], fy: Optional[npt.ArrayLike] = Non
         raise UsageError("compensate: arrays need fx, fy, fz, rate, sensor and speed_rpm")
     first = check.series("fx", fx)
     measured = [first, check.series("fy", fy, size=len(first)), check.series("fz", fz, size=len(first))]
-    for axis in sensor:
-        check.choice("sensor axis", axis, ("x", "y", "z"))
-    axes = [tuple(sensor[axis]) if axis in sensor else None for axis in "xyz"]
-    speed = check.positive("speed_rpm", speed_rpm, "rpm") * 2.0 * np.pi / 60.0
+    modes = check.modes("sensor", sensor, "xyz")
+    axes = [modes.get(axis) for axis in "xyz"]
+    speed = check.positive("speed_rpm", speed_rpm, "rpm") * RPM
     return Compensated(*_smartmill.compensate(measured, axes, check.positive("rate", rate, "Hz"), speed, *filters))

@@ -13,16 +13,14 @@ from .results import Coefficients, Cut, Mode, Progress, Record, Tool, UsageError
 def machine_model(tool: Optional[Tool] = None, cutting: Optional[Coefficients] = None, *,
                   tool_tip: Optional[Mapping[str, Sequence[Mode]]] = None,
                   force_sensor: Optional[Mapping[str, Sequence[Mode]]] = None) -> Model:
-    """A model from numbers, where no file is at hand.
+    """A model from numbers instead of a file.
 
     tool_tip: modes of the receptance [m/N] by axis "x", "y"; an axis left out is rigid.
     force_sensor: modes of measured over applied force [1] by axis "x", "y", "z"; an axis left out is ideal.
+    Raises Error naming a number that is out of range.
     """
-    for name, axes, allowed in (("tool_tip", tool_tip, "xy"), ("force_sensor", force_sensor, "xyz")):
-        for axis in axes or {}:
-            check.choice(f"{name} axis", axis, tuple(allowed))
-    return _smartmill.model_from(tool, cutting, {k: tuple(v) for k, v in (tool_tip or {}).items()},
-                                 {k: tuple(v) for k, v in (force_sensor or {}).items()})
+    return _smartmill.model_from(tool, cutting, check.modes("tool_tip", tool_tip, "xy"),
+                                 check.modes("force_sensor", force_sensor, "xyz"))
 
 
 def read_campaign(campaign: Path) -> Dict[str, Record]:

@@ -2,7 +2,7 @@
 from __future__ import annotations
 
 import os
-from typing import Dict, List, Optional, Sequence, Union
+from typing import Dict, Optional, Sequence, Union
 
 import numpy as np
 import numpy.typing as npt
@@ -29,12 +29,6 @@ def _options(low: float, high: float, max_modes: int, real_modes: bool, average:
     return options
 
 
-def _files(value: object) -> List[str]:
-    if isinstance(value, (str, os.PathLike)):
-        return [check.file_name("force", value)]
-    return [check.file_name("force", item) for item in value]  # type: ignore[attr-defined]
-
-
 def frf(force: Union[Path, Sequence[Path], npt.ArrayLike, Sequence[npt.ArrayLike]],
         response: Union[None, npt.ArrayLike, Sequence[npt.ArrayLike]] = None, rate: Optional[float] = None, *,
         kind: str = "acceleration", low: float = 0.0, high: float = 0.0, max_modes: int = 100,
@@ -45,18 +39,20 @@ def frf(force: Union[Path, Sequence[Path], npt.ArrayLike, Sequence[npt.ArrayLike
     force: hammer force [N] of one hit, or rows of hits; or files (hits, or one measured FRF; response is then left
     out). response: of the same shape, of a kind: acceleration [m/s2], velocity [m/s], displacement [m] or force [N].
     rate: sample rate [Hz]. low, high: band of the modes [Hz]; high 0: the whole record.
-    max_modes: at most so many, as many as the data prove; 0: no fit. real_modes: proportional damping.
-    average: h1, h2 or hv. weak_force: a lower peak [N] is no hit; 0: by the noise.
+    max_modes: largest number of modes, of those that the data prove; 0: no fit. real_modes: proportional damping.
+    average: h1, h2 or hv. weak_force: hits with a lower peak [N] are refused; 0: limit from the noise.
     exponential_time: time constant [s] of a window on both channels; 0: none.
     Raises Error when no hit is accepted, with the reason.
     """
     check.progress_function(progress)
     options = _options(low, high, max_modes, real_modes, average, weak_force, exponential_time)
     if response is None:
-        is_path = isinstance(force, (str, os.PathLike))
-        if not is_path and not (isinstance(force, (list, tuple)) and force and isinstance(force[0], (str, os.PathLike))):
+        files = [force] if isinstance(force, (str, os.PathLike)) else force
+        if not isinstance(files, (list, tuple)) or not all(isinstance(file, (str, os.PathLike)) for file in files):
             raise UsageError("response: expected the response to each hit")
-        return _smartmill.frf_of_files(_files(force), options, progress)
+        if not files:
+            raise UsageError("force: expected at least one file")
+        return _smartmill.frf_of_files([check.file_name("force", file) for file in files], options, progress)
     forces = check.series_list("force", force, least=16)
     responses = check.series_list("response", response, least=16)
     if [len(f) for f in forces] != [len(r) for r in responses]:
@@ -72,16 +68,18 @@ def modes(frequency: npt.ArrayLike, value: npt.ArrayLike, std: Optional[npt.Arra
           progress: Optional[Progress] = None) -> Frf:
     """Modes of a measured frequency response.
 
-    frequency: rising [Hz]. value: complex, of one length with it. std: standard deviation of each line, in the same
-    unit; None: by the noise seen. Other arguments as in frf().
+    frequency: increasing [Hz]. value: complex, of the same length. std: standard deviation of each line, in the same
+    unit; None: estimated from neighbouring lines. Other arguments as in frf().
     """
     check.progress_function(progress)
     lines = check.series("frequency", frequency, least=16)
     if (np.diff(lines) <= 0.0).any():
-        raise UsageError("frequency: expected numbers that rise")
-    values = np.ascontiguousarray(value, dtype=np.complex128)
-    if values.shape != lines.shape:
-        raise UsageError(f"value: expected shape {lines.shape} as frequency, got {values.shape}")
+        raise UsageError("frequency: expected increasing numbers")
+    values = np.asarray(value)
+    if values.dtype.kind not in "cfiu" or values.shape != lines.shape:
+        raise UsageError(f"value: expected a complex array of shape {lines.shape} as frequency, got dtype {values.dtype}, "
+                         f"shape {values.shape}")
+    values = np.asarray(values, dtype=np.complex128, order="C")
     check.check_finite("value", values)
     deviation = None if std is None else check.series("std", std, size=len(lines))
     return _smartmill.modes(lines, values, deviation, unit, _options(low, high, max_modes, real_modes), progress)

@@ -1,6 +1,7 @@
 """What the functions of smartmill take and return: frozen dataclasses in SI units, and the exceptions.
 
-A quantity that was estimated is an `Estimate`: a float that also knows its standard deviation.
+Arrays make these classes comparable by identity only. An estimated quantity is an `Estimate`: a float with a standard
+deviation.
 """
 from __future__ import annotations
 
@@ -19,11 +20,11 @@ ComplexArray = npt.NDArray[np.complex128]
 #: Called as progress(share, line): share of the work done 0..1, and a line of text that may be empty.
 Progress = Callable[[float, str], Optional[bool]]
 
-_RPM = 2.0 * math.pi / 60.0  # [rad/s]
+RPM = 2.0 * math.pi / 60.0  # [rad/s]
 
 
 class Error(RuntimeError):
-    """Bad file, bad data or bad parameter: one line that says what is wrong and where, as the programs print it."""
+    """Bad file, data or parameter: one line with what is wrong and where, as the program `smartmill` prints it."""
 
 
 class UsageError(Error, ValueError):
@@ -31,7 +32,7 @@ class UsageError(Error, ValueError):
 
 
 class Estimate(float):
-    """A float with a standard deviation in the same unit; NaN where it is not known.
+    """A float with a standard deviation in the same unit; NaN where it is unknown.
 
     Arithmetic gives plain floats. `str()` and an empty format show both: 1074.2 +- 0.3.
     """
@@ -83,7 +84,7 @@ class Mode:
     damping_ratio: Estimate  #: [1]
     gain: Estimate  #: static share: of a receptance [m/N], of a force sensor [1]
     phase: float = 0.0  #: [rad] of the gain; 0: proportional damping
-    evidence: float = math.nan  #: [1] Wald's statistic over what chance gives; proven from 2.5 on; NaN: not known
+    evidence: float = math.nan  #: [1] Wald's statistic over what chance gives; proven from 2.5 on; NaN: unknown
 
     def __post_init__(self) -> None:
         _estimates(self, "frequency", "damping_ratio", "gain")
@@ -123,7 +124,7 @@ class Cut:
     def of(cls, *, speed_rpm: float, feed_mm: float, depth_mm: float, entry_deg: float = 0.0,
            exit_deg: float = 180.0) -> "Cut":
         """From shop units: speed [rpm], feed per tooth and axial depth [mm], immersion angles [deg]; default a slot."""
-        return cls(speed_rpm * _RPM, 1e-3 * feed_mm, 1e-3 * depth_mm, math.radians(entry_deg), math.radians(exit_deg))
+        return cls(speed_rpm * RPM, 1e-3 * feed_mm, 1e-3 * depth_mm, math.radians(entry_deg), math.radians(exit_deg))
 
 
 @dataclass(frozen=True)
@@ -151,7 +152,7 @@ class Coefficients:
         return "\n".join(lines)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CoefficientResult:
     """Identified cutting coefficients."""
 
@@ -170,7 +171,7 @@ class CoefficientResult:
         return f"from the {self.source.replace('_', ' ')} in {self.tests} cuts:\n{self.coefficients}"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Record:
     """One test: its channels over time, measured, simulated or compensated."""
 
@@ -190,7 +191,7 @@ class Record:
     @property
     def speed_rpm(self) -> float:
         """Spindle speed [rpm]."""
-        return self.spindle_speed / _RPM
+        return self.spindle_speed / RPM
 
 
 @dataclass(frozen=True)
@@ -261,7 +262,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class Resemblance:
-    """An effect of the catalogue that comes near to the residual and was rejected."""
+    """An effect of the catalogue that resembles the residual and was rejected."""
 
     name: str
     variant: str
@@ -295,7 +296,7 @@ class ChannelShare:
     floor_gap: float  #: [1] the same over the noise
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RevolutionCurve:
     """One channel of one test over the spindle angle, mean of the revolutions; in the unit of the channel."""
 
@@ -307,7 +308,7 @@ class RevolutionCurve:
     improved: FloatArray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Explanation:
     """Why measurement and model differ."""
 
@@ -335,20 +336,20 @@ class Explanation:
         return self.summary
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Lobes:
     """First loss of stability over spindle speed."""
 
     speed: FloatArray  #: [rad/s]
-    depth: FloatArray  #: [m] limit; inf: stable to the largest depth asked for
+    depth: FloatArray  #: [m] limit; inf: stable up to max_depth
     frequency: FloatArray  #: [Hz] of the chatter; NaN without a limit
     kind: Tuple[str, ...]  #: none, hopf or flip
-    error: FloatArray  #: [m] numerical error of the limit; NaN where it was not asked for
+    error: FloatArray  #: [m] numerical error of the limit; NaN without errors=True
 
     @property
     def speed_rpm(self) -> FloatArray:
         """Spindle speed [rpm]."""
-        return self.speed / _RPM
+        return self.speed / RPM
 
     @property
     def depth_mm(self) -> FloatArray:
@@ -367,7 +368,7 @@ class RobustPoint:
     @property
     def speed_rpm(self) -> float:
         """Spindle speed [rpm]."""
-        return self.speed / _RPM
+        return self.speed / RPM
 
     @property
     def depth_mm(self) -> float:
@@ -375,7 +376,7 @@ class RobustPoint:
         return 1e3 * self.depth
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ChatterRisk:
     """Probability of chatter, from the standard deviations of modes and coefficients."""
 
@@ -388,16 +389,20 @@ class ChatterRisk:
     @property
     def speed_rpm(self) -> FloatArray:
         """Spindle speed [rpm]."""
-        return self.speed / _RPM
+        return self.speed / RPM
 
     @property
     def depth_std(self) -> FloatArray:
         """[m] Standard deviation of the limit at each speed, within the depths of the chart."""
+        # Mean and mean square of the limit from its distribution P(limit < depth) = probability.
         stable = 1.0 - self.probability
-        low = self.depth[0] * np.ones(len(self.speed))
-        mean = low + np.trapz(stable, self.depth, axis=1)
-        square = low**2 + np.trapz(2.0 * self.depth * stable, self.depth, axis=1)
+        low = self.depth[0]
+        mean = low + self._integral(stable)
+        square = low**2 + self._integral(2.0 * self.depth * stable)
         return np.asarray(np.sqrt(np.maximum(square - mean**2, 0.0)))
+
+    def _integral(self, values: FloatArray) -> FloatArray:
+        return np.asarray((0.5 * (values[:, 1:] + values[:, :-1]) * np.diff(self.depth)).sum(axis=1))
 
 
 @dataclass(frozen=True)
@@ -409,22 +414,22 @@ class Hit:
     reason: str  #: empty where accepted
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Frf:
     """A frequency response function and the modes fitted to it."""
 
     frequency: FloatArray  #: [Hz]
     value: ComplexArray  #: [m/N] of a motion, [1] of a force
-    std: FloatArray  #: unit of the value: root of E|error|^2; NaN: not known
+    std: FloatArray  #: unit of the value: root of E|error|^2; NaN: unknown
     coherence: FloatArray  #: [1]; NaN with a single hit
     unit: str  #: m/N or 1
     modes: Tuple[Mode, ...]  #: proven, lowest frequency first
-    doubts: Tuple[Mode, ...]  #: seen, not proven
+    doubts: Tuple[Mode, ...]  #: not proven
     fitted: ComplexArray  #: modes, doubts and flanks at each frequency; empty without a fit
     hits: Tuple[Hit, ...]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Compensated:
     """Force on the tool, recovered from a force sensor that vibrates [N]."""
 
@@ -433,7 +438,7 @@ class Compensated:
     fz: FloatArray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CompensatedCampaign:
     """Force on the tool of each cut of a campaign, and the sensor's modes that were used."""
 
@@ -444,7 +449,7 @@ class CompensatedCampaign:
         return self.records[test]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Chatter:
     """Verdict on a recorded cut."""
 
@@ -458,7 +463,7 @@ class Chatter:
     over_air: float  #: [dB] and over the same line out of the cut; NaN: the whole recording is cut
     companions: int  #: lines an integer number of tooth passings away
     share: float  #: [1] of the chatter's lines over those of the spindle's harmonics
-    mode: float  #: [Hz] mode that it is near; NaN: none is known
+    mode: float  #: [Hz] nearest of the given modes; NaN: none is given
     reason: str
     text: str = field(repr=False)  #: one line, as the program prints it
     time: FloatArray = field(repr=False)  #: [s] of the spectrogram's windows

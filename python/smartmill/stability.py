@@ -1,7 +1,6 @@
 """Stability lobes, probability of chatter, and chatter in recordings."""
 from __future__ import annotations
 
-import math
 import os
 from typing import Optional, Sequence, Union
 
@@ -11,9 +10,8 @@ from . import _arguments as check
 from . import _smartmill
 from ._arguments import Path
 from ._smartmill import Model
-from .results import Chatter, ChatterRisk, Lobes, Progress, UsageError
+from .results import RPM, Chatter, ChatterRisk, Lobes, Progress, UsageError
 
-_RPM = 2.0 * math.pi / 60.0
 METHODS = ("collocation", "semi_discretization", "multi_frequency", "zero_order")
 
 
@@ -23,7 +21,7 @@ def lobes(model: Union[Path, Model], speeds_rpm: npt.ArrayLike, *, max_depth: fl
     """First loss of stability when the depth of cut grows, over spindle speed.
 
     model: file or Model with tool, cutting coefficients and modes of the tool tip (see machine_model).
-    speeds_rpm: rising spindle speeds [rpm]. max_depth: depths up to here [m].
+    speeds_rpm: increasing spindle speeds [rpm]. max_depth: depths up to here [m].
     entry_deg, exit_deg: immersion angles of the cut [deg]; default a slot.
     method: collocation, semi_discretization, multi_frequency or zero_order.
     errors: estimate the numerical error of each limit by a refined solution. progress: called every 25 speeds.
@@ -32,7 +30,7 @@ def lobes(model: Union[Path, Model], speeds_rpm: npt.ArrayLike, *, max_depth: fl
     speeds = check.rising("speeds_rpm", speeds_rpm)
     check.progress_function(progress)
     return _smartmill.lobes(check.model(model), check.number("entry_deg", entry_deg), check.number("exit_deg", exit_deg),
-                            speeds * _RPM, check.positive("max_depth", max_depth, "m"),
+                            speeds * RPM, check.positive("max_depth", max_depth, "m"),
                             check.choice("method", method, METHODS), bool(errors), progress)
 
 
@@ -42,14 +40,14 @@ def chatter_risk(model: Union[Path, Model], speeds_rpm: npt.ArrayLike, depths: n
     """Probability of chatter over speed and depth, and cuts that stay below a risk.
 
     Machines are drawn from the standard deviations of modes and coefficients, or where the model has none from its
-    uncertainty_percent. speeds_rpm: rising [rpm]. depths: rising [m]. risk [1]: probability of chatter that a robust
+    uncertainty_percent. speeds_rpm: increasing [rpm]. depths: increasing [m]. risk [1]: probability of chatter that a robust
     point may have, for all speeds within speed_margin [1] of it. progress: called after each draw.
     Raises Error naming what the model lacks.
     """
     speeds, depth = check.rising("speeds_rpm", speeds_rpm), check.rising("depths", depths)
     check.progress_function(progress)
     return _smartmill.chatter_risk(
-        check.model(model), check.number("entry_deg", entry_deg), check.number("exit_deg", exit_deg), speeds * _RPM,
+        check.model(model), check.number("entry_deg", entry_deg), check.number("exit_deg", exit_deg), speeds * RPM,
         depth, check.integer("draws", draws, 1, 100000), check.integer("seed", seed, 0, 2**32 - 1),
         check.number("risk", risk, low=0.0, high=1.0), check.number("speed_margin", speed_margin, low=0.0, high=0.5),
         progress)
@@ -57,16 +55,16 @@ def chatter_risk(model: Union[Path, Model], speeds_rpm: npt.ArrayLike, depths: n
 
 def detect(samples: Union[Path, npt.ArrayLike, Sequence[npt.ArrayLike]], rate: Optional[float] = None, *,
            speed_rpm: float, teeth: int, speed_error: float = 0.02, modes: Sequence[float] = ()) -> Chatter:
-    """Is it chatter that was recorded?
+    """Decide whether a recorded cut chatters.
 
     samples: one channel, rows of channels, or a sound file (WAV, FLAC). Sound, vibration, displacement or force.
     rate: sample rate [Hz] of arrays. speed_rpm: of the spindle, within speed_error [1]. teeth: of the tool.
     modes: natural frequencies of tool and spindle [Hz], if known.
     Raises Error on a recording that is too short.
     """
-    speed = check.positive("speed_rpm", speed_rpm, "rpm") * _RPM
-    count = check.integer("teeth", teeth, 1, 20)
-    error = check.number("speed_error", speed_error, low=0.0, high=0.5)
+    speed = check.positive("speed_rpm", speed_rpm, "rpm") * RPM
+    count = check.integer("teeth", teeth, 1, 40)
+    error = check.number("speed_error", speed_error, low=0.0, high=0.1)
     known = [check.positive("modes", mode, "Hz") for mode in modes]
     if isinstance(samples, (str, os.PathLike)):
         return _smartmill.detect_sound(check.file_name("samples", samples), speed, count, error, known)

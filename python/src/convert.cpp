@@ -4,6 +4,8 @@
 #include <limits>
 #include <memory>
 
+#include "smartmill_core/cutting/mechanistic.h"
+
 namespace smartmill::python {
 namespace {
 
@@ -120,6 +122,7 @@ ToolGeometry toolOf(const py::object& tool) {
   geometry.diameter = number(tool, "diameter");
   geometry.helix = number(tool, "helix");
   geometry.pitch = tool.attr("pitch").cast<std::vector<double>>();
+  validate(geometry);
   return geometry;
 }
 
@@ -133,8 +136,10 @@ CuttingCoefficients coefficientsOf(const py::object& coefficients, bool std_dev)
 }
 
 Engagement engagementOf(const py::object& cut) {
-  return {number(cut, "entry"), number(cut, "exit"), number(cut, "axial_depth"),
-          number(cut, "feed_per_tooth")};
+  const Engagement engagement{number(cut, "entry"), number(cut, "exit"), number(cut, "axial_depth"),
+                              number(cut, "feed_per_tooth")};
+  validate(engagement);
+  return engagement;
 }
 
 MachineModel modelOf(const Campaign& campaign, const std::optional<MachineModel>& model) {

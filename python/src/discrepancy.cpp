@@ -1,12 +1,13 @@
-#include <chrono>
 #include <filesystem>
-#include <limits>
+#include <map>
 #include <string>
-#include <utility>
+#include <system_error>
+#include <vector>
 
 #include "convert.h"
 #include "module.h"
 #include "smartmill_core/campaign/campaign.h"
+#include "smartmill_core/error.h"
 #include "smartmill_core/model/cause_odds.h"
 #include "smartmill_discrepancy/data/alignment.h"
 #include "smartmill_discrepancy/explain/explain.h"
@@ -117,7 +118,9 @@ py::object explainCampaign(const std::string& path, const std::optional<MachineM
     };
     options.search.on_log = [&](const std::string& line) { work.progress(done, line); };
     options.search.on_progress = [&](double share) { work.progress(done = share); };
-    std::filesystem::create_directories(out);
+    std::error_code failed;
+    std::filesystem::create_directories(out, failed);
+    if (failed) throw Error(out + ": " + failed.message());
     const Campaign campaign = readCampaign(path);
     work.progress(0.0, "reading the records");
     const Dataset data = loadDataset(campaign, modelOf(campaign, given));

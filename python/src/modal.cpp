@@ -22,6 +22,7 @@ namespace {
 using namespace smartmill::hammer;
 
 struct FitOptions {
+  std::string file;               // first input, for messages; empty: arrays
   double low = 0.0, high = 0.0;  // [Hz]
   int max_modes = 0;             // 0: no fit
   bool real_modes = false;
@@ -55,7 +56,11 @@ void fit(const FitOptions& options, double truncated_length, Work& work, Found& 
     work.progress(share);
     return true;
   };
-  found.estimate = estimateModes({found.frf}, search);
+  try {
+    found.estimate = estimateModes({found.frf}, search);
+  } catch (const Error& error) {
+    throw Error((options.file.empty() ? "" : options.file + ": ") + error.what());
+  }
   for (const double f : found.frf.frequency) found.fitted.push_back(fittedResponse(found.estimate, 0, f));
   for (std::vector<EstimatedMode>* modes : {&found.estimate.modes, &found.estimate.doubts}) {
     // The exponential window's own damping.
@@ -80,18 +85,22 @@ Found average(const std::vector<TapRecord>& taps, const FitOptions& options, Wor
   return found;
 }
 
-Found readAll(const std::vector<std::string>& files, const FitOptions& options, Work& work) {
+Found readAll(const std::vector<std::string>& files, FitOptions options, Work& work) {
+  options.file = files.front();
   std::vector<TapRecord> taps;
   std::vector<NamedFrf> frfs;
   for (const std::string& file : files) {
+    work.check();
     TapFile read = readTapFile(file, detectFormat(file), {});
     taps.insert(taps.end(), read.taps.begin(), read.taps.end());
     frfs.insert(frfs.end(), read.frfs.begin(), read.frfs.end());
   }
-  if (!taps.empty() && frfs.empty()) return average(taps, options, work);
-  if (frfs.size() != 1 || !taps.empty())
+  if (!taps.empty() && !frfs.empty())
+    throw Error(frfs.front().name + ": an FRF cannot be combined with hits over time");
+  if (!taps.empty()) return average(taps, options, work);
+  if (frfs.size() != 1)
     throw Error(files.back() + ": expected hits of one point or one FRF, found " +
-                std::to_string(taps.size()) + " hits and " + std::to_string(frfs.size()) + " FRFs");
+                std::to_string(frfs.size()) + " FRFs");
   Found found{frfs.front().frf, {}, {}, {}};
   fit(options, 0.0, work, found);
   return found;
@@ -126,7 +135,8 @@ py::object toPython(Found found) {
 }
 
 FitOptions optionsOf(const py::dict& d) {
-  return {d["low"].cast<double>(),
+  return {"",
+          d["low"].cast<double>(),
           d["high"].cast<double>(),
           d["max_modes"].cast<int>(),
           d["real_modes"].cast<bool>(),

@@ -3,6 +3,7 @@
 #include "smartmill_core/model/machine_model.h"
 
 #include <filesystem>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -111,6 +112,8 @@ void addModel(py::module_& m) {
             writeMachineModel(model, path.string());
           },
           py::arg("path"), "Write a model file.")
+      .def("__copy__", [](const MachineModel& model) { return model; })
+      .def("__deepcopy__", [](const MachineModel& model, const py::dict&) { return model; })
       .def("__repr__", [](const MachineModel& model) { return "<smartmill.Model " + model.file + ">"; });
   m.def("model_from", &modelFrom, py::arg("tool"), py::arg("cutting"), py::arg("tool_tip"),
         py::arg("force_sensor"));

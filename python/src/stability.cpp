@@ -1,11 +1,11 @@
 #include <algorithm>
-#include <cmath>
-#include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "convert.h"
 #include "module.h"
+#include "smartmill_core/error.h"
 #include "smartmill_core/io/sound_file.h"
 #include "smartmill_stability/chart/uncertainty.h"
 #include "smartmill_stability/chatter/recording.h"
@@ -18,8 +18,7 @@ namespace {
 
 using namespace smartmill::stability;
 
-/// Speeds of one call of a solver: so often progress is told.
-constexpr std::size_t PIECE = 25;
+constexpr std::size_t PIECE = 25;  // speeds between two calls of progress
 
 py::object lobes(const MachineModel& model, double entry_deg, double exit_deg, const Array& speed,
                  double max_depth, const std::string& method, bool errors, const py::object& progress) {
@@ -83,26 +82,28 @@ py::object verdictOf(RecordingVerdict v) {
       arg("line") = arrayOf(std::move(v.spectrogram.frequency)), arg("power") = arrayOf(v.spectrogram.power));
 }
 
-py::object detect(std::vector<std::vector<double>> channels, double rate, double speed, int teeth,
-                  double speed_error, const std::vector<double>& modes) {
-  Recording recording{rate, std::move(channels)};
-  const RecordingRequest request{speed, teeth, speed_error, modes};
-  return verdictOf(interruptible(py::none(), [recording = std::move(recording), request](Work&) {
-    return judgeRecording(recording, request);
+py::object detect(const std::vector<Array>& samples, double rate, double speed, int teeth, double speed_error,
+                  const std::vector<double>& modes) {
+  Recording recording{rate, {}};
+  for (const Array& channel : samples) recording.channels.push_back(vectorOf(channel));
+  return verdictOf(interruptible(py::none(), [=](Work&) {
+    return judgeRecording(recording, {speed, teeth, speed_error, modes});
   }));
-}
-
-py::object detectArrays(const std::vector<Array>& samples, double rate, double speed, int teeth,
-                        double speed_error, const std::vector<double>& modes) {
-  std::vector<std::vector<double>> channels;
-  for (const Array& channel : samples) channels.push_back(vectorOf(channel));
-  return detect(std::move(channels), rate, speed, teeth, speed_error, modes);
 }
 
 py::object detectSound(const std::string& file, double speed, int teeth, double speed_error,
                        const std::vector<double>& modes) {
-  SoundFile sound = readSoundFile(file);
-  return detect(std::move(sound.channels), sound.sample_rate, speed, teeth, speed_error, modes);
+  const RecordingRequest request{speed, teeth, speed_error, modes};
+  request.validate();
+  return verdictOf(interruptible(py::none(), [=](Work& work) {
+    SoundFile sound = readSoundFile(file);
+    work.check();
+    try {
+      return judgeRecording({sound.sample_rate, std::move(sound.channels)}, request);
+    } catch (const Error& error) {
+      throw Error(file + ": " + error.what());
+    }
+  }));
 }
 
 }  // namespace
@@ -113,8 +114,8 @@ void addStability(py::module_& m) {
   m.def("chatter_risk", &chatterRisk, py::arg("model"), py::arg("entry_deg"), py::arg("exit_deg"),
         py::arg("speed"), py::arg("depth"), py::arg("draws"), py::arg("seed"), py::arg("risk"),
         py::arg("speed_margin"), py::arg("progress"));
-  m.def("detect", &detectArrays, py::arg("samples"), py::arg("rate"), py::arg("spindle_speed"),
-        py::arg("teeth"), py::arg("speed_error"), py::arg("modes"));
+  m.def("detect", &detect, py::arg("samples"), py::arg("rate"), py::arg("spindle_speed"), py::arg("teeth"),
+        py::arg("speed_error"), py::arg("modes"));
   m.def("detect_sound", &detectSound, py::arg("file"), py::arg("spindle_speed"), py::arg("teeth"),
         py::arg("speed_error"), py::arg("modes"));
 }

@@ -1,45 +1,18 @@
 #include "work.h"
 
 #include <chrono>
+#include <csignal>
 #include <list>
-#include <thread>
 
 namespace smartmill::python {
 namespace {
 
-constexpr std::chrono::milliseconds LOOK{50};  // between two looks at signals
+constexpr std::chrono::milliseconds SIGNAL_PERIOD{50};  // between two checks for signals
 
-/// Threads whose caller has gone.
-class AbandonedThreads {
- public:
-  void add(std::thread thread) {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    threads_.push_back(std::move(thread));
-  }
-  void join() {
-    std::list<std::thread> threads;
-    {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      threads.swap(threads_);
-    }
-    for (std::thread& thread : threads) thread.join();
-  }
-
- private:
-  std::mutex mutex_;
-  std::list<std::thread> threads_;
-};
-
-AbandonedThreads& abandonedThreads() {
-  static AbandonedThreads threads;
+/// Threads whose caller has gone. Used with the GIL held.
+std::list<std::thread>& abandonedThreads() {
+  static std::list<std::thread> threads;
   return threads;
-}
-
-/// @return whether the callback wants the work to end
-bool call(const py::object& progress, double share, const std::string& line) {
-  if (progress.is_none()) return false;
-  const py::object answer = progress(share, line);
-  return answer.is(py::bool_(false));
 }
 
 }  // namespace
@@ -53,51 +26,60 @@ void Work::progress(double share, const std::string& line) {
   changed_.notify_one();
 }
 
-void runAndWait(const std::shared_ptr<Work>& work, const std::function<void()>& body,
-                const py::object& progress) {
-  std::thread thread([work, body] {
-    std::exception_ptr failure;
-    try {
-      body();
-    } catch (...) {
-      failure = std::current_exception();
-    }
-    const std::lock_guard<std::mutex> lock(work->mutex_);
-    work->failure_ = failure;
-    work->done_ = true;
-    work->changed_.notify_one();
-  });
+void Work::run(const std::function<void()>& body) {
+  std::exception_ptr failure;
   try {
-    const py::gil_scoped_release released;
-    for (bool done = false; !done;) {
-      std::deque<Work::Message> messages;
-      {
-        std::unique_lock<std::mutex> lock(work->mutex_);
-        work->changed_.wait_for(lock, LOOK, [&] { return work->done_ || !work->messages_.empty(); });
-        messages.swap(work->messages_);
-        done = work->done_;
-      }
-      const py::gil_scoped_acquire acquired;
-      if (PyErr_CheckSignals() != 0) throw py::error_already_set();
-      for (const Work::Message& message : messages) {
-        if (call(progress, message.share, message.line)) work->stopped_ = true;
-      }
-    }
+    body();
   } catch (...) {
-    work->abandoned_ = true;
-    abandonedThreads().add(std::move(thread));
-    throw;
+    failure = std::current_exception();
   }
   {
-    const py::gil_scoped_release released;
-    thread.join();
+    const std::lock_guard<std::mutex> lock(mutex_);
+    failure_ = failure;
+    done_ = true;
   }
-  if (work->failure_) std::rethrow_exception(work->failure_);
+  changed_.notify_one();
+}
+
+bool Work::handleNext(const py::object& progress) {
+  std::deque<Message> messages;
+  bool done = false;
+  {
+    std::unique_lock<std::mutex> lock(mutex_);
+    changed_.wait_for(lock, SIGNAL_PERIOD, [&] { return done_ || !messages_.empty(); });
+    messages.swap(messages_);
+    done = done_;
+  }
+  const py::gil_scoped_acquire acquired;
+  if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+  if (!progress.is_none()) {
+    for (const Message& message : messages)
+      if (progress(message.share, message.line).is(py::bool_(false))) stopped_ = true;
+  }
+  return !done;
+}
+
+void Work::wait(std::thread thread, const py::object& progress) {
+  try {
+    const py::gil_scoped_release released;
+    while (handleNext(progress)) {
+    }
+    thread.join();
+  } catch (...) {
+    abandoned_ = true;
+    abandonedThreads().push_back(std::move(thread));
+    throw;
+  }
+  if (failure_) std::rethrow_exception(failure_);
 }
 
 void waitForAbandoned() {
+  std::list<std::thread> threads;
+  threads.swap(abandonedThreads());
+  if (threads.empty()) return;
+  PyOS_setsig(SIGINT, SIG_DFL);
   const py::gil_scoped_release released;
-  abandonedThreads().join();
+  for (std::thread& thread : threads) thread.join();
 }
 
 }  // namespace smartmill::python
