@@ -12,9 +12,9 @@ namespace smartmill::loadmeter {
 
 /// Motor currents to forces: Cheng & Venuvinod, sections 7..9.
 
-/// Approximation of a signal by Daubechies-5 wavelets: the `level` finest bands of detail are taken out (GSL,
-/// dyadic; the signal is mirrored at its ends to a power of two). Level L keeps what lies below rate /
-/// 2^(L+1).
+/// Approximation of a signal by Daubechies-5 wavelets: the `level` finest bands of detail are taken out
+/// (dyadic; the signal is mirrored at its ends to a power of two). Level L keeps what lies below
+/// rate / 2^(L+1).
 /// @throws Error with fewer than 2^level samples.
 std::vector<double> denoise(const std::vector<double>& signal, int level);
 
