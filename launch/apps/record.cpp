@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "node/asked_end.h"
 #include "node/bag_recorder.h"
+#include "node/shutdown_request.h"
 #include "smartmill_core/program.h"
 
 namespace {
@@ -29,7 +29,7 @@ void run(const std::string& path, const std::vector<std::string>& patterns, cons
 int main(int argc, char** argv) {
   // What waits when the end is asked for is still written.
   ros::init(argc, argv, "record", ros::init_options::NoSigintHandler);
-  const std::atomic<bool>& ended = smartmill::session::takeAskedEnd();
+  const std::atomic<bool>& ended = smartmill::session::catchShutdownRequest();
   std::string path;
   std::vector<std::string> patterns;
   smartmill::CommandLine line(

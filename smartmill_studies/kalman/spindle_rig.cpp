@@ -21,7 +21,7 @@ SpindleRig::SpindleRig(const MachineModel& model, const sim::WorldOptions& optio
     : model_(model), world_(model, options), use_plate_(use_plate) {
   ForceSensor ideal;
   for (ModalModel& axis : ideal.axis) axis.direct = 1.0;
-  SortedCompensation::Outputs outputs;
+  CompensationPipeline::Outputs outputs;
   outputs.force = [this](const ForceBlock& measured, const ForceBlock& compensated) {
     if (!recording_ || measured.stamp < from_ - 1e-6) return;
     for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -39,7 +39,7 @@ SpindleRig::SpindleRig(const MachineModel& model, const sim::WorldOptions& optio
   outputs.result = [this](const SensorResult& result) { tapped_ = result; };
   outputs.calibration = [this](const CalibrationResult& result) { calibration_ = result; };
   // Without hold-back every block comes out as it goes in.
-  sorted_ = std::make_unique<SortedCompensation>(filter, taps, ideal, 0.0, outputs);
+  sorted_ = std::make_unique<CompensationPipeline>(filter, taps, ideal, 0.0, outputs);
   sorted_->awaitCalibration();
 }
 

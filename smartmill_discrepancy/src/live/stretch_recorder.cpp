@@ -176,7 +176,7 @@ void StretchRecorder::finish() {
   blocks_.clear();
 }
 
-SortedStretches::SortedStretches(const StretchParameters& parameters, double hold_back,
+SegmentPipeline::SegmentPipeline(const StretchParameters& parameters, double hold_back,
                                  std::function<void(const Stretch&)> deliver)
     : recorder_(parameters, std::move(deliver)),
       sorter_(hold_back),
@@ -189,23 +189,23 @@ SortedStretches::SortedStretches(const StretchParameters& parameters, double hol
   sorter_.onRestart([this] { recorder_.reset(); });
 }
 
-void SortedStretches::push(const CuttingCondition& condition) {
+void SegmentPipeline::push(const CuttingCondition& condition) {
   sorter_.push(conditions_, condition.stamp, [this, condition] { recorder_.handle(condition); });
 }
 
-void SortedStretches::push(const CncState& state) {
+void SegmentPipeline::push(const CncState& state) {
   sorter_.push(states_, state.stamp, [this, state] { recorder_.handle(state); });
 }
 
-void SortedStretches::push(const SpindleAngle& angle) {
+void SegmentPipeline::push(const SpindleAngle& angle) {
   sorter_.push(angles_, angle.stamp, [this, angle] { recorder_.handle(angle); });
 }
 
-void SortedStretches::push(const SampleBlock& dynamometer) {
+void SegmentPipeline::push(const SampleBlock& dynamometer) {
   sorter_.push(blocks_, dynamometer.stamp, [this, dynamometer] { recorder_.handle(dynamometer); });
 }
 
-void SortedStretches::push(const LoadSample& load) {
+void SegmentPipeline::push(const LoadSample& load) {
   sorter_.push(loads_, load.stamp, [this, load] { recorder_.handle(load); });
 }
 

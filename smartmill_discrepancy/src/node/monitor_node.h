@@ -15,7 +15,7 @@
 
 namespace smartmill::discrepancy {
 
-/// Shell around SortedStretches and liveGap(): the twin follows the running machine, discrepancy/state and
+/// Shell around SegmentPipeline and liveGap(): the twin follows the running machine, discrepancy/state and
 /// discrepancy/force out.
 class MonitorNode {
  public:
@@ -34,7 +34,7 @@ class MonitorNode {
   MonitorParameters parameters_;
   MachineModel model_;
   NodeShell shell_;
-  SortedStretches stretches_;
+  SegmentPipeline stretches_;
   LiveGap last_;
   std::string problem_;  // why the last stretch could not be judged
   int recorded_ = 0;

@@ -8,7 +8,7 @@ namespace smartmill::discrepancy {
 
 /// The streams of a stretch, from a node's inputs or from a bag.
 template <class Source>
-void connect(Source& source, SortedStretches& stretches) {
+void connect(Source& source, SegmentPipeline& stretches) {
   feed<CuttingCondition>(source, names::CUTTING_CONDITION, stretches);
   feed<CncState>(source, names::CNC_STATE, stretches);
   feed<SpindleAngle>(source, names::SPINDLE_ANGLE, stretches);

@@ -16,7 +16,7 @@ Campaign campaignOfBag(const std::string& bag, const std::string& model_file, co
   const MonitorParameters parameters;
   const MachineModel model = readMachineModel(model_file);
   std::vector<Stretch> chosen;
-  SortedStretches stretches(parameters.stretch, parameters.hold_back, [&](const Stretch& stretch) {
+  SegmentPipeline stretches(parameters.stretch, parameters.hold_back, [&](const Stretch& stretch) {
     const auto same = [&](const Stretch& other) { return other.test.name == stretch.test.name; };
     const auto earlier = std::find_if(chosen.begin(), chosen.end(), same);
     if (earlier == chosen.end()) {

@@ -30,7 +30,7 @@ std::vector<Stretch> run(const Machine& machine, double length = 0.3) {
   StretchParameters parameters;
   parameters.length = length;
   parameters.settle = machine.settle;
-  SortedStretches recorder(parameters, 0.05, [&](const Stretch& s) { stretches.push_back(s); });
+  SegmentPipeline recorder(parameters, 0.05, [&](const Stretch& s) { stretches.push_back(s); });
   CuttingCondition condition;
   condition.stamp = machine.begin;
   condition.kind = CuttingCondition::Kind::cut;

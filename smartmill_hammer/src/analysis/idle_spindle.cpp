@@ -175,7 +175,7 @@ void IdleSpindle::finish() {
   interrupt();
 }
 
-SortedIdle::SortedIdle(double hold_back, IdleSpindle::Told told)
+IdleSpindlePipeline::IdleSpindlePipeline(double hold_back, IdleSpindle::Told told)
     : idle_(std::move(told)),
       sorter_(hold_back),
       conditions_(sorter_.addLatched(names::CUTTING_CONDITION)),
@@ -185,7 +185,7 @@ SortedIdle::SortedIdle(double hold_back, IdleSpindle::Told told)
   sorter_.onRestart([this] { idle_.interrupt(); });
 }
 
-void SortedIdle::finish() {
+void IdleSpindlePipeline::finish() {
   sorter_.flush();
   idle_.finish();
 }

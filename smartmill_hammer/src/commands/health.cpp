@@ -65,7 +65,7 @@ History read(const std::vector<std::string>& bags) {
       if (std::isfinite(set.friction_viscous) && std::isfinite(set.friction_coulomb))
         history.friction.push_back({bag, set.stamp, set.friction_viscous, set.friction_coulomb});
     });
-    SortedIdle idle(HOLD_BACK);
+    IdleSpindlePipeline idle(HOLD_BACK);
     connectIdle(reader, idle);
     feed<SpindleAngle>(reader, names::SPINDLE_ANGLE, idle);
     reader.run();

@@ -8,7 +8,7 @@
 #include "parameters.h"
 #include "smartmill_hammer/analysis/health_watch.h"
 #include "smartmill_hammer/analysis/idle_spindle.h"
-#include "smartmill_hammer/sequence/sorted_sequence.h"
+#include "smartmill_hammer/sequence/hammer_pipeline.h"
 #include "smartmill_ros/frf_server.h"
 #include "smartmill_ros/node_shell.h"
 
@@ -17,8 +17,8 @@ namespace hammer {
 
 /// The spindle's angle serves the measurement and the watch in air; one subscription.
 struct Streams {
-  SortedSequence& sequence;
-  SortedIdle& idle;
+  HammerPipeline& sequence;
+  IdleSpindlePipeline& idle;
 
   void push(const SampleBlock& hammer) { sequence.push(hammer); }
   void push(const CncState& state) { sequence.push(state); }
@@ -28,7 +28,7 @@ struct Streams {
   }
 };
 
-/// Shell around SortedSequence: goals and streams in, commands to the CNC bridge's actions and to daq/strike,
+/// Shell around HammerPipeline: goals and streams in, commands to the CNC bridge's actions and to daq/strike,
 /// results out. All callbacks run in one thread.
 class HammerServer {
  public:
@@ -45,8 +45,8 @@ class HammerServer {
   NodeParameters parameters_;
   NodeShell shell_;
   std::optional<MachineCommands> machine_;  // none in a replay
-  SortedSequence sorted_;
-  SortedIdle idle_;
+  HammerPipeline sorted_;
+  IdleSpindlePipeline idle_;
   Streams streams_;
   FrfServer server_;
   HealthWatch health_;

@@ -11,7 +11,7 @@
 #include <smartmill_msgs/RunProgramAction.h>
 
 #include "smartmill_hammer/sequence/hammer_sequence.h"
-#include "smartmill_ros/strike_caller.h"
+#include "smartmill_ros/strike_client.h"
 
 namespace smartmill {
 namespace hammer {
@@ -41,7 +41,7 @@ class MachineCommands {
   Client<smartmill_msgs::JogAction> jog_;
   Client<smartmill_msgs::OrientSpindleAction> orient_;
   Client<smartmill_msgs::RunProgramAction> program_;
-  StrikeCaller strike_;
+  StrikeClient strike_;
   std::deque<Command> waiting_;
   std::string busy_with_;  // action that is running
   bool stopping_ = false;  // its failure is wanted

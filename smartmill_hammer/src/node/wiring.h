@@ -17,7 +17,7 @@ void connect(Source& source, Sorted& sorted) {
 
 /// What the spindle shows in air, beside its angle.
 template <class Source>
-void connectIdle(Source& source, SortedIdle& idle) {
+void connectIdle(Source& source, IdleSpindlePipeline& idle) {
   feed<SampleBlock>(source, names::DYNAMOMETER, idle);
   feed<CuttingCondition>(source, names::CUTTING_CONDITION, idle);
   feed<LoadSample>(source, names::CNC_LOAD, idle);

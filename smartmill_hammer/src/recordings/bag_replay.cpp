@@ -3,7 +3,7 @@
 #include <cstdio>
 
 #include "node/wiring.h"
-#include "smartmill_hammer/sequence/sorted_sequence.h"
+#include "smartmill_hammer/sequence/hammer_pipeline.h"
 #include "smartmill_recording/recording_reader.h"
 
 namespace smartmill {
@@ -13,7 +13,7 @@ std::vector<MeasureFrfResult> replayBag(const std::string& bag, const std::strin
                                         const NodeParameters& parameters) {
   std::vector<MeasureFrfResult> results;
   // The recorded streams answer the commands.
-  SortedSequence sorted(
+  HammerPipeline sorted(
       parameters.measurement, readMachineModel(model), parameters.hold_back,
       {{},
        [](const Feedback& feedback) { std::fprintf(stderr, "%s\n", feedback.stage.c_str()); },

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "sequence_detail.h"
-#include "smartmill_core/modal/hit_judge.h"
+#include "smartmill_core/modal/hit_check.h"
 #include "smartmill_hammer/analysis/coil_talk.h"
 #include "smartmill_hammer/sequence/hammer_sequence.h"
 
@@ -24,7 +24,7 @@ constexpr double LEAST_LOWERED = 0.15;
 
 // Of a trial blow only the blow counts: the tool stands too far from the sensor for its answer to be judged.
 HitFault HammerSequence::judged(const Hit& hit) const {
-  HitJudgeOptions options{parameters_.weak_force, parameters_.second_hit_share,
+  HitCheckOptions options{parameters_.weak_force, parameters_.second_hit_share,
                           RANGE_SHARE * station_.range_volt, parameters_.force_high};
   if (stage_ != Stage::trial) return hitFault(hit, options);
   Hit blow = hit;

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "smartmill_core/modal/hit_judge.h"
+#include "smartmill_core/modal/hit_check.h"
 #include "smartmill_hammer_testing/hit_records.h"
 
 namespace smartmill {
@@ -19,7 +19,7 @@ TEST(HitGate, AcceptsCleanHitsAndRefusesEachFault) {
     int wrong = 0, hits = 0;
     for (std::uint64_t i = 0; i < RECORDS; ++i) {
       const HitCase drawn = drawHitCase(kind, 77000000 + i);
-      HitJudgeOptions options;
+      HitCheckOptions options;
       options.weak_force = drawn.weak_force;
       options.high = drawn.high;
       const std::vector<HitFault> faults = judgeHits(drawn.hits, options);

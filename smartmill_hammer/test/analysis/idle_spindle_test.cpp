@@ -29,7 +29,7 @@ struct Plant {
   }
 
   IdleRecord runAt(const std::vector<double>& speeds) {
-    SortedIdle idle(0.05);
+    IdleSpindlePipeline idle(0.05);
     double time = 0.0;
     std::uint64_t index = 0;
     std::normal_distribution<double> normal;

@@ -1,5 +1,5 @@
 #include "smartmill_core/modal/impact_analysis.h"
-#include "smartmill_core/modal/hit_judge.h"
+#include "smartmill_core/modal/hit_check.h"
 
 #include <cmath>
 #include <random>
@@ -196,7 +196,7 @@ TEST(ImpactAnalysis, ExponentialWindowAddsKnownDamping) {
 
 TEST(HitFaults, AreNamed) {
   std::mt19937 random(4);
-  const HitJudgeOptions limits{20.0, 0.1, 1.0, 0.0};
+  const HitCheckOptions limits{20.0, 0.1, 1.0, 0.0};
   const Hit good = blow(oneMode(), 200.0, 0.2, random);
   EXPECT_EQ(hitFault(good, limits).text, "");
   EXPECT_NE(hitFault(blow(oneMode(), 10.0, 0.2, random), limits).text.find("weak"), std::string::npos);

@@ -11,7 +11,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/signal/stream_sorter.h"
 #include "smartmill_core/testing/coverage.h"
-#include "smartmill_hammer/sequence/sorted_sequence.h"
+#include "smartmill_hammer/sequence/hammer_pipeline.h"
 
 namespace smartmill {
 namespace hammer {
@@ -408,11 +408,11 @@ TEST(HammerSequence, OneMeasurementAtATime) {
   EXPECT_FALSE(sequence.handle(goalFor("y", machine.time)));
 }
 
-TEST(SortedSequence, AJumpBackOfTimeStartsAfreshAndALateCancelFindsNothing) {
+TEST(HammerPipeline, AJumpBackOfTimeStartsAfreshAndALateCancelFindsNothing) {
   ClosedFormMachine machine(4), again(4);
   int restarts = 0, results = 0;
   std::vector<Command> commands;
-  SortedSequence sorted(HammerParameters(), machine.model, 0.05,
+  HammerPipeline sorted(HammerParameters(), machine.model, 0.05,
                         {[&](const Command& c) { commands.push_back(c); },
                          {},
                          [&](const MeasureFrfResult&) { ++results; },

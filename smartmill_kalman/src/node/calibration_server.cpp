@@ -50,7 +50,7 @@ smartmill_msgs::CalibrateForceSensorResult answer(Code code, const std::string& 
 }  // namespace
 
 struct CalibrationServer::Impl {
-  Impl(ros::NodeHandle nh, SortedCompensation& thinking)
+  Impl(ros::NodeHandle nh, CompensationPipeline& thinking)
       : sorted(thinking),
         server(nh, names::CALIBRATE_SENSOR,
                boost::function<void(Handle)>([this](Handle handle) { onGoal(handle); }),
@@ -105,13 +105,13 @@ struct CalibrationServer::Impl {
     }
   }
 
-  SortedCompensation& sorted;
+  CompensationPipeline& sorted;
   std::string file, last_message = "no calibration yet";
   std::optional<Handle> active;
   Server server;
 };
 
-CalibrationServer::CalibrationServer(ros::NodeHandle nh, SortedCompensation& sorted)
+CalibrationServer::CalibrationServer(ros::NodeHandle nh, CompensationPipeline& sorted)
     : impl_(std::make_unique<Impl>(std::move(nh), sorted)) {
 }
 

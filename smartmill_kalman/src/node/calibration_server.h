@@ -5,7 +5,7 @@
 
 #include <ros/node_handle.h>
 
-#include "smartmill_kalman/compensation/sorted_compensation.h"
+#include "smartmill_kalman/compensation/compensation_pipeline.h"
 
 namespace smartmill::kalman {
 
@@ -13,7 +13,7 @@ namespace smartmill::kalman {
 /// what a fit found is written where the goal says. All in the thread of the callbacks.
 class CalibrationServer {
  public:
-  CalibrationServer(ros::NodeHandle nh, SortedCompensation& sorted);
+  CalibrationServer(ros::NodeHandle nh, CompensationPipeline& sorted);
   ~CalibrationServer();
 
   void finish(const CalibrationResult& result);

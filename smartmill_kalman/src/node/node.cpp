@@ -153,7 +153,7 @@ void KalmanNode::watch() {
 
 void KalmanNode::watchMeasurement() {
   if (const auto fault = strike_.takeFault()) {
-    using Kind = StrikeCaller::Answer::Kind;
+    using Kind = StrikeClient::Answer::Kind;
     sorted_.event([fault](SensorMeasurement& m) {
       // Without an automatic hammer somebody hits by hand.
       if (fault->kind == Kind::failed) return m.commandFailed(fault->message);

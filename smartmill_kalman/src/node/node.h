@@ -15,12 +15,12 @@
 #include "node/parameters.h"
 #include "smartmill_ros/frf_server.h"
 #include "smartmill_ros/node_shell.h"
-#include "smartmill_ros/strike_caller.h"
+#include "smartmill_ros/strike_client.h"
 
 namespace smartmill::kalman {
 
-/// Shell around SortedCompensation: sensor blocks in, force/measured, force/compensated and force/wrench out,
-/// in the machine's frame; taps in, tool/frf and tool/modes of the force sensor out.
+/// Shell around CompensationPipeline: sensor blocks in, force/measured, force/compensated and force/wrench
+/// out, in the machine's frame; taps in, tool/frf and tool/modes of the force sensor out.
 class KalmanNode {
  public:
   using Parameters = NodeParameters;
@@ -50,8 +50,8 @@ class KalmanNode {
   double next_wrench_ = 0.0;  // [s]
 
   ros::Publisher measured_, compensated_, wrench_;
-  StrikeCaller strike_;
-  SortedCompensation sorted_;
+  StrikeClient strike_;
+  CompensationPipeline sorted_;
   FrfServer measure_;
   CalibrationServer calibrate_;
 };

@@ -98,7 +98,7 @@ class Turner {
 };
 
 /// A method that wants the whole cut, in place of what came sample by sample.
-void compensateWhole(BagCut& cut, Method method, const SortedCompensation& sorted,
+void compensateWhole(BagCut& cut, Method method, const CompensationPipeline& sorted,
                      const HarmonicFilterParameters& parameters) {
   // The others come as the node makes them.
   if ((method != Method::smoother && method != Method::inverse) || !(cut.speed > 0.0)) return;
@@ -116,20 +116,20 @@ BagSummary compensateBag(const std::string& path, const ForceSensor& sensor, con
   BagSummary summary;
   RecordingReader bag(path);
   Turner turner(bag, done);
-  std::optional<SortedCompensation> sorted;
+  std::optional<CompensationPipeline> sorted;
   Cutter cutter([&](BagCut&& cut) {
     ++summary.cuts;
     compensateWhole(cut, method, *sorted, parameters.compensation.filter);
     turner.take(std::move(cut));
   });
-  sorted.emplace(
-      parameters.compensation, parameters.taps, sensor, parameters.hold_back,
-      SortedCompensation::Outputs{[&](const ForceBlock& measured, const ForceBlock& compensated) {
-                                    cutter.blocks(measured, compensated, sorted->health().speed);
-                                  },
-                                  {},
-                                  {},
-                                  [&](const SensorResult& result) { summary.identified.push_back(result); }});
+  sorted.emplace(parameters.compensation, parameters.taps, sensor, parameters.hold_back,
+                 CompensationPipeline::Outputs{
+                     [&](const ForceBlock& measured, const ForceBlock& compensated) {
+                       cutter.blocks(measured, compensated, sorted->health().speed);
+                     },
+                     {},
+                     {},
+                     [&](const SensorResult& result) { summary.identified.push_back(result); }});
   useFiles(*sorted, parameters);
   std::size_t blocks = 0;
   bag.on<plain::SampleBlock>(parameters.force_input, [&](const plain::SampleBlock& m, double) {

@@ -29,9 +29,9 @@ struct BagSummary {
   std::vector<SensorResult> identified;  ///< tap tests that the bag holds
 };
 
-/// Puts a bag's sensors, conditions and goals through SortedCompensation, as the node does, without a master.
-/// Methods other than kalman run over each cut's samples with the sensor and the speed that the node had in
-/// it.
+/// Puts a bag's sensors, conditions and goals through CompensationPipeline, as the node does, without a
+/// master. Methods other than kalman run over each cut's samples with the sensor and the speed that the node
+/// had in it.
 /// @param done called at the end of each cut, in order @throws Error.
 BagSummary compensateBag(const std::string& path, const ForceSensor& sensor, const NodeParameters& parameters,
                          Method method, const std::function<void(BagCut&&)>& done,

@@ -9,10 +9,10 @@
 #include "smartmill_core/formatted.h"
 #include "smartmill_core/modal/results.h"
 #include "smartmill_core/names.h"
-#include "smartmill_core/signal/counted_angle.h"
 #include "smartmill_core/signal/feed.h"
 #include "smartmill_core/signal/steady_path.h"
 #include "smartmill_core/signal/streams.h"
+#include "smartmill_core/signal/unwrapped_angle.h"
 #include "smartmill_kalman/sensor/spindle_force_sensor.h"
 #include "smartmill_recording/recording_reader.h"
 
@@ -157,7 +157,7 @@ class Gatherer {
   std::optional<double> from_;  // [s] steady since
   double to_ = 0.0, last_state_ = 0.0;
   bool to_closed_ = false;
-  std::deque<CountedAngle> angles_;
+  std::deque<UnwrappedAngle> angles_;
   Stream force_, response_;
 };
 

@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "smartmill_core/units.h"
-#include "smartmill_kalman/compensation/sorted_compensation.h"
+#include "smartmill_kalman/compensation/compensation_pipeline.h"
 #include "smartmill_kalman_testing/reference_case.h"
 
 namespace {
@@ -52,7 +52,7 @@ TEST(Allocation, NoneASample) {
 long aBlock(bool coupled, bool spindle, std::size_t samples) {
   ForceSensor believed;
   for (ModalModel& axis : believed.axis) axis = ReferenceCase::exactSensor();
-  SortedCompensation sorted({}, {}, believed, 0.0, {});
+  CompensationPipeline sorted({}, {}, believed, 0.0, {});
   if (coupled) {
     SensorMatrix matrix;
     for (std::size_t i = 0; i < 3; ++i) {

@@ -1,4 +1,4 @@
-#include "smartmill_kalman/compensation/sorted_compensation.h"
+#include "smartmill_kalman/compensation/compensation_pipeline.h"
 
 #include <algorithm>
 #include <cmath>
@@ -96,7 +96,7 @@ class Runner {
     sorted.flush();
   }
   Collected result;
-  SortedCompensation sorted;
+  CompensationPipeline sorted;
 };
 
 TEST(ForceCompensation, keepsTheSampleIndexAndFindsTheForce) {

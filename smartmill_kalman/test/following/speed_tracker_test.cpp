@@ -9,7 +9,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/testing/coverage.h"
 #include "smartmill_core/units.h"
-#include "smartmill_kalman/compensation/sorted_compensation.h"
+#include "smartmill_kalman/compensation/compensation_pipeline.h"
 #include "smartmill_kalman_testing/reference_case.h"
 
 namespace smartmill::kalman {
@@ -112,14 +112,14 @@ TEST(TrackedSpeed, NeedsNoAngles) {
   parameters.track_speed = true;
   std::size_t out = 0;
   ForceBlock::Status last = ForceBlock::Status::measured;
-  SortedCompensation sorted(parameters, {}, ForceSensor(), 0.05,
-                            {[&](const ForceBlock&, const ForceBlock& c) {
-                               ++out;
-                               last = c.status;
-                             },
-                             {},
-                             {},
-                             {}});
+  CompensationPipeline sorted(parameters, {}, ForceSensor(), 0.05,
+                              {[&](const ForceBlock&, const ForceBlock& c) {
+                                 ++out;
+                                 last = c.status;
+                               },
+                               {},
+                               {},
+                               {}});
   CuttingCondition condition;
   condition.kind = CuttingCondition::Kind::cut;
   condition.spindle_speed = units::TWO_PI * 150.0;

@@ -8,7 +8,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/testing/coverage.h"
 #include "smartmill_core/testing/tap_rig.h"
-#include "smartmill_kalman/compensation/sorted_compensation.h"
+#include "smartmill_kalman/compensation/compensation_pipeline.h"
 
 namespace smartmill::kalman {
 namespace {
@@ -64,7 +64,7 @@ class Loop {
   std::vector<std::string> said;
   std::vector<SensorResult> results;
   std::vector<ForceBlock> forces;
-  SortedCompensation sorted;
+  CompensationPipeline sorted;
 };
 
 // Closed form: one mode at 930 Hz, 3 %. 1 N of noise against 300 N blows.

@@ -10,7 +10,7 @@
 #include "smartmill_core/testing/coverage.h"
 #include "smartmill_core/testing/temporary_folder.h"
 #include "smartmill_core/units.h"
-#include "smartmill_kalman/compensation/sorted_compensation.h"
+#include "smartmill_kalman/compensation/compensation_pipeline.h"
 
 namespace smartmill::kalman {
 namespace {
@@ -347,7 +347,7 @@ TEST(SpindleForceSensor, DynamicCrossTalkGoesWhereTheStaticOneFails) {
 }
 
 // What the node is made of: six channels in, force at the tool out, with the sensor's own sample index.
-TEST(SortedCompensation, TakesSixChannels) {
+TEST(CompensationPipeline, TakesSixChannels) {
   ForceSensor believed;
   for (ModalModel& axis : believed.axis) {
     axis.modes = {{930.0, 0.03, 0.9}};
@@ -356,14 +356,14 @@ TEST(SortedCompensation, TakesSixChannels) {
   SpindleSensorCalibration slack = TABLE;
   slack.preload.fill(50.0);
   std::vector<ForceBlock> measured, compensated;
-  SortedCompensation sorted({}, {}, believed, 0.05,
-                            {[&](const ForceBlock& m, const ForceBlock& c) {
-                               measured.push_back(m);
-                               compensated.push_back(c);
-                             },
-                             {},
-                             {},
-                             {}});
+  CompensationPipeline sorted({}, {}, believed, 0.05,
+                              {[&](const ForceBlock& m, const ForceBlock& c) {
+                                 measured.push_back(m);
+                                 compensated.push_back(c);
+                               },
+                               {},
+                               {},
+                               {}});
   const double speed = units::TWO_PI * 232.5;  // the fourth harmonic meets the mode: 15 times too large
   const std::complex<double> passed = believed.axis[0].response(930.0);
   const auto push = [&](int b, double fy) {

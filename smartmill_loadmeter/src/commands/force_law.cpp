@@ -123,7 +123,7 @@ void fromBag(const Options& o) {
   NodeParameters parameters = o.parameters;
   if (o.pieces > 0) parameters.curve.pieces = o.pieces;
   parameters.validate();
-  for (const FoundCurves& found : curvesFromBag(o.campaign, parameters)) {
+  for (const IdentifiedForceCurves& found : curvesFromBag(o.campaign, parameters)) {
     if ((!o.tool.empty() && found.tool != o.tool) || (!o.material.empty() && found.material != o.material))
       continue;
     std::string cuts;

@@ -181,7 +181,7 @@ void CurveFinder::close() {
 
 void CurveFinder::fit(const std::vector<Cut>& cuts) {
   if (!found_) return;
-  FoundCurves found;
+  IdentifiedForceCurves found;
   std::vector<AngleRecord> records;
   for (const Cut& cut : cuts) {
     records.push_back(cut.record);
@@ -197,7 +197,7 @@ void CurveFinder::fit(const std::vector<Cut>& cuts) {
 }
 
 // Without force or angle nothing may be held for them.
-SortedCurves::SortedCurves(const CurveParameters& parameters, double hold_back)
+ForceCurvePipeline::ForceCurvePipeline(const CurveParameters& parameters, double hold_back)
     : finder_(parameters),
       sorter_(hold_back),
       conditions_(sorter_.addLatched(names::CUTTING_CONDITION)),
@@ -207,16 +207,16 @@ SortedCurves::SortedCurves(const CurveParameters& parameters, double hold_back)
   sorter_.onRestart([this] { finder_.reset(); });
 }
 
-void SortedCurves::push(const CuttingCondition& condition) {
+void ForceCurvePipeline::push(const CuttingCondition& condition) {
   sorter_.push(conditions_, condition.stamp, [this, condition] { finder_.handle(condition); });
 }
-void SortedCurves::push(const CncState& state) {
+void ForceCurvePipeline::push(const CncState& state) {
   sorter_.push(states_, state.stamp, [this, state] { finder_.handle(state); });
 }
-void SortedCurves::push(const SpindleAngle& angle) {
+void ForceCurvePipeline::push(const SpindleAngle& angle) {
   sorter_.push(angles_, angle.stamp, [this, angle] { finder_.handle(angle); });
 }
-void SortedCurves::push(const ForceBlock& block) {
+void ForceCurvePipeline::push(const ForceBlock& block) {
   sorter_.push(blocks_, block.stamp, [this, block] { finder_.handle(block); });
 }
 

@@ -57,7 +57,7 @@ LoadMeterNode::LoadMeterNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
   estimate_publisher_ = nh.advertise<smartmill_msgs::ForceEstimate>(names::FORCE_ESTIMATE, 10, true);
   if (parameters_.force_curve) {
     curve_publisher_ = nh.advertise<smartmill_msgs::ForceCurve>(names::FORCE_CURVE, 1, true);
-    curves_.finder().onCurves([this](const FoundCurves& found) { publish(found); });
+    curves_.finder().onCurves([this](const IdentifiedForceCurves& found) { publish(found); });
     curves_.finder().onLeftOut([](const std::string& why) { ROS_WARN("force curve: %s", why.c_str()); });
   }
   connect(shell_.inputs(), parameters_, streams_);
@@ -124,7 +124,7 @@ void LoadMeterNode::tell(const ForceEstimate& force) {
   ROS_INFO("force, test '%s': %s", force.name.c_str(), force.text().c_str());
 }
 
-void LoadMeterNode::publish(const FoundCurves& found) {
+void LoadMeterNode::publish(const IdentifiedForceCurves& found) {
   curve_publisher_.publish(toMsg(found));
   const ForceCurve& curve = found.curves.tangential;
   const double chip = 0.5 * curve.knots.back();

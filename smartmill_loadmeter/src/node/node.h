@@ -12,7 +12,7 @@
 #include "node/wiring.h"
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_loadmeter/database/database.h"
-#include "smartmill_loadmeter/identification/sorted_identification.h"
+#include "smartmill_loadmeter/identification/identification_pipeline.h"
 #include "smartmill_msgs/DiscoverActionResult.h"
 #include "smartmill_msgs/FindCoefficients.h"
 #include "smartmill_msgs/IdentifyCoefficientsAction.h"
@@ -22,7 +22,7 @@
 
 namespace smartmill::loadmeter {
 
-/// Shell around SortedIdentification: topics in, action and service at the front, coefficients out.
+/// Shell around IdentificationPipeline: topics in, action and service at the front, coefficients out.
 class LoadMeterNode {
  public:
   using Parameters = NodeParameters;
@@ -46,15 +46,15 @@ class LoadMeterNode {
   void publish(const MotorForce& force);
   void publish(const ForceEstimate& force);
   void tell(const ForceEstimate& force);
-  void publish(const FoundCurves& found);
+  void publish(const IdentifiedForceCurves& found);
   void watch();
   void tellFleet();
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status);
 
   NodeParameters parameters_;
   NodeShell shell_;
-  SortedIdentification identification_;
-  SortedCurves curves_;
+  IdentificationPipeline identification_;
+  ForceCurvePipeline curves_;
   CutStreams streams_{identification_, curves_, parameters_};
   CoefficientDatabase database_;
   std::unique_ptr<FleetPusher> pusher_;

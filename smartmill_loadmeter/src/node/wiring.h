@@ -4,14 +4,14 @@
 #include "smartmill_core/names.h"
 #include "smartmill_core/signal/feed.h"
 #include "smartmill_loadmeter/identification/curve_finder.h"
-#include "smartmill_loadmeter/identification/sorted_identification.h"
+#include "smartmill_loadmeter/identification/identification_pipeline.h"
 
 namespace smartmill::loadmeter {
 
 /// What comes in, to both that think: coefficients, and force curves where they are asked for.
 struct CutStreams {
-  SortedIdentification& identification;
-  SortedCurves& curves;
+  IdentificationPipeline& identification;
+  ForceCurvePipeline& curves;
   const NodeParameters& parameters;
 
   template <class Data>
@@ -35,7 +35,7 @@ struct CutStreams {
 };
 
 /// The streams of an identification, from a node's inputs or from a bag.
-/// @param sorted a SortedIdentification, or what stands before it
+/// @param sorted a IdentificationPipeline, or what stands before it
 template <class Source, class Sorted>
 void connect(Source& source, const NodeParameters& parameters, Sorted& sorted) {
   feed<CncState>(source, names::CNC_STATE, sorted);
@@ -56,7 +56,7 @@ void connectCurves(Source& source, const NodeParameters& parameters, CutStreams&
 
 /// The streams of force curves alone.
 template <class Source>
-void connectCurves(Source& source, SortedCurves& curves) {
+void connectCurves(Source& source, ForceCurvePipeline& curves) {
   feed<CncState>(source, names::CNC_STATE, curves);
   feed<SpindleAngle>(source, names::SPINDLE_ANGLE, curves);
   feed<CuttingCondition>(source, names::CUTTING_CONDITION, curves);

@@ -5,14 +5,14 @@
 
 #include "node/wiring.h"
 #include "smartmill_core/error.h"
-#include "smartmill_loadmeter/identification/sorted_identification.h"
+#include "smartmill_loadmeter/identification/identification_pipeline.h"
 #include "smartmill_recording/recording_reader.h"
 
 namespace smartmill::loadmeter {
 
 std::vector<IdentifyResult> identifyFromBag(const std::string& path, const MachineModel& model,
                                             const NodeParameters& parameters, const BagListeners& listeners) {
-  SortedIdentification identification(model, parameters.identification, parameters.hold_back);
+  IdentificationPipeline identification(model, parameters.identification, parameters.hold_back);
   if (parameters.motor_learn) identification.identification().learnMotors();
   if (!parameters.motor_calibration.empty())
     identification.identification().setMotors(readMotorCalibration(parameters.motor_calibration));
@@ -44,12 +44,14 @@ std::vector<IdentifyResult> identifyFromBag(const std::string& path, const Machi
   return results;
 }
 
-std::vector<FoundCurves> curvesFromBag(const std::string& path, const NodeParameters& parameters,
-                                       const std::function<void(double)>& progress) {
-  SortedCurves curves(parameters.curve, parameters.hold_back);
-  std::map<std::pair<std::string, std::string>, FoundCurves> last;
+std::vector<IdentifiedForceCurves> curvesFromBag(const std::string& path, const NodeParameters& parameters,
+                                                 const std::function<void(double)>& progress) {
+  ForceCurvePipeline curves(parameters.curve, parameters.hold_back);
+  std::map<std::pair<std::string, std::string>, IdentifiedForceCurves> last;
   std::string left_out;
-  curves.finder().onCurves([&](const FoundCurves& found) { last[{found.tool, found.material}] = found; });
+  curves.finder().onCurves([&](const IdentifiedForceCurves& found) {
+    last[{found.tool, found.material}] = found;
+  });
   curves.finder().onLeftOut([&](const std::string& why) { left_out += "; " + why; });
   RecordingReader bag(path);
   for (const char* topic : {names::FORCE_COMPENSATED, names::SPINDLE_ANGLE}) {
@@ -59,7 +61,7 @@ std::vector<FoundCurves> curvesFromBag(const std::string& path, const NodeParame
   bag.run(progress);
   curves.flush();
   if (last.empty()) throw Error(path + ": no cut makes a force curve" + left_out);
-  std::vector<FoundCurves> found;
+  std::vector<IdentifiedForceCurves> found;
   for (auto& [of, one] : last) found.push_back(std::move(one));
   return found;
 }

@@ -30,7 +30,7 @@ std::vector<IdentifyResult> identifyFromBag(const std::string& path, const Machi
 /// The force curves of a bag, the last of each tool and material, by the class that the node runs.
 /// @throws Error when it holds no force/compensated or spindle/angle, or no cut makes one (each with its
 /// reason).
-std::vector<FoundCurves> curvesFromBag(const std::string& path, const NodeParameters& parameters,
-                                       const std::function<void(double)>& progress = {});
+std::vector<IdentifiedForceCurves> curvesFromBag(const std::string& path, const NodeParameters& parameters,
+                                                 const std::function<void(double)>& progress = {});
 
 }  // namespace smartmill::loadmeter

@@ -14,8 +14,8 @@ using ::testing::HasSubstr;
 TEST(CurveFinder, TellsTheLawOfTheCutsWhateverTheirHeading) {
   for (const double heading : {0.0, 2.1}) {
     CurveFinder finder({});
-    std::vector<FoundCurves> found;
-    finder.onCurves([&](const FoundCurves& f) { found.push_back(f); });
+    std::vector<IdentifiedForceCurves> found;
+    finder.onCurves([&](const IdentifiedForceCurves& f) { found.push_back(f); });
     Shop shop([&](const auto& input) { finder.handle(input); });
     shop.heading = heading;
     for (const double feed : {5e-5, 1e-4, 2e-4}) shop.cut("feed " + std::to_string(found.size()), feed);
@@ -36,7 +36,7 @@ TEST(CurveFinder, LeavesOutChatterAndCutsThatAreTooShort) {
   CurveFinder finder({});
   int found = 0;
   std::vector<std::string> left_out;
-  finder.onCurves([&](const FoundCurves&) { ++found; });
+  finder.onCurves([&](const IdentifiedForceCurves&) { ++found; });
   finder.onLeftOut([&](const std::string& why) { left_out.push_back(why); });
   Shop shop([&](const auto& input) { finder.handle(input); });
   shop.restless = 400.0;

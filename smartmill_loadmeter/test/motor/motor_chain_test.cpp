@@ -8,7 +8,7 @@
 #include "../session.h"
 #include "smartmill_core/error.h"
 #include "smartmill_core/testing/temporary_folder.h"
-#include "smartmill_loadmeter/identification/sorted_identification.h"
+#include "smartmill_loadmeter/identification/identification_pipeline.h"
 
 namespace smartmill::loadmeter {
 namespace {
@@ -70,7 +70,7 @@ struct MotorSession {
     from.onMotorForce([this](const MotorForce& f) { forces.push_back(f); });
     from.onResult([this](const IdentifyResult& r) { results.push_back(r); });
     const auto put = [&to](const auto& input) {
-      if constexpr (std::is_same_v<Identification, SortedIdentification>) {
+      if constexpr (std::is_same_v<Identification, IdentificationPipeline>) {
         to.push(input);
       } else {
         to.handle(input);
@@ -124,7 +124,7 @@ TEST(MotorChain, throughTheSorterAgreesWithTheInputsAsTheyCame) {
   MotorSession direct, sorted;
   LoadMeterIdentification identification(model(), direct.parameters);
   direct.feed(identification, identification);
-  SortedIdentification sorter(model(), sorted.parameters, 0.05);
+  IdentificationPipeline sorter(model(), sorted.parameters, 0.05);
   sorted.feed(sorter, sorter.identification());
   sorter.flush();
   ASSERT_EQ(direct.results.size(), 1u);

@@ -131,9 +131,9 @@ TEST(Bag, aRunoutIsToldAsOnTheRunningMachine) {
 TEST(Bag, givesTheForceCurveOfTheLiveRunToTheLastDigit) {
   const TemporaryFolder folder;
   const std::string file = folder.file("run.bag");
-  SortedCurves live({}, 0.05);
-  std::optional<FoundCurves> told;
-  live.finder().onCurves([&](const FoundCurves& found) { told = found; });
+  ForceCurvePipeline live({}, 0.05);
+  std::optional<IdentifiedForceCurves> told;
+  live.finder().onCurves([&](const IdentifiedForceCurves& found) { told = found; });
   {
     rosbag::Bag bag(file, rosbag::bagmode::Write);
     const auto write = [&](const std::string& topic, const auto& message) {
@@ -156,12 +156,12 @@ TEST(Bag, givesTheForceCurveOfTheLiveRunToTheLastDigit) {
     shop.end();
   }
   live.flush();
-  const std::vector<FoundCurves> offline = curvesFromBag(file, {});
+  const std::vector<IdentifiedForceCurves> offline = curvesFromBag(file, {});
   ASSERT_TRUE(told);
   ASSERT_EQ(offline.size(), 1u);
   // By the message too.
-  const FoundCurves sent = fromMsg(toMsg(*told));
-  for (const FoundCurves* found : {&offline[0], &sent}) {
+  const IdentifiedForceCurves sent = fromMsg(toMsg(*told));
+  for (const IdentifiedForceCurves* found : {&offline[0], &sent}) {
     EXPECT_EQ(found->curves.tangential.value, told->curves.tangential.value);
     EXPECT_EQ(found->curves.radial.std_dev, told->curves.radial.std_dev);
     EXPECT_EQ(found->cuts, told->cuts);

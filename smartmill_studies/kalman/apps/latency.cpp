@@ -15,7 +15,7 @@
 #include "smartmill_core/error.h"
 #include "smartmill_core/program.h"
 #include "smartmill_core/units.h"
-#include "smartmill_kalman/compensation/sorted_compensation.h"
+#include "smartmill_kalman/compensation/compensation_pipeline.h"
 #include "smartmill_kalman_testing/reference_case.h"
 
 namespace {

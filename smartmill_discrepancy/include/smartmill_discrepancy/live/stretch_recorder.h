@@ -83,9 +83,9 @@ class StretchRecorder {
 };
 
 /// The same behind a sorter, for a node and for a bag alike.
-class SortedStretches {
+class SegmentPipeline {
  public:
-  SortedStretches(const StretchParameters& parameters, double hold_back,
+  SegmentPipeline(const StretchParameters& parameters, double hold_back,
                   std::function<void(const Stretch&)> deliver);
 
   void push(const CuttingCondition& condition);

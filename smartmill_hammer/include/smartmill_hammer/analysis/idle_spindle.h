@@ -82,10 +82,10 @@ class IdleSpindle {
 };
 
 /// An IdleSpindle behind a StreamSorter, for node and offline tool. A jump back of time keeps what was told.
-class SortedIdle {
+class IdleSpindlePipeline {
  public:
   /// @param hold_back [s] see StreamSorter
-  explicit SortedIdle(double hold_back, IdleSpindle::Told told = {});
+  explicit IdleSpindlePipeline(double hold_back, IdleSpindle::Told told = {});
 
   void push(const CuttingCondition& condition) { sort(conditions_, condition); }
   void push(const SpindleAngle& angle) { sort(angles_, angle); }

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "smartmill_core/campaign/record.h"
-#include "smartmill_core/modal/hit_judge.h"
+#include "smartmill_core/modal/hit_check.h"
 #include "smartmill_core/modal/impact_analysis.h"
 #include "smartmill_core/modal/modal_estimate.h"
 #include "smartmill_core/signal/frequency_response.h"
@@ -70,7 +70,7 @@ struct TapVerdict {
 };
 
 struct TapFrfOptions {
-  HitJudgeOptions judge;
+  HitCheckOptions judge;
   double exponential_time = 0.0;  ///< [s] window on both channels; 0: none
   FrfAverage average = FrfAverage::h1;
 };

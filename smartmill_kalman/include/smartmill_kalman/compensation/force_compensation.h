@@ -85,7 +85,7 @@ struct CompensationHealth {
 };
 
 /// Sensor blocks in, force blocks out with the same sample index. Inputs come in stamp order
-/// (SortedCompensation); the result depends only on them: the filters start anew at every cutting condition
+/// (CompensationPipeline); the result depends only on them: the filters start anew at every cutting condition
 /// and at a gap of the sample index. They follow a speed that moves slowly; their gains are those of the
 /// nearest speed of a fine grid, and change without a jump.
 class ForceCompensation {

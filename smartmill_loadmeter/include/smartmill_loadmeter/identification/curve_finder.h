@@ -13,9 +13,9 @@
 
 #include "smartmill_core/cutting/force_curve.h"
 #include "smartmill_core/parameters/parameter_table.h"
-#include "smartmill_core/signal/counted_angle.h"
 #include "smartmill_core/signal/stream_sorter.h"
 #include "smartmill_core/signal/streams.h"
+#include "smartmill_core/signal/unwrapped_angle.h"
 #include "smartmill_loadmeter/identification/force_curve.h"
 
 namespace smartmill::loadmeter {
@@ -72,7 +72,7 @@ class CurveFinder {
   explicit CurveFinder(const CurveParameters& parameters);
 
   /// After each cut that counts.
-  void onCurves(std::function<void(const FoundCurves&)> callback) { found_ = std::move(callback); }
+  void onCurves(std::function<void(const IdentifiedForceCurves&)> callback) { found_ = std::move(callback); }
   /// Why a cut did not count, or no curve came of it: one line.
   void onLeftOut(std::function<void(const std::string&)> callback) { left_out_ = std::move(callback); }
 
@@ -96,11 +96,11 @@ class CurveFinder {
   void fit(const std::vector<Cut>& cuts);
 
   CurveParameters parameters_;
-  std::function<void(const FoundCurves&)> found_;
+  std::function<void(const IdentifiedForceCurves&)> found_;
   std::function<void(const std::string&)> left_out_;
   std::optional<CuttingCondition> condition_;
   std::deque<Sample> samples_;
-  std::deque<CountedAngle> angles_;
+  std::deque<UnwrappedAngle> angles_;
   std::optional<double> steady_since_, steady_until_;  // [s]
   double last_state_ = 0.0, last_used_ = 0.0;          // [s]
   double turned_ = 0.0;                                // [rad] of what was used
@@ -109,10 +109,10 @@ class CurveFinder {
 };
 
 /// The same behind the sorter: node and tool that reads bags both feed this class.
-class SortedCurves {
+class ForceCurvePipeline {
  public:
   /// @param hold_back [s], see StreamSorter.
-  SortedCurves(const CurveParameters& parameters, double hold_back);
+  ForceCurvePipeline(const CurveParameters& parameters, double hold_back);
   CurveFinder& finder() { return finder_; }
 
   void push(const CuttingCondition& condition);

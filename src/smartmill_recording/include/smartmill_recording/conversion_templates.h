@@ -408,7 +408,7 @@ inline ForceCurve forceCurveOf(const std::vector<double>& chip, const std::vecto
 }
 
 template <class M>
-void read(const M& m, FoundCurves& found) {
+void read(const M& m, IdentifiedForceCurves& found) {
   constexpr std::uint32_t MOST_TEETH = 1000;
   found.stamp = secondsOf(m.header.stamp);
   found.tool = m.tool;
@@ -424,7 +424,7 @@ void read(const M& m, FoundCurves& found) {
 }
 
 template <class M>
-void write(const FoundCurves& found, M& m) {
+void write(const IdentifiedForceCurves& found, M& m) {
   setStamp(found.stamp, m);
   m.tool = found.tool;
   m.material = found.material;

@@ -40,8 +40,8 @@ StabilityPoint fromMsg(const plain::StabilityPoint& message);
 plain::StabilityPoint toPlain(const StabilityPoint& point);
 StabilityChart fromMsg(const plain::StabilityChart& message);
 plain::StabilityChart toPlain(const StabilityChart& chart);
-FoundCurves fromMsg(const plain::ForceCurve& message);
-plain::ForceCurve toPlain(const FoundCurves& curves);
+IdentifiedForceCurves fromMsg(const plain::ForceCurve& message);
+plain::ForceCurve toPlain(const IdentifiedForceCurves& curves);
 /// @param received [s] taken for a missing stamp; only a stamped goal replays to the last digit
 MeasureFrfGoal goalFromMsg(const plain::MeasureFrfGoal& message, double received);
 
@@ -89,7 +89,7 @@ struct PlainOf<StabilityChart> {
   using Type = plain::StabilityChart;
 };
 template <>
-struct PlainOf<FoundCurves> {
+struct PlainOf<IdentifiedForceCurves> {
   using Type = plain::ForceCurve;
 };
 

@@ -10,15 +10,15 @@ namespace smartmill {
 /// A topic that hands a late subscriber the last message of every key (a direction): a latched topic would
 /// keep one message only.
 template <class Message>
-class KeptTopic {
+class LatchedTopic {
  public:
-  KeptTopic(ros::NodeHandle& nh, const std::string& topic)
+  LatchedTopic(ros::NodeHandle& nh, const std::string& topic)
       : publisher_(nh.advertise<Message>(
             topic, 10, ros::SubscriberStatusCallback([this](const ros::SingleSubscriberPublisher& to) {
               for (const auto& entry : kept_) to.publish(entry.second);
             }))) {}
-  KeptTopic(const KeptTopic&) = delete;
-  KeptTopic& operator=(const KeptTopic&) = delete;
+  LatchedTopic(const LatchedTopic&) = delete;
+  LatchedTopic& operator=(const LatchedTopic&) = delete;
 
   void publish(const std::string& key, const Message& message) {
     kept_[key] = message;

@@ -1,4 +1,4 @@
-#include "smartmill_core/modal/hit_judge.h"
+#include "smartmill_core/modal/hit_check.h"
 
 #include <algorithm>
 #include <cmath>
@@ -76,7 +76,7 @@ TEST(HitJudge, RefusesDoubleHits) {
 }
 
 TEST(HitJudge, NamesEachFault) {
-  const auto reason = [](const std::function<void(Hit&)>& spoil, HitJudgeOptions options = {}) {
+  const auto reason = [](const std::function<void(Hit&)>& spoil, HitCheckOptions options = {}) {
     Hit hit = blow(7);
     spoil(hit);
     return hitFault(hit, options).text;

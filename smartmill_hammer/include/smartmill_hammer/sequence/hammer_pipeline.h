@@ -11,7 +11,7 @@ namespace hammer {
 
 /// A HammerSequence behind a StreamSorter: what node and offline tool both feed, so that the same streams
 /// give the same result. A jump back of time starts it afresh.
-class SortedSequence {
+class HammerPipeline {
  public:
   struct Outputs {
     std::function<void(const Command&)> command;
@@ -21,7 +21,7 @@ class SortedSequence {
   };
 
   /// @param hold_back [s], see StreamSorter. @throws Error as HammerSequence.
-  SortedSequence(const HammerParameters& parameters, const MachineModel& model, double hold_back,
+  HammerPipeline(const HammerParameters& parameters, const MachineModel& model, double hold_back,
                  Outputs outputs);
 
   void push(const SampleBlock& hammer);

@@ -23,7 +23,7 @@ namespace smartmill::kalman {
 /// Everything the kalman node thinks with, behind the sorter: takes inputs in any order of arrival,
 /// compensates, and measures the sensor when a goal asks for it; modes it has measured serve from then on.
 /// The node and the offline tool both feed this class, so that both give the same numbers.
-class SortedCompensation {
+class CompensationPipeline {
  public:
   /// Where results go; empty ones are not called.
   struct Outputs {
@@ -36,10 +36,10 @@ class SortedCompensation {
 
   /// @param sensor the believed sensor: serves the axes not measured @param hold_back [s], see StreamSorter.
   /// @throws Error.
-  SortedCompensation(const CompensationParameters& parameters, const TapParameters& taps,
-                     const ForceSensor& sensor, double hold_back, Outputs outputs);
-  SortedCompensation(const SortedCompensation&) = delete;
-  SortedCompensation& operator=(const SortedCompensation&) = delete;
+  CompensationPipeline(const CompensationParameters& parameters, const TapParameters& taps,
+                       const ForceSensor& sensor, double hold_back, Outputs outputs);
+  CompensationPipeline(const CompensationPipeline&) = delete;
+  CompensationPipeline& operator=(const CompensationPipeline&) = delete;
 
   /// Blocks of six sensors in the spindle (channels x1 .. z2) become forces from now on; samples that are no
   /// measurement come out as NaN. @param length [m] of tool and holder. @throws Error.

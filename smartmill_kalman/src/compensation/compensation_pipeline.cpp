@@ -1,4 +1,4 @@
-#include "smartmill_kalman/compensation/sorted_compensation.h"
+#include "smartmill_kalman/compensation/compensation_pipeline.h"
 
 #include <algorithm>
 #include <cmath>
@@ -25,8 +25,9 @@ int axisOf(const std::string& direction) {
 
 }  // namespace
 
-SortedCompensation::SortedCompensation(const CompensationParameters& parameters, const TapParameters& taps,
-                                       const ForceSensor& sensor, double hold_back, Outputs outputs)
+CompensationPipeline::CompensationPipeline(const CompensationParameters& parameters,
+                                           const TapParameters& taps, const ForceSensor& sensor,
+                                           double hold_back, Outputs outputs)
     : believed_(sensor),
       outputs_(std::move(outputs)),
       compensation_(parameters, sensor.measures_workpiece,
@@ -59,18 +60,18 @@ SortedCompensation::SortedCompensation(const CompensationParameters& parameters,
   });
 }
 
-void SortedCompensation::useSpindleSensor(const SpindleSensorCalibration& calibration, double length) {
+void CompensationPipeline::useSpindleSensor(const SpindleSensorCalibration& calibration, double length) {
   spindle_length_ = length;
   spindle_.emplace(calibration, length);
   calibrator_ = SpindleSensorCalibrator(taps_, calibration);
 }
 
-void SortedCompensation::useTransferMatrix(const TransferMatrix& matrix, double bandwidth) {
+void CompensationPipeline::useTransferMatrix(const TransferMatrix& matrix, double bandwidth) {
   inverse_.emplace(MatrixInverse(matrix, bandwidth), believed_.measures_workpiece,
                    [this](const ForceBlock& m, const ForceBlock& c) { forward(m, c); });
 }
 
-void SortedCompensation::useModelFile() {
+void CompensationPipeline::useModelFile() {
   identified_.fill(NEVER);
   if (matrix_) {
     compensation_.setMatrix(*matrix_);
@@ -85,7 +86,7 @@ void SortedCompensation::useModelFile() {
   }
 }
 
-void SortedCompensation::push(SampleBlock block) {
+void CompensationPipeline::push(SampleBlock block) {
   const double stamp = block.stamp;
   sorter_.push(blocks_, stamp, [this, block = std::move(block)] {
     if (SpindleForceSensor::isSixChannels(block)) {
@@ -108,7 +109,7 @@ void SortedCompensation::push(SampleBlock block) {
   });
 }
 
-SampleBlock SortedCompensation::toForces(const SampleBlock& block) {
+SampleBlock CompensationPipeline::toForces(const SampleBlock& block) {
   if (!spindle_) throw Error("six channels of a spindle's force sensor, but no calibration (spindle_sensor)");
   for (std::size_t axis = 0; axis < 3; ++axis) spindle_->setSensor(axis, compensation_.sensor(axis));
   SampleBlock forces = spindle_->handle(block);
@@ -126,7 +127,7 @@ SampleBlock SortedCompensation::toForces(const SampleBlock& block) {
 }
 
 // The filters bridge what was not measured; where the sensor could not measure nothing is claimed.
-void SortedCompensation::forward(const ForceBlock& measured, const ForceBlock& compensated) {
+void CompensationPipeline::forward(const ForceBlock& measured, const ForceBlock& compensated) {
   if (!outputs_.force) return;
   if (!spindle_) {
     outputs_.force(measured, compensated);
@@ -145,7 +146,7 @@ void SortedCompensation::forward(const ForceBlock& measured, const ForceBlock& c
   outputs_.force(shown, marked);
 }
 
-void SortedCompensation::pushHammer(SampleBlock block) {
+void CompensationPipeline::pushHammer(SampleBlock block) {
   const double stamp = block.stamp;
   sorter_.push(hammers_, stamp, [this, block = std::move(block)] {
     calibrator_.handleHammer(block);
@@ -155,14 +156,14 @@ void SortedCompensation::pushHammer(SampleBlock block) {
   });
 }
 
-void SortedCompensation::push(const SpindleAngle& angle) {
+void CompensationPipeline::push(const SpindleAngle& angle) {
   sorter_.push(angles_, angle.stamp, [this, angle] {
     if (spindle_) spindle_->handle(angle);
     compensation_.handle(angle);
   });
 }
 
-void SortedCompensation::push(const CuttingCondition& condition) {
+void CompensationPipeline::push(const CuttingCondition& condition) {
   sorter_.push(conditions_, condition.stamp, [this, condition] {
     condition_ = condition;
     if (spindle_) spindle_->handle(condition);
@@ -170,7 +171,7 @@ void SortedCompensation::push(const CuttingCondition& condition) {
   });
 }
 
-void SortedCompensation::push(const MeasureFrfGoal& goal, std::function<bool(bool)> begin) {
+void CompensationPipeline::push(const MeasureFrfGoal& goal, std::function<bool(bool)> begin) {
   sorter_.push(goals_, goal.stamp, [this, goal, begin = std::move(begin)] {
     const bool free = !measurement_.active();
     const bool wanted = !begin || begin(free);  // before the goal's own results
@@ -186,7 +187,7 @@ void SortedCompensation::push(const MeasureFrfGoal& goal, std::function<bool(boo
   });
 }
 
-void SortedCompensation::push(const CalibrationGoal& goal, std::function<bool(bool)> begin) {
+void CompensationPipeline::push(const CalibrationGoal& goal, std::function<bool(bool)> begin) {
   sorter_.push(goals_, goal.stamp, [this, goal, begin = std::move(begin)] {
     const bool free = !calibrator_.active();
     const bool wanted = !begin || begin(free);
@@ -202,18 +203,18 @@ void SortedCompensation::push(const CalibrationGoal& goal, std::function<bool(bo
   });
 }
 
-void SortedCompensation::cancelCalibration() {
+void CompensationPipeline::cancelCalibration() {
   sorter_.pushNow(goals_, [this] {
     calibrator_.cancel();
     drainCalibration();
   });
 }
 
-void SortedCompensation::drainCalibration() {
+void CompensationPipeline::drainCalibration() {
   if (auto result = calibrator_.takeResult()) serve(std::move(*result));
 }
 
-void SortedCompensation::serve(CalibrationResult result) {
+void CompensationPipeline::serve(CalibrationResult result) {
   if (result.matrix) {
     try {
       useTransferMatrix(*result.matrix, bandwidth_);
@@ -233,14 +234,14 @@ void SortedCompensation::serve(CalibrationResult result) {
   if (outputs_.calibration) outputs_.calibration(result);
 }
 
-void SortedCompensation::event(std::function<void(SensorMeasurement&)> what) {
+void CompensationPipeline::event(std::function<void(SensorMeasurement&)> what) {
   sorter_.pushNow(goals_, [this, what = std::move(what)] {
     what(measurement_);
     drain();
   });
 }
 
-void SortedCompensation::push(const MeasuredModes& modes) {
+void CompensationPipeline::push(const MeasuredModes& modes) {
   const int found = axisOf(modes.direction);
   if (modes.point != POINT_FORCE_SENSOR || found < 0) return;
   sorter_.push(goals_, modes.stamp, [this, modes, axis = static_cast<std::size_t>(found)] {
@@ -250,7 +251,7 @@ void SortedCompensation::push(const MeasuredModes& modes) {
   });
 }
 
-double SortedCompensation::modesAge() const {
+double CompensationPipeline::modesAge() const {
   double age = 0.0;
   for (const double stamp : identified_) {
     if (std::isfinite(stamp)) age = std::max(age, sorter_.newest() - stamp);
@@ -258,7 +259,7 @@ double SortedCompensation::modesAge() const {
   return age;
 }
 
-void SortedCompensation::hammerLost(const std::string& text) {
+void CompensationPipeline::hammerLost(const std::string& text) {
   if (measurement_.active()) {
     measurement_.lost(text);
     drain();
@@ -266,7 +267,7 @@ void SortedCompensation::hammerLost(const std::string& text) {
   sorter_.setRegular(hammers_, false);
 }
 
-void SortedCompensation::drain() {
+void CompensationPipeline::drain() {
   if (const auto command = measurement_.takeCommand(); command && outputs_.strike) outputs_.strike(*command);
   if (const auto feedback = measurement_.takeFeedback(); feedback && outputs_.feedback)
     outputs_.feedback(*feedback);

@@ -1,4 +1,4 @@
-#include "smartmill_core/modal/hit_judge.h"
+#include "smartmill_core/modal/hit_check.h"
 
 #include <algorithm>
 #include <cmath>
@@ -427,7 +427,7 @@ Beside besideOthers(const std::vector<Lines>& lines, const std::vector<std::size
 
 }  // namespace
 
-HitFault hitFault(const Hit& hit, const HitJudgeOptions& options) {
+HitFault hitFault(const Hit& hit, const HitCheckOptions& options) {
   if (hit.force.empty() || hit.force.size() != hit.response.size())
     return {"the record is empty or its channels differ in length", true};
   if (hit.force.size() < LEAST_SAMPLES)
@@ -487,7 +487,7 @@ std::vector<HitFault> faultsBeside(const std::vector<Hit>& hits, const std::vect
   return faults;
 }
 
-std::vector<HitFault> judgeHits(const std::vector<Hit>& hits, const HitJudgeOptions& options) {
+std::vector<HitFault> judgeHits(const std::vector<Hit>& hits, const HitCheckOptions& options) {
   std::vector<HitFault> faults;
   std::vector<bool> usable;
   for (const Hit& hit : hits) {

@@ -12,11 +12,11 @@ namespace smartmill::loadmeter {
 
 /// LoadMeterIdentification behind the sorter: takes inputs in any order of arrival. The node and the tool
 /// that reads bags both feed this class.
-class SortedIdentification {
+class IdentificationPipeline {
  public:
   /// @param hold_back [s], see StreamSorter. @throws Error as LoadMeterIdentification.
-  SortedIdentification(const MachineModel& model, const IdentificationParameters& parameters,
-                       double hold_back);
+  IdentificationPipeline(const MachineModel& model, const IdentificationParameters& parameters,
+                         double hold_back);
 
   /// Coefficients, or why there are none; callbacks run inside push() and flush().
   LoadMeterIdentification& identification() { return identification_; }

@@ -1,4 +1,4 @@
-#include "smartmill_loadmeter/identification/sorted_identification.h"
+#include "smartmill_loadmeter/identification/identification_pipeline.h"
 
 #include <algorithm>
 
@@ -6,8 +6,8 @@
 
 namespace smartmill::loadmeter {
 
-SortedIdentification::SortedIdentification(const MachineModel& model,
-                                           const IdentificationParameters& parameters, double hold_back)
+IdentificationPipeline::IdentificationPipeline(const MachineModel& model,
+                                               const IdentificationParameters& parameters, double hold_back)
     : identification_(model, parameters), sorter_(hold_back) {
   states_ = sorter_.addRegular(names::CNC_STATE);
   loads_ = sorter_.addRegular(names::CNC_LOAD);
@@ -22,27 +22,27 @@ SortedIdentification::SortedIdentification(const MachineModel& model,
 }
 
 template <typename Input>
-void SortedIdentification::sort(StreamSorter::Stream stream, const Input& input) {
+void IdentificationPipeline::sort(StreamSorter::Stream stream, const Input& input) {
   sorter_.push(stream, input.stamp, [this, input] { identification_.handle(input); });
   newest_ = std::max(newest_, input.stamp);
 }
 
-void SortedIdentification::push(const CncState& state) {
+void IdentificationPipeline::push(const CncState& state) {
   sort(states_, state);
 }
-void SortedIdentification::push(const LoadSample& sample) {
+void IdentificationPipeline::push(const LoadSample& sample) {
   sort(loads_, sample);
 }
-void SortedIdentification::push(const SampleBlock& block) {
+void IdentificationPipeline::push(const SampleBlock& block) {
   sort(motors_, block);
 }
-void SortedIdentification::push(const ForceBlock& block) {
+void IdentificationPipeline::push(const ForceBlock& block) {
   sort(forces_, block);
 }
-void SortedIdentification::push(const CuttingCondition& condition) {
+void IdentificationPipeline::push(const CuttingCondition& condition) {
   sort(conditions_, condition);
 }
-void SortedIdentification::push(const IdentifyGoal& goal) {
+void IdentificationPipeline::push(const IdentifyGoal& goal) {
   sort(goals_, goal);
 }
 

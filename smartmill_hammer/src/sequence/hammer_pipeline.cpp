@@ -1,4 +1,4 @@
-#include "smartmill_hammer/sequence/sorted_sequence.h"
+#include "smartmill_hammer/sequence/hammer_pipeline.h"
 
 #include <utility>
 
@@ -7,7 +7,7 @@
 namespace smartmill {
 namespace hammer {
 
-SortedSequence::SortedSequence(const HammerParameters& parameters, const MachineModel& model,
+HammerPipeline::HammerPipeline(const HammerParameters& parameters, const MachineModel& model,
                                double hold_back, Outputs outputs)
     : sequence_(parameters, model),
       outputs_(std::move(outputs)),
@@ -23,24 +23,24 @@ SortedSequence::SortedSequence(const HammerParameters& parameters, const Machine
 }
 
 template <class Input>
-void SortedSequence::sort(StreamSorter::Stream stream, const Input& input) {
+void HammerPipeline::sort(StreamSorter::Stream stream, const Input& input) {
   sorter_.push(stream, input.stamp, [this, input] {
     sequence_.handle(input);
     drain();
   });
 }
 
-void SortedSequence::push(const SampleBlock& hammer) {
+void HammerPipeline::push(const SampleBlock& hammer) {
   sort(blocks_, hammer);
 }
-void SortedSequence::push(const CncState& state) {
+void HammerPipeline::push(const CncState& state) {
   sort(states_, state);
 }
-void SortedSequence::push(const SpindleAngle& angle) {
+void HammerPipeline::push(const SpindleAngle& angle) {
   sort(angles_, angle);
 }
 
-void SortedSequence::push(const MeasureFrfGoal& goal, std::function<bool(bool)> begin) {
+void HammerPipeline::push(const MeasureFrfGoal& goal, std::function<bool(bool)> begin) {
   sorter_.push(events_, goal.stamp, [this, goal, begin = std::move(begin)] {
     if (begin && !begin(!sequence_.active())) return;
     sequence_.handle(goal);
@@ -48,27 +48,27 @@ void SortedSequence::push(const MeasureFrfGoal& goal, std::function<bool(bool)> 
   });
 }
 
-void SortedSequence::cancel(std::function<bool()> due) {
+void HammerPipeline::cancel(std::function<bool()> due) {
   sorter_.pushNow(events_, [this, due = std::move(due)] {
     if (due()) sequence_.cancel(sorter_.newest());
     drain();
   });
 }
 
-void SortedSequence::commandFailed(const std::string& text) {
+void HammerPipeline::commandFailed(const std::string& text) {
   sorter_.pushNow(events_, [this, text] {
     sequence_.commandFailed(sorter_.newest(), text);
     drain();
   });
 }
 
-void SortedSequence::lost(const std::string& text) {
+void HammerPipeline::lost(const std::string& text) {
   if (!sequence_.active()) return;
   sequence_.lost(sorter_.newest(), text);
   drain();
 }
 
-void SortedSequence::drain() {
+void HammerPipeline::drain() {
   for (const Command& command : sequence_.takeCommands()) {
     if (outputs_.command) outputs_.command(command);
   }

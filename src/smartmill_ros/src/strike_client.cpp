@@ -1,4 +1,4 @@
-#include "smartmill_ros/strike_caller.h"
+#include "smartmill_ros/strike_client.h"
 
 #include <utility>
 
@@ -8,15 +8,15 @@
 
 namespace smartmill {
 
-StrikeCaller::StrikeCaller(ros::NodeHandle& nh, std::string point)
+StrikeClient::StrikeClient(ros::NodeHandle& nh, std::string point)
     : point_(std::move(point)), client_(nh.serviceClient<smartmill_msgs::Strike>(names::STRIKE)) {
 }
 
-StrikeCaller::~StrikeCaller() {
+StrikeClient::~StrikeClient() {
   if (thread_.joinable()) thread_.join();
 }
 
-void StrikeCaller::strike(const std::string& direction) {
+void StrikeClient::strike(const std::string& direction) {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (calling_) {
@@ -30,7 +30,7 @@ void StrikeCaller::strike(const std::string& direction) {
   thread_ = std::thread([this, direction] { call(direction); });
 }
 
-void StrikeCaller::call(const std::string& direction) {
+void StrikeClient::call(const std::string& direction) {
   using Response = smartmill_msgs::Strike::Response;
   smartmill_msgs::Strike strike;
   strike.request.point = point_;
@@ -48,7 +48,7 @@ void StrikeCaller::call(const std::string& direction) {
   }
 }
 
-std::optional<StrikeCaller::Answer> StrikeCaller::takeFault() {
+std::optional<StrikeClient::Answer> StrikeClient::takeFault() {
   const std::lock_guard<std::mutex> lock(mutex_);
   return std::exchange(fault_, std::nullopt);
 }

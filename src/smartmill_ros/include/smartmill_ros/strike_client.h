@@ -11,7 +11,7 @@ namespace smartmill {
 
 /// Asks daq/strike for blows in a thread of its own: a service call blocks, and the streams must go on
 /// meanwhile.
-class StrikeCaller {
+class StrikeClient {
  public:
   struct Answer {
     enum class Kind { failed, no_hammer, nobody };
@@ -20,10 +20,10 @@ class StrikeCaller {
   };
 
   /// @param point where the hammer strikes: tool or force_sensor
-  StrikeCaller(ros::NodeHandle& nh, std::string point);
-  ~StrikeCaller();
-  StrikeCaller(const StrikeCaller&) = delete;
-  StrikeCaller& operator=(const StrikeCaller&) = delete;
+  StrikeClient(ros::NodeHandle& nh, std::string point);
+  ~StrikeClient();
+  StrikeClient(const StrikeClient&) = delete;
+  StrikeClient& operator=(const StrikeClient&) = delete;
 
   void strike(const std::string& direction);
 
