@@ -1,13 +1,11 @@
 #include "smartmill_loadmeter/motor/motor_current.h"
 
-#include <gsl/gsl_wavelet.h>
-
 #include <algorithm>
 #include <cmath>
-#include <memory>
 #include <set>
 
 #include <Eigen/Dense>
+#include <boost/math/filters/daubechies.hpp>
 
 #include "smartmill_core/error.h"
 #include "smartmill_core/signal/statistics.h"
@@ -18,9 +16,31 @@ namespace smartmill::loadmeter {
 
 namespace {
 
-constexpr std::size_t DB5 = 10;  // taps: GSL's name of Daubechies with 5 vanishing moments
 constexpr int COARSEST = 10;
 constexpr double BAND_MARGIN = 6.0;  // smallest ratio of a band's upper end to the frequency of the sine
+
+/// Approximation at half the sample rate: one step of the periodic wavelet transform (Daubechies, five
+/// vanishing moments) without its detail. @param fine a power of two of samples
+std::vector<double> coarser(const std::vector<double>& fine) {
+  static const auto scaling = boost::math::filters::daubechies_scaling_filter<double, 5>();
+  std::vector<double> coarse(fine.size() / 2, 0.0);
+  for (std::size_t i = 0; i < coarse.size(); ++i) {
+    for (std::size_t k = 0; k < scaling.size(); ++k)
+      coarse[i] += scaling[k] * fine[(2 * i + k) & (fine.size() - 1)];
+  }
+  return coarse;
+}
+
+/// The inverse of coarser(), with no detail added.
+std::vector<double> finer(const std::vector<double>& coarse) {
+  static const auto scaling = boost::math::filters::daubechies_scaling_filter<double, 5>();
+  std::vector<double> fine(2 * coarse.size(), 0.0);
+  for (std::size_t i = 0; i < coarse.size(); ++i) {
+    for (std::size_t k = 0; k < scaling.size(); ++k)
+      fine[(2 * i + k) & (fine.size() - 1)] += scaling[k] * coarse[i];
+  }
+  return fine;
+}
 
 }  // namespace
 
@@ -40,14 +60,8 @@ std::vector<double> denoise(const std::vector<double>& signal, int level) {
     const std::size_t at = (i + period * (size / period + 1) - before) % period;
     data[i] = signal[at < n ? at : period - 1 - at];
   }
-  const std::unique_ptr<gsl_wavelet, void (*)(gsl_wavelet*)> wavelet(
-      gsl_wavelet_alloc(gsl_wavelet_daubechies, DB5), gsl_wavelet_free);
-  const std::unique_ptr<gsl_wavelet_workspace, void (*)(gsl_wavelet_workspace*)> space(
-      gsl_wavelet_workspace_alloc(size), gsl_wavelet_workspace_free);
-  gsl_wavelet_transform_forward(wavelet.get(), data.data(), 1, size, space.get());
-  // Coefficients are ordered from coarse to fine; the finest band fills the upper half.
-  std::fill(data.begin() + static_cast<std::ptrdiff_t>(size >> level), data.end(), 0.0);
-  gsl_wavelet_transform_inverse(wavelet.get(), data.data(), 1, size, space.get());
+  for (int step = 0; step < level; ++step) data = coarser(data);
+  for (int step = 0; step < level; ++step) data = finer(data);
   return {data.begin() + static_cast<std::ptrdiff_t>(before),
           data.begin() + static_cast<std::ptrdiff_t>(before + n)};
 }

@@ -12,8 +12,8 @@ namespace smartmill::loadmeter {
 
 /// Motor currents to forces: Cheng & Venuvinod, sections 7..9.
 
-/// Approximation of a signal by Daubechies-5 wavelets without the `level` finest bands of detail (GSL,
-/// dyadic; the signal is mirrored at its ends to a power of two). Level L retains frequencies below rate /
+/// Approximation of a signal by Daubechies-5 wavelets without the `level` finest bands of detail
+/// (dyadic; the signal is mirrored at its ends to a power of two). Level L retains frequencies below rate /
 /// 2^(L+1).
 /// @throws Error with fewer than 2^level samples.
 std::vector<double> denoise(const std::vector<double>& signal, int level);
