@@ -14,13 +14,21 @@ import smartmill
 campaign = sys.argv[1]
 measured = smartmill.read_campaign(campaign)
 force = smartmill.compensate(campaign, identify=True)
-found = smartmill.coefficients(campaign)
+found = smartmill.coefficients(campaign, means="revolutions")
 for axis, modes in force.sensor.items():
     print(f"sensor {axis}: " + ", ".join(f"{mode.frequency} Hz" for mode in modes))
 print(found)
 
-name, compensated = max(force.records.items(), key=lambda item: item[1].spindle_speed)  # where it distorts most
-record = measured[name]
+
+
+def distortion(name):
+    """RMS of what the sensor's vibration adds in the second half of a record [N]."""
+    half = len(measured[name].time) // 2
+    return math.hypot(*(np.std((measured[name][axis] - force[name][axis])[half:]) for axis in ("fx", "fy")))
+
+
+name = max(force.records, key=distortion)
+record, compensated = measured[name], force[name]
 fig, (over_angle, values) = plt.subplots(1, 2, figsize=(11, 4.5), width_ratios=(2, 1), constrained_layout=True)
 turn = 2.0 * math.pi / record.spindle_speed  # [s]
 shown = record.time > record.time[-1] - 2.0 * turn
@@ -29,11 +37,13 @@ for channel, color in (("fx", "tab:blue"), ("fy", "tab:red")):
     over_angle.plot(angle, record[channel][shown], color=color, lw=1, alpha=0.4, label=f"{channel} measured")
     over_angle.plot(angle, compensated[channel][shown], color=color, lw=2, label=f"{channel} on the tool")
 over_angle.set(xlabel="Spindle angle [deg]", ylabel="Force [N]", xlim=(0, 720),
-               title=f"{name}: {record.speed_rpm:.0f} rpm, sensor modes taken out")
+               xticks=range(0, 721, 120), title=f"{name}: {record.speed_rpm:.0f} rpm, sensor vibration compensated")
 over_angle.margins(y=0.2)
 over_angle.legend(ncol=4, loc="upper center", fontsize=9)
-chip = {key: getattr(found.coefficients, key) for key in ("ktc", "krc", "kac")}
-values.bar(list(map(str.capitalize, chip)), [v / 1e6 for v in chip.values()], yerr=[2 * v.std / 1e6 for v in chip.values()],
-           color="tab:gray", capsize=8)
-values.set(ylabel="Coefficient [N/mm2], 2 standard deviations", title=f"From {found.tests} cuts")
+for place, key in enumerate(("ktc", "krc", "kac")):
+    value = smartmill.Estimate(getattr(found.coefficients, key) / 1e6, getattr(found.coefficients, key).std / 1e6)
+    values.bar(key.capitalize(), value, yerr=2.0 * value.std, color="tab:gray", capsize=8)
+    values.annotate(str(value), (place, value), (0, 6), textcoords="offset points", ha="center", fontsize=9)
+values.margins(y=0.1)
+values.set(ylabel="Coefficient [N/mm2]", title=f"From {found.tests} cuts")
 fig.savefig("dynamometer.png", dpi=120)

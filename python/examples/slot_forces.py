@@ -19,19 +19,20 @@ expected = {"fx": -n * b * (c * k.krc / 4 + k.kre / math.pi), "fy": n * b * (c *
 turn = round(2.0 * math.pi / cut.spindle_speed * record.rate)  # samples
 
 fig, (over_angle, spectrum) = plt.subplots(1, 2, figsize=(11, 4.2), constrained_layout=True)
-for channel, color in zip(expected, ("tab:blue", "tab:red", "tab:green")):
+for place, (channel, color) in enumerate(zip(expected, ("tab:blue", "tab:red", "tab:green"))):
     force = record[channel]
-    mean = force.mean()  # 30 whole revolutions
-    print(f"{channel}: mean {mean:8.3f} N, closed form {expected[channel]:8.3f} N")
+    print(f"{channel}: mean {force.mean():8.3f} N, closed form {expected[channel]:8.3f} N")  # 30 whole revolutions
     over_angle.plot(360.0 * np.arange(2 * turn) / turn, force[:2 * turn], color=color, label=channel)
     over_angle.axhline(expected[channel], color=color, ls=":", lw=1)
-    lines = 2.0 * np.abs(np.fft.rfft(force)) / len(force)
+    amplitude = 2.0 * np.abs(np.fft.rfft(force)) / len(force)
     frequency = np.fft.rfftfreq(len(force), 1.0 / record.rate)
-    shown = (frequency > 1.0) & (frequency < 2500.0) & (lines > 0.05)
-    spectrum.vlines(frequency[shown], 0.05, lines[shown], color=color, lw=3)
+    shown = (frequency > 1.0) & (frequency < 2500.0) & (amplitude > 0.05)
+    spectrum.bar(frequency[shown] + 40.0 * (place - 1), amplitude[shown], width=40.0, color=color)  # next to each other
 over_angle.set(xlabel="Spindle angle [deg]", ylabel="Force on the tool [N] (dotted: mean, closed form)",
-               xlim=(0, 720), ylim=(-170, 250), title=f"Slot, {record.speed_rpm:.0f} rpm, {1e3 * b:g} mm deep, {1e3 * c:g} mm per tooth")
+               xlim=(0, 720), ylim=(-170, 250), xticks=range(0, 721, 120),
+               title=f"Slot, {record.speed_rpm:.0f} rpm, {1e3 * b:g} mm deep, {1e3 * c:g} mm per tooth")
 over_angle.legend(loc="upper center", ncol=3)
-spectrum.set(xlabel="Frequency [Hz]", ylabel="Amplitude [N]", yscale="log",
-             title=f"Lines of the tooth passing, {n * record.speed_rpm / 60:.0f} Hz apart")
+spectrum.set(xlabel="Frequency [Hz]", ylabel="Amplitude [N]", yscale="log", ylim=(0.05, 100.0),
+             title=f"Harmonics of the tooth passing frequency, {n * record.speed_rpm / 60:.0f} Hz")
+spectrum.yaxis.set_major_formatter("{x:g}")
 fig.savefig("slot_forces.png", dpi=120)

@@ -1,4 +1,7 @@
-"""From hammer hits to modes: tap_test.py [FILE...], without files of five simulated hits. Writes tap_test.png."""
+"""From hammer hits to modes. Writes tap_test.png.
+
+usage: tap_test.py [FILE...]    files of hits of one point; without files five simulated hits
+"""
 import sys
 
 import matplotlib
@@ -27,11 +30,14 @@ for mode in frf.modes:
 shown = (frf.frequency > 100.0) & (frf.frequency < 3000.0)
 f, h, s = frf.frequency[shown], np.abs(frf.value[shown]), frf.std[shown]
 fig, (size, quality) = plt.subplots(2, 1, figsize=(9, 6), sharex=True, height_ratios=(3, 1), constrained_layout=True)
-size.fill_between(f, np.maximum(h - 2 * s, 1e-12), h + 2 * s, color="tab:blue", alpha=0.3, label="2 standard deviations")
+size.fill_between(f, np.maximum(h - 2 * s, 1e-12), h + 2 * s, color="tab:blue", alpha=0.3,
+                  label="2 standard deviations")
 size.plot(f, h, color="tab:blue", lw=1, label=f"measured, {sum(hit.accepted for hit in frf.hits)} hits")
 size.plot(f, np.abs(frf.fitted[shown]), color="black", lw=1, ls="--", label="fitted")
 for mode in frf.modes:
     size.axvline(mode.frequency, color="tab:red", lw=0.8)
+    size.annotate(f" {mode.frequency:.0f} Hz", (mode.frequency, 0.02), xycoords=("data", "axes fraction"),
+                  color="tab:red")
 size.set(ylabel=f"Receptance [{frf.unit}]", yscale="log", title=f"Hammer test: {len(frf.modes)} modes")
 size.legend()
 quality.plot(f, frf.coherence[shown], color="tab:green")

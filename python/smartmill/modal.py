@@ -77,8 +77,8 @@ def modes(frequency: npt.ArrayLike, value: npt.ArrayLike, std: Optional[npt.Arra
         raise UsageError("frequency: expected increasing numbers")
     values = np.asarray(value)
     if values.dtype.kind not in "cfiu" or values.shape != lines.shape:
-        raise UsageError(f"value: expected a complex array of shape {lines.shape} as frequency, got dtype {values.dtype}, "
-                         f"shape {values.shape}")
+        raise UsageError(f"value: expected a complex array of shape {lines.shape} as frequency, "
+                         f"got dtype {values.dtype}, shape {values.shape}")
     values = np.asarray(values, dtype=np.complex128, order="C")
     check.check_finite("value", values)
     deviation = None if std is None else check.series("std", std, size=len(lines))

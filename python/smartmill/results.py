@@ -68,26 +68,28 @@ class Estimate(float):
         return (type(self), (float(self), self.std))
 
 
-def _estimates(result: object, *names: str) -> None:
-    """Plain numbers given by the user become estimates without a standard deviation."""
-    for name in names:
-        value = getattr(result, name)
-        if not isinstance(value, Estimate):
-            object.__setattr__(result, name, Estimate(value))
+def _set(result: object, *, estimates: Mapping[str, float], **values: float) -> None:
+    """Set the fields of a frozen dataclass; plain numbers become estimates without a standard deviation."""
+    for name, value in estimates.items():
+        object.__setattr__(result, name, value if isinstance(value, Estimate) else Estimate(value))
+    for name, value in values.items():
+        object.__setattr__(result, name, value)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, init=False)
 class Mode:
     """One vibration mode: gain w^2 / (w^2 - W^2 + 2 i zeta w W)."""
 
     frequency: Estimate  #: [Hz] natural frequency
     damping_ratio: Estimate  #: [1]
     gain: Estimate  #: static share: of a receptance [m/N], of a force sensor [1]
-    phase: float = 0.0  #: [rad] of the gain; 0: proportional damping
-    evidence: float = math.nan  #: [1] Wald's statistic over what chance gives; proven from 2.5 on; NaN: unknown
+    phase: float  #: [rad] of the gain; 0: proportional damping
+    evidence: float  #: [1] Wald's statistic over what chance gives; proven from 2.5 on; NaN: unknown
 
-    def __post_init__(self) -> None:
-        _estimates(self, "frequency", "damping_ratio", "gain")
+    def __init__(self, frequency: float, damping_ratio: float, gain: float, phase: float = 0.0,
+                 evidence: float = math.nan) -> None:
+        _set(self, estimates=dict(frequency=frequency, damping_ratio=damping_ratio, gain=gain), phase=phase,
+             evidence=evidence)
 
     @property
     def stiffness(self) -> Estimate:
@@ -127,19 +129,20 @@ class Cut:
         return cls(speed_rpm * RPM, 1e-3 * feed_mm, 1e-3 * depth_mm, math.radians(entry_deg), math.radians(exit_deg))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, init=False)
 class Coefficients:
     """Cutting coefficients of the linear edge-force model, per tooth, acting on the tool."""
 
     ktc: Estimate  #: [N/m2] tangential
     krc: Estimate  #: [N/m2] radial
-    kac: Estimate = Estimate(0.0)  #: [N/m2] axial
-    kte: Estimate = Estimate(0.0)  #: [N/m] tangential edge
-    kre: Estimate = Estimate(0.0)  #: [N/m] radial edge
-    kae: Estimate = Estimate(0.0)  #: [N/m] axial edge
+    kac: Estimate  #: [N/m2] axial
+    kte: Estimate  #: [N/m] tangential edge
+    kre: Estimate  #: [N/m] radial edge
+    kae: Estimate  #: [N/m] axial edge
 
-    def __post_init__(self) -> None:
-        _estimates(self, "ktc", "krc", "kac", "kte", "kre", "kae")
+    def __init__(self, ktc: float, krc: float, kac: float = 0.0, kte: float = 0.0, kre: float = 0.0,
+                 kae: float = 0.0) -> None:
+        _set(self, estimates=dict(ktc=ktc, krc=krc, kac=kac, kte=kte, kre=kre, kae=kae))
 
     def __str__(self) -> str:
         """Values in N/mm2 and N/mm."""

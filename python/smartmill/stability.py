@@ -29,9 +29,9 @@ def lobes(model: Union[Path, Model], speeds_rpm: npt.ArrayLike, *, max_depth: fl
     """
     speeds = check.rising("speeds_rpm", speeds_rpm)
     check.progress_function(progress)
-    return _smartmill.lobes(check.model(model), check.number("entry_deg", entry_deg), check.number("exit_deg", exit_deg),
-                            speeds * RPM, check.positive("max_depth", max_depth, "m"),
-                            check.choice("method", method, METHODS), bool(errors), progress)
+    return _smartmill.lobes(
+        check.model(model), check.number("entry_deg", entry_deg), check.number("exit_deg", exit_deg), speeds * RPM,
+        check.positive("max_depth", max_depth, "m"), check.choice("method", method, METHODS), bool(errors), progress)
 
 
 def chatter_risk(model: Union[Path, Model], speeds_rpm: npt.ArrayLike, depths: npt.ArrayLike, *,
@@ -39,9 +39,10 @@ def chatter_risk(model: Union[Path, Model], speeds_rpm: npt.ArrayLike, depths: n
                  speed_margin: float = 0.02, progress: Optional[Progress] = None) -> ChatterRisk:
     """Probability of chatter over speed and depth, and cuts that stay below a risk.
 
-    Machines are drawn from the standard deviations of modes and coefficients, or where the model has none from its
-    uncertainty_percent. speeds_rpm: increasing [rpm]. depths: increasing [m]. risk [1]: probability of chatter that a robust
-    point may have, for all speeds within speed_margin [1] of it. progress: called after each draw.
+    Machines are drawn from the standard deviations of modes and coefficients, or from the model's uncertainty_percent
+    where it has none. speeds_rpm: increasing [rpm]. depths: increasing [m]. draws: machines. seed: of the draws.
+    risk [1]: probability of chatter that a robust point may have at all of speeds_rpm within speed_margin [1] of it:
+    give speeds closer together than the margin. progress: called after each draw.
     Raises Error naming what the model lacks.
     """
     speeds, depth = check.rising("speeds_rpm", speeds_rpm), check.rising("depths", depths)

@@ -11,8 +11,15 @@ namespace {
 
 constexpr double NOT_KNOWN = std::numeric_limits<double>::quiet_NaN();
 
+/// @throws TypeError of Python for what is no number
+double number(const py::handle& value) {
+  const double result = PyFloat_AsDouble(value.ptr());
+  if (PyErr_Occurred() != nullptr) throw py::error_already_set();
+  return result;
+}
+
 double number(const py::object& object, const char* name) {
-  return object.attr(name).cast<double>();
+  return number(object.attr(name));
 }
 
 /// ktc of Ktc_n_per_mm2
@@ -24,7 +31,7 @@ std::string nameOf(const CuttingKey& k) {
 }
 
 double stdOf(const py::object& object, const char* name) {
-  return object.attr(name).attr("std").cast<double>();
+  return number(object.attr(name).attr("std"));
 }
 
 std::vector<Mode> modesOf(const py::object& modes) {
@@ -118,10 +125,11 @@ ModalModel sensorOf(const py::object& modes) {
 
 ToolGeometry toolOf(const py::object& tool) {
   ToolGeometry geometry;
-  geometry.teeth = tool.attr("teeth").cast<int>();
+  geometry.teeth = static_cast<int>(PyLong_AsLong(tool.attr("teeth").ptr()));
+  if (PyErr_Occurred() != nullptr) throw py::error_already_set();
   geometry.diameter = number(tool, "diameter");
   geometry.helix = number(tool, "helix");
-  geometry.pitch = tool.attr("pitch").cast<std::vector<double>>();
+  for (const py::handle& pitch : tool.attr("pitch")) geometry.pitch.push_back(number(pitch));
   validate(geometry);
   return geometry;
 }

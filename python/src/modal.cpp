@@ -22,7 +22,7 @@ namespace {
 using namespace smartmill::hammer;
 
 struct FitOptions {
-  std::string file;               // first input, for messages; empty: arrays
+  std::string file;              // first input, for messages; empty: arrays
   double low = 0.0, high = 0.0;  // [Hz]
   int max_modes = 0;             // 0: no fit
   bool real_modes = false;

@@ -98,7 +98,8 @@ class SingleDegreeOfFreedomTest(unittest.TestCase):
 
     def mode(self):
         natural = math.sqrt(self.stiffness / self.mass)
-        return Mode(natural / (2.0 * math.pi), self.damping / (2.0 * math.sqrt(self.stiffness * self.mass)), 1.0 / self.stiffness)
+        return Mode(natural / (2.0 * math.pi), self.damping / (2.0 * math.sqrt(self.stiffness * self.mass)),
+                    1.0 / self.stiffness)
 
     def expect_mode(self, found):
         """Within four standard deviations, which are below a per cent."""
@@ -118,14 +119,15 @@ class SingleDegreeOfFreedomTest(unittest.TestCase):
         line = np.fft.rfftfreq(len(time), 1.0 / rate)
         pulse = np.where(np.abs(time - 0.02) < 2e-4, np.cos((time - 0.02) * np.pi / 4e-4), 0.0)
         force = [peak * pulse + random.normal(0.0, 0.2, len(time)) for peak in (200.0, 240.0, 180.0)]
-        motion = [np.fft.irfft(self.receptance(line) * np.fft.rfft(f)) + random.normal(0.0, 1e-8, len(time)) for f in force]
+        motion = [np.fft.irfft(self.receptance(line) * np.fft.rfft(f)) + random.normal(0.0, 1e-8, len(time))
+                  for f in force]
         found = smartmill.frf(force, motion, rate, kind="displacement", high=2000.0)
         self.assertEqual((found.unit, len(found.modes), [hit.accepted for hit in found.hits]), ("m/N", 1, 3 * [True]))
         self.expect_mode(found.modes[0])
         near = (found.frequency > 700.0) & (found.frequency < 1300.0)
         expected = self.receptance(found.frequency[near])
         spectra = np.array([np.fft.rfft(f) for f in force])[:, np.isin(line, found.frequency[near])]
-        noise = math.sqrt(len(time)) * np.hypot(1e-8, 0.2 * np.abs(expected)) / np.sqrt((np.abs(spectra)**2).sum(axis=0))
+        noise = np.hypot(1e-8, 0.2 * np.abs(expected)) * math.sqrt(len(time)) / np.linalg.norm(spectra, axis=0)
         self.assertEqual(noise.shape, expected.shape)
         self.assertLess(np.max(np.abs(found.value[near] - expected) / noise), 5.0)
 
@@ -166,7 +168,8 @@ class LobesTest(unittest.TestCase):
     mode = Mode(Estimate(922.0, 3.0), Estimate(0.011, 0.001), Estimate(7.46e-7, 2e-8))
 
     def model(self):
-        return smartmill.machine_model(self.tool, Coefficients(self.kt, self.kr), tool_tip={"x": [self.mode], "y": [self.mode]})
+        return smartmill.machine_model(self.tool, Coefficients(self.kt, self.kr),
+                                       tool_tip={"x": [self.mode], "y": [self.mode]})
 
     def test_zero_order_limits_are_those_of_altintas_and_budak(self):
         rpm = np.array([6100.0, 8200.0, 9500.0, 12800.0, 15000.0])

@@ -80,21 +80,24 @@ class ProgramTest(FolderTest):
             arguments = [word for key, value in options.items() for word in (f"--{key}", value)]
             printed = self.run_program("coefficients", campaign, *arguments, "-o", "cutting.yaml")
             found = smartmill.coefficients(campaign, **options)
-            self.assertIn(f"in {found.tests} cuts" if options["source"] == "load_meter" else f"of {found.tests} cuts", printed)
+            self.assertRegex(printed, f"^from the (forces of|load meter in) {found.tests} cuts")
             written = numbers(self.folder / "cutting.yaml")
             for name in COEFFICIENTS:
                 value = getattr(found.coefficients, name)
-                key, unit = name.capitalize() + ("_n_per_mm2" if name.endswith("c") else "_n_per_mm"), 1e6 if name.endswith("c") else 1e3
+                suffix, unit = ("n_per_mm2", 1e6) if name.endswith("c") else ("n_per_mm", 1e3)
+                key = f"{name.capitalize()}_{suffix}"
                 if key in written:
-                    np.testing.assert_allclose((value / unit, value.std / unit), (written[key][0], written[f"{key}_std"][0]), rtol=1e-9)
+                    np.testing.assert_allclose((value / unit, value.std / unit), written[key] + written[f"{key}_std"],
+                                               rtol=1e-9)
                 else:
                     self.assertTrue(math.isnan(value), name)
             self.assertEqual(len(written), 12 if options["source"] == "force" else 4)
             if options["source"] == "load_meter":
-                self.assertIn(f"{found.friction_viscous:.4e} Nm s/rad viscous, {found.friction_coulomb:.4f} Nm Coulomb", printed)
+                self.assertIn(f"{found.friction_viscous:.4e} Nm s/rad viscous, {found.friction_coulomb:.4f} Nm", printed)
 
     def test_compensate(self):
-        campaign = subset(shared("campaigns/none"), self.folder / "campaign", "tap_x", "tap_y", "slot_9000", "up_4500")
+        campaign = subset(shared("campaigns/none"), self.folder / "campaign", "tap_x", "tap_y", "slot_9000",
+                          "slot_13950")
         for options in (dict(), dict(identify=True, method="smoother"), dict(method="inverse"),
                         dict(method="fixed-lag", lag=0.02), dict(method="delay", noise_rms=2.0, bandwidth=3000.0)):
             names = {"lag": "--lag-s", "noise_rms": "--noise-rms-n", "bandwidth": "--bandwidth-hz"}
@@ -103,11 +106,12 @@ class ProgramTest(FolderTest):
             out = self.folder / "_".join(map(str, options.values()))
             self.run_program("compensate", campaign, *arguments, "-o", out)
             found = smartmill.compensate(campaign, **options)
-            self.assertEqual(list(found.records), ["slot_9000", "up_4500"])
+            self.assertEqual(list(found.records), ["slot_9000", "slot_13950"])
             for name, record in found.records.items():
                 written = columns(out / f"{name}.csv")
                 for channel in ("fx", "fy", "fz"):
-                    np.testing.assert_allclose(record[channel], written[channel], rtol=1e-5, atol=1e-5, err_msg=f"{options} {name}")
+                    np.testing.assert_allclose(record[channel], written[channel], rtol=1e-5, atol=1e-5,
+                                               err_msg=f"{options} {name}")
 
     def test_compensated_arrays_are_those_of_the_campaign(self):
         campaign = shared("campaigns/none")
@@ -120,27 +124,30 @@ class ProgramTest(FolderTest):
 
     def test_lobes(self):
         for method in ("collocation", "zero_order"):
-            self.run_program("lobes", MODEL, "--entry-deg", 90, "--exit-deg", 180, "--speeds", "4000:12000:81", "--max-depth-mm", 2,
-                             "--method", method, "-o", "chart.csv")
+            self.run_program("lobes", MODEL, "--entry-deg", 90, "--exit-deg", 180, "--speeds", "4000:12000:81",
+                             "--max-depth-mm", 2, "--method", method, "-o", "chart.csv")
             written = columns(self.folder / "chart.csv")
-            found = smartmill.lobes(MODEL, np.linspace(4000.0, 12000.0, 81), max_depth=0.002, entry_deg=90.0, method=method)
+            found = smartmill.lobes(MODEL, np.linspace(4000.0, 12000.0, 81), max_depth=0.002, entry_deg=90.0,
+                                    method=method)
             np.testing.assert_allclose(found.speed_rpm, written["rpm"], rtol=1e-7)
             limited = np.isfinite(found.depth)
             np.testing.assert_array_equal(limited, np.isfinite(written["limit_mm"]))
             np.testing.assert_allclose(found.depth_mm[limited], written["limit_mm"][limited], rtol=1e-7)
             np.testing.assert_allclose(found.frequency[limited], written["chatter_hz"][limited], rtol=1e-7)
-            kinds = [line.rsplit(",", 1)[1] or "none" for line in (self.folder / "chart.csv").read_text().splitlines()[1:]]
-            self.assertEqual(list(found.kind), kinds)
+            rows = (self.folder / "chart.csv").read_text().splitlines()[1:]
+            self.assertEqual(list(found.kind), [row.rsplit(",", 1)[1] or "none" for row in rows])
 
     def test_chatter_risk(self):
-        printed = self.run_program("chatter-probability", MODEL, "--entry-deg", 0, "--exit-deg", 180, "--speeds", "4000:6000:5",
-                                   "--depths-mm", "0.1:1:10", "--draws", 8, "--seed", 3, "-o", "grid.csv")
+        printed = self.run_program("chatter-probability", MODEL, "--entry-deg", 0, "--exit-deg", 180, "--speeds",
+                                   "4000:6000:5", "--depths-mm", "0.1:1:10", "--draws", 8, "--seed", 3, "-o", "grid.csv")
         written = columns(self.folder / "grid.csv")
-        found = smartmill.chatter_risk(MODEL, np.linspace(4000.0, 6000.0, 5), np.linspace(1e-4, 1e-3, 10), draws=8, seed=3)
+        found = smartmill.chatter_risk(MODEL, np.linspace(4000.0, 6000.0, 5), np.linspace(1e-4, 1e-3, 10), draws=8,
+                                       seed=3)
         np.testing.assert_allclose(found.probability.ravel(), written["probability"], rtol=1e-7)
         np.testing.assert_allclose(1e3 * found.nominal, written["nominal_limit_mm"][::10], rtol=1e-7)
         for point in found.points[:5]:
-            self.assertIn(f"{point.speed_rpm:8.1f} rpm {point.depth_mm:8.4f} mm  {100.0 * point.probability:4.1f} %", printed)
+            line = f"{point.speed_rpm:8.1f} rpm {point.depth_mm:8.4f} mm  {100.0 * point.probability:4.1f} %"
+            self.assertIn(line, printed)
 
     def test_frf(self):
         hits = sorted(shared("measured/five_hits").glob("*.csv"))
@@ -159,8 +166,10 @@ class ProgramTest(FolderTest):
             both = found.modes + found.doubts
             for name, key, scale in (("frequency", "frequency_hz", 1.0), ("damping_ratio", "damping_ratio", 1.0),
                                      ("stiffness", "stiffness_n_per_um", 1e-6)):
-                np.testing.assert_allclose([scale * getattr(m, name) for m in both], modes[key], rtol=1e-8)
-                np.testing.assert_allclose([scale * getattr(m, name).std for m in both], np.abs(modes[f"{key}_std"]), rtol=1e-3)
+                found_here = [getattr(mode, name) for mode in both]
+                np.testing.assert_allclose([scale * value for value in found_here], modes[key], rtol=1e-8)
+                np.testing.assert_allclose([scale * value.std for value in found_here], np.abs(modes[f"{key}_std"]),
+                                           rtol=1e-3)
             np.testing.assert_allclose([m.evidence for m in both], modes["evidence"], rtol=1e-3)
 
     def test_arrays_of_hits_give_what_their_files_give(self):
@@ -168,7 +177,8 @@ class ProgramTest(FolderTest):
         records = [columns(hit) for hit in hits]
         response = next(name for name in records[0] if name not in ("time", "hammer"))
         rate = 1.0 / np.diff(records[0]["time"]).mean()
-        found = smartmill.frf([r["hammer"] for r in records], [r[response] for r in records], rate, kind=response, high=3000.0)
+        found = smartmill.frf([r["hammer"] for r in records], [r[response] for r in records], rate, kind=response,
+                              high=3000.0)
         of_files = smartmill.frf(hits, high=3000.0)
         np.testing.assert_allclose(found.value, of_files.value, rtol=1e-6)
         np.testing.assert_allclose([m.frequency for m in found.modes], [m.frequency for m in of_files.modes], rtol=1e-6)
@@ -181,12 +191,13 @@ class ProgramTest(FolderTest):
         for name in ("chatter", "no_chatter", "idle_after"):
             sound = sounds / f"{name}.wav"
             found = smartmill.detect(sound, speed_rpm=8018, teeth=4)
-            self.assertEqual(f"{found}\n", self.run_program("detect", sound, "--speed", 8018, "--teeth", 4, "-o", "picture.png"))
+            self.assertEqual(f"{found}\n", self.run_program("detect", sound, "--speed", 8018, "--teeth", 4))
             verdicts[name] = bool(found)
         self.assertEqual(verdicts, {"chatter": True, "no_chatter": False, "idle_after": False})
 
     def test_explain(self):
-        campaign = subset(shared("campaigns/runout"), self.folder / "campaign", "slot_3000", "slot_4500_060", "slot_4500_100")
+        campaign = subset(shared("campaigns/runout"), self.folder / "campaign", "slot_3000", "slot_4500_060",
+                          "slot_4500_100")
         printed = self.run_program("explain", campaign, "-o", "program", "--threads", "1")
         found = smartmill.explain(campaign, out=self.folder / "module", threads=1)
         report = json.loads((self.folder / "program" / "report.json").read_text())
