@@ -10,6 +10,7 @@
 #include "import/mat_writer.h"
 #include "shell.h"
 #include "simulated_session.h"
+#include "smartmill_cli/commands.h"
 #include "smartmill_core/campaign/campaign.h"
 #include "smartmill_core/io/csv.h"
 #include "smartmill_core/units.h"
@@ -37,9 +38,11 @@ class Formats : public ::testing::Test {
       done("campaign " + folder_.file("session." + format) + " --model " MODEL " -o " + folder_.file(format));
     const Campaign steady = readCampaign(folder_.file("bag"));
     EXPECT_EQ(steady.tests.size(), std::size(CUTS));
-    std::string plan = "format: smartmill-import/1\nmodel: " MODEL
-                       "\ndefaults:\n  kind: cut\n  entry_deg: 0\n  exit_deg: 180\n  axial_depth_mm: 0.5\n  "
-                       "spindle_speed_rpm: 4500\nfiles:\n";
+    const std::string stated =
+        "format: smartmill-import/1\nmodel: " MODEL
+        "\ndefaults:\n  kind: cut\n  entry_deg: 0\n  exit_deg: 180\n  axial_depth_mm: 0.5\n  "
+        "spindle_speed_rpm: 4500\nfiles:\n";
+    std::map<std::string, std::string> plans{{"csv", stated}, {"mat", stated}};
     for (const CampaignTest& test : steady.tests) {
       // The recordings' campaign states where its record begins.
       const auto first = static_cast<std::size_t>(
@@ -47,17 +50,14 @@ class Formats : public ::testing::Test {
       const Record cut = part(session.record(test.name), first, readRecord(steady, test).size());
       writeCsv(cut, folder_.file(test.name + ".csv"), 9);
       writeMat(cut, folder_.file(test.name + ".mat"));
-      for (const char* format : {".csv", ".mat"})
-        plan += "- {file: " + test.name + format +
+      for (auto& [format, plan] : plans)
+        plan += "- {file: " + test.name + "." + format +
                 ", feed_per_tooth_mm: " + std::to_string(test.engagement->feed_per_tooth / units::MM) +
                 ", running_before_s: " + std::to_string(*test.running_before) + "}\n";
     }
-    const std::string plan_file = folder_.write("import.yaml", plan);
-    for (const std::string format : {"csv", "mat"}) {
-      std::string files;
-      for (const char* cut : CUTS) files += folder_.file(cut + ("." + format)) + " ";
-      done("campaign " + files + "--import " + plan_file + " -o " + folder_.file(format));
-    }
+    for (const auto& [format, plan] : plans)
+      done("campaign --import " + folder_.write(format + ".yaml", plan) + " -o " + folder_.file(format));
+    folder_.write("import.yaml", plans.at("csv"));
   }
 
   static Record part(const Record& whole, std::size_t first, std::size_t count) {
@@ -127,6 +127,61 @@ TEST_F(Formats, OfRecordingsAreCompensatedAlike) {
   EXPECT_EQ(bag.files.size(), std::size(CUTS));
   EXPECT_EQ(mcap.out, bag.out);
   EXPECT_TRUE(mcap.files == bag.files);
+}
+
+/// Every example of --help, typed where the files are that it names.
+TEST_F(Formats, TheExamplesOfCampaignWork) {
+  folder_.write("hit.csv", "time[s],hammer[N],Ch2\n0,0,0\n0.001,90,0.1\n0.002,10,-0.1\n");
+  std::filesystem::copy_file(folder_.file("slow.mat"), folder_.file("cut.mat"));
+  std::filesystem::copy_file(MODEL, folder_.file("mill.yaml"));
+  std::size_t tried = 0;
+  for (const CommandTopic& topic : smartmillProgram().topics) {
+    for (const Command& command : topic.commands) {
+      if (command.name != "campaign") continue;
+      for (const CommandExample& example : command.examples) {
+        const Outcome outcome =
+            shell("cp -r '" + folder_.file(".") +
+                  "' work && cd work && rm -rf campaign taps && " SMARTMILL " campaign " + example.arguments);
+        EXPECT_EQ(outcome.code, 0) << example.arguments << "\n" << outcome.error;
+        EXPECT_EQ(outcome.error, "") << example.arguments;
+        ++tried;
+      }
+    }
+  }
+  EXPECT_EQ(tried, 4u);
+}
+
+// One line on standard error for one fault, which begins as those of all commands; nothing is written.
+TEST_F(Formats, AFaultOfCampaignIsOneLine) {
+  const std::string cut = folder_.file("slow.csv"), mat = folder_.file("slow.mat");
+  const std::string stated =
+      " --kind cut --speed-rpm 4500 --feed-per-tooth-mm 0.04 --axial-depth-mm 0.5 --entry-deg 0";
+  const std::string tool = " --teeth 4 --diameter-mm 19.05 --helix-deg 30 ";
+  const std::string garbage = folder_.write("garbage.csv", std::string("\x01\x00\xFF\x7F", 4));
+  const std::string empty = folder_.write("empty.csv", ""), session = folder_.file("session.mcap");
+  const std::vector<std::pair<std::string, std::string>> faults{
+      {cut + stated + tool, cut + ": exit_deg is missing"},
+      {cut + stated + " --exit-deg 180 --diameter-mm 19 --helix-deg 30", "model: tool.teeth is missing"},
+      {cut + " " + cut + stated + " --exit-deg 180" + tool, cut + ": given twice"},
+      {mat + stated + " --exit-deg 180 --channels 'fx=Fx[lbs]'" + tool, "unknown unit 'lbs'"},
+      {mat + stated + " --exit-deg 180 --channels fx=Fq" + tool,
+       "channel Fq (for fx) is missing; the file has"},
+      {mat + stated + " --exit-deg 180 --sample-rate-hz 5000" + tool, "sample rate: 5000 Hz from"},
+      {garbage + stated + " --exit-deg 180" + tool, garbage + ": binary data of an unknown format"},
+      {empty + stated + " --exit-deg 180" + tool, empty + ": is empty"},
+      {session, session + ": a recording needs the machine model"},
+      {folder_.file("none.csv") + stated + " --exit-deg 180" + tool,
+       "none.csv: cannot be read: No such file"}};
+  for (const auto& [arguments, line] : faults) {
+    const Outcome outcome = shell(SMARTMILL " campaign " + arguments + " -o out");
+    EXPECT_EQ(outcome.code, 1) << arguments;
+    EXPECT_EQ(linesOf(outcome.error), 1u) << outcome.error;
+    EXPECT_EQ(outcome.error.rfind("smartmill campaign: ", 0), 0u) << outcome.error;
+    EXPECT_THAT(outcome.error, HasSubstr(line));
+    EXPECT_TRUE(outcome.files.empty()) << arguments;
+  }
+  EXPECT_EQ(shell(SMARTMILL " campaign -o out").code, 2);
+  EXPECT_EQ(shell(SMARTMILL " campaign cut.csv --channels fx -o out").code, 2);
 }
 
 }  // namespace

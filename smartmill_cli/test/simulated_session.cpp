@@ -82,7 +82,8 @@ void SimulatedSession::run(const CampaignTest& test) {
   write(names::CUTTING_CONDITION, condition);
   const std::vector<double>& angle = record.column("spindle_angle");
   const std::vector<double>& load = record.column("load_meter");
-  offsets_[test.name] = static_cast<double>(samples_) / RATE;
+  if (records_.empty()) first_ = now();
+  offsets_[test.name] = now() - first_;
   for (std::size_t first = 0; first + BLOCK <= record.size(); first += BLOCK, ++steps_) {
     CncState state;
     state.stamp = now();

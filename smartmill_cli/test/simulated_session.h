@@ -45,7 +45,7 @@ class SimulatedSession {
   static constexpr double STEP = 0.01;  // [s]
   std::unique_ptr<RecordingWriter> writer_;
   MachineModel truth_;
-  double begin_;
+  double begin_, first_ = 0.0;  // [s] the first samples' stamp
   std::uint64_t steps_ = 0, samples_ = 0;
   std::map<std::string, Record> records_;
   std::map<std::string, double> offsets_;

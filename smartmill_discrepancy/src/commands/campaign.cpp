@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "recordings/bag_campaign.h"
+#include "smartmill_core/error.h"
 #include "smartmill_discrepancy/commands.h"
 #include "smartmill_recording/import/import_campaign.h"
 
@@ -17,6 +18,7 @@ using namespace smartmill::recording;
 constexpr double NOT_STATED = std::numeric_limits<double>::quiet_NaN();
 
 struct Arguments {
+  std::string program;
   std::vector<std::string> files;
   std::string out, plan, model, measures, kind, direction, channels;
   std::vector<double> numbers = std::vector<double>(settingKeys().size(), NOT_STATED);
@@ -54,7 +56,11 @@ ImportPlan planOf(const Arguments& arguments) {
       throw UsageError(std::string(key.option) + ": " + outOfRange(arguments.numbers[i], key.range));
     plan.stated.*key.value = arguments.numbers[i];
   }
-  plan.stated.channels = channelChoices(arguments.channels);
+  try {
+    plan.stated.channels = channelChoices(arguments.channels);
+  } catch (const Error& error) {
+    throw UsageError(error.what());
+  }
   return plan;
 }
 
@@ -64,6 +70,7 @@ int run(const Arguments& arguments) {
   if (files.empty()) {
     for (const ImportPlan::Entry& entry : plan.files) files.push_back(entry.file);
   }
+  if (files.empty()) throw UsageError("FILES is required, or a list of files in --import");
   const auto note = [](const std::string& line) { std::printf("%s\n", line.c_str()); };
   const ImportResult result =
       importCampaign(plan, files, arguments.out,
@@ -71,11 +78,11 @@ int run(const Arguments& arguments) {
                        return discrepancy::campaignOfBag(recording, model, folder, note);
                      });
   for (const std::string& line : result.report) note(line);
-  for (const std::string& fault : result.faults) std::fprintf(stderr, "%s\n", fault.c_str());
-  if (!result.faults.empty()) {
-    std::fprintf(stderr, "%zu errors; nothing was written\n", result.faults.size());
-    return 1;
-  }
+  const char* const program = arguments.program.c_str();
+  for (const std::string& fault : result.faults) std::fprintf(stderr, "%s: %s\n", program, fault.c_str());
+  if (result.faults.size() > 1)
+    std::fprintf(stderr, "%s: %zu faults, nothing was written\n", program, result.faults.size());
+  if (!result.faults.empty()) return 1;
   note(arguments.out + "/campaign.yaml: written");
   return 0;
 }
@@ -106,6 +113,7 @@ Command campaignCommand() {
                    {"import.yaml", "smartmill-import/1: statements about the files (docs/formats.md)"}};
   command.declare = [](CommandLine& line) -> std::function<int()> {
     const auto a = std::make_shared<Arguments>();
+    a->program = line.program();
     line.option("FILES", a->files, "measurement files, recordings, campaigns (default: those of --import)");
     line.option("-o,--out", a->out, "folder of the campaign; must not exist or be empty").required();
     line.option("--import", a->plan, "import.yaml: statements about the files");

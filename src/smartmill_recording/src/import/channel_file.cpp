@@ -1,7 +1,9 @@
 #include "smartmill_recording/import/channel_file.h"
 
 #include <array>
+#include <cerrno>
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <set>
@@ -50,7 +52,7 @@ FileKind fileKind(const std::string& path) {
   std::ifstream stream(path, std::ios::binary);
   std::array<char, 1024> bytes{};
   stream.read(bytes.data(), bytes.size());
-  if (!stream && !stream.eof()) throw Error(path + ": cannot be read");
+  if (!stream && !stream.eof()) throw Error(path + ": cannot be read: " + std::strerror(errno));
   const std::string head(bytes.data(), static_cast<std::size_t>(stream.gcount()));
   if (head.empty()) throw Error(path + ": is empty");
   const std::string hdf5 = "\x89HDF\r\n\x1a\n";

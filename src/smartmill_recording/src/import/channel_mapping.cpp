@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <functional>
 #include <set>
 #include <sstream>
 
@@ -245,8 +246,13 @@ class Mapper {
       if (channel.values.size() < 2) return fault("channel " + channel.name + ": fewer than two samples");
       std::vector<double> time = channel.values;
       for (double& t : time) t *= *factor;
+      const auto stop = std::adjacent_find(time.begin(), time.end(), std::greater_equal<>());
+      if (stop != time.end())
+        return fault(formatted("channel %s: times must increase: %g s at sample %zu, %g s at the next",
+                               channel.name.c_str(), stop[0],
+                               static_cast<std::size_t>(stop - time.begin()) + 1, stop[1]));
       if (const std::optional<UnevenStep> step = unevenStep(time))
-        return fault(formatted("channel %s: uneven time: a step of %g s behind sample %zu, %g s expected",
+        return fault(formatted("channel %s: uneven time: a step of %g s after sample %zu, %g s expected",
                                channel.name.c_str(), step->step, step->sample + 1, step->usual));
       rate = static_cast<double>(time.size() - 1) / (time.back() - time.front());
       const double whole = std::round(rate);

@@ -1,6 +1,8 @@
 #include "smartmill_recording/import/import_campaign.h"
 
+#include <cerrno>
 #include <cmath>
+#include <cstring>
 #include <filesystem>
 #include <set>
 
@@ -29,7 +31,7 @@ class NewFolder {
     std::error_code code;
     fs::create_directories(target_.parent_path(), code);
     std::string pattern = target_.string() + ".XXXXXX";
-    if (!mkdtemp(pattern.data())) throw Error(target + ": cannot be made");
+    if (!mkdtemp(pattern.data())) throw Error(target + ": cannot be created: " + std::strerror(errno));
     path_ = pattern;
     fs::permissions(path_,
                     fs::perms::owner_all | fs::perms::group_read | fs::perms::group_exec |
