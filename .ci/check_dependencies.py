@@ -61,6 +61,8 @@ def packages_launched(launch):
 def asked(package, ours):
     """(file, package asked for, kinds of dependency that do)"""
     for path in package.files:
+        if "consumer" in path.parts:
+            continue  # a project of its own, which uses the installed libraries
         test = "test" in path.relative_to(package.folder).parts
         if path.suffix in (".cpp", ".h"):
             kinds = TEST if test else BUILD

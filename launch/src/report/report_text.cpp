@@ -107,7 +107,8 @@ std::vector<std::string> failedSteps(const std::string& session) {
   if (session.empty()) return failed;
   const Json summary = parsed(session);
   for (const Json& step : summary.value("steps", Json::array())) {
-    if (!step.value("done", false)) failed.push_back(step.value("name", "") + ": " + step.value("detail", ""));
+    if (!step.value("done", false))
+      failed.push_back(step.value("name", "") + ": " + step.value("detail", ""));
   }
   return failed;
 }

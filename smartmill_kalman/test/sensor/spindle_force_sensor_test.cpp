@@ -426,7 +426,8 @@ TEST(FitDynamicCrossTalk, FindsTheCourse) {
   const ModalModel found = fitDynamicCrossTalk(first_axis, cross, 27.7, RATE, 50.0, 2500.0, 3);
   EXPECT_NEAR(found.staticGain(), 1.0, 1e-9);
   for (const double f : {200.0, 700.0, 800.0, 1200.0})
-    EXPECT_NEAR(std::abs(found.response(f) - dynamics.response(f)), 0.0, 0.02 * std::abs(dynamics.response(f)))
+    EXPECT_NEAR(std::abs(found.response(f) - dynamics.response(f)), 0.0,
+                0.02 * std::abs(dynamics.response(f)))
         << f;
 }
 

@@ -58,7 +58,7 @@ struct Section {
 struct TrueStability {
   std::optional<StabilityChart> chart;  ///< empty: no truth recorded, or not computed
   std::vector<double> limits;           ///< [m] at the speed of each recorded cut; NaN or empty: not known
-  std::string failure;                  ///< why it was not computed although the truth is known; empty: it was
+  std::string failure;  ///< why it was not computed although the truth is known; empty: it was
 };
 
 struct Report {
@@ -74,7 +74,8 @@ struct Report {
 /// settled. Empty (first == second) when there are none.
 std::pair<std::uint64_t, std::uint64_t> judgedSamples(const RecordedCut& cut, double settle_revolutions);
 
-/// Steps that failed, with the reason. @param session JSON text that the session wrote @throws Error when it is not JSON
+/// Steps that failed, with the reason. @param session JSON text that the session wrote @throws Error when it
+/// is not JSON
 std::vector<std::string> failedSteps(const std::string& session);
 
 Report makeReport(const SessionRecording& recording, const TrueStability& truth);

@@ -29,7 +29,7 @@ TEST(Install, aProgramOutsideTheRepositoryFindsLinksAndRuns) {
       << output();
   ASSERT_EQ(call(CMAKE " --build " + folder.file("build")), 0) << output();
   ASSERT_EQ(call(folder.file("build/consumer")), 0) << output();
-  EXPECT_EQ(output(), "1.200e-07 m/N\n");  // 1e-7 of the mode and 2e-8 beside it
+  EXPECT_EQ(output(), "1.200e-07 m/N\n");  // 1e-7 of the mode plus 2e-8 of the direct term
 }
 
 }  // namespace
