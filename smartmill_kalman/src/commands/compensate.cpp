@@ -24,6 +24,7 @@
 #include "smartmill_core/parameters/parameter_options.h"
 #include "smartmill_core/units.h"
 #include "smartmill_kalman/compensation/campaign_compensation.h"
+#include "smartmill_kalman/compensation/record_compensation.h"
 #include "smartmill_kalman/sensor/blind_mode.h"
 #include "smartmill_recording/recording_file.h"
 
@@ -110,7 +111,7 @@ void fromCampaign(const Request& request) {
     if (test.kind != TestKind::cut) continue;
     std::fprintf(stderr, "compensating %s\n", test.name.c_str());
     Record record = readRecord(campaign, test);
-    if (workpiece) kalman::turnForces(record);
+    if (workpiece) kalman::negateForces(record);
     if (request.blind) printBlind(test.name, record, test, request);
     const auto force = matrix ? kalman::compensate(record, *matrix, test.spindle_speed, test.sample_rate,
                                                    parameters.compensation.filter)
@@ -237,7 +238,7 @@ Command compensateCommand() {
             "--method", o->method,
             "kalman (causal, as the node), delay (as the node with `delay_form`), smoother, fixed-lag (as "
             "the node with `lag`) or inverse")
-        .oneOf({"kalman", "delay", "smoother", "fixed-lag", "inverse"})
+        .oneOf(kalman::methodNames())
         .showDefault();
     line.option("--lag-s", o->lag, "lag of fixed-lag [s]").within(0.0, 10.0).showDefault();
     const auto table = std::make_shared<ParameterTable>(tableOf(o->parameters));

@@ -16,7 +16,7 @@
 #include "smartmill_core/names.h"
 #include "smartmill_core/units.h"
 #include "smartmill_kalman/compensation/campaign_compensation.h"
-#include "smartmill_kalman/in_cut/campaign_lines.h"
+#include "smartmill_kalman/in_cut/cut_segments.h"
 #include "smartmill_recording/recording_file.h"
 
 namespace {
@@ -41,10 +41,10 @@ kalman::CuttingFrfAxis linesOf(const Campaign& campaign, const MachineModel& mod
     if (test.kind != TestKind::cut) continue;
     std::fprintf(stderr, "%s: %s\n", kalman::AXIS_NAMES[axis], test.name.c_str());
     const Record record = readRecord(campaign, test, model);
-    const kalman::CutStretch cut =
-        tool ? kalman::toolStretch(record, test, axis, sensors[axis])
-             : kalman::sensorStretch(record, test, axis, model, 0.01 * model.uncertainty.cutting);
-    const auto lines = kalman::cuttingLines(cut, request.options);
+    const kalman::CutSegment cut =
+        tool ? kalman::toolSegment(record, test, axis, sensors[axis])
+             : kalman::sensorSegment(record, test, axis, model, 0.01 * model.uncertainty.cutting);
+    const auto lines = kalman::frfLines(cut, request.options);
     if (lines.empty())
       std::fprintf(stderr, "%s: no line of %s stands out (eleven revolutions are needed)\n",
                    test.name.c_str(), kalman::AXIS_NAMES[axis]);
@@ -72,8 +72,8 @@ std::vector<kalman::CuttingFrfAxis> fromBag(const kalman::CuttingFrfRequest& req
     kalman::CuttingFrfAxis axis;
     axis.axis = a;
     axis.rest = cuts.rest[a];
-    for (const kalman::CutStretch& cut : cuts.axis[a]) {
-      const auto lines = kalman::cuttingLines(cut, request.options);
+    for (const kalman::CutSegment& cut : cuts.axis[a]) {
+      const auto lines = kalman::frfLines(cut, request.options);
       if (lines.empty())
         std::fprintf(stderr, "%s: no line of %s stands out (eleven revolutions are needed)\n",
                      cut.name.c_str(), kalman::AXIS_NAMES[a]);

@@ -22,7 +22,7 @@ struct CuttingFrfRequest {
 /// An axis: its lines in the cuts, and the tap at rest.
 struct CuttingFrfAxis {
   std::size_t axis = 0;
-  std::vector<CuttingLine> lines;
+  std::vector<FrfLine> lines;
   ModalModel rest;
   std::vector<SpeedFrf> found;
 };

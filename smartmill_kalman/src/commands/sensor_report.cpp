@@ -28,7 +28,7 @@ using namespace smartmill;
 using kalman::MatrixTap;
 using kalman::TransferMatrix;
 
-constexpr double TOLD = 0.1;  // [1]
+constexpr double DETERMINED = 0.1;  // [1]
 constexpr auto& CHANNELS = PLATE_CHANNELS;
 
 using Taps = kalman::TapRecords;
@@ -78,11 +78,11 @@ void writeMatrix(const TransferMatrix& matrix, const std::string& file) {
 }
 
 /// Frequency up to which the taps tell every element to a tenth of the static gain [Hz].
-double toldTo(const TransferMatrix& matrix, double low) {
+double determinedUpTo(const TransferMatrix& matrix, double low) {
   double told = low;
   for (std::size_t l = 0; l < matrix.frequency.size(); ++l) {
     if (matrix.frequency[l] <= low) continue;
-    if (matrix.forward_std[l].topLeftCorner(3, 3).maxCoeff() > TOLD) break;
+    if (matrix.forward_std[l].topLeftCorner(3, 3).maxCoeff() > DETERMINED) break;
     told = matrix.frequency[l];
   }
   return told;
@@ -160,7 +160,7 @@ void run(const Request& request) {
   const Taps taps =
       isTapFile(request.source) ? kalman::readTapFile(request.source) : fromCampaign(request.source);
   const TransferMatrix matrix = kalman::identifyTransferMatrix(taps.taps, taps.rate);
-  const double told = toldTo(matrix, request.low);
+  const double told = determinedUpTo(matrix, request.low);
   const double high = request.high == 0.0 ? told : request.high;
   if (!(request.low >= 0.0 && high > request.low && high < 0.5 * taps.rate))
     throw Error("--low-hz, --high-hz: expected 0 <= low < high < half the sample rate");

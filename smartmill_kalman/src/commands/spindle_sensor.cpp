@@ -18,7 +18,7 @@
 namespace {
 
 using namespace smartmill;
-using kalman::LengthLine;
+using kalman::LengthDependence;
 using kalman::SpindleSensorCalibration;
 
 constexpr double LARGEST_ERROR = 0.05;  // Burzoni 3.2.1
@@ -28,7 +28,7 @@ struct Request {
   double low_pass = 0.0;
 };
 
-void printLine(const char* what, const LengthLine& found, const LengthLine& before, double length) {
+void printLengthDependence(const char* what, const LengthDependence& found, const LengthDependence& before, double length) {
   std::printf("%-32s %9.4g L + %9.4g   std %.2g, %.2g%s   at %.0f mm %8.3f   before %8.3f\n", what,
               found.slope * units::MM, found.offset, found.slope_std * units::MM, found.offset_std,
               found.reciprocal ? " of its reciprocal" : "", length / units::MM, found.at(length),
@@ -38,23 +38,23 @@ void printLine(const char* what, const LengthLine& found, const LengthLine& befo
 void calibrate(const Request& request) {
   const SpindleSensorCalibration base =
       request.base.empty() ? SpindleSensorCalibration::table3() : kalman::readSpindleSensor(request.base);
-  const kalman::StaticReadings readings = kalman::readStaticReadings(request.table);
+  const kalman::StaticMeasurements readings = kalman::readStaticMeasurements(request.table);
   const kalman::StaticCalibration found = kalman::calibrateStatic(readings, base);
   const SpindleSensorCalibration& c = found.calibration;
   const double length = found.lengths.front().length;
-  LengthLine none;
+  LengthDependence none;
   none.offset = std::nan("");
   std::printf(
       "constants over the length L [mm] of tool and holder (applied over shown force), known for %.0f .. "
       "%.0f mm\n",
       c.lengths[0] / units::MM, c.lengths[1] / units::MM);
-  printLine("x", c.x, base.x, length);
-  printLine("y", c.y, base.y, length);
-  printLine("z", c.z, base.z, length);
-  const auto cross = [&](const char* what, const std::optional<LengthLine>& line,
-                         const std::optional<LengthLine>& before) {
+  printLengthDependence("x", c.x, base.x, length);
+  printLengthDependence("y", c.y, base.y, length);
+  printLengthDependence("z", c.z, base.z, length);
+  const auto cross = [&](const char* what, const std::optional<LengthDependence>& line,
+                         const std::optional<LengthDependence>& before) {
     if (line) {
-      printLine(what, *line, before.value_or(none), length);
+      printLengthDependence(what, *line, before.value_or(none), length);
     } else {
       std::printf("%-32s none beyond its uncertainty\n", what);
     }
@@ -62,7 +62,7 @@ void calibrate(const Request& request) {
   cross("cross-talk in x, caused by y", c.yx, base.yx);
   cross("cross-talk in z, caused by y", c.yz, base.yz);
   cross("cross-talk in z, caused by x", c.xz, base.xz);
-  for (const kalman::LengthConstants& l : found.lengths) {
+  for (const kalman::ConstantsAtLength& l : found.lengths) {
     const auto left = [&l](int row, int column) { return 100.0 * l.share[row][column] / l.share[row][row]; };
     std::printf(
         "%.1f mm: drift up to %.2f N/min taken out, residual %.3f N; outside the model: x in y %.2f %%, z in "
@@ -77,7 +77,7 @@ void calibrate(const Request& request) {
 }
 
 void verify(const Request& request) {
-  const auto error = kalman::verifyStatic(kalman::readStaticReadings(request.table),
+  const auto error = kalman::verifyStatic(kalman::readStaticMeasurements(request.table),
                                           kalman::readSpindleSensor(request.calibration));
   std::printf("largest difference to the reference, of its largest force: x %.2f y %.2f z %.2f %% (5 due)\n",
               100.0 * error[0], 100.0 * error[1], 100.0 * error[2]);
@@ -87,8 +87,8 @@ void verify(const Request& request) {
 
 void apply(const Request& request) {
   const SpindleSensorCalibration c = kalman::readSpindleSensor(request.calibration);
-  const kalman::StaticReadings record = kalman::readStaticReadings(request.table);
-  kalman::needLengths(record, c);
+  const kalman::StaticMeasurements record = kalman::readStaticMeasurements(request.table);
+  kalman::checkLengths(record, c);
   std::array<std::vector<double>, 3> force;
   std::size_t unloaded = 0;
   for (std::size_t i = 0; i < record.size(); ++i) {

@@ -28,7 +28,7 @@ void SensorFitParameters::validate() const {
   }
 }
 
-FrequencyResponse averaged(const std::vector<std::vector<double>>& hammer,
+FrequencyResponse averagedFrf(const std::vector<std::vector<double>>& hammer,
                            const std::vector<std::vector<double>>& response, double sample_rate) {
   if (hammer.empty() || hammer.size() != response.size()) throw Error("sensor identification: no hits");
   FrfEstimator estimator(sample_rate, hammer.front().size());
@@ -59,7 +59,7 @@ FrequencyResponse averaged(const std::vector<std::vector<double>>& hammer,
 namespace {
 
 /// A blow against the sensor's axis, or a sensor that shows the reaction: its slow response is negative.
-bool staysOpposite(const FrequencyResponse& frf, double low) {
+bool hasNegativeStaticGain(const FrequencyResponse& frf, double low) {
   double sum = 0.0;
   for (const auto& value : frf.band(low, 3.0 * low + 50.0).value) sum += value.real();
   return sum < 0.0;
@@ -97,8 +97,8 @@ ModalFit identifySensor(const std::vector<std::vector<double>>& hammer,
   options.high = std::min(parameters.high, 0.45 * sample_rate);
   options.max_modes = parameters.max_modes;
   options.unit_static_gain = true;
-  FrequencyResponse measured = averaged(hammer, response, sample_rate);
-  if (staysOpposite(measured, parameters.low)) {
+  FrequencyResponse measured = averagedFrf(hammer, response, sample_rate);
+  if (hasNegativeStaticGain(measured, parameters.low)) {
     for (auto& value : measured.value) value = -value;
   }
   return fitModes(measured, options);
@@ -124,7 +124,7 @@ bool measuresWorkpiece(const Campaign& campaign, const std::string& model_file) 
   return readMachineModel(file).force_sensor.measures_workpiece;
 }
 
-void turnForces(Record& record) {
+void negateForces(Record& record) {
   for (std::size_t i = 0; i < record.names.size(); ++i) {
     if (std::find(FORCE_CHANNELS.begin(), FORCE_CHANNELS.end(), record.names[i]) == FORCE_CHANNELS.end())
       continue;
@@ -160,8 +160,8 @@ SensorMatrix identifySensorMatrix(const Campaign& campaign, const SensorFitParam
   for (std::size_t j = 0; j < 3; ++j) {
     for (std::size_t i = 0; i < 3; ++i) {
       if (i == j) continue;
-      FrequencyResponse across = averaged(taps[j].hammer, taps[j].response[i], taps[j].rate);
-      if (staysOpposite(averaged(taps[j].hammer, taps[j].response[j], taps[j].rate), parameters.low)) {
+      FrequencyResponse across = averagedFrf(taps[j].hammer, taps[j].response[i], taps[j].rate);
+      if (hasNegativeStaticGain(averagedFrf(taps[j].hammer, taps[j].response[j], taps[j].rate), parameters.low)) {
         for (auto& value : across.value) value = -value;
       }
       sensor.h[i][j] = fitCrossTalk(across, sensor.h[j][j], sensor.h[i][i], parameters.low,

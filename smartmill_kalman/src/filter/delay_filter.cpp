@@ -15,13 +15,13 @@ namespace smartmill::kalman {
 namespace {
 
 /// The quick memory over settling_revolutions: a line of samples has more to learn than a band of harmonics.
-constexpr double QUICK = 1.5;
+constexpr double QUICK_FACTOR = 1.5;
 /// Length of the array in which the line moves, in lines.
-constexpr std::size_t ROOM = 8;
+constexpr std::size_t BUFFER_LINES = 8;
 /// Steps of the gain's recursion, in revolutions, and the rise of P over a revolution at which it ends. What
 /// the sensor hardly passes goes on rising long after: it stays as slow as it is then, when the innovation's
 /// variance rises by less than SETTLED.
-constexpr double MOST_REVOLUTIONS = 1000.0, CONVERGED = 1e-7, SETTLED = 1e-4;
+constexpr double MAX_REVOLUTIONS = 1000.0, CONVERGED = 1e-7, SETTLED = 1e-4;
 
 /// Coefficients of u^i, lowest first, of the polynomial that is 1 at node j and 0 at the others.
 std::vector<double> lagrangePolynomial(const std::vector<double>& nodes, std::size_t j) {
@@ -40,7 +40,7 @@ std::vector<double> lagrangePolynomial(const std::vector<double>& nodes, std::si
 }
 
 /// Shares of the TAPS points around a position in its value (Lagrange). @return the first of them
-std::size_t sharesAt(double position, std::vector<double>& shares) {
+std::size_t interpolationAt(double position, std::vector<double>& shares) {
   constexpr std::size_t TAPS = DelayModel::TAPS;
   const auto first = static_cast<std::size_t>(std::floor(position)) - (TAPS / 2 - 1);
   for (std::size_t j = 0; j < TAPS; ++j) {
@@ -102,7 +102,7 @@ void DelayModel::setPeriod(double samples) {
   line = static_cast<std::size_t>(std::ceil(samples)) + TAPS / 2;
   const double position = static_cast<double>(line) - samples;
   interpolate.resize(TAPS);
-  at = sharesAt(position, interpolate);
+  at = interpolationAt(position, interpolate);
 }
 
 void DelayModel::step(std::vector<double>& x) const {
@@ -136,7 +136,7 @@ std::vector<double> delayGain(const DelayModel& model, double q, double r) {
   std::vector<double> l(model.states(), 0.0), n = l, through(model.states());
   l.back() = 1.0;
   double m = q, variance = r;
-  const auto most = static_cast<std::size_t>(MOST_REVOLUTIONS * static_cast<double>(model.line));
+  const auto most = static_cast<std::size_t>(MAX_REVOLUTIONS * static_cast<double>(model.line));
   double rise = 0.0;  // of the innovation's variance over a revolution
   for (std::size_t step = 1; step <= most; ++step) {
     const double seen = model.measured(l), before = variance;
@@ -168,20 +168,20 @@ DelayFilter::DelayFilter(const ModalModel& sensor, double spindle_speed, double 
                          const HarmonicFilterParameters& parameters)
     : sample_rate_(sample_rate),
       model_(sensor, units::TWO_PI / spindle_speed, sample_rate),
-      watch_(1, units::TWO_PI / spindle_speed * sample_rate) {
+      memory_(1, units::TWO_PI / spindle_speed * sample_rate) {
   parameters.validate();
   const double r = parameters.noise_rms * parameters.noise_rms;
-  const double quick = QUICK * parameters.settling_revolutions;
+  const double quick = QUICK_FACTOR * parameters.settling_revolutions;
   const double slow = std::max(quick, parameters.memory_revolutions);
   for (const double memory : {quick, std::sqrt(quick * slow), slow}) {
     gain_.push_back(delayGain(model_, r / (memory * memory), r));
     innovation_std_.push_back(std::sqrt(gain_.back().back()));
     gain_.back().pop_back();
   }
-  watch_.setLevels(gain_.size());
+  memory_.setLevels(gain_.size());
   modes_.resize(2 * model_.modes);
   next_.resize(2 * model_.modes);
-  line_.resize(ROOM * model_.line);
+  line_.resize(BUFFER_LINES * model_.line);
   reset();
 }
 
@@ -190,7 +190,7 @@ void DelayFilter::reset() {
   std::fill(line_.begin(), line_.end(), 0.0);
   head_ = 0;
   innovation_ = 0.0;
-  watch_.reset();
+  memory_.reset();
 }
 
 double DelayFilter::spindleSpeed() const {
@@ -211,18 +211,18 @@ void DelayFilter::retune(double spindle_speed) {
       gain.push_back(next);
     }
   }
-  takeLine(before);
-  watch_.setRevolution(model_.period);
+  resampleFrom(before);
+  memory_.setRevolution(model_.period);
 }
 
-void DelayFilter::adopt(const DelayFilter& other) {
+void DelayFilter::continueFrom(const DelayFilter& other) {
   modes_ = other.modes_;
-  takeLine(other);
-  watch_.setLevel(other.level());
+  resampleFrom(other);
+  memory_.setLevel(other.level());
 }
 
 // The same force at the same angle: the other's samples lie closer or wider.
-void DelayFilter::takeLine(const DelayFilter& other) {
+void DelayFilter::resampleFrom(const DelayFilter& other) {
   constexpr std::size_t TAPS = DelayModel::TAPS;
   const DelayModel& was = other.model_;
   const auto first = other.line_.begin() + static_cast<std::ptrdiff_t>(other.head_);
@@ -234,7 +234,7 @@ void DelayFilter::takeLine(const DelayFilter& other) {
     for (std::size_t j = 0; j < TAPS; ++j) next += was.interpolate[j] * known[from + j];
     known.push_back(next);
   }
-  line_.assign(ROOM * model_.line, 0.0);
+  line_.assign(BUFFER_LINES * model_.line, 0.0);
   head_ = 0;
   std::vector<double> share(TAPS);
   constexpr auto NOW = static_cast<double>(DelayModel::NOW);
@@ -242,7 +242,7 @@ void DelayFilter::takeLine(const DelayFilter& other) {
     double position = NOW + (static_cast<double>(i) - NOW) * was.period / model_.period;
     if (position < 0.5 * static_cast<double>(TAPS)) position += was.period;
     if (position > static_cast<double>(was.line + TAPS)) position -= was.period;
-    const std::size_t from = sharesAt(position, share);
+    const std::size_t from = interpolationAt(position, share);
     for (std::size_t j = 0; j < TAPS; ++j) line_[i] += share[j] * known[from + j];
   }
 }
@@ -256,7 +256,7 @@ double DelayFilter::expected() const {
 double DelayFilter::step(double measured) {
   const double innovation = measured - expected();
   const double force = advance(innovation);
-  watch_.add(innovation);
+  memory_.add(innovation);
   return force;
 }
 
@@ -268,7 +268,7 @@ double DelayFilter::advance(double innovation) {
   }
   double* forces = line_.data() + head_;
   innovation_ = innovation;
-  const double* gain = gain_[watch_.level()].data();
+  const double* gain = gain_[memory_.level()].data();
   for (std::size_t i = 0; i < modes_.size(); ++i) modes_[i] += gain[i] * innovation;
   gain += modes_.size();
   for (std::size_t i = 0; i < model_.line; ++i) forces[i] += gain[i] * innovation;

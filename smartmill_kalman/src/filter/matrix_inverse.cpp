@@ -16,14 +16,14 @@ using Complex = std::complex<double>;
 using Eigen::Index;
 using Eigen::MatrixXcd;
 
-constexpr double FADE = 0.15;      // [1] of the bandwidth, over which it ends
+constexpr double ROLL_OFF = 0.15;      // [1] of the bandwidth, over which it ends
 constexpr double LATENCY = 0.01;   // [s] for what comes before its cause
 constexpr std::size_t TAIL = 8;    // an eighth of the taps is cut softly
 constexpr std::size_t FORCES = 3;  // rows that are asked for
 
-/// 1 up to the bandwidth, 0 from 1 + FADE times it on.
+/// 1 up to the bandwidth, 0 from 1 + ROLL_OFF times it on.
 double passed(double frequency, double bandwidth) {
-  const double beyond = std::clamp((frequency / bandwidth - 1.0) / FADE, 0.0, 1.0);
+  const double beyond = std::clamp((frequency / bandwidth - 1.0) / ROLL_OFF, 0.0, 1.0);
   return 0.5 * (1.0 + std::cos(units::PI * beyond));
 }
 

@@ -22,10 +22,10 @@ namespace {
 using Complex = std::complex<double>;
 using Vector = std::vector<Complex>;
 
-constexpr int MOST_SWEEPS = 60;
-constexpr double FOUND = 1e-9;         // [1] step of a root after which it is right to rounding: cubic
+constexpr int MAX_SWEEPS = 60;
+constexpr double ROOT_TOLERANCE = 1e-9;         // [1] step of a root after which it is right to rounding: cubic
 constexpr double TOLERANCE = 1e-9;     // [1] of the factors' product over the spectrum
-constexpr double LEAST_PASSED = 1e-6;  // [1] below it a harmonic's covariance is lost in rounding
+constexpr double MIN_TRANSMISSION = 1e-6;  // [1] below it a harmonic's covariance is lost in rounding
 
 // Without the care for infinities, which do not arise, a division is a few cycles.
 Complex reciprocal(Complex z) {
@@ -38,9 +38,9 @@ Complex times(Complex a, Complex b) {
 }
 
 /// One of each conjugate pair, the constant, which is its own, between modes and harmonics.
-class Uncoupled {
+class DecoupledModel {
  public:
-  explicit Uncoupled(const HarmonicDesign& design)
+  explicit DecoupledModel(const HarmonicDesign& design)
       : modes_(design.sensor.modes.size()), count_(modes_ + design.settling.size()) {
     const double dt = 1.0 / design.sample_rate, r = design.noise_rms * design.noise_rms;
     for (const Mode& mode : design.sensor.modes) {
@@ -105,7 +105,7 @@ class Uncoupled {
 /// poles and their conjugates, and what its logarithm rises over log z.
 class Spectrum {
  public:
-  Spectrum(const Uncoupled& plant, double r, double dt) : r_(r) {
+  Spectrum(const DecoupledModel& plant, double r, double dt) : r_(r) {
     for (std::size_t i = 0; i < plant.count(); ++i) {
       pole_.push_back(plant.turn(i));
       Complex h = 0.0;
@@ -162,7 +162,7 @@ class Spectrum {
 Vector zeros(const Spectrum& spectrum, Vector zero, std::size_t single) {
   std::vector<bool> found(zero.size(), false);
   std::size_t left = zero.size();
-  for (int sweep = 0; sweep < MOST_SWEEPS && left > 0; ++sweep) {
+  for (int sweep = 0; sweep < MAX_SWEEPS && left > 0; ++sweep) {
     for (std::size_t i = 0; i < zero.size(); ++i) {
       if (found[i]) continue;
       const Complex z = zero[i], inverse = reciprocal(z);
@@ -181,7 +181,7 @@ Vector zeros(const Spectrum& spectrum, Vector zero, std::size_t single) {
       Complex next = z * (1.0 - step);
       // A root outside is the mirror of one inside.
       if (std::abs(next) >= 1.0) next = 1.0 / std::conj(next);
-      found[i] = std::abs(next - z) <= FOUND;
+      found[i] = std::abs(next - z) <= ROOT_TOLERANCE;
       left -= found[i] ? 1 : 0;
       zero[i] = next;
     }
@@ -190,7 +190,7 @@ Vector zeros(const Spectrum& spectrum, Vector zero, std::size_t single) {
 }
 
 /// Each harmonic damped as in a comb of its kind: sinh(decay T / 2) = |H| T / (2 tau).
-Vector firstZeros(const Uncoupled& plant, const HarmonicDesign& design) {
+Vector firstZeros(const DecoupledModel& plant, const HarmonicDesign& design) {
   const double dt = 1.0 / design.sample_rate, revolution = units::TWO_PI / design.spindle_speed;
   Vector zero;
   for (std::size_t i = 0; i < plant.count(); ++i) {
@@ -207,9 +207,9 @@ Vector firstZeros(const Uncoupled& plant, const HarmonicDesign& design) {
 }
 
 /// Filter, innovation and covariance of the zeros.
-class Factor {
+class SpectralFactor {
  public:
-  Factor(const Uncoupled& plant, const Spectrum& spectrum, Vector zero)
+  SpectralFactor(const DecoupledModel& plant, const Spectrum& spectrum, Vector zero)
       : plant_(plant), zero_(std::move(zero)) {
     // Between the poles, all around: the product of the factors is the spectrum.
     const std::size_t points = 2 * zero_.size() + 1;
@@ -279,7 +279,7 @@ class Factor {
     return unseen - variance_ * gains / (1.0 - turned);
   }
 
-  const Uncoupled& plant_;
+  const DecoupledModel& plant_;
   Vector zero_, predictor_;
   double variance_ = 0.0, misfit_ = 0.0;
 };
@@ -309,14 +309,14 @@ std::vector<double> stateOf(const Vector& v, const HarmonicDesign& design) {
 }  // namespace
 
 std::optional<HarmonicGain> spectralGain(const HarmonicDesign& design) {
-  const Uncoupled plant(design);
+  const DecoupledModel plant(design);
   for (std::size_t i = plant.modes(); i < plant.count(); ++i) {
-    if (std::abs(plant.output(i)) < LEAST_PASSED) return std::nullopt;
+    if (std::abs(plant.output(i)) < MIN_TRANSMISSION) return std::nullopt;
   }
   const Spectrum spectrum(plant, design.noise_rms * design.noise_rms, 1.0 / design.sample_rate);
   Vector zero = zeros(spectrum, firstZeros(plant, design), plant.modes());
   if (zero.empty()) return std::nullopt;
-  const Factor factor(plant, spectrum, std::move(zero));
+  const SpectralFactor factor(plant, spectrum, std::move(zero));
   if (!(factor.misfit() < TOLERANCE)) return std::nullopt;
   Vector filter, smoothing;
   for (std::size_t i = 0; i < plant.count(); ++i) {

@@ -207,7 +207,7 @@ class CutResiduals : public fit::Residuals {
  public:
   CutResiduals(const WeightedHarmonics& measured, const Sensor& now, const ToolGeometry& tool,
                const Engagement& engagement, const std::vector<double>& radius,
-               const FollowParameters& parameters, const std::array<std::size_t, 2>& tapped)
+               const ModeFollowerParameters& parameters, const std::array<std::size_t, 2>& tapped)
       : measured_(measured), now_(now), tool_(tool), engagement_(engagement), radius_(radius) {
     const std::size_t modes = now[0].modes.size() + now[1].modes.size();
     gains_ = modes > tapped[0] + tapped[1];
@@ -353,12 +353,12 @@ std::optional<Sensor> withHidden(const WeightedHarmonics& measured, const Sensor
 
 }  // namespace
 
-void FollowParameters::validate() const {
+void ModeFollowerParameters::validate() const {
   checkBounds(*this);
 }
 
 ModeFollower::ModeFollower(const ToolGeometry& tool, const Engagement& engagement, int harmonics,
-                           const FollowParameters& parameters)
+                           const ModeFollowerParameters& parameters)
     : tool_(tool), engagement_(engagement), harmonics_(harmonics), parameters_(parameters) {
   parameters.validate();
   validate(tool);
@@ -367,7 +367,7 @@ ModeFollower::ModeFollower(const ToolGeometry& tool, const Engagement& engagemen
   radius_.assign(static_cast<std::size_t>(tool.teeth), 0.0);
 }
 
-std::optional<ModeFollower::Move> ModeFollower::look(const Harmonics& measured, double noise_std,
+std::optional<ModeFollower::Update> ModeFollower::update(const Harmonics& measured, double noise_std,
                                                      const std::array<ModalModel, 2>& now,
                                                      double spindle_speed) {
   const auto count = static_cast<std::size_t>(harmonics_) + 1;
@@ -382,20 +382,20 @@ std::optional<ModeFollower::Move> ModeFollower::look(const Harmonics& measured, 
   const auto residualsOf = [&](const Sensor& sensor) {
     return CutResiduals(seen, sensor, tool_, engagement_, radius_, parameters_, tapped);
   };
-  // The tool's runout first, with the sensor as believed: that is what the cut may be without any move.
+  // The tool's runout first, with the sensor as believed: that is what the cut may be without any update.
   const CutResiduals residuals = residualsOf(now);
   CutFit cut(residuals);
   cut.fitRadii();
   const double unmoved = cut.cost();
   const std::vector<double> radius = cut.radii();
-  Move move;
-  move.before = cut.squares();
+  Update update;
+  update.before = cut.squares();
   const double first = seen.innovations(*first_, cut.force()).squaredNorm();
   const std::optional<Sensor> suspected = withHidden(seen, now, cut.force(), tapped);
   cut.fitAll();
-  move.after = cut.squares();
-  move.sensor = cut.sensor();
-  const double scale = scaleOf(seen, residuals, move.after);
+  update.after = cut.squares();
+  update.sensor = cut.sensor();
+  const double scale = scaleOf(seen, residuals, update.after);
   // What no move explains may be a mode that the taps have not shown. It must leave nothing unexplained.
   if (suspected && scale > UNEXPLAINED) {
     const CutResiduals more = residualsOf(*suspected);
@@ -406,21 +406,21 @@ std::optional<ModeFollower::Move> ModeFollower::look(const Harmonics& measured, 
         scaleOf(seen, more, hidden.squares()) <= 1.0 && hidden.cost() < REMAINS * cut.cost();
     if (all_told && fall > HIDDEN_EVIDENCE * parameters_.evidence) {
       radius_ = hidden.radii();
-      move.after = hidden.squares();
-      move.sensor = hidden.sensor();
-      return move;
+      update.after = hidden.squares();
+      update.sensor = hidden.sensor();
+      return update;
     }
   }
   if ((unmoved - cut.cost()) / scale > parameters_.evidence) {
     radius_ = cut.radii();
-    return move;
+    return update;
   }
   radius_ = radius;
   // Back to the taps when they explain the cut as well.
-  if (first < move.before) {
-    move.sensor = *first_;
-    move.after = first;
-    return move;
+  if (first < update.before) {
+    update.sensor = *first_;
+    update.after = first;
+    return update;
   }
   return std::nullopt;
 }

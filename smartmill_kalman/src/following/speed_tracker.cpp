@@ -56,7 +56,7 @@ void SpeedTracker::predict(double speed_used, double memory) {
     if (beyond_ > LOST * units::TWO_PI / nominal_) {
       speed_ = nominal_;
       acceleration_ = beyond_ = 0.0;
-      reopen();
+      resetCovariance();
     }
   }
   acceleration_ *= decay_;
@@ -109,7 +109,7 @@ void SpeedTracker::update(std::size_t axis, double innovation, double slope, dou
   }
 }
 
-void SpeedTracker::reopen() {
+void SpeedTracker::resetCovariance() {
   for (auto& row : p_) row[0] = row[1] = 0.0;
   p_[0][1] = p_[0][2] = p_[1][2] = 0.0;
   p_[1][1] = most_variance_;

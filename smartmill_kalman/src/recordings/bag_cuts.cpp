@@ -42,9 +42,9 @@ struct Stream {
   double end() const { return stamp + static_cast<double>(value[0].size()) / rate; }
 };
 
-class Gatherer {
+class CutCollector {
  public:
-  Gatherer(const BagCutsRequest& request, BagCuts& found) : request_(request), found_(found) {
+  CutCollector(const BagCutsRequest& request, BagCuts& found) : request_(request), found_(found) {
     if (!request.spindle_sensor.empty())
       spindle_.emplace(readSpindleSensor(request.spindle_sensor), request.length);
   }
@@ -124,7 +124,7 @@ class Gatherer {
     const double begin = std::max({*from_ + SETTLING, force_.stamp, response_.stamp, angles_.front().time});
     const double end = std::min({to_ - SETTLING, force_.end(), response_.end(), angles_.back().time});
     if (!(end > begin)) return;
-    CutStretch one;
+    CutSegment one;
     one.name = condition_->name;
     one.sample_rate = force_.rate;
     one.relative_force_std = request_.force_error;
@@ -165,20 +165,20 @@ class Gatherer {
 
 BagCuts cutsOfBag(const BagCutsRequest& request, const std::function<void(double)>& progress) {
   BagCuts found;
-  Gatherer gatherer(request, found);
+  CutCollector collector(request, found);
   RecordingReader bag(request.path);
   for (const std::string& topic :
        {std::string(names::FORCE_COMPENSATED), std::string(names::SPINDLE_ANGLE), request.response}) {
     if (!bag.has(topic)) throw Error(request.path + ": holds no " + topic);
   }
-  feed<CuttingCondition>(bag, names::CUTTING_CONDITION, gatherer);
-  feed<CncState>(bag, names::CNC_STATE, gatherer);
-  feed<SpindleAngle>(bag, names::SPINDLE_ANGLE, gatherer);
-  feed<ForceBlock>(bag, names::FORCE_COMPENSATED, gatherer);
-  feed<SampleBlock>(bag, request.response, gatherer);
-  feed<MeasuredModes>(bag, names::TOOL_MODES, gatherer);
+  feed<CuttingCondition>(bag, names::CUTTING_CONDITION, collector);
+  feed<CncState>(bag, names::CNC_STATE, collector);
+  feed<SpindleAngle>(bag, names::SPINDLE_ANGLE, collector);
+  feed<ForceBlock>(bag, names::FORCE_COMPENSATED, collector);
+  feed<SampleBlock>(bag, request.response, collector);
+  feed<MeasuredModes>(bag, names::TOOL_MODES, collector);
   bag.run(progress);
-  gatherer.close();
+  collector.close();
   return found;
 }
 

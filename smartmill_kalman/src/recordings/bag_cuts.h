@@ -22,7 +22,7 @@ struct BagCutsRequest {
 
 /// Steady cuts of a bag, one stretch each, and the taps at rest that the same bag holds.
 struct BagCuts {
-  std::array<std::vector<CutStretch>, 3> axis;  ///< x, y, z; force/compensated drives
+  std::array<std::vector<CutSegment>, 3> axis;  ///< x, y, z; force/compensated drives
   std::array<ModalModel, 3> rest;               ///< tool/modes of the tool or of the sensor; empty: none
 };
 

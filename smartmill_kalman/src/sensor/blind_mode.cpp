@@ -21,7 +21,7 @@ constexpr double SKIRT = 4.0;
 /// Powers of neighbouring lines of a Hann window are correlated, (2/3)^2 and (1/6)^2: so many lines count as
 /// one.
 constexpr double CORRELATED = 1.0 + 2.0 * (4.0 / 9.0 + 1.0 / 36.0);
-constexpr std::size_t LEAST_LINES = 50;
+constexpr std::size_t MIN_LINES = 50;
 
 struct Fit {
   double f0 = 0.0, zeta = 0.0, share = 0.0, floor = 0.0;
@@ -104,7 +104,7 @@ fit::Covariance covarianceOf(const PowerLines& lines, const Fit& best, double un
   const Eigen::VectorXd at = unknownsOf(best, unit);
   Eigen::MatrixXd slopes(static_cast<Eigen::Index>(lines.frequency.size()), 4);
   for (std::size_t k = 0; k < lines.frequency.size(); ++k) {
-    const DuePower due = duePower(lines.frequency[k], at, unit);
+    const ExpectedPower due = expectedPower(lines.frequency[k], at, unit);
     for (Eigen::Index i = 0; i < 4; ++i)
       slopes(static_cast<Eigen::Index>(k), i) = due.slope[i] / due.value / std::sqrt(CORRELATED);
   }
@@ -129,7 +129,7 @@ BlindMode findBlindMode(const std::vector<double>& samples, double sample_rate, 
     lines.frequency.push_back(frequency[k]);
     lines.power.push_back(std::norm(spectrum[k]));
   }
-  if (lines.power.size() < LEAST_LINES) throw Error("blind mode: too few lines between those of the spindle");
+  if (lines.power.size() < MIN_LINES) throw Error("blind mode: too few lines between those of the spindle");
 
   Fit best;
   for (double f0 = low; f0 <= high; f0 *= 1.008) {

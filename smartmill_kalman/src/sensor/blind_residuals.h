@@ -16,11 +16,11 @@ struct PowerLines {
 double resonance(double f, double f0, double zeta);
 
 /// Power that is due on a line with its derivatives by log f0, log zeta, share and floor (over `unit`).
-struct DuePower {
+struct ExpectedPower {
   double value = 0.0;
   double slope[4] = {};
 };
-DuePower duePower(double f, const Eigen::VectorXd& at, double unit);
+ExpectedPower expectedPower(double f, const Eigen::VectorXd& at, double unit);
 
 /// Deviance residuals of an exponentially distributed spectrum over log f0, log zeta, share and floor (over
 /// the mean power): half the sum of their squares is minus the log-likelihood but for a constant, so that

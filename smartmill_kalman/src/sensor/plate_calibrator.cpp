@@ -68,19 +68,19 @@ void PlateCalibrator::handleHammer(const SampleBlock& block) {
   if (collector_) collector_->handleHammer(block);
 }
 
-void PlateCalibrator::tapping(const std::string& direction) {
+void PlateCalibrator::beginTaps(const std::string& direction) {
   if (!point_) return;
   direction_ = direction;
   columns_.clear();  // told by the first block
   collector_.emplace(parameters_, 0);
 }
 
-void PlateCalibrator::tapped(const SensorResult& result) {
+void PlateCalibrator::endTaps(const SensorResult& result) {
   if (!collector_) return;
   const auto axis = std::string("xyz").find(direction_);
   if (result.code == FrfCode::ok && axis < 3) {
     if (records_.rate != collector_->rate()) records_ = {{}, collector_->rate()};  // another device
-    for (std::vector<Hit>& hit : collector_->counted(result)) {
+    for (std::vector<Hit>& hit : collector_->acceptedHits(result)) {
       MatrixTap tap;
       tap.point = *point_;
       // The blow came from the side that the sensor shows.

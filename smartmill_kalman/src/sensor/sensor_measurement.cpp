@@ -10,6 +10,7 @@
 #include "smartmill_core/modal/impact_analysis.h"
 #include "smartmill_core/modal/modal_fit.h"
 #include "smartmill_core/signal/statistics.h"
+#include "smartmill_kalman/sensor/block_channels.h"
 
 namespace smartmill::kalman {
 namespace {
@@ -17,7 +18,7 @@ namespace {
 /// Stamps are rounded to nanoseconds; equal times must compare equal however a stream is cut into blocks.
 constexpr double SAME_TIME = 1e-6;  // [s]
 /// Lines at the lower end that tell the static gain at least.
-constexpr std::size_t LEAST_STATIC_LINES = 4;
+constexpr std::size_t MIN_STATIC_LINES = 4;
 /// Share of the time before the trigger that is free of the foot of the hit.
 constexpr double QUIET_SHARE = 0.75;
 
@@ -54,7 +55,7 @@ std::optional<SensorResult> SensorMeasurement::takeResult() {
   return std::exchange(done_, std::nullopt);
 }
 
-void SensorMeasurement::say(const std::string& stage) {
+void SensorMeasurement::reportStage(const std::string& stage) {
   feedback_ = TapFeedback{stage, 0.95 * static_cast<double>(hits_.size()) / goal_.hits,
                           static_cast<int>(hits_.size())};
 }
@@ -77,19 +78,18 @@ bool SensorMeasurement::handle(const MeasureFrfGoal& goal) {
   } else {
     // The samples before the first blow fill the record's quiet part.
     rest_until_ = goal.stamp + std::max(parameters_.rest_time, 2.0 * parameters_.pre_trigger);
-    say("waiting for the samples");
+    reportStage("waiting for the samples");
   }
   return true;
 }
 
 void SensorMeasurement::take(const SampleBlock& block, const std::string& channel,
                              std::deque<Sample>& queue) {
-  const std::size_t c = block.channel(channel);
-  if (block.units.at(c) != "N") throw Error("channel " + channel + " is in " + block.units[c] + ", N is due");
+  const std::size_t c = columnOf(block, channel, "N");
   for (std::size_t i = 0; i < block.size(); ++i) {
     queue.push_back({block.timeOf(i), block.first_index + i, block.sample_rate, block.at(i, c)});
   }
-  join();
+  pairSamples();
   for (const auto* waiting : {&hammer_, &sensor_}) {
     if (waiting->empty() || waiting->back().time - waiting->front().time <= parameters_.strike_timeout)
       continue;
@@ -108,7 +108,7 @@ void SensorMeasurement::handleSensor(const SampleBlock& block) {
 }
 
 // A sample that one stream lost leaves a gap in the index, which the collector sees.
-void SensorMeasurement::join() {
+void SensorMeasurement::pairSamples() {
   while (!hammer_.empty() && !sensor_.empty()) {
     const Sample h = hammer_.front(), s = sensor_.front();
     if (h.index <= s.index) hammer_.pop_front();
@@ -123,47 +123,47 @@ void SensorMeasurement::join() {
 void SensorMeasurement::sample(double time, std::uint64_t index, double rate, double force, double response) {
   if (time < goal_.stamp - SAME_TIME) return;
   auto record = collector_.add(time, index, rate, force, response);
-  if (record) return recorded(time, std::move(*record));
+  if (record) return handleRecord(time, std::move(*record));
   if (!waiting_for_hit_) {
-    if (time >= rest_until_ - SAME_TIME) strike(time);
+    if (time >= rest_until_ - SAME_TIME) requestHit(time);
   } else if (time > deadline_ && !collector_.recording()) {
     collector_.disarm();
-    badHit(time, formatted("no hit within %.1f s", parameters_.strike_timeout), false);
+    rejectHit(time, formatted("no hit within %.1f s", parameters_.strike_timeout), false);
   }
 }
 
-void SensorMeasurement::strike(double now) {
+void SensorMeasurement::requestHit(double now) {
   waiting_for_hit_ = true;
   deadline_ = now + parameters_.strike_timeout;
   collector_.arm();
   command_ = StrikeCommand{now, goal_.direction};
-  say("waiting for hit " + std::to_string(hits_.size() + 1) + " of " + std::to_string(goal_.hits));
+  reportStage("waiting for hit " + std::to_string(hits_.size() + 1) + " of " + std::to_string(goal_.hits));
 }
 
 void SensorMeasurement::hitByHand() {
-  if (active_) say("hit the workpiece by hand in " + goal_.direction);
+  if (active_) reportStage("hit the workpiece by hand in " + goal_.direction);
 }
 
-void SensorMeasurement::recorded(double now, HitCollector::Record record) {
+void SensorMeasurement::handleRecord(double now, HitCollector::Record record) {
   HitFault fault{record.fault, true};
   if (fault.text.empty()) {
     fault = hitFault(record.hit,
                      {parameters_.weak_force, parameters_.second_hit_share, parameters_.response_range, 0.0});
   }
-  if (!fault.text.empty()) return badHit(now, fault.text, fault.bad_data);
+  if (!fault.text.empty()) return rejectHit(now, fault.text, fault.bad_data);
   hits_.push_back(std::move(record.hit));
   if (static_cast<int>(hits_.size()) >= goal_.hits) return evaluate();
-  say("hit " + std::to_string(hits_.size()) + " of " + std::to_string(goal_.hits));
+  reportStage("hit " + std::to_string(hits_.size()) + " of " + std::to_string(goal_.hits));
   waiting_for_hit_ = false;
   rest_until_ = now + parameters_.rest_time;
 }
 
-void SensorMeasurement::badHit(double now, const std::string& why, bool bad_data) {
+void SensorMeasurement::rejectHit(double now, const std::string& why, bool bad_data) {
   if (++bad_hits_ > parameters_.max_bad_hits) {
     return finish(bad_data ? FrfCode::bad_data : FrfCode::no_hit,
                   std::to_string(bad_hits_) + " useless hits, the last: " + why);
   }
-  say("hit thrown away: " + why);
+  reportStage("hit thrown away: " + why);
   waiting_for_hit_ = false;
   rest_until_ = now + parameters_.rest_time;
 }
@@ -172,7 +172,7 @@ void SensorMeasurement::badHit(double now, const std::string& why, bool bad_data
 void SensorMeasurement::staticGain(const FrequencyResponse& frf) {
   double weights = 0.0, sum = 0.0;
   for (std::size_t k = 0;
-       k < frf.size() && (k < LEAST_STATIC_LINES || frf.frequency[k] <= parameters_.fit_low); ++k) {
+       k < frf.size() && (k < MIN_STATIC_LINES || frf.frequency[k] <= parameters_.fit_low); ++k) {
     const double weight = std::isfinite(frf.std_dev[k]) ? 2.0 / std::norm(frf.std_dev[k]) : 0.0;
     weights += weight;
     sum += weight * frf.value[k].real();
@@ -240,7 +240,7 @@ void SensorMeasurement::commandFailed(const std::string& text) {
   if (active_) finish(FrfCode::no_hit, text);
 }
 
-void SensorMeasurement::lost(const std::string& text) {
+void SensorMeasurement::abort(const std::string& text) {
   if (active_) finish(FrfCode::bad_data, text);
 }
 

@@ -21,7 +21,7 @@ namespace smartmill::kalman {
 namespace {
 
 constexpr const char* AXES = "xyz";
-constexpr double PROOF = 9.0;           // [1] of chi squared by which a beam's law must fit better
+constexpr double MIN_CHI2_GAIN = 9.0;           // [1] of chi squared by which a beam's law must fit better
 constexpr double LENGTH_MARGIN = 2e-3;  // [m] that constants hold beyond the lengths of their readings
 constexpr const char* FORMAT = "smartmill-spindle-sensor/1";
 
@@ -51,7 +51,7 @@ LeastSquares solve(const Eigen::MatrixXd& a, const Eigen::VectorXd& b, const std
   return found;
 }
 
-LengthConstants constantsOf(const StaticReadings& readings, double length) {
+ConstantsAtLength constantsOf(const StaticMeasurements& readings, double length) {
   std::map<int, Eigen::Index> tests;
   std::vector<std::size_t> rows;
   for (std::size_t i = 0; i < readings.size(); ++i) {
@@ -76,7 +76,7 @@ LengthConstants constantsOf(const StaticReadings& readings, double length) {
   for (Eigen::Index j = 0; j < 3; ++j) {
     if (a.col(j).isZero()) throw Error(what + ": no load along " + AXES[j]);
   }
-  LengthConstants found;
+  ConstantsAtLength found;
   found.length = length;
   double squares = 0.0;
   for (Eigen::Index k = 0; k < 3; ++k) {
@@ -93,13 +93,13 @@ LengthConstants constantsOf(const StaticReadings& readings, double length) {
 }
 
 /// Weighted line over length of the constants, or of their reciprocals, and what it leaves.
-std::pair<LengthLine, double> fitLine(const std::vector<LengthConstants>& lengths, int row, int column,
+std::pair<LengthDependence, double> fitLine(const std::vector<ConstantsAtLength>& lengths, int row, int column,
                                       bool reciprocal) {
   Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
   Eigen::Vector2d right = Eigen::Vector2d::Zero();
   double middle = 0.0, weights = 0.0;
   std::vector<std::array<double, 3>> points;  // length, value, weight
-  for (const LengthConstants& l : lengths) {
+  for (const ConstantsAtLength& l : lengths) {
     const double share = l.share[row][column], value = reciprocal ? share : 1.0 / share;
     const double moves = reciprocal ? 1.0 : value * value;
     const double std_dev = std::max(l.std_dev[row][column] * moves, 1e-12 * std::abs(value));
@@ -108,7 +108,7 @@ std::pair<LengthLine, double> fitLine(const std::vector<LengthConstants>& length
     weights += points.back()[2];
   }
   middle /= weights;
-  LengthLine line;
+  LengthDependence line;
   line.reciprocal = reciprocal;
   if (points.size() == 1) {
     line.offset = points[0][1];
@@ -134,23 +134,23 @@ std::pair<LengthLine, double> fitLine(const std::vector<LengthConstants>& length
 }
 
 /// Constant over length: a line, unless readings at three lengths or more prove that the reciprocal is one.
-LengthLine lineOf(const std::vector<LengthConstants>& lengths, int row, int column) {
+LengthDependence lengthDependenceOf(const std::vector<ConstantsAtLength>& lengths, int row, int column) {
   const auto [line, chi2] = fitLine(lengths, row, column, false);
   if (lengths.size() < 3) return line;
   const auto [beam, beam_chi2] = fitLine(lengths, row, column, true);
-  return chi2 - beam_chi2 > PROOF ? beam : line;
+  return chi2 - beam_chi2 > MIN_CHI2_GAIN ? beam : line;
 }
 
 /// Cross-talk that is there at every length.
-std::optional<LengthLine> crossOf(const std::vector<LengthConstants>& lengths, int row, int column) {
-  for (const LengthConstants& l : lengths) {
+std::optional<LengthDependence> crossTalkOf(const std::vector<ConstantsAtLength>& lengths, int row, int column) {
+  for (const ConstantsAtLength& l : lengths) {
     if (!(std::abs(l.share[row][column]) > 2.0 * l.std_dev[row][column])) return {};
   }
-  return lineOf(lengths, row, column);
+  return lengthDependenceOf(lengths, row, column);
 }
 
-LengthLine readLine(const StrictYaml& yaml) {
-  LengthLine line;
+LengthDependence readLengthDependence(const StrictYaml& yaml) {
+  LengthDependence line;
   line.slope = yaml.number("slope_per_mm") / units::MM;
   line.offset = yaml.number("offset");
   if (yaml.has("line_of")) line.reciprocal = yaml.oneOf("line_of", {"constant", "share"}) == "share";
@@ -161,7 +161,7 @@ LengthLine readLine(const StrictYaml& yaml) {
   return line;
 }
 
-std::string text(const std::string& key, const LengthLine& line) {
+std::string text(const std::string& key, const LengthDependence& line) {
   std::string out =
       key + ": {slope_per_mm: " + yamlNumber(line.slope * units::MM) + ", offset: " + yamlNumber(line.offset);
   if (std::isfinite(line.slope_std)) out += ", slope_per_mm_std: " + yamlNumber(line.slope_std * units::MM);
@@ -169,7 +169,7 @@ std::string text(const std::string& key, const LengthLine& line) {
   return out + (line.reciprocal ? ", line_of: share}\n" : "}\n");
 }
 
-ModalModel readCourse(const StrictYaml& yaml) {
+ModalModel readDynamics(const StrictYaml& yaml) {
   ModalModel model = ideal();
   for (const StrictYaml& entry : yaml.maps("modes")) {
     Mode mode;
@@ -203,7 +203,7 @@ SpindleSensorCalibration::SpindleSensorCalibration()
 SpindleSensorCalibration SpindleSensorCalibration::table3() {
   SpindleSensorCalibration table;
   const auto line = [](double slope_per_mm, double offset) {
-    LengthLine l;
+    LengthDependence l;
     l.slope = slope_per_mm / units::MM;
     l.offset = offset;
     return l;
@@ -220,7 +220,7 @@ SpindleSensorCalibration SpindleSensorCalibration::table3() {
 }
 
 void SpindleSensorCalibration::validate() const {
-  const auto check = [](const std::string& key, const LengthLine& line) {
+  const auto check = [](const std::string& key, const LengthDependence& line) {
     require((key + ".slope").c_str(), line.slope, Range{});
     require((key + ".offset").c_str(), line.offset, Range{});
   };
@@ -237,7 +237,7 @@ void SpindleSensorCalibration::validate() const {
   require("drift_std_n_per_s", drift_std, Range::positive());
 }
 
-void SpindleSensorCalibration::needLength(double length) const {
+void SpindleSensorCalibration::checkLength(double length) const {
   if (length >= lengths[0] && length <= lengths[1]) return;
   throw Error(formatted("%.1f mm of tool and holder is outside the calibrated %.1f .. %.1f mm",
                         length / units::MM, lengths[0] / units::MM, lengths[1] / units::MM));
@@ -269,15 +269,15 @@ SpindleSensorCalibration readSpindleSensor(const std::string& file) {
   const StrictYaml yaml = StrictYaml::fromFile(file);
   yaml.oneOf("format", {FORMAT});
   SpindleSensorCalibration c;
-  c.x = readLine(yaml.map("x"));
-  c.y = readLine(yaml.map("y"));
-  c.z = readLine(yaml.map("z"));
-  const auto cross = [&](const char* key, std::optional<LengthLine>& line, ModalModel& course) {
-    if (const auto map = yaml.optionalMap(key)) line = readLine(*map);
+  c.x = readLengthDependence(yaml.map("x"));
+  c.y = readLengthDependence(yaml.map("y"));
+  c.z = readLengthDependence(yaml.map("z"));
+  const auto cross = [&](const char* key, std::optional<LengthDependence>& line, ModalModel& course) {
+    if (const auto map = yaml.optionalMap(key)) line = readLengthDependence(*map);
     const std::string dynamic = std::string("dynamic_") + key;
     if (const auto map = yaml.optionalMap(dynamic)) {
       if (!line) yaml.fail(dynamic, "there is no static cross-talk " + std::string(key));
-      course = readCourse(*map);
+      course = readDynamics(*map);
     }
   };
   cross("yx", c.yx, c.dynamic_yx);
@@ -348,10 +348,10 @@ void writeSpindleSensor(const SpindleSensorCalibration& c, const std::string& fi
   if (!stream) throw Error(file + ": cannot be written");
 }
 
-StaticReadings readStaticReadings(const std::string& file) {
+StaticMeasurements readStaticMeasurements(const std::string& file) {
   const auto columns = readColumns(file, {"test", "time[s]", "length[mm]", "load_x[N]", "load_y[N]",
                                           "load_z[N]", "x1[N]", "x2[N]", "y1[N]", "y2[N]", "z1[N]", "z2[N]"});
-  StaticReadings readings;
+  StaticMeasurements readings;
   readings.file = file;
   for (std::size_t i = 0; i < columns[0].size(); ++i) {
     readings.test.push_back(static_cast<int>(std::lround(columns[0][i])));
@@ -364,13 +364,13 @@ StaticReadings readStaticReadings(const std::string& file) {
   return readings;
 }
 
-StaticCalibration calibrateStatic(const StaticReadings& readings, const SpindleSensorCalibration& base) {
+StaticCalibration calibrateStatic(const StaticMeasurements& readings, const SpindleSensorCalibration& base) {
   const std::set<double> lengths(readings.length.begin(), readings.length.end());
   if (lengths.empty()) throw Error(readings.file + ": there are none");
   StaticCalibration result;
   result.calibration = base;
   for (const double length : lengths) result.lengths.push_back(constantsOf(readings, length));
-  for (const LengthConstants& l : result.lengths) {
+  for (const ConstantsAtLength& l : result.lengths) {
     for (int axis = 0; axis < 3; ++axis) {
       if (!(std::abs(l.share[axis][axis]) > 2.0 * l.std_dev[axis][axis])) {
         throw Error(readings.file + ": length " + std::to_string(l.length / units::MM) + " mm: the pair " +
@@ -379,26 +379,26 @@ StaticCalibration calibrateStatic(const StaticReadings& readings, const SpindleS
     }
   }
   result.calibration.lengths = {*lengths.begin() - LENGTH_MARGIN, *lengths.rbegin() + LENGTH_MARGIN};
-  result.calibration.x = lineOf(result.lengths, 0, 0);
-  result.calibration.y = lineOf(result.lengths, 1, 1);
-  result.calibration.z = lineOf(result.lengths, 2, 2);
-  result.calibration.yx = crossOf(result.lengths, 0, 1);
-  result.calibration.yz = crossOf(result.lengths, 2, 1);
-  result.calibration.xz = crossOf(result.lengths, 2, 0);
+  result.calibration.x = lengthDependenceOf(result.lengths, 0, 0);
+  result.calibration.y = lengthDependenceOf(result.lengths, 1, 1);
+  result.calibration.z = lengthDependenceOf(result.lengths, 2, 2);
+  result.calibration.yx = crossTalkOf(result.lengths, 0, 1);
+  result.calibration.yz = crossTalkOf(result.lengths, 2, 1);
+  result.calibration.xz = crossTalkOf(result.lengths, 2, 0);
   return result;
 }
 
-void needLengths(const StaticReadings& readings, const SpindleSensorCalibration& calibration) {
+void checkLengths(const StaticMeasurements& readings, const SpindleSensorCalibration& calibration) {
   try {
-    for (const double length : readings.length) calibration.needLength(length);
+    for (const double length : readings.length) calibration.checkLength(length);
   } catch (const Error& error) {
     throw Error(readings.file + ": " + error.what());
   }
 }
 
-std::array<double, 3> verifyStatic(const StaticReadings& readings,
+std::array<double, 3> verifyStatic(const StaticMeasurements& readings,
                                    const SpindleSensorCalibration& calibration) {
-  needLengths(readings, calibration);
+  checkLengths(readings, calibration);
   std::array<double, 3> worst{}, largest{};
   const std::set<int> tests(readings.test.begin(), readings.test.end());
   for (const int test : tests) {

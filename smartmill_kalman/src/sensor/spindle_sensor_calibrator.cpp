@@ -104,7 +104,7 @@ void SpindleSensorCalibrator::read(const SampleBlock& block, const std::array<st
                       formatted("channel %s is not a number in the reading", SPINDLE_SENSOR_CHANNELS[k]));
       }
     }
-    StaticReadings& to = goal_->reference ? reference_ : readings_;
+    StaticMeasurements& to = goal_->reference ? reference_ : readings_;
     to.test.push_back(goal_->test);
     to.time.push_back(time_sum_ / n);
     to.length.push_back(goal_->length);
@@ -120,7 +120,7 @@ void SpindleSensorCalibrator::handleHammer(const SampleBlock& block) {
   collector_.handleHammer(block);
 }
 
-void SpindleSensorCalibrator::tapping(const std::string& direction, double length) {
+void SpindleSensorCalibrator::beginTaps(const std::string& direction, double length) {
   direction_ = direction;
   if (length > 0.0) tap_length_ = length;
   if (direction.empty()) {
@@ -130,21 +130,21 @@ void SpindleSensorCalibrator::tapping(const std::string& direction, double lengt
   }
 }
 
-void SpindleSensorCalibrator::tapped(const SensorResult& result) {
+void SpindleSensorCalibrator::endTaps(const SensorResult& result) {
   const std::size_t along = direction_ == "x" ? 0 : direction_ == "y" ? 1 : 2;
   if (!direction_.empty() && result.code == FrfCode::ok) {
     taps_[along].clear();
     tap_rate_ = collector_.rate();
-    for (const std::vector<Hit>& hit : collector_.counted(result))
+    for (const std::vector<Hit>& hit : collector_.acceptedHits(result))
       taps_[along].push_back({hit[0].response, hit[1].response, hit[2].response});
   }
-  tapping("");
+  beginTaps("");
 }
 
 /// Courses of the cross-talk where there are taps. @return what was found, for the message
-std::string SpindleSensorCalibrator::fitCourses(SpindleSensorCalibration& c) const {
+std::string SpindleSensorCalibrator::fitDynamicCrossTalks(SpindleSensorCalibration& c) const {
   std::string text;
-  const auto course = [&](std::size_t along, std::size_t in, const std::optional<LengthLine>& line,
+  const auto course = [&](std::size_t along, std::size_t in, const std::optional<LengthDependence>& line,
                           ModalModel& model, const char* name) {
     const auto& taps = taps_[along];
     if (taps.empty() || !line) return;
@@ -175,7 +175,7 @@ std::string SpindleSensorCalibrator::fitCourses(SpindleSensorCalibration& c) con
   return text;
 }
 
-std::string SpindleSensorCalibrator::readingsTable() const {
+std::string SpindleSensorCalibrator::measurementTable() const {
   std::string out =
       "test,time[s],length[mm],load_x[N],load_y[N],load_z[N],x1[N],x2[N],y1[N],y2[N],z1[N],z2[N]\n";
   for (std::size_t i = 0; i < readings_.size(); ++i) {
@@ -191,7 +191,7 @@ std::string SpindleSensorCalibrator::readingsTable() const {
 void SpindleSensorCalibrator::fit() {
   try {
     StaticCalibration found = calibrateStatic(readings_, base_);
-    const std::string courses = fitCourses(found.calibration);
+    const std::string courses = fitDynamicCrossTalks(found.calibration);
     const SpindleSensorCalibration& c = found.calibration;
     finish(Code::ok, formatted("%zu readings at %zu lengths: constants x %.3f, y %.3f, z %.3f at %.0f mm",
                                readings_.size(), found.lengths.size(), c.x.at(tap_length_),

@@ -20,11 +20,11 @@ using Eigen::Index;
 using Eigen::MatrixXcd;
 using Eigen::MatrixXd;
 
-constexpr std::size_t SMOOTH = 8;   // lines to each side that share a residual variance
-constexpr double FULL_RANK = 1e-6;  // [1] smallest over largest singular value of the directions tapped
+constexpr std::size_t SMOOTHING_LINES = 8;   // lines to each side that share a residual variance
+constexpr double MIN_RANK_RATIO = 1e-6;  // [1] smallest over largest singular value of the directions tapped
 
 /// Force and moment of a unit blow (eq. 2.2, 2.6), moments over the lever.
-Eigen::VectorXd blow(const MatrixTap& tap, Index channels, double lever) {
+Eigen::VectorXd unitHit(const MatrixTap& tap, Index channels, double lever) {
   const Eigen::Vector3d n =
       Eigen::Vector3d(tap.direction[0], tap.direction[1], tap.direction[2]).normalized();
   const Eigen::Vector3d r(tap.point[0], tap.point[1], tap.point[2]);
@@ -118,16 +118,16 @@ Matrix scaledBy(const Eigen::VectorXd& scale, const Matrix& matrix) {
 
 /// Forces and moments of every tap over its hammer's force, a column a tap. @throws Error when they leave a
 /// direction out.
-MatrixXd blowsOf(const std::vector<MatrixTap>& taps, Index channels, double lever) {
-  MatrixXd blows(channels, static_cast<Index>(taps.size()));
+MatrixXd unitHitsOf(const std::vector<MatrixTap>& taps, Index channels, double lever) {
+  MatrixXd unit_hits(channels, static_cast<Index>(taps.size()));
   for (std::size_t k = 0; k < taps.size(); ++k)
-    blows.col(static_cast<Index>(k)) = blow(taps[k], channels, lever);
-  const Eigen::VectorXd values = linear::singularValues(blows);
-  if (!(values(channels - 1) > FULL_RANK * values(0))) {
+    unit_hits.col(static_cast<Index>(k)) = unitHit(taps[k], channels, lever);
+  const Eigen::VectorXd values = linear::singularValues(unit_hits);
+  if (!(values(channels - 1) > MIN_RANK_RATIO * values(0))) {
     throw Error(channels == 6 ? "transfer matrix: the taps do not press along and turn about every axis"
                               : "transfer matrix: the taps do not press along every axis");
   }
-  return blows;
+  return unit_hits;
 }
 
 /// What every tap shows on the lines, scaled.
@@ -136,9 +136,9 @@ struct TapSpectra {
   std::vector<std::vector<std::vector<Complex>>> measured;  // [tap][channel][line]
   MatrixXd noise;                                           // [N^2 samples] of a line; channel, tap
 
-  MatrixXcd applied(const MatrixXd& blows, std::size_t line) const {
-    MatrixXcd e(blows.rows(), blows.cols());
-    for (Index k = 0; k < e.cols(); ++k) e.col(k) = blows.col(k) * hammer[static_cast<std::size_t>(k)][line];
+  MatrixXcd applied(const MatrixXd& unit_hits, std::size_t line) const {
+    MatrixXcd e(unit_hits.rows(), unit_hits.cols());
+    for (Index k = 0; k < e.cols(); ++k) e.col(k) = unit_hits.col(k) * hammer[static_cast<std::size_t>(k)][line];
     return e;
   }
   MatrixXcd shown(std::size_t line) const {
@@ -224,7 +224,7 @@ Eigen::VectorXd varianceAt(const std::vector<LineFit>& lines, std::size_t at, co
                            Index hits) {
   const Index free = hits - before.size();
   if (free <= 0) return before;
-  const std::size_t from = at < SMOOTH ? 0 : at - SMOOTH, to = std::min(lines.size(), at + SMOOTH + 1);
+  const std::size_t from = at < SMOOTHING_LINES ? 0 : at - SMOOTHING_LINES, to = std::min(lines.size(), at + SMOOTHING_LINES + 1);
   Eigen::VectorXd left = Eigen::VectorXd::Zero(before.size());
   for (std::size_t l = from; l < to; ++l) left += lines[l].left;
   return before.cwiseMax(left / static_cast<double>(to - from) / static_cast<double>(free));
@@ -246,13 +246,13 @@ TransferMatrix identifyTransferMatrix(const std::vector<MatrixTap>& taps, double
   }
   result.lever = std::max(1e-3, std::sqrt(distance / static_cast<double>(hits)));
   const Eigen::VectorXd scale = result.scale();
-  const MatrixXd blows = blowsOf(taps, channels, result.lever);
+  const MatrixXd unit_hits = unitHitsOf(taps, channels, result.lever);
   const TapSpectra spectra = spectraOf(taps, scale);
 
   // First what each line leaves over, then its standard deviations.
   std::vector<LineFit> lines;
   for (std::size_t l = 0; l < result.frequency.size(); ++l)
-    lines.push_back(fitLine(spectra.applied(blows, l), spectra.shown(l)));
+    lines.push_back(fitLine(spectra.applied(unit_hits, l), spectra.shown(l)));
   const Eigen::VectorXd before = spectra.noise.rowwise().mean();
   for (std::size_t l = 0; l < lines.size(); ++l) {
     const auto std_dev = deviations(lines[l], varianceAt(lines, l, before, hits));

@@ -50,18 +50,18 @@ TEST(Allocation, NoneASample) {
 
 /// Allocations of one block once everything is laid out.
 long aBlock(bool coupled, bool spindle, std::size_t samples) {
-  ForceSensor believed;
-  for (ModalModel& axis : believed.axis) axis = ReferenceCase::exactSensor();
-  CompensationPipeline sorted({}, {}, believed, 0.0, {});
+  ForceSensor model_sensor;
+  for (ModalModel& axis : model_sensor.axis) axis = ReferenceCase::exactSensor();
+  CompensationPipeline pipeline({}, {}, model_sensor, 0.0, {});
   if (coupled) {
     SensorMatrix matrix;
     for (std::size_t i = 0; i < 3; ++i) {
-      matrix.h[i][i] = believed.axis[i];
+      matrix.h[i][i] = model_sensor.axis[i];
       matrix.h[i][(i + 1) % 3].direct = 0.05;
     }
-    sorted.useMatrix(matrix);
+    pipeline.useMatrix(matrix);
   }
-  if (spindle) sorted.useSpindleSensor(SpindleSensorCalibration::table3(), 0.139);
+  if (spindle) pipeline.useSpindleSensor(SpindleSensorCalibration::table3(), 0.139);
   SampleBlock block;
   block.sample_rate = RATE;
   block.channels = spindle ? std::vector<std::string>{"x1", "x2", "y1", "y2", "z1", "z2"}
@@ -72,8 +72,8 @@ long aBlock(bool coupled, bool spindle, std::size_t samples) {
   long before = 0;
   for (int b = 0; b < 2 * blocks; ++b) {
     if (b == blocks) before = made;
-    sorted.push(SpindleAngle{block.stamp, 0.0, SPEED});
-    sorted.push(block);
+    pipeline.push(SpindleAngle{block.stamp, 0.0, SPEED});
+    pipeline.push(block);
     block.first_index += samples;
     block.stamp += static_cast<double>(samples) / RATE;
   }

@@ -86,7 +86,7 @@ TEST_P(Measures, IdentifiedSensorGivesTheForceOnTheTool) {
   EXPECT_NEAR(sensor[0].modes[0].frequency, 1450.0, 3.0);
   EXPECT_NEAR(sensor[0].staticGain(), 1.0, 1e-9);
   Record cut = readRecord(campaign, campaign.tests[0]);
-  if (measuresWorkpiece(campaign, "")) turnForces(cut);
+  if (measuresWorkpiece(campaign, "")) negateForces(cut);
   const auto force = compensate(cut, sensor, false, reference.spindle_speed, reference.sample_rate, {});
   for (std::size_t axis = 0; axis < 2; ++axis)
     EXPECT_LT(

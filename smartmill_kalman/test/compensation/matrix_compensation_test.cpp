@@ -61,16 +61,19 @@ TEST(MatrixCompensation, GivesTheForceBackInTheStream) {
   const auto measured = PlateSensor().measure(applied, {0.026, -0.020, 0.03}, RATE, 6, random);
   std::array<std::vector<double>, 3> found, raw;
   std::size_t blocks = 0;
+  double measured_stamp = NAN;
   MatrixCompensation compensation(
-      MatrixInverse(six(), BANDWIDTH), false, [&](const ForceBlock& m, const ForceBlock& c) {
-        EXPECT_EQ(c.first_index, blocks * BLOCK);
-        EXPECT_DOUBLE_EQ(c.stamp, m.stamp);
-        ++blocks;
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-          found[axis].insert(found[axis].end(), c.force[axis].begin(), c.force[axis].end());
+      MatrixInverse(six(), BANDWIDTH), false, {[&](const ForceBlock& m) {
+        measured_stamp = m.stamp;
+        for (std::size_t axis = 0; axis < 3; ++axis)
           raw[axis].insert(raw[axis].end(), m.force[axis].begin(), m.force[axis].end());
-        }
-      });
+      }, [&](const ForceBlock& c) {
+        EXPECT_EQ(c.first_index, blocks * BLOCK);
+        EXPECT_DOUBLE_EQ(c.stamp, measured_stamp);
+        ++blocks;
+        for (std::size_t axis = 0; axis < 3; ++axis)
+          found[axis].insert(found[axis].end(), c.force[axis].begin(), c.force[axis].end());
+      }});
   for (std::size_t i = 0; i + BLOCK <= SAMPLES; i += BLOCK) compensation.handle(blockOf(measured, i));
   EXPECT_LT(blocks, SAMPLES / BLOCK);
   compensation.flush();
@@ -86,9 +89,9 @@ TEST(MatrixCompensation, ClaimsNothingInAHoleAndRefusesWhatIsNotItsOwn) {
   measured[1][700] = NOT_A_NUMBER;
   std::vector<double> found;
   MatrixCompensation compensation(MatrixInverse(six(), BANDWIDTH), false,
-                                  [&](const ForceBlock&, const ForceBlock& c) {
+                                  {{}, [&](const ForceBlock& c) {
                                     found.insert(found.end(), c.force[0].begin(), c.force[0].end());
-                                  });
+                                  }});
   for (std::size_t i = 0; i < 4 * BLOCK; i += BLOCK) compensation.handle(blockOf(measured, i));
   compensation.flush();
   ASSERT_EQ(found.size(), 4 * BLOCK);

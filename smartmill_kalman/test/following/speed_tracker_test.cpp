@@ -112,18 +112,15 @@ TEST(TrackedSpeed, NeedsNoAngles) {
   parameters.track_speed = true;
   std::size_t out = 0;
   ForceBlock::Status last = ForceBlock::Status::measured;
-  CompensationPipeline sorted(parameters, {}, ForceSensor(), 0.05,
-                              {[&](const ForceBlock&, const ForceBlock& c) {
-                                 ++out;
-                                 last = c.status;
-                               },
-                               {},
-                               {},
-                               {}});
+  CompensationPipeline pipeline(parameters, {}, ForceSensor(), 0.05,
+                              {{{}, [&](const ForceBlock& c) {
+                                  ++out;
+                                  last = c.status;
+                                }}});
   CuttingCondition condition;
   condition.kind = CuttingCondition::Kind::cut;
   condition.spindle_speed = units::TWO_PI * 150.0;
-  sorted.push(condition);
+  pipeline.push(condition);
   for (std::size_t b = 0; b < 100; ++b) {
     SampleBlock block;
     block.stamp = 0.01 * static_cast<double>(b);
@@ -137,11 +134,11 @@ TEST(TrackedSpeed, NeedsNoAngles) {
           100.0 * std::cos(units::TWO_PI * 150.7 * t) + 300.0 * std::sin(units::TWO_PI * 602.8 * t);
       block.samples.insert(block.samples.end(), {force, 0.5 * force, 0.1 * force});
     }
-    sorted.push(block);
+    pipeline.push(block);
   }
   EXPECT_GT(out, 90u);  // the last 50 ms wait for events
   EXPECT_EQ(last, ForceBlock::Status::compensated);
-  EXPECT_NEAR(sorted.health().speed, units::TWO_PI * 150.7, 0.01);
+  EXPECT_NEAR(pipeline.health().speed, units::TWO_PI * 150.7, 0.01);
 }
 
 }  // namespace

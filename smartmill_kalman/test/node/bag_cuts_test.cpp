@@ -115,14 +115,14 @@ class Shop {
   std::normal_distribution<double> normal_;
 };
 
-std::vector<SpeedFrf> frfs(const std::vector<CutStretch>& cuts, bool tool) {
+std::vector<SpeedFrf> frfs(const std::vector<CutSegment>& cuts, bool tool) {
   CuttingFrfOptions options;
   options.high = 4000.0;
   options.speed_width = 0.1;
   options.unit_static_gain = !tool;
-  std::vector<CuttingLine> lines;
-  for (const CutStretch& cut : cuts) {
-    const auto some = cuttingLines(cut, options);
+  std::vector<FrfLine> lines;
+  for (const CutSegment& cut : cuts) {
+    const auto some = frfLines(cut, options);
     lines.insert(lines.end(), some.begin(), some.end());
   }
   return cuttingFrfs(lines, tool ? "m/N" : "1", options);

@@ -50,7 +50,7 @@ TEST(BlindMode, DerivativesAgreeWithDifferences) {
     lines.power.push_back(2.0);
   }
   for (std::size_t k = 0; k < lines.power.size(); ++k) {
-    const double due = duePower(lines.frequency[k], at, 2.0).value;
+    const double due = expectedPower(lines.frequency[k], at, 2.0).value;
     if (k % 3 > 0) lines.power[k] = due * (k % 3 == 1 ? 1.0 + 1e-5 : 0.2);
   }
   // The mean power is the unit of share and floor.

@@ -57,11 +57,11 @@ TEST(SpindleSensorCalibration, RefusesALengthBeyondItsLine) {
 }
 
 /// Burzoni 3.2: seven weights of 10 lbs hung on one after another and taken off, drift to 5 N/min a sensor.
-StaticReadings weights(const std::vector<double>& lengths_mm, double noise, std::uint32_t seed) {
+StaticMeasurements weights(const std::vector<double>& lengths_mm, double noise, std::uint32_t seed) {
   std::mt19937 random(seed);
   std::normal_distribution<double> normal(0.0, 1.0);
   std::uniform_real_distribution<double> drift(-5.0 / 60.0, 5.0 / 60.0);
-  StaticReadings readings;
+  StaticMeasurements readings;
   readings.file = "weights";
   int test = 0;
   for (const double mm : lengths_mm) {
@@ -94,7 +94,7 @@ TEST(CalibrateStatic, FindsTable3ThroughDrift) {
   const StaticCalibration found = calibrateStatic(weights({100.0, 139.0, 180.0}, 0.01, 3), TABLE);
   ASSERT_EQ(found.lengths.size(), 3u);
   EXPECT_GT(found.lengths[0].drift, 0.02);  // there was one to take out [N/s]
-  const auto near = [](const LengthLine& a, const LengthLine& b) {
+  const auto near = [](const LengthDependence& a, const LengthDependence& b) {
     EXPECT_NEAR(a.slope, b.slope, 4.0 * a.slope_std);
     EXPECT_NEAR(a.offset, b.offset, 4.0 * a.offset_std);
     EXPECT_NEAR(a.at(LENGTH), b.at(LENGTH), 0.01 * std::abs(b.at(LENGTH)));
@@ -122,7 +122,7 @@ TEST(CalibrateStatic, VerificationTellsAWrongConstant) {
 TEST(CalibrateStatic, ALengthThatNoWeightWasHungAtIsRefused) {
   SpindleSensorCalibration known = SpindleSensorCalibration::table3();
   known.lengths = {0.1, 0.18};
-  StaticReadings readings = weights({139.0, 250.0}, 0.001, 5);
+  StaticMeasurements readings = weights({139.0, 250.0}, 0.001, 5);
   readings.file = "weights.csv";
   EXPECT_EQ(errorOf([&] { verifyStatic(readings, known); }),
             "weights.csv: 250.0 mm of tool and holder is outside the calibrated 100.0 .. 180.0 mm");
@@ -257,7 +257,7 @@ TEST(SpindleForceSensor, UnbalanceLearntInTheAirIsTakenOffAtAnySpeed) {
   const double fast = units::radPerSecFromRpm(18000.0);
   const auto out = rig.run(1.0, fast, [](double) { return std::array<double, 3>{100.0, 0.0, 0.0}; });
   const auto& health = rig.sensor.health();
-  EXPECT_EQ(health.stretches, 2u);
+  EXPECT_EQ(health.air_segments, 2u);
   // (m e) cos(a + 0.7), sin(a + 0.7): phasors m e exp(0.7 i) and -i m e exp(0.7 i).
   EXPECT_NEAR(std::abs(health.unbalance[0] - std::polar(2e-5, 0.7)), 0.0, 4.0 * health.unbalance_std[0]);
   EXPECT_NEAR(std::abs(health.unbalance[1] - std::polar(2e-5, 0.7 - units::PI / 2.0)), 0.0,
@@ -348,24 +348,19 @@ TEST(SpindleForceSensor, DynamicCrossTalkGoesWhereTheStaticOneFails) {
 
 // What the node is made of: six channels in, force at the tool out, with the sensor's own sample index.
 TEST(CompensationPipeline, TakesSixChannels) {
-  ForceSensor believed;
-  for (ModalModel& axis : believed.axis) {
+  ForceSensor model_sensor;
+  for (ModalModel& axis : model_sensor.axis) {
     axis.modes = {{930.0, 0.03, 0.9}};
     axis.direct = 0.1;
   }
   SpindleSensorCalibration slack = TABLE;
   slack.preload.fill(50.0);
   std::vector<ForceBlock> measured, compensated;
-  CompensationPipeline sorted({}, {}, believed, 0.05,
-                              {[&](const ForceBlock& m, const ForceBlock& c) {
-                                 measured.push_back(m);
-                                 compensated.push_back(c);
-                               },
-                               {},
-                               {},
-                               {}});
+  CompensationPipeline pipeline({}, {}, model_sensor, 0.05,
+                              {{[&](const ForceBlock& m) { measured.push_back(m); },
+                                [&](const ForceBlock& c) { compensated.push_back(c); }}});
   const double speed = units::TWO_PI * 232.5;  // the fourth harmonic meets the mode: 15 times too large
-  const std::complex<double> passed = believed.axis[0].response(930.0);
+  const std::complex<double> passed = model_sensor.axis[0].response(930.0);
   const auto push = [&](int b, double fy) {
     SampleBlock block;
     block.stamp = 50.0 + b * 0.01;
@@ -378,18 +373,18 @@ TEST(CompensationPipeline, TakesSixChannels) {
       const auto s = sensorsUnder(139.0, (passed * std::polar(20.0, phase)).real(), fy, 0.0);
       block.samples.insert(block.samples.end(), s.begin(), s.end());
     }
-    sorted.push(SpindleAngle{block.stamp, 0.0, speed});
-    sorted.push(block);
+    pipeline.push(SpindleAngle{block.stamp, 0.0, speed});
+    pipeline.push(block);
   };
   EXPECT_THROW(  // no calibration yet, and it says so
       {
         push(0, 0.0);
-        sorted.flush();
+        pipeline.flush();
       },
       Error);
-  sorted.useSpindleSensor(slack, LENGTH);
+  pipeline.useSpindleSensor(slack, LENGTH);
   for (int b = 50; b < 250; ++b) push(b, b == 240 ? 905.0 : 0.0);  // 905 N unload the pair of y
-  sorted.flush();
+  pipeline.flush();
   ASSERT_GT(measured.size(), 190u);
   const std::size_t last = measured.size() - 1, bad = last - 9;
   EXPECT_EQ(compensated[last].first_index, measured[last].first_index);
@@ -406,8 +401,8 @@ TEST(CompensationPipeline, TakesSixChannels) {
   }
   EXPECT_NEAR(shown, 20.0 * std::abs(passed), 2.0);
   EXPECT_NEAR(largest, 20.0, 0.2);
-  ASSERT_NE(sorted.spindleHealth(), nullptr);
-  EXPECT_EQ(sorted.spindleHealth()->unloaded, 256u);
+  ASSERT_NE(pipeline.spindleHealth(), nullptr);
+  EXPECT_EQ(pipeline.spindleHealth()->unloaded, 256u);
 }
 
 TEST(FitDynamicCrossTalk, FindsTheCourse) {

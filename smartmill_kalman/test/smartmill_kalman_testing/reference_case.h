@@ -15,9 +15,9 @@ namespace smartmill::kalman {
 /// condition: force x and y. With track_speed no angle comes. @param believed sensor @param moves counts the
 /// moves that were followed; may be null
 std::array<std::vector<double>, 2> runCompensation(const ReferenceCase& reference,
-                                                   const ReferenceRecord& record, const ModalModel& believed,
+                                                   const ReferenceRecord& record, const ModalModel& model_sensor,
                                                    const CompensationParameters& parameters,
-                                                   std::size_t* moves = nullptr);
+                                                   std::size_t* mode_updates = nullptr);
 
 /// RMS innovation of a filter that is shown noise of 1 N rms alone [N]. @param from first sample that counts
 template <class Filter>

@@ -130,11 +130,11 @@ void run(double minutes) {
   for (ModalModel& axis : sensor.axis) axis = ReferenceCase::exactSensor();
   std::size_t blocks_out = 0;
   double sum = 0.0;
-  const auto receive = [&](const ForceBlock&, const ForceBlock& compensated) {
+  const auto receive = [&](const ForceBlock& compensated) {
     ++blocks_out;
     sum += compensated.force[0].back();
   };
-  kalman::CompensationPipeline sorted({}, {}, sensor, 0.05, {receive, {}, {}, {}});
+  kalman::CompensationPipeline sorted({}, {}, sensor, 0.05, {{{}, receive}});
   const auto blocks = static_cast<long>(minutes * BLOCKS_PER_MINUTE);
   const auto begin = std::chrono::steady_clock::now();
   Machine machine;

@@ -22,7 +22,7 @@ struct SensorFitParameters {
 };
 
 /// H1 over all hits [1], hammer force windowed, with standard deviations.
-FrequencyResponse averaged(const std::vector<std::vector<double>>& hammer,
+FrequencyResponse averagedFrf(const std::vector<std::vector<double>>& hammer,
                            const std::vector<std::vector<double>>& response, double sample_rate);
 
 /// Sensor model of one axis (static gain 1) from taps along it: H1 over all hits, hammer force windowed
@@ -57,6 +57,6 @@ std::array<std::vector<double>, 3> compensate(const Record& record, const std::a
 bool measuresWorkpiece(const Campaign& campaign, const std::string& model_file);
 
 /// Turns fx, fy, fz: the reaction becomes the force on the tool.
-void turnForces(Record& record);
+void negateForces(Record& record);
 
 }  // namespace smartmill::kalman

@@ -2,8 +2,6 @@
 
 #include <array>
 #include <cstddef>
-#include <cstdint>
-#include <deque>
 #include <functional>
 #include <optional>
 #include <string>
@@ -12,6 +10,7 @@
 #include "smartmill_core/model/machine_model.h"
 #include "smartmill_core/signal/stream_sorter.h"
 #include "smartmill_kalman/compensation/force_compensation.h"
+#include "smartmill_kalman/compensation/invalid_samples.h"
 #include "smartmill_kalman/compensation/matrix_compensation.h"
 #include "smartmill_kalman/sensor/plate_calibrator.h"
 #include "smartmill_kalman/sensor/sensor_measurement.h"
@@ -20,117 +19,113 @@
 
 namespace smartmill::kalman {
 
-/// Everything the kalman node thinks with, behind the sorter: takes inputs in any order of arrival,
-/// compensates, and measures the sensor when a goal asks for it; modes it has measured serve from then on.
-/// The node and the offline tool both feed this class, so that both give the same numbers.
+/// The kalman node without ROS: puts its inputs into stamp order, compensates the force, and measures or
+/// calibrates the sensor on request; a measured sensor replaces the one in use. The node and the offline
+/// tool feed this class, so that both give the same numbers.
 class CompensationPipeline {
  public:
-  /// Where results go; empty ones are not called.
+  /// Receivers of the results; empty ones are not called.
   struct Outputs {
-    ForceCompensation::Output force;
-    std::function<void(const StrikeCommand&)> strike;
-    std::function<void(const TapFeedback&)> feedback;
-    std::function<void(const SensorResult&)> result;
+    ForceOutputs force;
+    std::function<void(const StrikeCommand&)> strike = {};
+    std::function<void(const TapFeedback&)> feedback = {};
+    std::function<void(const SensorResult&)> result = {};
     std::function<void(const CalibrationResult&)> calibration = {};
+    /// A block of the force sensor could not be compensated. Empty: the push() that released it throws.
+    std::function<void(const std::string& reason)> block_error = {};
   };
 
-  /// @param sensor the believed sensor: serves the axes not measured @param hold_back [s], see StreamSorter.
-  /// @throws Error.
+  /// @param sensor of the machine model, for axes that are not measured @param hold_back [s], see
+  /// StreamSorter. @throws Error.
   CompensationPipeline(const CompensationParameters& parameters, const TapParameters& taps,
                        const ForceSensor& sensor, double hold_back, Outputs outputs);
   CompensationPipeline(const CompensationPipeline&) = delete;
   CompensationPipeline& operator=(const CompensationPipeline&) = delete;
 
-  /// Blocks of six sensors in the spindle (channels x1 .. z2) become forces from now on; samples that are no
-  /// measurement come out as NaN. @param length [m] of tool and holder. @throws Error.
+  /// Accepts blocks of six sensors in the spindle (channels x1 .. z2); invalid samples give NaN.
+  /// @param length [m] of tool and holder. @throws Error.
   void useSpindleSensor(const SpindleSensorCalibration& calibration, double length);
-  /// Length [m] of tool and holder for a calibration that is made here.
+  /// Length [m] of tool and holder for a calibration on the machine.
   void setSpindleSensorLength(double length) { spindle_length_ = length; }
-  /// Six sensors without a calibration are not refused but wait for one.
-  void awaitCalibration() { awaits_calibration_ = true; }
-  bool uncalibrated() const { return awaits_calibration_ && !spindle_; }
-  /// Blocks of a sensor of 3 or 6 channels go through the inverse of its matrix from now on, instead of the
-  /// filters; they come out late. @throws Error.
+  /// Six sensors without a calibration are accepted and give no force until they are calibrated.
+  void allowUncalibrated() { uncalibrated_allowed_ = true; }
+  bool isUncalibrated() const { return uncalibrated_allowed_ && !spindle_; }
+  /// Inverts the transfer matrix of a sensor of 3 or 6 channels instead of filtering. @throws Error.
   void useTransferMatrix(const TransferMatrix& matrix, double bandwidth);
-  /// @return null without a transfer matrix.
-  const MatrixCompensation* transferMatrix() const { return inverse_ ? &*inverse_ : nullptr; }
-  /// The sensor's cross-talk serves from now on, its own axes instead of the believed ones until taps tell
-  /// better.
+  /// Sensor with cross-talk; its diagonal replaces the machine model's sensor.
   void useMatrix(const SensorMatrix& matrix) {
     matrix_ = matrix;
-    useModelFile();
+    useModelSensors();
   }
-  /// @return counts of the spindle's sensor; null without one.
+  /// @return null without a sensor in the spindle.
   const SpindleSensorHealth* spindleHealth() const { return spindle_ ? &spindle_->health() : nullptr; }
 
-  /// Block of the force sensor.
+  /// Block of the force sensor. @throws Error when it does not suit the sensor.
   void push(SampleBlock block);
-  /// Block of the hammer; a machine without one never sends any.
+  /// Block of the hammer, on machines that have one. @throws Error when the channel is missing or not in N.
   void pushHammer(SampleBlock block);
   void push(const SpindleAngle& angle);
   void push(const CuttingCondition& condition);
-  /// @param begin told, when its time has come, whether the goal can be taken (false while another
-  /// measurement runs); returns whether it is still wanted; may be empty
+  /// @param begin called at the goal's stamp with whether no other measurement runs; returns whether to
+  /// start; may be empty
   void push(const MeasureFrfGoal& goal, std::function<bool(bool)> begin = {});
-  /// A step of the calibration of a spindle's sensor, at its stamp. @param begin as of the goal above
+  /// A step of a calibration, at its stamp. @param begin as for the other goal
   void push(const CalibrationGoal& goal, std::function<bool(bool)> begin = {});
-  /// Ends a reading, at the stamp of the newest input.
+  /// Ends a running calibration measurement, at the stamp of the newest input.
   void cancelCalibration();
   const SpindleSensorCalibrator& calibrator() const { return calibrator_; }
   const PlateCalibrator& plate() const { return plate_; }
-  /// Something that happened outside the streams, at the stamp of the newest input.
-  void event(std::function<void(SensorMeasurement&)> what);
-  /// Modes measured earlier (tool/modes of the force sensor) serve from their stamp on, unless the same or
-  /// later taps have been seen here. Those of other points are ignored.
+  /// Event without a stamp for the measurement, at the stamp of the newest input.
+  void event(std::function<void(SensorMeasurement&)> action);
+  /// Modes measured earlier (tool/modes of the force sensor). They are used from their stamp on, unless the
+  /// same or later taps were measured here. Modes of other points are ignored.
   void push(const MeasuredModes& modes);
-  /// The hammer's stream has died: it holds the others back no longer.
-  void hammerLost(const std::string& text);
+  /// The hammer's stream has ended: other streams no longer wait for it.
+  void hammerStopped(const std::string& reason);
   /// End of data.
-  void flush() {
-    sorter_.flush();
-    compensation_.flush();
-    if (inverse_) inverse_->flush();
-  }
+  void flush();
 
-  const CompensationHealth& health() const { return compensation_.health(); }
+  CompensationHealth health() const;
   /// Model in use of an axis.
   const ModalModel& sensor(std::size_t axis) const { return compensation_.sensor(axis); }
-  /// Age of the oldest modes in use that taps have told, at the newest input [s]; 0 when all are the model
-  /// file's.
-  double modesAge() const;
-  bool measuring() const { return measurement_.active(); }
+  /// Age of the oldest measured modes in use, at the newest input [s]; 0 without measured modes.
+  double ageOfModes() const;
+  bool isMeasuring() const { return measurement_.active(); }
   std::string waitingFor() const { return sorter_.waitingFor(); }
   std::size_t late() const { return sorter_.late(); }
-  /// Told when stamps jump back: a bag was restarted. Identified modes are forgotten then.
-  void onRestart(std::function<void()> told) { restarted_ = std::move(told); }
+  /// @param callback called when stamps jump back (a recording was restarted); measured modes are dropped
+  void onRestart(std::function<void()> callback) { on_restart_ = std::move(callback); }
 
  private:
-  void drain();
-  void drainCalibration();
-  void serve(CalibrationResult result);
-  SampleBlock toForces(const SampleBlock& block);
-  void forward(const ForceBlock& measured, const ForceBlock& compensated);
-  void useModelFile();
+  void check(const SampleBlock& block) const;
+  void handle(const SampleBlock& block);
+  void restart();
+  void publishResults();
+  void publishCalibration();
+  void applyCalibration(CalibrationResult result);
+  SampleBlock forcesOf(const SampleBlock& block);
+  ForceOutputs blockOutputs();
+  void useModelSensors();
 
-  ForceSensor believed_;
+  ForceSensor model_sensor_;
   Outputs outputs_;
   ForceCompensation compensation_;
   SensorMeasurement measurement_;
   StreamSorter sorter_;
-  std::array<double, 3> identified_{};  // [s] stamp of the modes in use, an axis each
+  std::array<double, 3> modes_stamp_{};  // [s] of the measured modes in use, each axis
   StreamSorter::Stream conditions_, goals_, hammers_, angles_, blocks_;
   std::optional<MatrixCompensation> inverse_;
   std::optional<SpindleForceSensor> spindle_;
-  bool awaits_calibration_ = false;
-  double spindle_length_ = 0.0;  // [m] 0: not told
+  bool uncalibrated_allowed_ = false;
+  double spindle_length_ = 0.0;  // [m] 0: unknown
   std::optional<CuttingCondition> condition_;
   TapParameters taps_;
   SpindleSensorCalibrator calibrator_;
   PlateCalibrator plate_;
-  double bandwidth_;  // [Hz] of a matrix that is made here
+  double bandwidth_;  // [Hz] of a transfer matrix that is measured here
   std::optional<SensorMatrix> matrix_;
-  std::deque<std::pair<std::uint64_t, std::uint64_t>> invalid_;  // samples [from, to) that are no measurement
-  std::function<void()> restarted_;
+  InvalidSamples invalid_;
+  std::function<void()> on_restart_;
 };
 
 }  // namespace smartmill::kalman

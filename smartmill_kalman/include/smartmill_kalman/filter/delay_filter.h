@@ -5,7 +5,7 @@
 
 #include "smartmill_core/modal/modal_model.h"
 #include "smartmill_kalman/filter/harmonic_filter.h"
-#include "smartmill_kalman/filter/innovation_watch.h"
+#include "smartmill_kalman/filter/adaptive_memory.h"
 
 namespace smartmill::kalman {
 
@@ -63,19 +63,19 @@ class DelayFilter {
   /// Takes one measured sample [N]. @return applied force [N] at this sample, from all samples up to it.
   double step(double measured);
   /// Keeps the state going without a measurement. @return predicted force [N].
-  double coast() { return advance(0.0); }
+  double predict() { return advance(0.0); }
   void reset();
 
   /// Another spindle speed: the force goes on over the angle, the gains stay.
   void retune(double spindle_speed);
   /// Takes the force of another filter of the same sensor over, so that new gains start without a jump.
-  void adopt(const DelayFilter& other);
+  void continueFrom(const DelayFilter& other);
 
   double innovation() const { return innovation_; }  ///< [N] of the last step
-  double innovationStd() const { return innovation_std_[watch_.level()]; }
+  double innovationStd() const { return innovation_std_[memory_.level()]; }
   std::size_t states() const { return model_.states(); }
-  std::size_t level() const { return watch_.level(); }
-  void setLevel(std::size_t level) { watch_.setLevel(level); }
+  std::size_t level() const { return memory_.level(); }
+  void setLevel(std::size_t level) { memory_.setLevel(level); }
 
   double spindleSpeed() const;  ///< [rad/s]
 
@@ -83,13 +83,13 @@ class DelayFilter {
   double advance(double innovation);
   double expected() const;
   /// Line of a filter as it stands in this one's samples.
-  void takeLine(const DelayFilter& other);
+  void resampleFrom(const DelayFilter& other);
 
   double sample_rate_;
   DelayModel model_;
   std::vector<std::vector<double>> gain_;  // a level each
   std::vector<double> innovation_std_;
-  InnovationWatch watch_;
+  AdaptiveMemory memory_;
   std::vector<double> modes_, next_, line_;  // the line is a window that moves through a longer array
   std::size_t head_ = 0;
   double innovation_ = 0.0;

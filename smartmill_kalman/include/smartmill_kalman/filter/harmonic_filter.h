@@ -9,7 +9,7 @@
 #include "smartmill_core/modal/modal_model.h"
 #include "smartmill_core/parameters/parameter_table.h"
 #include "smartmill_kalman/filter/harmonic_gain.h"
-#include "smartmill_kalman/filter/innovation_watch.h"
+#include "smartmill_kalman/filter/adaptive_memory.h"
 
 namespace smartmill::kalman {
 
@@ -68,14 +68,14 @@ class HarmonicFilter {
 
   /// Takes one measured sample [N]. @return applied force [N] at this sample, from all samples up to it.
   double step(double measured) {
-    innovation_ = measured - expected_;
+    innovation_ = measured - predicted_output_;
     const double force = advance(gains_[level()].data(), innovation_, force_gain_[level()]);
-    watch_.add(innovation_);
+    memory_.add(innovation_);
     return force;
   }
 
   /// Keeps the state going without a measurement. @return predicted force [N].
-  double coast() {
+  double predict() {
     innovation_ = 0.0;
     return advance(gains_[level()].data(), 0.0, 0.0);
   }
@@ -97,7 +97,7 @@ class HarmonicFilter {
   /// Harmonic n of the applied force at the next sample [N], 0 the constant: force = Re sum.
   std::complex<double> forceHarmonic(std::size_t n) const {
     const std::size_t i = modes_ + n;
-    return {blocks_[i / 4].re[i % 4], blocks_[i / 4].im[i % 4]};
+    return {batches_[i / 4].re[i % 4], batches_[i / 4].im[i % 4]};
   }
 
   /// Slope of the sample expected next over the spindle's angle [N/rad], of the harmonics in their steady
@@ -106,7 +106,7 @@ class HarmonicFilter {
 
   /// Takes the force of another filter over (harmonics beyond its own: zero), so that a new layout starts
   /// without a jump. The sensor's modes must be as many.
-  void adopt(const HarmonicFilter& other);
+  void continueFrom(const HarmonicFilter& other);
 
   /// Fixed-interval smoother with the slowest gain (modified Bryson-Frazier: nothing is stored but
   /// innovations), of all samples together. @return applied force [N] at each sample. Starts from this
@@ -118,43 +118,43 @@ class HarmonicFilter {
   double spindleSpeed() const { return spindle_speed_; }             ///< [rad/s]
   int harmonics() const { return harmonics_; }
   std::size_t states() const { return 2 * modes_ + 1 + 2 * static_cast<std::size_t>(harmonics_); }
-  std::size_t level() const { return watch_.level(); }  ///< 0 quick .. LEVELS - 1 slow
-  bool settled() const { return watch_.settled(); }     ///< at its longest memory
+  std::size_t level() const { return memory_.level(); }  ///< 0 quick .. LEVELS - 1 slow
+  bool settled() const { return memory_.settled(); }     ///< at its longest memory
   /// Times that an innovation was out of line: the memory began anew.
-  std::size_t restarts() const { return watch_.restarts(); }
-  void setLevel(std::size_t level) { watch_.setLevel(level); }
+  std::size_t restarts() const { return memory_.restarts(); }
+  void setLevel(std::size_t level) { memory_.setLevel(level); }
   /// State in the coordinates of HarmonicGain.
   std::vector<double> state() const;
   void setState(const std::vector<double>& state);
 
   // A pair is a rotation (a, b) of (re, im) with the share (c1, c2) in the measured and (g) in the applied
-  // force. Four pairs run side by side.
-  typedef double Four __attribute__((vector_size(32), aligned(8)));
-  struct Block {
-    Four re, im, a, b, c1, c2, g;
+  // force. Vector4 pairs run side by side.
+  typedef double Vector4 __attribute__((vector_size(32), aligned(8)));
+  struct PairBatch {
+    Vector4 re, im, a, b, c1, c2, g;
   };
-  struct GainBlock {
-    Four re, im;
+  struct GainBatch {
+    Vector4 re, im;
   };
   /// What a smoother goes back with; one for as long as sensor, speed and gains stay.
-  struct Layout {
-    std::vector<Block> blocks;                             ///< re, im of no meaning
-    std::vector<std::vector<GainBlock>> gains, smoothing;  ///< a level each
+  struct SmootherDesign {
+    std::vector<PairBatch> batches;                             ///< re, im of no meaning
+    std::vector<std::vector<GainBatch>> gains, smoothing;  ///< a level each
     std::vector<double> variance, force_gain;              ///< [N2], [1] a level each
   };
-  std::shared_ptr<const Layout> layout() const;
+  std::shared_ptr<const SmootherDesign> smootherDesign() const;
   /// One sample back: lambda of a sample from that of the one after it. @param level, innovation of the
   /// sample's step @param seen false: it was bridged @return correction of its predicted force [N]
-  static double goBack(const Layout& layout, std::size_t level, double innovation, bool seen,
-                       std::vector<GainBlock>& lambda);
+  static double smoothBackward(const SmootherDesign& design, std::size_t level, double innovation, bool seen,
+                       std::vector<GainBatch>& lambda);
 
  private:
-  double advance(const GainBlock* gain, double innovation, double force_gain);
-  void layOut(const ModalModel& sensor, double spindle_speed);
+  double advance(const GainBatch* gain, double innovation, double force_gain);
+  void setModel(const ModalModel& sensor, double spindle_speed);
   std::vector<double> toPairs(const std::vector<double>& state) const;
   void setGains();
   void replaceModes(const ModalModel& sensor, std::vector<HarmonicGain> gains);
-  double expectation() const;
+  double predictedOutput() const;
 
   ModalModel sensor_;
   double spindle_speed_ = 0.0, sample_rate_;
@@ -162,12 +162,12 @@ class HarmonicFilter {
   int harmonics_;
   std::vector<HarmonicGain> design_;
   std::vector<std::array<double, 4>> modal_;  // transition of each mode's two states, row-major
-  std::vector<Block> blocks_;
-  std::vector<std::vector<GainBlock>> gains_;
+  std::vector<PairBatch> batches_;
+  std::vector<std::vector<GainBatch>> gains_;
   std::vector<double> force_gain_, innovation_std_;
-  double expected_ = 0.0, innovation_ = 0.0;
-  InnovationWatch watch_;
-  mutable std::shared_ptr<const Layout> shared_layout_;  // empty: to be made
+  double predicted_output_ = 0.0, innovation_ = 0.0;
+  AdaptiveMemory memory_;
+  mutable std::shared_ptr<const SmootherDesign> smoother_design_;  // empty: to be made
 };
 
 }  // namespace smartmill::kalman

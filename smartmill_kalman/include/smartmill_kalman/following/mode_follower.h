@@ -11,7 +11,7 @@
 
 namespace smartmill::kalman {
 
-struct FollowParameters {
+struct ModeFollowerParameters {
   double misfit = 0.01;
   double frequency_std = 0.02;  ///< [1] by which a mode may move between two looks
   double damping_std = 0.1;     ///< [1] the same of its damping ratio
@@ -43,9 +43,9 @@ class ModeFollower {
 
   /// @throws Error on an impossible tool or engagement.
   ModeFollower(const ToolGeometry& tool, const Engagement& engagement, int harmonics,
-               const FollowParameters& parameters);
+               const ModeFollowerParameters& parameters);
 
-  struct Move {
+  struct Update {
     std::array<ModalModel, 2> sensor;  ///< as it is now
     double before = 0.0, after = 0.0;  ///< [1] sum of squares of the innovations over their variance
   };
@@ -54,7 +54,7 @@ class ModeFollower {
   /// 1
   /// @param noise_std [N] of their real and imaginary parts @param now the sensor as believed now
   /// @param spindle_speed [rad/s] @return nothing when the believed sensor explains them.
-  std::optional<Move> look(const Harmonics& measured, double noise_std, const std::array<ModalModel, 2>& now,
+  std::optional<Update> update(const Harmonics& measured, double noise_std, const std::array<ModalModel, 2>& now,
                            double spindle_speed);
 
  private:
@@ -62,7 +62,7 @@ class ModeFollower {
   Engagement engagement_;
   int harmonics_;
   std::vector<double> radius_;  // [m] of each tooth over the first's, as found last
-  FollowParameters parameters_;
+  ModeFollowerParameters parameters_;
   std::optional<std::array<ModalModel, 2>> first_;
 };
 

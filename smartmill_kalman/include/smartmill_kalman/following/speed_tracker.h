@@ -46,7 +46,7 @@ class SpeedTracker {
   /// @param slope_noise [N/rad] of the slope when nothing but noise is measured
   void update(std::size_t axis, double innovation, double slope, double noise_rms, double slope_noise);
   /// The force has changed: the speed may have, too.
-  void reopen();
+  void resetCovariance();
 
   double speed() const { return speed_; }                ///< [rad/s]
   double speedStd() const;                               ///< [rad/s]

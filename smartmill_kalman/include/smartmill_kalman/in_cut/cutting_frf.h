@@ -13,7 +13,7 @@
 namespace smartmill::kalman {
 
 /// A stretch of a cut in its steady state, one axis.
-struct CutStretch {
+struct CutSegment {
   std::string name;              ///< for messages
   double sample_rate = 0.0;      ///< [Hz]
   double speed = 0.0;            ///< [rad/s] of the spindle
@@ -24,11 +24,11 @@ struct CutStretch {
   double relative_force_std = 0;  ///< [1] of a force that a model tells
   int every = 1;                  ///< [1] lines: multiples of this order of the spindle
 
-  CutStretch() { chain.direct = 1.0; }
+  CutSegment() { chain.direct = 1.0; }
 };
 
 /// What a structure answers at one harmonic of the spindle.
-struct CuttingLine {
+struct FrfLine {
   double frequency = 0.0;      ///< [Hz]
   double speed = 0.0;          ///< [rad/s] of the spindle
   std::complex<double> value;  ///< [unit]
@@ -53,7 +53,7 @@ struct CuttingFrfOptions {
 /// come from what does not repeat with the revolution: the spectra midway between the harmonics, of force and
 /// response. A part needs eleven revolutions. Lines whose force does not stand out of that are left out.
 /// @throws Error on unequal lengths, NaN, or a speed that is not above zero.
-std::vector<CuttingLine> cuttingLines(const CutStretch& cut, const CuttingFrfOptions& options);
+std::vector<FrfLine> frfLines(const CutSegment& cut, const CuttingFrfOptions& options);
 
 /// An FRF at one speed of the spindle.
 struct SpeedFrf {
@@ -70,7 +70,7 @@ struct SpeedFrf {
 /// at the group's mean speed, and what is not known of that widens the deviations. One group alone is taken
 /// for one tool.
 /// @param unit of the lines, m/N or 1
-std::vector<SpeedFrf> cuttingFrfs(std::vector<CuttingLine> lines, const std::string& unit,
+std::vector<SpeedFrf> cuttingFrfs(std::vector<FrfLine> lines, const std::string& unit,
                                   const CuttingFrfOptions& options);
 
 }  // namespace smartmill::kalman

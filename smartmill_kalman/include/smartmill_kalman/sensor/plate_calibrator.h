@@ -25,8 +25,8 @@ class PlateCalibrator {
   void handle(const SampleBlock& block);
   void handleHammer(const SampleBlock& block);
   /// Blows from now on are along an axis, for the measurement that tapped() ends.
-  void tapping(const std::string& direction);
-  void tapped(const SensorResult& result);
+  void beginTaps(const std::string& direction);
+  void endTaps(const SensorResult& result);
   void reset() { *this = PlateCalibrator(parameters_); }
 
   const TapRecords& taps() const { return records_; }

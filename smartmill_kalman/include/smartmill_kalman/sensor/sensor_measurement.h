@@ -81,7 +81,7 @@ class SensorMeasurement {
   void hitByHand();
   void commandFailed(const std::string& text);
   /// An input stream has died, nothing further can be judged.
-  void lost(const std::string& text);
+  void abort(const std::string& text);
   /// Forgets everything: a bag was restarted.
   void reset();
 
@@ -98,15 +98,15 @@ class SensorMeasurement {
     double rate, value;
   };
   void take(const SampleBlock& block, const std::string& channel, std::deque<Sample>& queue);
-  void join();
+  void pairSamples();
   void sample(double time, std::uint64_t index, double rate, double force, double response);
-  void strike(double now);
-  void recorded(double now, HitCollector::Record record);
-  void badHit(double now, const std::string& why, bool bad_data);
+  void requestHit(double now);
+  void handleRecord(double now, HitCollector::Record record);
+  void rejectHit(double now, const std::string& why, bool bad_data);
   void staticGain(const FrequencyResponse& frf);
   void evaluate();
   void finish(FrfCode code, const std::string& message);
-  void say(const std::string& stage);
+  void reportStage(const std::string& stage);
 
   TapParameters parameters_;
   bool active_ = false;

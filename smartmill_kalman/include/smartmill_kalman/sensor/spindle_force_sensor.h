@@ -20,9 +20,9 @@ namespace smartmill::kalman {
 struct SpindleSensorHealth {
   std::size_t unloaded = 0;    ///< samples at which a sensor had less than least_compression left
   std::size_t overloaded = 0;  ///< samples at which a sensor was beyond its range
-  double least_left = std::numeric_limits<double>::infinity();  ///< [N] least compression of any sensor over
+  double compression_margin = std::numeric_limits<double>::infinity();  ///< [N] least compression of any sensor over
                                                                 ///< least_compression
-  std::size_t stretches = 0;  ///< stretches without cutting that told zero and unbalance
+  std::size_t air_segments = 0;  ///< stretches without cutting that told zero and unbalance
   std::array<std::complex<double>, 3> unbalance{};  ///< [kg m]
   std::array<double, 3> unbalance_std{{0, 0, 0}};   ///< [kg m]; 0: none known
   double zero_std =
@@ -70,7 +70,7 @@ class SpindleForceSensor {
 
  private:
   /// Sums of a stretch without cutting: offset, drift, cosine and sine of the spindle angle of every pair.
-  struct Stretch {
+  struct AirSegment {
     double from = 0.0, speed = 0.0;  // [s], [rad/s]
     std::size_t samples = 0;
     std::array<std::array<double, 4>, 4> normal{};
@@ -83,20 +83,20 @@ class SpindleForceSensor {
     std::array<double, 6> offset{}, drift{};
     double oo = 0.0, od = 0.0, dd = 0.0;  // covariance of offset and drift, worst sensor
   };
-  void learnPending(double before);
-  void learn(double time, double angle, double speed, const std::array<double, 6>& sensors);
-  void closeStretch();
-  void tellZero();
-  void layOutCourses(const SampleBlock& block);
-  bool turning() const;
+  void addPendingSamples(double before);
+  void addAirSample(double time, double angle, double speed, const std::array<double, 6>& sensors);
+  void closeAirSegment();
+  void updateZero();
+  void prepareCrossTalkFilters(const SampleBlock& block);
+  bool isRotating() const;
   /// [N] of the unbalance at a time [s], complex: its real part shows.
-  std::array<std::complex<double>, 3> unbalancePull(double time) const;
+  std::array<std::complex<double>, 3> unbalanceForce(double time) const;
   /// @return whether all six measure: none unloaded or overloaded, which is counted.
-  bool takeZeroOff(double time, std::array<double, 6>& sensors);
+  bool subtractZero(double time, std::array<double, 6>& sensors);
   std::array<double, 3> forceOf(const std::array<double, 6>& sensors);
   /// A sample that is no measurement: the cross-talk's courses go on with the last forces.
-  void passOver();
-  std::array<std::complex<double>, 3> throughCalibration(const std::array<std::complex<double>, 3>& means,
+  void skipSample();
+  std::array<std::complex<double>, 3> calibratedAmplitudes(const std::array<std::complex<double>, 3>& means,
                                                          double f) const;
 
   SpindleSensorCalibration calibration_;
@@ -104,8 +104,8 @@ class SpindleForceSensor {
   std::array<double, 3> constant_{};  // of x, y, z
   double yx_, yz_, xz_;               // pair per load; 0: none
   std::array<ModalModel, 3> sensor_;
-  std::vector<ModalFilter> courses_;  // of yx, yz, xz
-  double course_rate_ = 0.0;          // [Hz]
+  std::vector<ModalFilter> cross_talk_filters_;  // of yx, yz, xz
+  double cross_talk_rate_ = 0.0;          // [Hz]
   std::array<double, 3> last_{{0, 0, 0}};
   std::vector<LowPass> low_pass_;
   double low_pass_rate_ = 0.0;
@@ -116,7 +116,7 @@ class SpindleForceSensor {
   std::vector<std::array<double, 6>> pending_;
   double pending_from_ = 0.0, pending_rate_ = 0.0;  // [s], [Hz]
   SpindleAngle pending_angle_;
-  std::optional<Stretch> stretch_;
+  std::optional<AirSegment> air_segment_;
   std::optional<Zero> zero_;
   SpindleAngle angle_;
   bool angle_known_ = false;

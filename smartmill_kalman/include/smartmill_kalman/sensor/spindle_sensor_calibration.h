@@ -15,7 +15,7 @@ namespace smartmill::kalman {
 
 /// A calibration constant over the length of tool and holder: applied over shown force. A line (Burzoni eq.
 /// 3-4), or its reciprocal is one, as a beam bends.
-struct LengthLine {
+struct LengthDependence {
   bool reciprocal = false;
   double slope = 0.0;                                           ///< [1/m]
   double offset = 0.0;                                          ///< [1]
@@ -29,8 +29,8 @@ struct LengthLine {
 
 /// What turns six sensors into three forces (Burzoni ch. 3).
 struct SpindleSensorCalibration {
-  LengthLine x, y, z;  ///< applied force over the pair's mean
-  std::optional<LengthLine> yx, yz,
+  LengthDependence x, y, z;  ///< applied force over the pair's mean
+  std::optional<LengthDependence> yx, yz,
       xz;  ///< cross-talk: load along the first over what the second's pair shows
   /// Course of the cross-talk over frequency with static gain 1 (eq. 3-7), driven by the force that the first
   /// axis shows. Ideal: static cross-talk (eq. 3-5).
@@ -51,7 +51,7 @@ struct SpindleSensorCalibration {
   /// @throws Error naming key and value.
   void validate() const;
   /// @throws Error naming a length [m] of tool and holder that the constants are not known for.
-  void needLength(double length) const;
+  void checkLength(double length) const;
 };
 
 /// Pairs' means (eq. 3-1): x half the difference, y half the negative difference, z half the sum: a force
@@ -72,7 +72,7 @@ SpindleSensorCalibration readSpindleSensor(const std::string& file);
 void writeSpindleSensor(const SpindleSensorCalibration& calibration, const std::string& file);
 
 /// Readings of a static calibration: weights hung on a dummy tool, one row a reading.
-struct StaticReadings {
+struct StaticMeasurements {
   std::vector<int> test;                       ///< readings of one test drift together
   std::vector<double> time;                    ///< [s]
   std::vector<double> length;                  ///< [m] of tool and holder
@@ -84,10 +84,10 @@ struct StaticReadings {
 
 /// Table with columns test, time[s], length[mm], load_x[N], load_y[N], load_z[N], x1[N] .. z2[N].
 /// @throws Error naming file, line and column.
-StaticReadings readStaticReadings(const std::string& file);
+StaticMeasurements readStaticMeasurements(const std::string& file);
 
 /// Constants of one length of tool and holder, beside those that the model has no place for.
-struct LengthConstants {
+struct ConstantsAtLength {
   double length = 0.0;                             ///< [m]
   std::array<std::array<double, 3>, 3> share{};    ///< [1] pair [row] per load along [column]
   std::array<std::array<double, 3>, 3> std_dev{};  ///< [1]
@@ -97,7 +97,7 @@ struct LengthConstants {
 
 struct StaticCalibration {
   SpindleSensorCalibration calibration;  ///< with standard deviations of its lines
-  std::vector<LengthConstants> lengths;
+  std::vector<ConstantsAtLength> lengths;
 };
 
 /// Constants by least squares over all readings of one length (offset and drift of every test among the
@@ -106,15 +106,15 @@ struct StaticCalibration {
 /// it.
 /// @param base gives what readings do not tell (preload, limits).
 /// @throws Error when a direction was never loaded.
-StaticCalibration calibrateStatic(const StaticReadings& readings, const SpindleSensorCalibration& base);
+StaticCalibration calibrateStatic(const StaticMeasurements& readings, const SpindleSensorCalibration& base);
 
 /// @throws Error naming the table and a length in it that the constants are not known for.
-void needLengths(const StaticReadings& readings, const SpindleSensorCalibration& calibration);
+void checkLengths(const StaticMeasurements& readings, const SpindleSensorCalibration& calibration);
 
 /// Verification (Burzoni 3.2.1): largest difference between force told and applied, over the largest applied
 /// force, an axis each [1]. Zero and drift from the readings without load. An axis never loaded: over the
 /// largest of all.
-std::array<double, 3> verifyStatic(const StaticReadings& readings,
+std::array<double, 3> verifyStatic(const StaticMeasurements& readings,
                                    const SpindleSensorCalibration& calibration);
 
 /// Course of a cross-talk (static gain 1) from taps along the first axis.

@@ -53,26 +53,26 @@ class SpindleSensorCalibrator {
   void handleHammer(const SampleBlock& block);
   /// Blows from now on are along an axis, for the measurement that tapped() ends. @param length [m] of tool
   /// and holder; 0: not told
-  void tapping(const std::string& direction, double length = 0.0);
-  void tapped(const SensorResult& result);
+  void beginTaps(const std::string& direction, double length = 0.0);
+  void endTaps(const SensorResult& result);
   void cancel();
   void reset();
 
   bool active() const { return goal_.has_value(); }
   std::optional<CalibrationResult> takeResult();
   /// What fit reads, as a table of `spindle_sensor calibrate`.
-  std::string readingsTable() const;
+  std::string measurementTable() const;
 
  private:
   void read(const SampleBlock& block, const std::array<std::size_t, 6>& column);
   void finish(CalibrationResult::Code code, const std::string& message);
   void fit();
-  std::string fitCourses(SpindleSensorCalibration& calibration) const;
+  std::string fitDynamicCrossTalks(SpindleSensorCalibration& calibration) const;
   void verify();
 
   TapParameters parameters_;
   SpindleSensorCalibration base_;
-  StaticReadings readings_, reference_;
+  StaticMeasurements readings_, reference_;
   std::optional<CalibrationGoal> goal_;  // of the reading that runs
   std::array<double, 6> sum_{};
   double time_sum_ = 0.0;

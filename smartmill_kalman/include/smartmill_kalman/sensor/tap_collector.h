@@ -24,7 +24,7 @@ class TapCollector {
   /// One sample of all channels. @param time [s] @param index running index @param rate [Hz]
   void add(double time, std::uint64_t index, double rate, std::vector<double> values);
   /// Blows so far that the measurement counts: a hit a channel.
-  std::vector<std::vector<Hit>> counted(const SensorResult& result) const;
+  std::vector<std::vector<Hit>> acceptedHits(const SensorResult& result) const;
   double rate() const { return rate_; }  ///< [Hz] of the last blow; 0 before
 
  private:
@@ -38,7 +38,7 @@ class TapCollector {
     double rate;
     std::vector<double> values;
   };
-  void join();
+  void pairSamples();
 
   bool active_ = false;
   double rate_ = 0.0;

@@ -1,4 +1,4 @@
-#include "smartmill_kalman/in_cut/campaign_lines.h"
+#include "smartmill_kalman/in_cut/cut_segments.h"
 
 #include <cmath>
 
@@ -13,8 +13,8 @@ constexpr double SETTLING = 0.03;  // [s] after the entry: tool, sensor and the 
 constexpr const char* TOOL[] = {"tool_x", "tool_y"};
 
 /// What of a record is steady, without force and response.
-CutStretch steady(const Record& record, const CampaignTest& test, std::size_t* from) {
-  CutStretch cut;
+CutSegment steady(const Record& record, const CampaignTest& test, std::size_t* from) {
+  CutSegment cut;
   cut.name = test.name;
   cut.sample_rate = test.sample_rate;
   cut.speed = test.spindle_speed;
@@ -31,10 +31,10 @@ std::vector<double> behind(const std::vector<double>& values, std::size_t from) 
 
 }  // namespace
 
-CutStretch toolStretch(const Record& record, const CampaignTest& test, std::size_t axis,
+CutSegment toolSegment(const Record& record, const CampaignTest& test, std::size_t axis,
                        const ModalModel& sensor) {
   std::size_t from = 0;
-  CutStretch cut = steady(record, test, &from);
+  CutSegment cut = steady(record, test, &from);
   if (record.has("spindle_angle")) cut.angle = behind(record.column("spindle_angle"), from);
   cut.force = behind(record.column(FORCE_CHANNELS[axis]), from);
   cut.response = behind(record.column(TOOL[axis]), from);
@@ -42,10 +42,10 @@ CutStretch toolStretch(const Record& record, const CampaignTest& test, std::size
   return cut;
 }
 
-CutStretch sensorStretch(const Record& record, const CampaignTest& test, std::size_t axis,
+CutSegment sensorSegment(const Record& record, const CampaignTest& test, std::size_t axis,
                          const MachineModel& model, double relative_std) {
   std::size_t from = 0;
-  CutStretch cut = steady(record, test, &from);
+  CutSegment cut = steady(record, test, &from);
   cut.angle = behind(record.column("spindle_angle"), from);
   cut.response = behind(record.column(FORCE_CHANNELS[axis]), from);
   if (!model.tool_tip.x.modes.empty() || !model.tool_tip.y.modes.empty())

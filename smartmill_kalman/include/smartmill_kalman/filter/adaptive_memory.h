@@ -7,15 +7,15 @@ namespace smartmill::kalman {
 /// Judges a filter's innovations and says how long its memory may be: level 0 is quick. Short windows tell a
 /// change of the force (one out of line with the revolution before takes the memory back at once),
 /// revolutions tell when nothing changes any more (the memory grows by a level).
-class InnovationWatch {
+class AdaptiveMemory {
  public:
   /// @param levels >= 1 @param revolution [samples]
-  InnovationWatch(std::size_t levels, double revolution);
+  AdaptiveMemory(std::size_t levels, double revolution);
 
   /// @param innovation [N] of one sample
   void add(double innovation) {
     window_sum_ += innovation * innovation;
-    if (++window_count_ == WINDOW) judgeWindow();
+    if (++window_count_ == WINDOW) checkWindow();
   }
   /// Other length of a revolution [samples]; the judgement goes on.
   void setRevolution(double revolution);
@@ -36,8 +36,8 @@ class InnovationWatch {
   static constexpr std::size_t WINDOW = 16;  ///< [samples]
 
  private:
-  void judgeWindow();
-  void judgeRevolution();
+  void checkWindow();
+  void checkRevolution();
 
   std::size_t levels_, level_ = 0, restarts_ = 0;
   std::size_t window_count_ = 0, windows_ = 0, windows_a_revolution_ = 1, dwell_ = 0;

@@ -1,4 +1,4 @@
-#include "smartmill_kalman/filter/lag_smoother.h"
+#include "smartmill_kalman/filter/fixed_lag_smoother.h"
 
 #include <algorithm>
 #include <cmath>
@@ -18,7 +18,7 @@ constexpr double RATE = 25600.0;  // [Hz]
 
 // A random walk seen with noise, the textbook case: variance p - p^2 / s (1 - a^(2 L + 2)) / (1 - a^2) with
 // s = p + r, a = r / s and p^2 = q (p + r).
-TEST(LagSmoother, HasTheVarianceOfTheTextbook) {
+TEST(FixedLagSmoother, HasTheVarianceOfTheTextbook) {
   ModalModel ideal;
   ideal.direct = 1.0;
   HarmonicFilterParameters parameters;
@@ -29,7 +29,7 @@ TEST(LagSmoother, HasTheVarianceOfTheTextbook) {
   std::vector<double> found;
   for (const std::size_t lag : {0u, 3u, 10u, 40u}) {
     HarmonicFilter filter(ideal, SPEED, RATE, parameters);
-    LagSmoother smoother;
+    FixedLagSmoother smoother;
     std::mt19937 random(5);
     std::normal_distribution<double> noise(0.0, 1.0);
     std::vector<double> truth;
@@ -39,7 +39,7 @@ TEST(LagSmoother, HasTheVarianceOfTheTextbook) {
       force += std::sqrt(Q) * noise(random);
       truth.push_back(force);
       smoother.step(filter, force + noise(random));
-      if (smoother.waiting() == lag + 1) squares += std::pow(smoother.take(1)[0] - truth[i - lag], 2);
+      if (smoother.pending() == lag + 1) squares += std::pow(smoother.takeSmoothed(1)[0] - truth[i - lag], 2);
     }
     const double power = static_cast<double>(lag) + 1.0;
     const double variance = p - p * p / s * (1.0 - std::pow(a, 2.0 * power)) / (1.0 - a * a);
@@ -53,7 +53,7 @@ TEST(LagSmoother, HasTheVarianceOfTheTextbook) {
 }
 
 // With a lag as long as the record it is the fixed-interval smoother.
-TEST(LagSmoother, OverTheWholeRecordIsTheFixedIntervalOne) {
+TEST(FixedLagSmoother, OverTheWholeRecordIsTheFixedIntervalOne) {
   const double speed = units::radPerSecFromRpm(21750.0);
   HarmonicFilterParameters parameters;
   parameters.memory_revolutions = parameters.settling_revolutions;
@@ -62,10 +62,10 @@ TEST(LagSmoother, OverTheWholeRecordIsTheFixedIntervalOne) {
   std::normal_distribution<double> noise(0.0, 1.0);
   std::vector<double> measured;
   for (int i = 0; i < 3000; ++i) measured.push_back(noise(random) + 20.0 * std::cos(4.0 * speed * i / RATE));
-  LagSmoother smoother;
+  FixedLagSmoother smoother;
   for (const double sample : measured) smoother.step(filter, sample);
   ASSERT_EQ(filter.restarts(), 0u);
-  const std::vector<double> force = smoother.take(measured.size()), whole = other.smooth(measured);
+  const std::vector<double> force = smoother.takeSmoothed(measured.size()), whole = other.smooth(measured);
   ASSERT_EQ(force.size(), whole.size());
   for (std::size_t i = 0; i < force.size(); ++i) ASSERT_NEAR(force[i], whole[i], 1e-8) << i;
 }
@@ -79,17 +79,23 @@ Outcome runOf(const ReferenceRecord& record, double lag) {
   constexpr std::size_t BLOCK = 256;
   CompensationParameters parameters;
   parameters.lag = lag;
-  parameters.filter.memory_revolutions = 2.0;  // a longer memory leaves less for the lag to win
+  parameters.filter.memory_revolutions = 2.0;  // with a longer memory the lag gains less
   Outcome run;
   std::size_t blocks = 0;
-  ForceCompensation compensation(parameters, false, [&](const ForceBlock& m, const ForceBlock& c) {
+  ForceBlock measured;
+  ForceOutputs outputs;
+  outputs.measured = [&](const ForceBlock& m) {
     EXPECT_EQ(m.first_index, 1000 + BLOCK * blocks);
-    EXPECT_EQ(c.first_index, m.first_index);
-    EXPECT_EQ(c.stamp, m.stamp);
     EXPECT_EQ(m.force[0][7], record.measured[0][BLOCK * blocks + 7]);
+    measured = m;
+  };
+  outputs.compensated = [&](const ForceBlock& c) {
+    EXPECT_EQ(c.first_index, measured.first_index);
+    EXPECT_EQ(c.stamp, measured.stamp);
     run.force.insert(run.force.end(), c.force[0].begin(), c.force[0].end());
     ++blocks;
-  });
+  };
+  ForceCompensation compensation(parameters, false, outputs);
   for (std::size_t axis = 0; axis < 3; ++axis) compensation.setSensor(axis, ReferenceCase::exactSensor());
   for (std::size_t at = 0; at + BLOCK <= record.time.size(); at += BLOCK) {
     compensation.handle(SpindleAngle{record.time[at], 0.0, units::radPerSecFromRpm(21750.0)});
@@ -124,12 +130,12 @@ TEST(FixedLag, KeepsTheIndexAndLowersTheError) {
   };
   EXPECT_LT(error(causal.force), 0.012);
   EXPECT_LT(error(lagged.force), 0.95 * error(causal.force));
-  // The entry of the tool is a wall: nothing of it shows before (the filter's window and 8 samples), and what
-  // the causal filter says there is noise of the same size.
+  // The backward pass stops at the entry of the tool: before it (less the detection delay) the force is noise
+  // of the causal filter's size.
   for (std::size_t i = 256; i + 40 < 512; ++i) EXPECT_LT(std::abs(lagged.force[i]), 6.0) << i;
 }
 
-TEST(FixedLag, AGapEndsWhatWaits) {
+TEST(FixedLag, AGapPublishesPendingBlocks) {
   ReferenceCase reference;
   reference.spindle_speed = units::radPerSecFromRpm(21750.0);
   reference.duration = 0.1;
@@ -138,7 +144,7 @@ TEST(FixedLag, AGapEndsWhatWaits) {
   parameters.lag = 1.0;
   std::vector<std::uint64_t> out;
   ForceCompensation compensation(
-      parameters, false, [&](const ForceBlock&, const ForceBlock& c) { out.push_back(c.first_index); });
+      parameters, false, {{}, [&](const ForceBlock& c) { out.push_back(c.first_index); }});
   for (std::size_t axis = 0; axis < 3; ++axis) compensation.setSensor(axis, ReferenceCase::exactSensor());
   const auto feed = [&](std::uint64_t index) {
     compensation.handle(SpindleAngle{static_cast<double>(index) / RATE, 0.0, reference.spindle_speed});

@@ -1,4 +1,4 @@
-#include "smartmill_kalman/filter/innovation_watch.h"
+#include "smartmill_kalman/filter/adaptive_memory.h"
 
 #include <algorithm>
 #include <cmath>
@@ -19,22 +19,22 @@ constexpr double MEMORY_TOO_LONG = 1.5;
 
 }  // namespace
 
-InnovationWatch::InnovationWatch(std::size_t levels, double revolution) : levels_(levels) {
+AdaptiveMemory::AdaptiveMemory(std::size_t levels, double revolution) : levels_(levels) {
   setRevolution(revolution);
 }
 
-void InnovationWatch::setRevolution(double revolution) {
+void AdaptiveMemory::setRevolution(double revolution) {
   windows_a_revolution_ = std::max<std::size_t>(
       4, static_cast<std::size_t>(std::lround(revolution / static_cast<double>(WINDOW))));
 }
 
-void InnovationWatch::reset() {
+void AdaptiveMemory::reset() {
   level_ = 0;
   window_count_ = windows_ = dwell_ = 0;
   window_sum_ = revolution_sum_ = peak_ = last_peak_ = last_mean_ = accepted_mean_ = 0.0;
 }
 
-void InnovationWatch::judgeWindow() {
+void AdaptiveMemory::checkWindow() {
   const double mean = window_sum_ / static_cast<double>(WINDOW);
   window_count_ = 0;
   window_sum_ = 0.0;
@@ -49,10 +49,10 @@ void InnovationWatch::judgeWindow() {
   }
   revolution_sum_ += mean;
   peak_ = std::max(peak_, mean);
-  if (++windows_ == windows_a_revolution_) judgeRevolution();
+  if (++windows_ == windows_a_revolution_) checkRevolution();
 }
 
-void InnovationWatch::judgeRevolution() {
+void AdaptiveMemory::checkRevolution() {
   const double mean = revolution_sum_ / static_cast<double>(windows_);
   const bool settled = mean > STILL_FALLING * last_mean_;
   if (level_ > 0 && mean > MEMORY_TOO_LONG * accepted_mean_) {
