@@ -9,8 +9,7 @@
 #include "smartmill_core/require.h"
 #include "smartmill_core/units.h"
 
-// Vectors for the processor at hand; clang, which only reads this file, wants to see it where a function is
-// declared.
+// Code for the processor in use. Clang, which only analyses this file, requires the attribute on declarations.
 #ifdef __clang__
 #define AVX2_AND_DEFAULT
 #else
@@ -22,10 +21,10 @@ namespace {
 
 using Complex = std::complex<double>;
 
-/// A harmonic that a sensor passes by less is not told by it.
+/// Transmissibility [1] below which a harmonic cannot be estimated.
 constexpr double MIN_TRANSMISSION = 1e-3;
 
-/// Steady answer of a mode's two states (StateSpace form) to a force of 1 at w [rad/s].
+/// Steady-state response of a mode's two states (StateSpace form) to a unit force at w [rad/s].
 std::array<Complex, 2> steady(const Mode& mode, double w) {
   const double wn = units::TWO_PI * mode.frequency;
   const Complex second = mode.response(w / units::TWO_PI);
@@ -107,19 +106,19 @@ void HarmonicFilter::setModel(const ModalModel& sensor, double spindle_speed) {
       modal_.push_back({batch.a[k] + zeta * wn * s, -wn * s, wn * s, batch.a[k] - zeta * wn * s});
     } else if (i < pairs) {
       const double n = static_cast<double>(i - modes_);
-      const Complex answer = sensor.response(n * spindle_speed / units::TWO_PI);
+      const Complex response = sensor.response(n * spindle_speed / units::TWO_PI);
       batch.a[k] = std::cos(n * spindle_speed * dt);
       batch.b[k] = std::sin(n * spindle_speed * dt);
-      batch.c1[k] = answer.real();
-      batch.c2[k] = n > 0.0 ? -answer.imag() : 0.0;
+      batch.c1[k] = response.real();
+      batch.c2[k] = n > 0.0 ? -response.imag() : 0.0;
       batch.g[k] = 1.0;
     }
   }
   memory_.setRevolution(units::TWO_PI / spindle_speed * sample_rate_);
 }
 
-// Force states w = F - i G turn with exp(i n w dt). A mode's own pair is what it still rings: its state less
-// the steady answer to the force, as (second state, what makes the pair a rotation).
+// Force states w = F - i G rotate by exp(i n w dt). A mode's pair is its free response, its state less the
+// steady-state response to the force, as (second state, quadrature that makes the pair a rotation).
 std::vector<double> HarmonicFilter::toPairs(const std::vector<double>& state) const {
   std::vector<double> pairs(8 * batches_.size(), 0.0);
   const double* force = state.data() + 2 * modes_;
@@ -199,7 +198,7 @@ void HarmonicFilter::setGains() {
 }
 
 void HarmonicFilter::retune(const ModalModel& sensor, double spindle_speed) {
-  if (sensor.modes.size() != modes_) throw Error("Kalman filter: the number of modes cannot change");
+  if (sensor.modes.size() != modes_) throw Error("Kalman filter: number of modes differs from that of the filter");
   const std::vector<double> now = state();
   setModel(sensor, spindle_speed);
   setState(now);
@@ -208,10 +207,10 @@ void HarmonicFilter::retune(const ModalModel& sensor, double spindle_speed) {
 
 void HarmonicFilter::replaceModes(const ModalModel& sensor, std::vector<HarmonicGain> gains) {
   HarmonicFilter other(std::move(gains), sensor, spindle_speed_, sample_rate_);
-  const std::vector<Complex> seen = measuredHarmonics();
-  for (std::size_t n = 0; n < seen.size() && n <= static_cast<std::size_t>(other.harmonics_); ++n) {
-    const Complex passed = sensor.response(static_cast<double>(n) * spindle_speed_ / units::TWO_PI);
-    const Complex force = std::abs(passed) < MIN_TRANSMISSION ? forceHarmonic(n) : seen[n] / passed;
+  const std::vector<Complex> measured = measuredHarmonics();
+  for (std::size_t n = 0; n < measured.size() && n <= static_cast<std::size_t>(other.harmonics_); ++n) {
+    const Complex gain = sensor.response(static_cast<double>(n) * spindle_speed_ / units::TWO_PI);
+    const Complex force = std::abs(gain) < MIN_TRANSMISSION ? forceHarmonic(n) : measured[n] / gain;
     const std::size_t i = other.modes_ + n;
     other.batches_[i / 4].re[i % 4] = force.real();
     other.batches_[i / 4].im[i % 4] = n > 0 ? force.imag() : 0.0;
@@ -225,7 +224,7 @@ void HarmonicFilter::replaceModes(const ModalModel& sensor, std::vector<Harmonic
 
 void HarmonicFilter::replaceSensor(const ModalModel& sensor, std::vector<HarmonicGain> gains) {
   if (sensor.modes.size() != modes_) {
-    if (gains.empty()) throw Error("Kalman filter: other modes ask for other gains");
+    if (gains.empty()) throw Error("Kalman filter: no gains for another number of modes");
     return replaceModes(sensor, std::move(gains));
   }
   for (int n = 0; n <= harmonics_; ++n) {
@@ -258,7 +257,7 @@ std::vector<std::complex<double>> HarmonicFilter::measuredHarmonics() const {
 }
 
 void HarmonicFilter::continueFrom(const HarmonicFilter& other) {
-  if (other.modes_ != modes_) throw Error("Kalman filter: the number of modes cannot change");
+  if (other.modes_ != modes_) throw Error("Kalman filter: number of modes differs from that of the filter");
   std::vector<double> state = other.state();
   memory_.setLevel(other.level());
   state.resize(2 * modes_ + 1 + 2 * static_cast<std::size_t>(harmonics_), 0.0);
@@ -271,7 +270,7 @@ double HarmonicFilter::slope(double highest) const {
   const double first = -static_cast<double>(modes_);
   Vector4 order = {first, first + 1.0, first + 2.0, first + 3.0};
   for (const PairBatch& batch : batches_) {
-    // Modes come first and do not turn with the spindle.
+    // Modes come first and do not rotate with the spindle.
     Vector4 n = order > 0.0 ? order : Vector4{};
     n = order > highest ? Vector4{} : n;
     sum += n * (batch.c2 * batch.re - batch.c1 * batch.im);
@@ -294,7 +293,7 @@ void HarmonicFilter::reset() {
   memory_.reset();
 }
 
-// Without fused multiply-adds the clones give the same numbers.
+// Without fused multiply-adds all clones give the same numbers.
 AVX2_AND_DEFAULT double HarmonicFilter::advance(const GainBatch* gain, double innovation, double force_gain) {
   const Vector4 nu = {innovation, innovation, innovation, innovation};
   Vector4 force = {}, expected = {};
@@ -349,7 +348,7 @@ std::shared_ptr<const HarmonicFilter::SmootherDesign> HarmonicFilter::smootherDe
 
 // lambda(k) = c' nu / S + (I - c' K') Phi' lambda(k + 1); force smoothed = force predicted + (P d')' lambda.
 AVX2_AND_DEFAULT double HarmonicFilter::smoothBackward(const SmootherDesign& design, std::size_t level, double innovation,
-                                               bool seen, std::vector<GainBatch>& lambda) {
+                                               bool is_measured, std::vector<GainBatch>& lambda) {
   const std::vector<GainBatch>&gain = design.gains[level], &smoothing = design.smoothing[level];
   Vector4 through = {}, correction = {};
   for (std::size_t i = 0; i < lambda.size(); ++i) {
@@ -360,7 +359,7 @@ AVX2_AND_DEFAULT double HarmonicFilter::smoothBackward(const SmootherDesign& des
     through += gain[i].re * lambda[i].re + gain[i].im * lambda[i].im;
   }
   const double taken = (through[0] + through[2]) + (through[1] + through[3]);
-  const double drive = seen ? innovation / design.variance[level] - taken : 0.0;
+  const double drive = is_measured ? innovation / design.variance[level] - taken : 0.0;
   for (std::size_t i = 0; i < lambda.size(); ++i) {
     lambda[i].re += design.batches[i].c1 * drive;
     lambda[i].im += design.batches[i].c2 * drive;
