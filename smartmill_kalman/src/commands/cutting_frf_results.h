@@ -27,9 +27,9 @@ struct CuttingFrfAxis {
   std::vector<SpeedFrf> found;
 };
 
-/// What the tap shows at rest.
+/// Prints the modes of the tap at rest.
 void printRest(const CuttingFrfAxis& axis, bool receptance);
-/// The modes at a speed, and their rows in the table.
+/// Prints the modes at a speed and adds them to the table.
 void printFrf(const CuttingFrfAxis& axis, const SpeedFrf& frf, bool receptance, CsvWriter& table);
 /// Ending of the files of an axis at a speed, e.g. "_x_6000".
 std::string suffixOf(const CuttingFrfAxis& axis, const SpeedFrf& frf);

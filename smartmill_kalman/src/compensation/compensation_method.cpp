@@ -12,7 +12,8 @@ namespace smartmill::kalman {
 void CompensationParameters::validate() const {
   checkBounds(*this);
   // Mode tracking needs the angle of the teeth, which cannot be estimated from the force alone.
-  if (track_speed && follow) throw Error("track_speed: true, expected false with follow (needs spindle/angle)");
+  if (track_speed && follow)
+    throw Error("track_speed: true, expected false with follow (needs spindle/angle)");
   if (delay_form && (track_speed || follow || lag > 0.0))
     throw Error("delay_form: true, expected false with track_speed, follow or lag > 0 (they need harmonics)");
 }

@@ -31,8 +31,7 @@ CompensationPipeline::CompensationPipeline(const CompensationParameters& paramet
                                            double hold_back, Outputs outputs)
     : model_sensor_(sensor),
       outputs_(std::move(outputs)),
-      compensation_(parameters, sensor.measures_workpiece,
-                    blockOutputs()),
+      compensation_(parameters, sensor.measures_workpiece, blockOutputs()),
       measurement_(withRange(taps, parameters.saturation)),
       sorter_(hold_back),
       conditions_(sorter_.addLatched(names::CUTTING_CONDITION)),

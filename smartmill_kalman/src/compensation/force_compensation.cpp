@@ -117,11 +117,10 @@ void ForceCompensation::handle(const SampleBlock& block) {
     return;
   }
   if (method_->prepare(spindle_, block.sample_rate)) {
-    settling_left_ = parameters_.settling_periods * parameters_.filter.settling_revolutions *
-                     units::TWO_PI / spindle_.speed;
+    settling_left_ = parameters_.settling_periods * parameters_.filter.settling_revolutions * units::TWO_PI /
+                     spindle_.speed;
   }
-  compensated.status =
-      settling_left_ > 0.0 ? ForceBlock::Status::settling : ForceBlock::Status::compensated;
+  compensated.status = settling_left_ > 0.0 ? ForceBlock::Status::settling : ForceBlock::Status::compensated;
   settling_left_ -= static_cast<double>(block.size()) / block.sample_rate;
   method_->process(measured, std::move(compensated), health_);
   spindle_.speed = method_->speed();

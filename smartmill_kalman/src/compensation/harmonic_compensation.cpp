@@ -91,8 +91,7 @@ void HarmonicCompensation::design() {
 }
 
 void HarmonicCompensation::retune() {
-  for (std::size_t axis = 0; axis < 3; ++axis)
-    filters_[axis].retune(sensor_[axis].model, spindle_.speed);
+  for (std::size_t axis = 0; axis < 3; ++axis) filters_[axis].retune(sensor_[axis].model, spindle_.speed);
   onFiltersChanged(filters_, sample_rate_);
 }
 

@@ -28,8 +28,8 @@ void MatrixCompensation::reset() {
 
 std::vector<std::size_t> MatrixCompensation::columnsOf(const SampleBlock& block) const {
   if (std::abs(block.sample_rate / inverse_.sampleRate() - 1.0) > 1e-9) {
-    throw Error(formatted("sample block: sample rate %.1f Hz, expected %.1f Hz as in plate_taps", block.sample_rate,
-                          inverse_.sampleRate()));
+    throw Error(formatted("sample block: sample rate %.1f Hz, expected %.1f Hz as in plate_taps",
+                          block.sample_rate, inverse_.sampleRate()));
   }
   std::vector<std::size_t> columns;
   for (std::size_t c = 0; c < inverse_.channels(); ++c)

@@ -8,8 +8,8 @@
 #include "smartmill_core/units.h"
 #include "smartmill_kalman/filter/adaptive_memory.h"
 #include "smartmill_kalman/filter/delay_filter.h"
-#include "smartmill_kalman/filter/inverse_filter.h"
 #include "smartmill_kalman/filter/fixed_lag_smoother.h"
+#include "smartmill_kalman/filter/inverse_filter.h"
 
 namespace smartmill::kalman {
 namespace {

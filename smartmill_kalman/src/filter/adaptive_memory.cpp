@@ -8,13 +8,13 @@ namespace {
 
 /// A window whose mean square exceeds the largest of the revolution before by this is a change of the force.
 constexpr double OUT_OF_LINE = 5.0;
-/// Windows after a start that tell what is usual.
+/// Windows after a start that give the reference power.
 constexpr std::size_t LEAST_WINDOWS = 12;
-/// Revolutions at a memory before a longer one is tried.
+/// Revolutions at a level before the next is tried.
 constexpr std::size_t DWELL = 2;
-/// The mean square of a revolution that still falls below this share of the last one's: not settled.
+/// A revolution with a mean square below this share of the previous one has not settled.
 constexpr double STILL_FALLING = 0.8;
-/// The mean square that a longer memory may have over the one at which it was accepted.
+/// Largest mean square at a longer memory, relative to that at the shortest.
 constexpr double MEMORY_TOO_LONG = 1.5;
 
 }  // namespace

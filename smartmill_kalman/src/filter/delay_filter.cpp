@@ -14,13 +14,13 @@
 namespace smartmill::kalman {
 namespace {
 
-/// The quick memory over settling_revolutions: a line of samples has more to learn than a band of harmonics.
+/// Shortest memory over settling_revolutions: the line has more states than the harmonics.
 constexpr double QUICK_FACTOR = 1.5;
-/// Length of the array in which the line moves, in lines.
+/// Length of the buffer in which the line moves, in lines.
 constexpr std::size_t BUFFER_LINES = 8;
-/// Steps of the gain's recursion, in revolutions, and the rise of P over a revolution at which it ends. What
-/// the sensor hardly passes goes on rising long after: it stays as slow as it is then, when the innovation's
-/// variance rises by less than SETTLED.
+/// Longest recursion of the gain in revolutions, and relative rise of P per revolution at convergence.
+/// Frequencies that the sensor hardly transmits converge much later; the recursion then ends at its longest,
+/// if the variance of the innovation rises by less than SETTLED.
 constexpr double MAX_REVOLUTIONS = 1000.0, CONVERGED = 1e-7, SETTLED = 1e-4;
 
 /// Coefficients of u^i, lowest first, of the polynomial that is 1 at node j and 0 at the others.
@@ -39,7 +39,7 @@ std::vector<double> lagrangePolynomial(const std::vector<double>& nodes, std::si
   return p;
 }
 
-/// Shares of the TAPS points around a position in its value (Lagrange). @return the first of them
+/// Lagrange weights of the TAPS points around a position. @return index of the first point
 std::size_t interpolationAt(double position, std::vector<double>& shares) {
   constexpr std::size_t TAPS = DelayModel::TAPS;
   const auto first = static_cast<std::size_t>(std::floor(position)) - (TAPS / 2 - 1);
@@ -95,7 +95,7 @@ DelayModel::DelayModel(const ModalModel& sensor, double turn, double sample_rate
 
 void DelayModel::setPeriod(double samples) {
   if (!(samples >= 18.0) || samples > 1e6) {
-    throw Error("delay form: a period of " + std::to_string(samples) + " samples, 18 .. 1e6 is due");
+    throw Error("delay form: a period of " + std::to_string(samples) + " samples, expected 18 .. 1e6");
   }
   period = samples;
   // The line's next element is line[line]; one period before it is line[line - T].
@@ -131,7 +131,7 @@ double DelayModel::measured(const std::vector<double>& x) const {
 }
 
 std::vector<double> delayGain(const DelayModel& model, double q, double r) {
-  if (!(q > 0.0) || !(r > 0.0)) throw Error("delay form: variances above 0 are due");
+  if (!(q > 0.0) || !(r > 0.0)) throw Error("delay form: expected variances above 0");
   // Morf, Sidhu and Kailath: P(k + 1) - P(k) = m l l', n = P c'.
   std::vector<double> l(model.states(), 0.0), n = l, through(model.states());
   l.back() = 1.0;
@@ -139,15 +139,15 @@ std::vector<double> delayGain(const DelayModel& model, double q, double r) {
   const auto most = static_cast<std::size_t>(MAX_REVOLUTIONS * static_cast<double>(model.line));
   double rise = 0.0;  // of the innovation's variance over a revolution
   for (std::size_t step = 1; step <= most; ++step) {
-    const double seen = model.measured(l), before = variance;
+    const double output = model.measured(l), before = variance;
     // l(k + 1) = (phi - phi n c / variance) l
-    for (std::size_t i = 0; i < l.size(); ++i) through[i] = l[i] - n[i] * (seen / before);
-    for (std::size_t i = 0; i < l.size(); ++i) n[i] += m * seen * l[i];
-    variance += m * seen * seen;
+    for (std::size_t i = 0; i < l.size(); ++i) through[i] = l[i] - n[i] * (output / before);
+    for (std::size_t i = 0; i < l.size(); ++i) n[i] += m * output * l[i];
+    variance += m * output * output;
     m *= before / variance;
     model.step(through);
     l.swap(through);
-    rise += m * seen * seen;
+    rise += m * output * output;
     if (step % model.line == 0) {
       double left = 0.0;
       for (const double x : l) left += x * x;
@@ -161,7 +161,7 @@ std::vector<double> delayGain(const DelayModel& model, double q, double r) {
       rise = 0.0;
     }
   }
-  throw Error("delay form: the gain does not settle");
+  throw Error("delay form: the gain does not converge");
 }
 
 DelayFilter::DelayFilter(const ModalModel& sensor, double spindle_speed, double sample_rate,
@@ -201,7 +201,7 @@ void DelayFilter::retune(double spindle_speed) {
   const DelayFilter before = *this;
   model_.setPeriod(units::TWO_PI * sample_rate_ / spindle_speed);
   for (std::vector<double>& gain : gain_) {
-    // The far end of the line is made of the forces one period before it, and so is its gain.
+    // The end of the line repeats the forces one period earlier, and so does its gain.
     const std::size_t first = 2 * model_.modes;
     gain.resize(std::min(gain.size(), model_.states()));
     while (gain.size() < model_.states()) {
@@ -221,13 +221,13 @@ void DelayFilter::continueFrom(const DelayFilter& other) {
   memory_.setLevel(other.level());
 }
 
-// The same force at the same angle: the other's samples lie closer or wider.
+// The same force at the same angle, with another spacing of the samples.
 void DelayFilter::resampleFrom(const DelayFilter& other) {
   constexpr std::size_t TAPS = DelayModel::TAPS;
   const DelayModel& was = other.model_;
   const auto first = other.line_.begin() + static_cast<std::ptrdiff_t>(other.head_);
   std::vector<double> known(first, first + static_cast<std::ptrdiff_t>(was.line));
-  // What comes after the line, as the model tells it, so that every place has its points around it.
+  // Extended by the model beyond its end, so that every position has its points around it.
   while (known.size() < was.line + 2 * TAPS) {
     const std::size_t from = was.at + known.size() - was.line;
     double next = 0.0;

@@ -37,8 +37,8 @@ std::vector<double> FixedLagSmoother::takeSmoothed(std::size_t count) {
     const Sample& sample = samples_[at];
     if (lambda.size() != sample.design->batches.size())
       lambda.assign(sample.design->batches.size(), HarmonicFilter::GainBatch{});
-    const double correction =
-        HarmonicFilter::smoothBackward(*sample.design, sample.level, sample.innovation, sample.is_measured, lambda);
+    const double correction = HarmonicFilter::smoothBackward(*sample.design, sample.level, sample.innovation,
+                                                             sample.is_measured, lambda);
     if (at < count) force[at] = sample.predicted + correction;
     if (sample.is_change) std::fill(lambda.begin(), lambda.end(), HarmonicFilter::GainBatch{});
   }

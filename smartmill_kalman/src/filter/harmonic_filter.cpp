@@ -9,7 +9,8 @@
 #include "smartmill_core/require.h"
 #include "smartmill_core/units.h"
 
-// Code for the processor in use. Clang, which only analyses this file, requires the attribute on declarations.
+// Code for the processor in use. Clang, which only analyses this file, requires the attribute on
+// declarations.
 #ifdef __clang__
 #define AVX2_AND_DEFAULT
 #else
@@ -198,7 +199,8 @@ void HarmonicFilter::setGains() {
 }
 
 void HarmonicFilter::retune(const ModalModel& sensor, double spindle_speed) {
-  if (sensor.modes.size() != modes_) throw Error("Kalman filter: number of modes differs from that of the filter");
+  if (sensor.modes.size() != modes_)
+    throw Error("Kalman filter: number of modes differs from that of the filter");
   const std::vector<double> now = state();
   setModel(sensor, spindle_speed);
   setState(now);
@@ -347,8 +349,9 @@ std::shared_ptr<const HarmonicFilter::SmootherDesign> HarmonicFilter::smootherDe
 }
 
 // lambda(k) = c' nu / S + (I - c' K') Phi' lambda(k + 1); force smoothed = force predicted + (P d')' lambda.
-AVX2_AND_DEFAULT double HarmonicFilter::smoothBackward(const SmootherDesign& design, std::size_t level, double innovation,
-                                               bool is_measured, std::vector<GainBatch>& lambda) {
+AVX2_AND_DEFAULT double HarmonicFilter::smoothBackward(const SmootherDesign& design, std::size_t level,
+                                                       double innovation, bool is_measured,
+                                                       std::vector<GainBatch>& lambda) {
   const std::vector<GainBatch>&gain = design.gains[level], &smoothing = design.smoothing[level];
   Vector4 through = {}, correction = {};
   for (std::size_t i = 0; i < lambda.size(); ++i) {

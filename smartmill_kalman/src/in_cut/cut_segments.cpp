@@ -12,7 +12,7 @@ namespace {
 constexpr double SETTLING = 0.03;  // [s] after the entry: tool, sensor and the first marks on the surface
 constexpr const char* TOOL[] = {"tool_x", "tool_y"};
 
-/// What of a record is steady, without force and response.
+/// Start of the steady part of a record; force and response are not set.
 CutSegment steady(const Record& record, const CampaignTest& test, std::size_t* from) {
   CutSegment cut;
   cut.name = test.name;
@@ -49,10 +49,11 @@ CutSegment sensorSegment(const Record& record, const CampaignTest& test, std::si
   cut.angle = behind(record.column("spindle_angle"), from);
   cut.response = behind(record.column(FORCE_CHANNELS[axis]), from);
   if (!model.tool_tip.x.modes.empty() || !model.tool_tip.y.modes.empty())
-    throw Error(model.file + ": tool_tip: the force of a tool that vibrates is not told by its coefficients");
-  const ToolGeometry& tool = model.needTool("tell the force of a cut");
+    throw Error(model.file +
+                ": tool_tip: has modes, expected a rigid tool (the predicted force excludes vibration)");
+  const ToolGeometry& tool = model.needTool("predict the cutting force");
   CuttingLaw law;
-  law.coefficients = model.needCutting("tell the force of a cut");
+  law.coefficients = model.needCutting("predict the cutting force");
   if (!test.engagement) throw Error(test.name + ": no engagement");
   RigidCut rigid(tool, law, *test.engagement);
   cut.force.reserve(cut.angle.size());

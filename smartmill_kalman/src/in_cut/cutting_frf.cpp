@@ -18,14 +18,14 @@ namespace {
 
 using Complex = std::complex<double>;
 
-constexpr double MIN_REVOLUTIONS = 11.0;  // the window's main lobe is +-4 of their inverse
-constexpr int NEIGHBOURS = 8;               // places between harmonics whose mean is a line's noise
-constexpr double SAME_LINE = 5e-4;          // [1] of frequency
-constexpr double SAME_MODE = 0.1;           // [1] of frequency, at neighbouring speeds
-constexpr double MIN_GAIN_DEVIATIONS = 3.0;                // [1] gain over its deviation
-constexpr double SPEED_TOLERANCE = 3e-3;        // [1] of speed
-constexpr std::size_t MIN_JACKKNIFE_CUTS = 5;      // that tell by leaving one out
-constexpr int PASSES = 4;                   // of slopes and fits, each of which moves the other
+constexpr double MIN_REVOLUTIONS = 11.0;       // the window's main lobe is +-4 of their inverse
+constexpr int NEIGHBOURS = 8;                  // half orders around a harmonic that estimate its noise
+constexpr double SAME_LINE = 5e-4;             // [1] of frequency
+constexpr double SAME_MODE = 0.1;              // [1] of frequency, at neighbouring speeds
+constexpr double MIN_GAIN_DEVIATIONS = 3.0;    // [1] gain over its standard deviation, for a significant mode
+constexpr double SPEED_TOLERANCE = 3e-3;       // [1] of speed
+constexpr std::size_t MIN_JACKKNIFE_CUTS = 5;  // for the jackknife
+constexpr int PASSES = 4;                      // of the iteration between slopes and fits
 
 std::vector<double> taper(std::size_t size) {
   std::vector<double> window(size);
@@ -34,8 +34,7 @@ std::vector<double> taper(std::size_t size) {
   return window;
 }
 
-/// Angle of the spindle over a part: a parabola through what was measured, so that the reading's own noise
-/// does not stand in the lines. [rad]
+/// Spindle angle over a part [rad]: a parabola fitted to the measured angle, which removes its noise.
 class RotationFit {
  public:
   RotationFit(const CutSegment& cut, std::size_t from, std::size_t size)
@@ -72,8 +71,8 @@ class RotationFit {
 struct HalfOrders {
   std::vector<Complex> force, response;
 
-  /// Power of what does not repeat at a line, from the places between the harmonics around it; one less than
-  /// there are, since few places make a ratio of Student's kind.
+  /// Power of the non-synchronous part at a line, from the half orders around it; divided by their number
+  /// less one, since a ratio to so few is distributed as Student's.
   static double noise(const std::vector<Complex>& values, std::size_t order) {
     double sum = 0.0;
     int count = 0;
@@ -117,7 +116,7 @@ HalfOrders halfOrders(const CutSegment& cut, std::size_t from, std::size_t size,
   return found;
 }
 
-/// Relative variance that the deviations of a sensor's modes leave in its response.
+/// Relative variance of a sensor's response by the standard deviations of its modes.
 double relativeVariance(const ModalModel& chain, double f) {
   const Complex nominal = chain.response(f);
   double sum = 0.0;
@@ -136,8 +135,8 @@ double relativeVariance(const ModalModel& chain, double f) {
   return sum;
 }
 
-void addSegmentLines(const CutSegment& cut, std::size_t from, std::size_t size, const CuttingFrfOptions& options,
-                 std::vector<FrfLine>& lines) {
+void addSegmentLines(const CutSegment& cut, std::size_t from, std::size_t size,
+                     const CuttingFrfOptions& options, std::vector<FrfLine>& lines) {
   const RotationFit rotation(cut, from, size);
   const double step = rotation.speed() / units::TWO_PI;  // [Hz]
   if (!(step > 0.0) || static_cast<double>(size) / cut.sample_rate * step < MIN_REVOLUTIONS) return;
@@ -148,20 +147,20 @@ void addSegmentLines(const CutSegment& cut, std::size_t from, std::size_t size, 
     line.frequency = static_cast<double>(k) * step;
     if (line.frequency < options.low) continue;
     line.speed = rotation.speed();
-    const Complex shown = found.force[2 * k], chain = cut.chain.response(line.frequency);
+    const Complex measured = found.force[2 * k], chain = cut.chain.response(line.frequency);
     const double force_noise = HalfOrders::noise(found.force, k),
                  response_noise = HalfOrders::noise(found.response, k);
-    if (std::norm(shown) < options.least_signal * options.least_signal * force_noise) continue;
-    line.value = found.response[2 * k] / shown * chain;
-    line.force = std::abs(shown / chain);
-    const double relative = force_noise / std::norm(shown) + relativeVariance(cut.chain, line.frequency) +
+    if (std::norm(measured) < options.least_signal * options.least_signal * force_noise) continue;
+    line.value = found.response[2 * k] / measured * chain;
+    line.force = std::abs(measured / chain);
+    const double relative = force_noise / std::norm(measured) + relativeVariance(cut.chain, line.frequency) +
                             cut.relative_force_std * cut.relative_force_std;
     line.std_dev = std::sqrt(response_noise / (line.force * line.force) + std::norm(line.value) * relative);
     if (line.std_dev > 0.0) lines.push_back(line);
   }
 }
 
-/// Lines at one frequency become one, the likelier the heavier; their scatter counts where it is larger.
+/// Weighted mean of lines at one frequency; its standard deviation includes their scatter.
 FrfLine merged(const std::vector<FrfLine>& lines) {
   FrfLine sum;
   double weights = 0.0;
@@ -198,19 +197,20 @@ FrequencyResponse frfOf(std::vector<FrfLine> lines, const std::string& unit) {
   return frf;
 }
 
-/// What of a mode goes with the speed.
+/// Parameters of a mode that depend on the speed.
 using Value = double Mode::*;
 constexpr Value VALUES[] = {&Mode::frequency, &Mode::damping_ratio, &Mode::gain};
 constexpr Value DEVIATIONS[] = {&Mode::frequency_std, &Mode::damping_ratio_std, &Mode::gain_std};
 constexpr std::size_t KINDS = 3;
 
-/// How a mode goes with the speed around a group of cuts: d ln value / d ln speed of each.
+/// Dependence of a mode on the speed around a group of cuts: d ln value / d ln speed.
 struct SpeedDependentMode {
   Mode mode;
   double slope[KINDS] = {0.0, 0.0, 0.0}, std_dev[KINDS] = {0.0, 0.0, 0.0};
 
-  /// What its response at f loses when the speed is by this ratio another one. [unit]
-  Complex lost(double f, double ratio) const {
+  /// Correction of the response at f from another speed to that of the group. @param ratio of the speeds
+  /// [unit]
+  Complex correction(double f, double ratio) const {
     Mode there = mode;
     for (std::size_t k = 0; k < KINDS; ++k) there.*VALUES[k] *= std::pow(ratio, slope[k]);
     return mode.response(f) - there.response(f);
@@ -223,8 +223,7 @@ double meanSpeed(const std::vector<FrfLine>& lines) {
   return sum;
 }
 
-/// Takes out modes whose gain does not stand out of its own deviation: what the lines' misfit between groups
-/// of speeds may seem to ask for.
+/// Removes modes with a gain that is not significant; differences between speeds can produce such modes.
 void dropUncertainModes(ModalFit& fit, bool unit_static_gain) {
   std::vector<Mode>& modes = fit.model.modes;
   const auto unseen = [](const Mode& m) { return !(std::abs(m.gain) > MIN_GAIN_DEVIATIONS * m.gain_std); };
@@ -235,7 +234,7 @@ void dropUncertainModes(ModalFit& fit, bool unit_static_gain) {
   fit.covariance.resize(0, 0);  // of other modes than these
 }
 
-/// Lines of one group, each as it would be at the group's mean speed, or at the one given.
+/// FRF and fit of one group, lines corrected to the group's mean speed or to the given one.
 SpeedFrf fitted(std::vector<FrfLine> lines, const std::vector<SpeedDependentMode>& moving,
                 const std::string& unit, const CuttingFrfOptions& options, std::optional<double> speed = {}) {
   SpeedFrf found;
@@ -243,11 +242,12 @@ SpeedFrf fitted(std::vector<FrfLine> lines, const std::vector<SpeedDependentMode
   found.lowest = lines.front().speed;
   found.highest = lines.back().speed;
   for (FrfLine& line : lines)
-    for (const SpeedDependentMode& mode : moving) line.value += mode.lost(line.frequency, line.speed / found.speed);
+    for (const SpeedDependentMode& mode : moving)
+      line.value += mode.correction(line.frequency, line.speed / found.speed);
   found.frf = frfOf(std::move(lines), unit);
   const auto count = static_cast<int>(found.frf.size());
   if (count < options.least_lines) {
-    found.reason = formatted("%d lines, %d are needed", count, options.least_lines);
+    found.reason = formatted("%d lines, expected at least %d", count, options.least_lines);
     return found;
   }
   ModalFitOptions fit;
@@ -261,14 +261,14 @@ SpeedFrf fitted(std::vector<FrfLine> lines, const std::vector<SpeedDependentMode
     dropUncertainModes(*found.fit, options.unit_static_gain);
     if (!found.fit->model.modes.empty()) return found;
     found.fit.reset();
-    found.reason = "no mode stands out of its deviation";
+    found.reason = "no significant mode";
   } catch (const Error& e) {
     found.reason = e.what();
   }
   return found;
 }
 
-/// One of the modes that has this frequency, or none.
+/// Mode closest to a frequency, within SAME_MODE; null: none.
 const Mode* nearest(const SpeedFrf& frf, double frequency) {
   const Mode* best = nullptr;
   if (!frf.fit) return best;
@@ -279,31 +279,31 @@ const Mode* nearest(const SpeedFrf& frf, double frequency) {
   return best;
 }
 
-/// Slopes of one mode at a group: of the parabola through the values at the nearest three speeds, of the
-/// line through two; unknown beside no other group, and then taken for none.
+/// Slopes of one mode at a group: of the parabola through the values at the nearest three speeds, or of the
+/// line through two; zero for a single group.
 SpeedDependentMode speedDependentMode(const std::vector<SpeedFrf>& all, std::size_t group, const Mode& mode,
-                      bool receptance) {
+                                      bool receptance) {
   SpeedDependentMode moving;
   moving.mode = mode;
-  std::vector<std::pair<double, const Mode*>> seen;  // speed over this one, less 1
+  std::vector<std::pair<double, const Mode*>> neighbours;  // speed over this one, less 1
   for (const SpeedFrf& other : all) {
     if (const Mode* same = nearest(other, mode.frequency))
-      seen.emplace_back(other.speed / all[group].speed - 1.0, same);
+      neighbours.emplace_back(other.speed / all[group].speed - 1.0, same);
   }
-  std::sort(seen.begin(), seen.end(),
+  std::sort(neighbours.begin(), neighbours.end(),
             [](const auto& a, const auto& b) { return std::abs(a.first) < std::abs(b.first); });
-  seen.resize(std::min<std::size_t>(seen.size(), 3));
-  const auto count = static_cast<Eigen::Index>(seen.size());
+  neighbours.resize(std::min<std::size_t>(neighbours.size(), 3));
+  const auto count = static_cast<Eigen::Index>(neighbours.size());
   if (count < 2) return moving;
   Eigen::MatrixXd powers(count, count);
   for (Eigen::Index i = 0; i < count; ++i)
     for (Eigen::Index j = 0; j < count; ++j)
-      powers(i, j) = std::pow(seen[static_cast<std::size_t>(i)].first, static_cast<double>(j));
+      powers(i, j) = std::pow(neighbours[static_cast<std::size_t>(i)].first, static_cast<double>(j));
   const Eigen::RowVectorXd share = powers.inverse().row(1);
-  // The gains of a force sensor are shares of its static answer, which no speed changes.
+  // The gains of a force sensor do not depend on the speed: its static gain is 1.
   for (std::size_t k = 0; k < (receptance ? KINDS : KINDS - 1); ++k) {
     for (Eigen::Index i = 0; i < count; ++i) {
-      const Mode& at = *seen[static_cast<std::size_t>(i)].second;
+      const Mode& at = *neighbours[static_cast<std::size_t>(i)].second;
       moving.slope[k] += share[i] * std::log(at.*VALUES[k]);
       moving.std_dev[k] = std::hypot(moving.std_dev[k], share[i] * (at.*DEVIATIONS[k]) / (at.*VALUES[k]));
     }
@@ -311,9 +311,10 @@ SpeedDependentMode speedDependentMode(const std::vector<SpeedFrf>& all, std::siz
   return moving;
 }
 
-/// How the modes may move in a group that does not tell it by itself: as those of the nearest one that does.
+/// Speed dependence for a group without a fit: that of the nearest group with one.
 std::vector<SpeedDependentMode> borrowed(const std::vector<SpeedFrf>& all,
-                                 const std::vector<std::vector<SpeedDependentMode>>& moving, std::size_t group) {
+                                         const std::vector<std::vector<SpeedDependentMode>>& moving,
+                                         std::size_t group) {
   std::size_t best = all.size();
   const auto apart = [&](std::size_t g) { return std::abs(std::log(all[g].speed / all[group].speed)); };
   for (std::size_t g = 0; g < all.size(); ++g)
@@ -326,9 +327,9 @@ std::vector<SpeedDependentMode> borrowed(const std::vector<SpeedFrf>& all,
   return here;
 }
 
-/// What slopes that are not known better do to the modes, as a further deviation.
+/// Adds the uncertainty of the slopes to the standard deviations of the modes.
 void widenBySlopes(const std::vector<FrfLine>& lines, const std::vector<SpeedDependentMode>& moving,
-               const std::string& unit, const CuttingFrfOptions& options, SpeedFrf& found) {
+                   const std::string& unit, const CuttingFrfOptions& options, SpeedFrf& found) {
   if (!found.fit) return;
   std::vector<Mode>& modes = found.fit->model.modes;
   const std::vector<Mode> before = modes;
@@ -347,7 +348,7 @@ void widenBySlopes(const std::vector<FrfLine>& lines, const std::vector<SpeedDep
   }
 }
 
-/// Cuts of a group, by their speeds: lines from .. to.
+/// Cuts of a group, by their speeds: ranges of lines.
 std::vector<std::pair<std::size_t, std::size_t>> cutsOf(const std::vector<FrfLine>& lines) {
   std::vector<std::pair<std::size_t, std::size_t>> cuts;
   for (std::size_t i = 0; i < lines.size(); ++i) {
@@ -357,29 +358,29 @@ std::vector<std::pair<std::size_t, std::size_t>> cutsOf(const std::vector<FrfLin
   return cuts;
 }
 
-/// Deviations by leaving out each cut in turn (jackknife), where they are larger: few lines lie in a mode's
-/// band, those of one cut side by side, and what is left of their fit hardly shows how they scatter.
+/// Standard deviations by leaving out each cut in turn (jackknife), where they are larger: a mode's band has
+/// few lines, those of one cut are adjacent, and the residual of the fit underestimates their scatter.
 void widenByCuts(const std::vector<FrfLine>& lines, const std::vector<SpeedDependentMode>& moving,
                  const std::string& unit, const CuttingFrfOptions& options, SpeedFrf& found) {
   if (!found.fit) return;
   const auto cuts = cutsOf(lines);
   std::vector<Mode>& modes = found.fit->model.modes;
   if (cuts.size() < MIN_JACKKNIFE_CUTS) return;
-  std::vector<std::array<std::vector<double>, KINDS>> seen(modes.size());
+  std::vector<std::array<std::vector<double>, KINDS>> neighbours(modes.size());
   for (const auto& [from, to] : cuts) {
     std::vector<FrfLine> others;
     for (std::size_t i = 0; i < lines.size(); ++i)
       if (i < from || i >= to) others.push_back(lines[i]);
-    // At the group's speed, not at that of those left.
+    // At the mean speed of the whole group.
     const SpeedFrf left = fitted(std::move(others), moving, unit, options, found.speed);
     for (std::size_t m = 0; m < modes.size(); ++m) {
       const Mode* there = nearest(left, modes[m].frequency);
-      for (std::size_t k = 0; there && k < KINDS; ++k) seen[m][k].push_back(there->*VALUES[k]);
+      for (std::size_t k = 0; there && k < KINDS; ++k) neighbours[m][k].push_back(there->*VALUES[k]);
     }
   }
   for (std::size_t m = 0; m < modes.size(); ++m) {
     for (std::size_t k = 0; k < KINDS; ++k) {
-      const std::vector<double>& values = seen[m][k];
+      const std::vector<double>& values = neighbours[m][k];
       if (values.size() < MIN_JACKKNIFE_CUTS) continue;
       const auto n = static_cast<double>(values.size());
       const double deviation = (n - 1.0) / std::sqrt(n) * standardDeviation(values);
@@ -407,16 +408,17 @@ std::vector<FrfLine> frfLines(const CutSegment& cut, const CuttingFrfOptions& op
   options.validate();
   const std::size_t size = cut.force.size();
   if (cut.response.size() != size || (!cut.angle.empty() && cut.angle.size() != size))
-    throw Error(cut.name + ": force, response and angle are not of one length");
+    throw Error(cut.name + ": force, response and angle differ in length");
   for (const std::vector<double>* values : {&cut.force, &cut.response, &cut.angle})
-    if (firstNotFinite(*values) < values->size()) throw Error(cut.name + ": a value is not a finite number");
+    if (firstNotFinite(*values) < values->size()) throw Error(cut.name + ": a value is not finite");
   if (!(cut.sample_rate > 0.0) || !(cut.speed > 0.0)) throw Error(cut.name + ": no sample rate or no speed");
-  // Parts as long as asked, but of enough revolutions.
+  // Each part has MIN_REVOLUTIONS at least.
   const double least = 1.02 * MIN_REVOLUTIONS * units::TWO_PI / cut.speed;
-  const auto wanted = static_cast<std::size_t>(std::max(options.part, least) * cut.sample_rate);
-  const std::size_t parts = std::max<std::size_t>(1, size / std::max<std::size_t>(1, wanted));
+  const auto part_size = static_cast<std::size_t>(std::max(options.part, least) * cut.sample_rate);
+  const std::size_t parts = std::max<std::size_t>(1, size / std::max<std::size_t>(1, part_size));
   std::vector<FrfLine> lines;
-  for (std::size_t p = 0; p < parts; ++p) addSegmentLines(cut, p * (size / parts), size / parts, options, lines);
+  for (std::size_t p = 0; p < parts; ++p)
+    addSegmentLines(cut, p * (size / parts), size / parts, options, lines);
   return lines;
 }
 
@@ -428,14 +430,13 @@ std::vector<SpeedFrf> cuttingFrfs(std::vector<FrfLine> lines, const std::string&
   std::vector<std::vector<FrfLine>> groups;
   for (auto begin = lines.begin(); begin != lines.end();) {
     const double most = begin->speed * (1.0 + options.speed_width);
-    const auto end =
-        std::find_if(begin, lines.end(), [most](const FrfLine& l) { return l.speed > most; });
+    const auto end = std::find_if(begin, lines.end(), [most](const FrfLine& l) { return l.speed > most; });
     groups.emplace_back(begin, end);
     begin = end;
   }
   std::vector<SpeedFrf> found;
   for (const auto& group : groups) found.push_back(fitted(group, {}, unit, options));
-  // Within a group the modes move, too: how, the groups beside it tell.
+  // Modes also shift within a group; the neighbouring groups give the slopes.
   std::vector<std::vector<SpeedDependentMode>> moving(groups.size());
   for (int pass = 0; pass < PASSES && groups.size() > 1; ++pass) {
     for (std::size_t g = 0; g < groups.size(); ++g) {

@@ -9,8 +9,8 @@
 
 namespace smartmill::kalman {
 
-/// The action kalman/calibrate: each goal is a step of a calibration, started at its stamp in the streams. The
-/// result of a fit is written to the goal's file. Runs in the thread of the callbacks.
+/// The action kalman/calibrate: each goal is a step of a calibration, started at its stamp in the streams.
+/// The result of a fit is written to the goal's file. Runs in the thread of the callbacks.
 class CalibrationServer {
  public:
   CalibrationServer(ros::NodeHandle nh, CompensationPipeline& pipeline);

@@ -19,11 +19,11 @@
 namespace smartmill::kalman {
 namespace {
 
-constexpr std::size_t MAX_WAITING = 4000;        // blocks that wait for the rotation: 20 s of both topics
-constexpr double MAX_INNOVATION_RATIO = 3.0;     // [1] innovations are larger than the model explains
-constexpr double MAX_CORRELATION = 0.5;          // [1] of neighbouring innovations
-constexpr double CHECK_PERIOD = 0.05;            // [s]
-constexpr double GOAL_TIMEOUT = 1.0;             // [s] before a goal that waits for a dead input is refused
+constexpr std::size_t MAX_WAITING = 4000;     // blocks that wait for the rotation: 20 s of both topics
+constexpr double MAX_INNOVATION_RATIO = 3.0;  // [1] innovations are larger than the model explains
+constexpr double MAX_CORRELATION = 0.5;       // [1] of neighbouring innovations
+constexpr double CHECK_PERIOD = 0.05;         // [s]
+constexpr double GOAL_TIMEOUT = 1.0;          // [s] before a goal that waits for a dead input is refused
 
 ForceSensor sensorOf(const NodeParameters& parameters) {
   if (parameters.model.empty()) throw Error("model: empty, expected the path of a smartmill-model/1 file");
@@ -47,7 +47,8 @@ KalmanNode::KalmanNode(ros::NodeHandle nh, ros::NodeHandle private_nh)
   loadSensorFiles(pipeline_, parameters_);
   if (parameters_.inSpindle() && parameters_.spindle_sensor.empty()) {
     pipeline_.allowUncalibrated();
-    ROS_WARN("spindle_sensor: not set; no force is published until kalman/calibrate has calibrated the sensors");
+    ROS_WARN(
+        "spindle_sensor: not set; no force is published until kalman/calibrate has calibrated the sensors");
   }
   pipeline_.onRestart([this] {
     measurement_server_.restart();
@@ -199,7 +200,8 @@ std::pair<int, std::string> KalmanNode::summary(const SpindleSensorHealth* spind
   const std::size_t invalid = spindle ? spindle->unloaded + spindle->overloaded : 0;
   if (std::exchange(reported_invalid_, invalid) != invalid)
     return {Level::ERROR, "a sensor in the spindle was unloaded or overloaded: its samples are invalid"};
-  if (std::exchange(reported_failures_, failed_blocks_) != failed_blocks_) return {Level::ERROR, last_failure_};
+  if (std::exchange(reported_failures_, failed_blocks_) != failed_blocks_)
+    return {Level::ERROR, last_failure_};
   if (std::exchange(reported_drops_, dropped_blocks_) != dropped_blocks_)
     return {Level::ERROR, "force blocks were dropped: no transform of the force sensor for 20 s"};
   if (shell_.inputs().watchdog(parameters_.force_input).dead())

@@ -25,7 +25,8 @@ struct NodeParameters {
   TapParameters taps;
 
   void declare(ParameterTable& table) {
-    table.title("Parameters of kalman_node (package smartmill_kalman): force at the tool from a force sensor.");
+    table.title(
+        "Parameters of kalman_node (package smartmill_kalman): force at the tool from a force sensor.");
     table.atLaunch("model", model,
                    "path of a smartmill-model/1 file; its force_sensor section gives the sensor's modes");
     table.section();
@@ -33,9 +34,10 @@ struct NodeParameters {
                "topic of the force sensor; daq/spindle_force: sensor in the spindle, taps are on the tool");
     table.text("sensor_matrix", sensor_matrix,
                "smartmill-sensor-matrix/1 file (compensate --coupled --matrix-out): corrects cross-talk");
-    table.text("spindle_sensor", spindle_sensor,
-               "smartmill-spindle-sensor/1 file: calibration of six sensors x1 x2 y1 y2 z1 z2 on force_input; "
-               "empty: calibrate them first (action kalman/calibrate)");
+    table.text(
+        "spindle_sensor", spindle_sensor,
+        "smartmill-spindle-sensor/1 file: calibration of six sensors x1 x2 y1 y2 z1 z2 on force_input; "
+        "empty: calibrate them first (action kalman/calibrate)");
     table.number("spindle_sensor_length", spindle_sensor_length, "m", Range::positive(),
                  "length of tool and holder, for spindle_sensor");
     table.text("plate_taps", plate_taps,

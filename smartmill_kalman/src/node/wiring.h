@@ -12,8 +12,8 @@ namespace smartmill::kalman {
 /// Connects hammer and tachometer, from the inputs of a node or from a recording.
 template <class Source>
 void connect(Source& source, CompensationPipeline& pipeline) {
-  source.template on<SampleBlock>(names::HAMMER,
-                                  [&pipeline](const SampleBlock& block, double) { pipeline.pushHammer(block); });
+  source.template on<SampleBlock>(
+      names::HAMMER, [&pipeline](const SampleBlock& block, double) { pipeline.pushHammer(block); });
   feed<SpindleAngle>(source, names::SPINDLE_ANGLE, pipeline);
 }
 
@@ -23,7 +23,7 @@ inline void loadSensorFiles(CompensationPipeline& pipeline, const NodeParameters
   if (!parameters.plate_taps.empty()) {
     const TapRecords records = readTapFile(parameters.plate_taps);
     pipeline.useTransferMatrix(identifyTransferMatrix(records.taps, records.rate),
-                             parameters.compensation.filter.bandwidth);
+                               parameters.compensation.filter.bandwidth);
   }
   pipeline.setSpindleSensorLength(parameters.spindle_sensor_length);
   if (!parameters.spindle_sensor.empty()) {

@@ -69,8 +69,7 @@ class CutSplitter {
 /// Rotates cuts into the machine's frame. They wait until the recording has given the sensor's transform.
 class FrameTransformer {
  public:
-  FrameTransformer(RecordingReader& bag, std::function<void(BagCut&&)> output)
-      : output_(std::move(output)) {
+  FrameTransformer(RecordingReader& bag, std::function<void(BagCut&&)> output) : output_(std::move(output)) {
     for (const char* topic : {"/tf_static", "/tf"}) {
       bag.on<plain::TFMessage>(topic, [this](const plain::TFMessage& message, double) {
         for (const plain::TransformStamped& transform : message.transforms) frames_.add(transform);

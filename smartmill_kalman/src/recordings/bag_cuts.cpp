@@ -24,15 +24,15 @@ constexpr double PATH_TOLERANCE = 1e-3;  // [m]
 constexpr double MAXIMUM_GAP = 0.2;      // [s] of states: not steady
 constexpr double TOGETHER = 0.02;        // [1] of a sample's time
 
-/// A channel set over time, samples one after the other.
+/// Consecutive samples of three channels.
 struct Stream {
   double stamp = 0.0, rate = 0.0;  // [s] of the first, [Hz]
   std::array<std::vector<double>, 3> value;
 
-  /// Behind what is there; another rate or a hole begins anew.
+  /// Appends samples; another rate or a gap starts anew.
   void add(double begin, double sample_rate, const std::array<std::vector<double>, 3>& values) {
-    const double due = stamp + static_cast<double>(value[0].size()) / std::max(rate, 1.0);
-    if (value[0].empty() || sample_rate != rate || std::abs(begin - due) > 0.5 / sample_rate) {
+    const double expected = stamp + static_cast<double>(value[0].size()) / std::max(rate, 1.0);
+    if (value[0].empty() || sample_rate != rate || std::abs(begin - expected) > 0.5 / sample_rate) {
       for (auto& v : value) v.clear();
       stamp = begin;
       rate = sample_rate;
@@ -81,7 +81,7 @@ class CutCollector {
     const bool six = SpindleForceSensor::isSixChannels(raw);
     if (six && !spindle_)
       throw Error(request_.path + ": " + request_.response +
-                  " is of the six sensors in the spindle: their calibration is due (--spindle-sensor)");
+                  ": six sensors in the spindle, expected a calibration (--spindle-sensor)");
     const SampleBlock block = six ? spindle_->handle(raw) : raw;
     if (!cutting()) return;
     std::array<std::vector<double>, 3> values;
@@ -169,7 +169,7 @@ BagCuts cutsOfBag(const BagCutsRequest& request, const std::function<void(double
   RecordingReader bag(request.path);
   for (const std::string& topic :
        {std::string(names::FORCE_COMPENSATED), std::string(names::SPINDLE_ANGLE), request.response}) {
-    if (!bag.has(topic)) throw Error(request.path + ": holds no " + topic);
+    if (!bag.has(topic)) throw Error(request.path + ": topic " + topic + " not found");
   }
   feed<CuttingCondition>(bag, names::CUTTING_CONDITION, collector);
   feed<CncState>(bag, names::CNC_STATE, collector);

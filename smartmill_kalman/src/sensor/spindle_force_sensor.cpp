@@ -16,11 +16,11 @@ namespace {
 
 using Complex = std::complex<double>;
 
-constexpr double STEADY = 0.005;       // [1] change of speed that begins another stretch
-constexpr double MIN_AIR_TIME = 0.1;  // [s] before a stretch tells the zero
-constexpr double MIN_REVOLUTIONS = 10.0;   // [1] before it tells the unbalance
-constexpr double MIN_SPEED = 1.0;    // [rad/s] below it there is no unbalance
-constexpr double SYSTEMATIC = 0.002;   // [1] share of an amplitude that scatter does not show
+constexpr double STEADY = 0.005;          // [1] relative change of speed that starts another segment
+constexpr double MIN_AIR_TIME = 0.1;      // [s] of a segment for the zero
+constexpr double MIN_REVOLUTIONS = 10.0;  // [1] of a segment for the unbalance
+constexpr double MIN_SPEED = 1.0;         // [rad/s] for an unbalance
+constexpr double SYSTEMATIC = 0.002;      // [1] systematic relative error of an amplitude
 
 ModalModel ideal() {
   ModalModel model;
@@ -43,7 +43,7 @@ SpindleForceSensor::SpindleForceSensor(const SpindleSensorCalibration& calibrati
     if (!(constant_[axis] > 0.0)) {
       throw Error(std::string("spindle sensor: constant ") + "xyz"[axis] + " is " +
                   std::to_string(constant_[axis]) + " at a length of " + std::to_string(length / units::MM) +
-                  " mm, above 0 is due");
+                  " mm, expected above 0");
     }
   }
   const auto share = [length](const std::optional<LengthDependence>& line) {
@@ -110,11 +110,12 @@ void SpindleForceSensor::addPendingSamples(double before) {
 }
 
 void SpindleForceSensor::addAirSample(double time, double angle, double speed,
-                               const std::array<double, 6>& sensors) {
+                                      const std::array<double, 6>& sensors) {
   for (const double s : sensors) {
     if (!std::isfinite(s)) return;
   }
-  if (air_segment_ && std::abs(speed - air_segment_->speed) > STEADY * std::max(air_segment_->speed, MIN_SPEED))
+  if (air_segment_ &&
+      std::abs(speed - air_segment_->speed) > STEADY * std::max(air_segment_->speed, MIN_SPEED))
     closeAirSegment();
   if (!air_segment_) {
     air_segment_ = AirSegment{};
@@ -137,7 +138,7 @@ void SpindleForceSensor::addAirSample(double time, double angle, double speed,
 
 namespace {
 
-/// Solution of a stretch with the drift's prior: amplitudes of each sensor and their covariance.
+/// Fit of a segment with the prior of the drift: amplitudes of each sensor and their covariance.
 struct SegmentFit {
   std::array<Eigen::Vector4d, 6> x;
   std::array<double, 6> variance{};  // of one sample [N2]
@@ -150,7 +151,7 @@ SegmentFit solve(const AirSegment& s, double drift_std) {
   for (int i = 0; i < 4; ++i) {
     for (int j = 0; j <= i; ++j) normal(i, j) = normal(j, i) = s.normal[i][j];
   }
-  if (s.speed < MIN_SPEED) {  // at rest there is no turning part
+  if (s.speed < MIN_SPEED) {  // at rest there is no synchronous part
     normal.bottomRows<2>().setZero();
     normal.rightCols<2>().setZero();
     normal(2, 2) = normal(3, 3) = 1.0;
@@ -161,7 +162,7 @@ SegmentFit solve(const AirSegment& s, double drift_std) {
     if (s.speed < MIN_SPEED) right.tail<2>().setZero();
     Eigen::Matrix4d with_prior = normal;
     double variance = 0.0;
-    for (int pass = 0; pass < 2; ++pass) {  // the prior's weight needs the noise
+    for (int pass = 0; pass < 2; ++pass) {  // the weight of the prior depends on the noise
       with_prior(1, 1) = normal(1, 1) + variance / (drift_std * drift_std);
       solved.x[k] = with_prior.ldlt().solve(right);
       const double squares =
@@ -195,7 +196,7 @@ void SpindleForceSensor::updateZero() {
 }
 
 std::array<Complex, 3> SpindleForceSensor::calibratedAmplitudes(const std::array<Complex, 3>& means,
-                                                              double f) const {
+                                                                double f) const {
   const Complex y = means[1] * constant_[1];
   const Complex x = (means[0] - y * yx_ * calibration_.dynamic_yx.response(f)) * constant_[0];
   const Complex z = (means[2] - y * yz_ * calibration_.dynamic_yz.response(f) -
@@ -227,16 +228,16 @@ void SpindleForceSensor::closeAirSegment() {
   const std::array<double, 3> own{constant_[0] * constant_[0] * pair(0),
                                   constant_[1] * constant_[1] * pair(1),
                                   constant_[2] * constant_[2] * pair(2)};
-  // What cross-talk brings along from the axes before.
+  // Including the cross-talk from the axes before.
   const std::array<double, 3> force_variance{
       own[0] + std::pow(constant_[0] * yx_, 2) * own[1], own[1],
       own[2] + std::pow(constant_[2] * yz_, 2) * own[1] + std::pow(constant_[2] * xz_, 2) * own[0]};
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const Complex shown = s.speed * s.speed * sensor_[axis].response(f);
+    const Complex response = s.speed * s.speed * sensor_[axis].response(f);
     const double floor = std::pow(SYSTEMATIC * std::abs(amplitude[axis]), 2);
-    const double weight = std::norm(shown) / std::max(force_variance[axis] + floor, 1e-300);
+    const double weight = std::norm(response) / std::max(force_variance[axis] + floor, 1e-300);
     weight_[axis] += weight;
-    weighted_[axis] += weight * amplitude[axis] / shown;
+    weighted_[axis] += weight * amplitude[axis] / response;
     health_.unbalance[axis] = weighted_[axis] / weight_[axis];
     health_.unbalance_std[axis] = 1.0 / std::sqrt(weight_[axis]);
   }
@@ -247,9 +248,9 @@ void SpindleForceSensor::prepareCrossTalkFilters(const SampleBlock& block) {
   next_index_ = block.first_index + block.size();
   if (!cross_talk_filters_.empty() && cross_talk_rate_ == block.sample_rate && !gap) return;
   cross_talk_filters_.clear();
-  for (const ModalModel* course :
+  for (const ModalModel* model :
        {&calibration_.dynamic_yx, &calibration_.dynamic_yz, &calibration_.dynamic_xz})
-    cross_talk_filters_.emplace_back(*course, block.sample_rate, Hold::first_order);
+    cross_talk_filters_.emplace_back(*model, block.sample_rate, Hold::first_order);
   cross_talk_rate_ = block.sample_rate;
 }
 
@@ -258,15 +259,16 @@ bool SpindleForceSensor::isRotating() const {
 }
 
 std::array<Complex, 3> SpindleForceSensor::unbalanceForce(double time) const {
-  std::array<Complex, 3> pull{};
-  if (!isRotating()) return pull;
+  std::array<Complex, 3> unbalance{};
+  if (!isRotating()) return unbalance;
   const double f = angle_.speed / units::TWO_PI;
   const Complex phase = std::polar(1.0, angle_.angle + angle_.speed * (time - angle_.stamp));
   for (std::size_t axis = 0; axis < 3; ++axis) {
     if (weight_[axis] > 0.0)
-      pull[axis] = health_.unbalance[axis] * angle_.speed * angle_.speed * sensor_[axis].response(f) * phase;
+      unbalance[axis] =
+          health_.unbalance[axis] * angle_.speed * angle_.speed * sensor_[axis].response(f) * phase;
   }
-  return pull;
+  return unbalance;
 }
 
 bool SpindleForceSensor::subtractZero(double time, std::array<double, 6>& sensors) {
@@ -288,7 +290,8 @@ std::array<double, 3> SpindleForceSensor::forceOf(const std::array<double, 6>& s
   const std::array<double, 3> means = pairMeans(sensors);
   const double y = means[1] * constant_[1];
   const double x = (means[0] - yx_ * cross_talk_filters_[0].step(y)) * constant_[0];
-  const double z = (means[2] - yz_ * cross_talk_filters_[1].step(y) - xz_ * cross_talk_filters_[2].step(x)) * constant_[2];
+  const double z =
+      (means[2] - yz_ * cross_talk_filters_[1].step(y) - xz_ * cross_talk_filters_[2].step(x)) * constant_[2];
   return {x, y, z};
 }
 
@@ -317,8 +320,8 @@ SampleBlock SpindleForceSensor::handle(const SampleBlock& block) {
     pending_rate_ = block.sample_rate;
     pending_angle_ = angle_known_ ? angle_ : SpindleAngle{};
   }
-  // Unbalance at the first sample and what turns it to the next.
-  std::array<Complex, 3> pull = unbalanceForce(block.stamp);
+  // Unbalance at the first sample and its rotation to the next.
+  std::array<Complex, 3> unbalance = unbalanceForce(block.stamp);
   const Complex turn = isRotating() ? std::polar(1.0, angle_.speed / block.sample_rate) : 1.0;
   for (std::size_t i = 0; i < block.size(); ++i) {
     std::array<double, 6> sensors{};
@@ -332,12 +335,13 @@ SampleBlock SpindleForceSensor::handle(const SampleBlock& block) {
     any_invalid_ = any_invalid_ || invalid_[i];
     if (finite && !invalid_[i]) {
       last_ = forceOf(sensors);
-      for (std::size_t axis = 0; axis < 3; ++axis) forces.samples.push_back(last_[axis] - pull[axis].real());
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        forces.samples.push_back(last_[axis] - unbalance[axis].real());
     } else {
       skipSample();
       forces.samples.insert(forces.samples.end(), 3, NOT_A_NUMBER);
     }
-    for (Complex& p : pull) p *= turn;
+    for (Complex& p : unbalance) p *= turn;
   }
   if (zero_) {
     const double t = block.stamp - zero_->at;

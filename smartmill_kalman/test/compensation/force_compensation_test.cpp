@@ -153,9 +153,9 @@ TEST(ForceCompensation, followsASlowChangeOfSpeedWithoutAJump) {
   const ModalModel model = dynamometer();
   ModalFilter dynamometer(model, 4.0 * RATE, Hold::first_order);
   std::vector<double> truth, found;
-  ForceCompensation compensation({}, false, {{}, [&](const ForceBlock& c) {
-    found.insert(found.end(), c.force[0].begin(), c.force[0].end());
-  }});
+  ForceCompensation compensation(
+      {}, false,
+      {{}, [&](const ForceBlock& c) { found.insert(found.end(), c.force[0].begin(), c.force[0].end()); }});
   for (std::size_t axis = 0; axis < 3; ++axis) compensation.setSensor(axis, model);
   double angle = 0.0;
   for (std::size_t b = 0; b < 200; ++b) {
@@ -205,7 +205,8 @@ TEST(ForceCompensation, estimatesTheZeroOfTheSensorAndTheCorrelationOfTheInnovat
   // Mean over 2 s of 1 N noise: 5 mN; the zero comes in with that time constant, 10 s of it.
   EXPECT_NEAR(compensation.health().zero[0], 5.0, 0.05);
   EXPECT_NEAR(compensation.health().zero[1], -2.0, 0.05);
-  EXPECT_LT(compensation.health().innovation_correlation, 0.3);  // 1 / sqrt(256) a block, and what the filter takes out
+  EXPECT_LT(compensation.health().innovation_correlation,
+            0.3);  // 1 / sqrt(256) a block, and what the filter takes out
   EXPECT_NEAR(compensation.health().innovation_ratio, 1.0, 0.2);
   feed(1000, 0.9);
   EXPECT_GT(compensation.health().innovation_correlation, 0.5);
@@ -267,8 +268,8 @@ TEST(CompensationPipeline, RefusesABadBlockAtItsOwnPush) {
   EXPECT_EQ(runner.pipeline.health().gaps, 1u);
 }
 
-// The delay form needs 18 samples a revolution; 90,000 rpm give 17.07 at 25.6 kHz. The input that releases the
-// block is not blamed.
+// The delay form needs 18 samples a revolution; 90,000 rpm give 17.07 at 25.6 kHz. The input that releases
+// the block is not blamed.
 TEST(CompensationPipeline, ReportsABlockThatCannotBeCompensated) {
   Session s = session(10);
   for (SpindleAngle& angle : s.angles) angle.speed = units::radPerSecFromRpm(90000.0);

@@ -16,8 +16,8 @@ namespace {
 
 constexpr double RATE = 25600.0;  // [Hz]
 
-// A random walk seen with noise, the textbook case: variance p - p^2 / s (1 - a^(2 L + 2)) / (1 - a^2) with
-// s = p + r, a = r / s and p^2 = q (p + r).
+// A random walk with measurement noise, the textbook case: variance p - p^2 / s (1 - a^(2 L + 2)) / (1 - a^2)
+// with s = p + r, a = r / s and p^2 = q (p + r).
 TEST(FixedLagSmoother, HasTheVarianceOfTheTextbook) {
   ModalModel ideal;
   ideal.direct = 1.0;
@@ -143,8 +143,8 @@ TEST(FixedLag, AGapPublishesPendingBlocks) {
   CompensationParameters parameters;
   parameters.lag = 1.0;
   std::vector<std::uint64_t> out;
-  ForceCompensation compensation(
-      parameters, false, {{}, [&](const ForceBlock& c) { out.push_back(c.first_index); }});
+  ForceCompensation compensation(parameters, false,
+                                 {{}, [&](const ForceBlock& c) { out.push_back(c.first_index); }});
   for (std::size_t axis = 0; axis < 3; ++axis) compensation.setSensor(axis, ReferenceCase::exactSensor());
   const auto feed = [&](std::uint64_t index) {
     compensation.handle(SpindleAngle{static_cast<double>(index) / RATE, 0.0, reference.spindle_speed});

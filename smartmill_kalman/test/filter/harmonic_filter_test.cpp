@@ -57,7 +57,7 @@ ModalModel sensor(double frequency) {
 }
 
 TEST(StationaryCovariance, solvesTheScalarEquation) {
-  // Random walk seen with noise: p^2 = q (p + r), so p = (q + sqrt(q^2 + 4 q r)) / 2.
+  // Random walk with measurement noise: p^2 = q (p + r), so p = (q + sqrt(q^2 + 4 q r)) / 2.
   const double q = 0.3, r = 2.0;
   const Eigen::MatrixXd one = Eigen::MatrixXd::Identity(1, 1);
   const Eigen::MatrixXd p = stationaryCovariance(one, q * one, one.row(0), r);
@@ -259,8 +259,9 @@ TEST(HarmonicFilter, coastsThroughAGap) {
   double worst = 0.0;
   for (int i = 0; i < 256000; ++i) {
     const double phase = speed * i / RATE;
-    const double estimate =
-        i > 250000 && i < 250100 ? filter.predict() : filter.step((response * std::polar(100.0, phase)).real());
+    const double estimate = i > 250000 && i < 250100
+                                ? filter.predict()
+                                : filter.step((response * std::polar(100.0, phase)).real());
     if (i > 245000) worst = std::max(worst, std::abs(estimate - 100.0 * std::cos(phase)));
   }
   EXPECT_LT(worst, 1e-6);

@@ -55,7 +55,7 @@ CutSegment periodic(double rpm, std::mt19937& random, double ramp = 0.0, double 
   return cut;
 }
 
-// At every line, over force and response with noise: errors are what the deviations say.
+// At every line, over force and response with noise: errors agree with the standard deviations.
 TEST(CuttingLines, DeviationsCoverTheTruth) {
   std::mt19937 random(1);
   Coverage coverage;
@@ -128,7 +128,7 @@ TEST(CuttingLines, RefusesWhatIsNoCut) {
   EXPECT_THROW(frfLines(periodic(6000.0, random), options), Error);
 }
 
-// Cuts of another program's machine, its tool known: what its cuts tell at each speed is that tool.
+// Cuts of another program's machine, its tool known: its cuts give that tool at each speed.
 TEST(CuttingFrf, FindsTheToolOfAnIndependentCampaign) {
   SMARTMILL_SHARED_DATA(folder, "campaigns/vibrating_runout");
   const Campaign campaign = readCampaign(folder);
@@ -143,10 +143,10 @@ TEST(CuttingFrf, FindsTheToolOfAnIndependentCampaign) {
       lines.insert(lines.end(), found.begin(), found.end());
     }
     const Mode& truth = (axis == 0 ? model.tool_tip.x : model.tool_tip.y).modes.front();
-    int told = 0;
+    int fits = 0;
     for (const SpeedFrf& frf : cuttingFrfs(lines, "m/N", {})) {
       if (!frf.fit) continue;
-      ++told;
+      ++fits;
       ASSERT_EQ(frf.fit->model.modes.size(), 1U);
       const Mode& mode = frf.fit->model.modes.front();
       // That program's own integration is good to 0.04 N of 20 N a line.
@@ -154,7 +154,7 @@ TEST(CuttingFrf, FindsTheToolOfAnIndependentCampaign) {
       EXPECT_NEAR(mode.damping_ratio, truth.damping_ratio, 0.04 * truth.damping_ratio);
       EXPECT_NEAR(mode.gain, truth.gain, 0.01 * truth.gain);
     }
-    EXPECT_EQ(told, 3);  // 13,950 rpm has too few lines, 1200 and 3000 too few revolutions
+    EXPECT_EQ(fits, 3);  // 13,950 rpm has too few lines, 1200 and 3000 too few revolutions
   }
 }
 

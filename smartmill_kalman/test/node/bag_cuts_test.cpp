@@ -192,7 +192,7 @@ TEST(BagCuts, WhatIsMissingOrNotSampledTogetherIsNamed) {
   BagCutsRequest request;
   request.path = folder.file("run.bag");
   request.response = names::DISPLACEMENT;
-  EXPECT_THAT(errorOf([&] { cutsOfBag(request); }), HasSubstr("run.bag: holds no daq/displacement"));
+  EXPECT_THAT(errorOf([&] { cutsOfBag(request); }), HasSubstr("run.bag: topic daq/displacement not found"));
   request.tool = false;
   request.response = SENSOR;
   EXPECT_THAT(errorOf([&] { cutsOfBag(request); }), HasSubstr("cut '6000': force/compensated and"));

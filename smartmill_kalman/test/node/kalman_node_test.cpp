@@ -98,17 +98,17 @@ TEST(KalmanNode, compensatesInTheMachinesFrame) {
 }
 
 // The pair of x shows force / 18.002, that of y in both: eq. 3-5 at 139 mm by hand. A block in which a sensor
-// is unloaded comes out as NaN, and the diagnostics say so.
+// is unloaded comes out as NaN, and the diagnostics report it.
 TEST(KalmanNode, takesSixSensorsInTheSpindle) {
   ros::NodeHandle nh("/spindle_sensor");
   Blocks compensated, measured;
-  bool told = false;
+  bool reported = false;
   const auto sub1 = collect(nh, names::FORCE_COMPENSATED, compensated),
              sub2 = collect(nh, names::FORCE_MEASURED, measured);
   const auto sub3 = nh.subscribe<diagnostic_msgs::DiagnosticArray>(
       "/diagnostics", 100, [&](const diagnostic_msgs::DiagnosticArray::ConstPtr& m) {
         for (const auto& status : m->status)
-          told = told || status.message.find("unloaded or overloaded") != std::string::npos;
+          reported = reported || status.message.find("unloaded or overloaded") != std::string::npos;
       });
   auto blocks = nh.advertise<smartmill_msgs::SampleBlock>(names::DYNAMOMETER, 0);
   auto angles = nh.advertise<smartmill_msgs::SpindleAngle>(names::SPINDLE_ANGLE, 0);
@@ -149,7 +149,7 @@ TEST(KalmanNode, takesSixSensorsInTheSpindle) {
     EXPECT_TRUE(std::isnan((*stream)[256 * BAD].fz[255]));
     EXPECT_FALSE(std::isnan((*stream)[256 * (BAD + 1)].fx[0]));
   }
-  EXPECT_TRUE(waitUntil([&] { return told; }));
+  EXPECT_TRUE(waitUntil([&] { return determined; }));
 }
 
 TEST(KalmanNode, refusesAStringForANumber) {

@@ -25,19 +25,19 @@ MeasureFrfGoal goal(const std::string& direction, int hits, int modes) {
   return g;
 }
 
-/// Rig and class in a loop: the rig's hammer strikes when it is told to.
+/// Rig and class in a loop: the rig's hammer executes the strike commands.
 class Loop {
  public:
   explicit Loop(const ModalModel& truth = dynamometer(), std::uint32_t seed = 1, TapParameters taps = {})
       : rig(TapRig::diagonal(truth), START, seed),
         pipeline({}, taps, ForceSensor(), 0.05,
-               {{{}, [this](const ForceBlock& c) { forces.push_back(c); }},
-                [this](const StrikeCommand& c) {
-                  ++strikes;
-                  if (automatic_hammer) rig.strike(static_cast<std::size_t>(c.direction[0] - 'x'));
-                },
-                [this](const TapFeedback& f) { said.push_back(f.stage); },
-                [this](const SensorResult& r) { results.push_back(r); }}) {}
+                 {{{}, [this](const ForceBlock& c) { forces.push_back(c); }},
+                  [this](const StrikeCommand& c) {
+                    ++strikes;
+                    if (automatic_hammer) rig.strike(static_cast<std::size_t>(c.direction[0] - 'x'));
+                  },
+                  [this](const TapFeedback& f) { said.push_back(f.stage); },
+                  [this](const SensorResult& r) { results.push_back(r); }}) {}
 
   void run(double seconds) {
     const double end = rig.now() + seconds;
@@ -67,7 +67,7 @@ class Loop {
   CompensationPipeline pipeline;
 };
 
-// Closed form: one mode at 930 Hz, 3 %. 1 N of noise against 300 N blows.
+// Closed form: one mode at 930 Hz, 3 %. 1 N of noise with hits of 300 N.
 TEST(SensorMeasurement, findsTheModeFromThreeTaps) {
   for (const char* direction : {"x", "y", "z"}) {
     Loop loop;
@@ -198,8 +198,8 @@ TEST(SensorMeasurement, CancelsAndRefusesASecondGoal) {
   EXPECT_EQ(taken, (std::vector<bool>{true, false}));
 }
 
-// The believed sensor is ideal; only the tap test can tell its modes. Slot at 9000 rpm, 4 flutes: the second
-// harmonic of 600 Hz is on the flank of the mode.
+// The model has an ideal sensor; its modes are known from the tap test only. Slot at 9000 rpm, 4 flutes: the
+// second harmonic of 600 Hz is on the flank of the mode.
 TEST(SensorMeasurement, IdentifiedModesServeFromThenOn) {
   Loop loop;
   loop.go_on = true;
@@ -233,10 +233,10 @@ TEST(SensorMeasurement, IdentifiedModesServeFromThenOn) {
   }
   std::printf("error x %.4f y %.4f z (not tapped) %.4f\n", std::sqrt(error[0] / norm[0]),
               std::sqrt(error[1] / norm[1]), std::sqrt(error[2] / norm[2]));
-  // What is left is noise of 1 N in a force of some 30 N.
+  // The residual is noise of 1 N in a force of some 30 N.
   EXPECT_LT(std::sqrt(error[0] / norm[0]), 0.05);
   EXPECT_LT(std::sqrt(error[1] / norm[1]), 0.05);
-  EXPECT_GT(std::sqrt(error[2] / norm[2]), 0.05);  // believed ideal, left as it is
+  EXPECT_GT(std::sqrt(error[2] / norm[2]), 0.05);  // ideal by the model, not compensated
 }
 
 TEST(SensorMeasurement, RefusesParametersOutOfRange) {

@@ -7,16 +7,19 @@
 namespace smartmill::kalman {
 
 std::array<std::vector<double>, 2> runCompensation(const ReferenceCase& reference,
-                                                   const ReferenceRecord& record, const ModalModel& model_sensor,
+                                                   const ReferenceRecord& record,
+                                                   const ModalModel& model_sensor,
                                                    const CompensationParameters& parameters,
                                                    std::size_t* mode_updates) {
   constexpr std::size_t BLOCK = 256;
   std::array<std::vector<double>, 2> force;
   ForceCompensation compensation(parameters, false, {{}, [&](const ForceBlock& compensated) {
-    for (std::size_t axis = 0; axis < 2; ++axis) {
-      force[axis].insert(force[axis].end(), compensated.force[axis].begin(), compensated.force[axis].end());
-    }
-  }});
+                                                       for (std::size_t axis = 0; axis < 2; ++axis) {
+                                                         force[axis].insert(force[axis].end(),
+                                                                            compensated.force[axis].begin(),
+                                                                            compensated.force[axis].end());
+                                                       }
+                                                     }});
   compensation.setSensor(0, model_sensor);
   compensation.setSensor(1, model_sensor);
   ModalModel ideal;

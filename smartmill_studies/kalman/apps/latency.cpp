@@ -105,9 +105,9 @@ class Load {
 Took runEstimator(int blocks, double& sum) {
   std::size_t out = 0;
   kalman::ForceCompensation estimator({}, false, {{}, [&](const ForceBlock& compensated) {
-    ++out;
-    sum += compensated.force[0].back();
-  }});
+                                                    ++out;
+                                                    sum += compensated.force[0].back();
+                                                  }});
   for (std::size_t axis = 0; axis < 3; ++axis) estimator.setSensor(axis, ReferenceCase::exactSensor());
   const Took took = run(blocks, [&](const SampleBlock& block) {
     estimator.handle(SpindleAngle{block.stamp, SPEED * block.stamp, SPEED});

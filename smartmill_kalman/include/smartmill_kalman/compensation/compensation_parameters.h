@@ -31,9 +31,10 @@ struct CompensationParameters {
     table.number("lag", lag, "s", Range::closed(0.0, 10.0),
                  "delay of the blocks; each force is estimated from the samples up to this time after it; "
                  "0: causal");
-    table.flag("delay_form", delay_form,
-               "true: force model F(t) = F(t - T) in place of harmonics; no band limit, three times the cost; "
-               "requires lag 0, no track_speed, no follow and no sensor_matrix");
+    table.flag(
+        "delay_form", delay_form,
+        "true: force model F(t) = F(t - T) in place of harmonics; no band limit, three times the cost; "
+        "requires lag 0, no track_speed, no follow and no sensor_matrix");
     table.flag("track_speed", track_speed,
                "true: no tachometer; the speed is estimated from the force, starting at the cutting "
                "condition's speed; use memory_revolutions 2");

@@ -4,9 +4,9 @@
 
 namespace smartmill::kalman {
 
-/// Judges a filter's innovations and says how long its memory may be: level 0 is quick. Short windows tell a
-/// change of the force (one out of line with the revolution before takes the memory back at once),
-/// revolutions tell when nothing changes any more (the memory grows by a level).
+/// Chooses the memory of a filter from its innovations; level 0 is the shortest. A window of samples with
+/// larger innovations than in the revolution before (a change of the force) resets the level. A revolution
+/// without a decrease of the innovations raises it.
 class AdaptiveMemory {
  public:
   /// @param levels >= 1 @param revolution [samples]
@@ -17,15 +17,15 @@ class AdaptiveMemory {
     window_sum_ += innovation * innovation;
     if (++window_count_ == WINDOW) checkWindow();
   }
-  /// Other length of a revolution [samples]; the judgement goes on.
+  /// Changes the length of a revolution [samples]; the state is kept.
   void setRevolution(double revolution);
-  /// As new; restarts go on counting.
+  /// As new; restarts() continues.
   void reset();
 
   std::size_t level() const { return level_; }
   std::size_t levels() const { return levels_; }
   bool settled() const { return level_ + 1 == levels_; }
-  /// Times that an innovation was out of line.
+  /// Number of resets by large innovations.
   std::size_t restarts() const { return restarts_; }
   void setLevel(std::size_t level) { level_ = level < levels_ ? level : levels_ - 1; }
   void setLevels(std::size_t levels) {

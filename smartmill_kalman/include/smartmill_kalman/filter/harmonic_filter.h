@@ -8,8 +8,8 @@
 
 #include "smartmill_core/modal/modal_model.h"
 #include "smartmill_core/parameters/parameter_table.h"
-#include "smartmill_kalman/filter/harmonic_gain.h"
 #include "smartmill_kalman/filter/adaptive_memory.h"
+#include "smartmill_kalman/filter/harmonic_gain.h"
 
 namespace smartmill::kalman {
 
@@ -22,14 +22,17 @@ struct HarmonicFilterParameters {
   double memory_revolutions = 8.0;
 
   void declare(ParameterTable& table) {
-    table.number("bandwidth", bandwidth, "Hz", Range::positive(),
-                 "highest frequency of the harmonics of the spindle; at most 0.45 of the sample rate is used");
     table.number(
-        "max_harmonics", max_harmonics, "1", Range::closed(0, 200),
-        "largest number of harmonics, reached at low speeds; the design time grows with its square; 0: random walk");
-    table.number("noise_rms", noise_rms, "N", Range::positive(), "standard deviation of one sample of the sensor");
-    table.number("settling_revolutions", settling_revolutions, "1", Range::positive(),
-                 "time constant of the harmonics' amplitudes after a change of the force; smaller follows faster");
+        "bandwidth", bandwidth, "Hz", Range::positive(),
+        "highest frequency of the harmonics of the spindle; at most 0.45 of the sample rate is used");
+    table.number("max_harmonics", max_harmonics, "1", Range::closed(0, 200),
+                 "largest number of harmonics, reached at low speeds; the design time grows with its square; "
+                 "0: random walk");
+    table.number("noise_rms", noise_rms, "N", Range::positive(),
+                 "standard deviation of one sample of the sensor");
+    table.number(
+        "settling_revolutions", settling_revolutions, "1", Range::positive(),
+        "time constant of the harmonics' amplitudes after a change of the force; smaller follows faster");
     table.number(
         "memory_revolutions", memory_revolutions, "1", Range::positive(),
         "time constant in a steady cut; larger is less noisy; at most settling_revolutions: not used");
@@ -100,7 +103,8 @@ class HarmonicFilter {
     return {batches_[i / 4].re[i % 4], batches_[i / 4].im[i % 4]};
   }
 
-  /// Derivative of the predicted sample with respect to the spindle angle [N/rad], steady-state harmonics only.
+  /// Derivative of the predicted sample with respect to the spindle angle [N/rad], steady-state harmonics
+  /// only.
   /// @param highest harmonic that is included
   double slope(double highest = 1e9) const;
 
@@ -137,7 +141,7 @@ class HarmonicFilter {
   };
   /// Data of the backward pass, constant while sensor, speed and gains stay.
   struct SmootherDesign {
-    std::vector<PairBatch> batches;                             ///< re, im unused
+    std::vector<PairBatch> batches;                        ///< re, im unused
     std::vector<std::vector<GainBatch>> gains, smoothing;  ///< each level
     std::vector<double> variance, force_gain;              ///< [N2], [1] each level
   };
@@ -145,8 +149,8 @@ class HarmonicFilter {
   /// Backward pass of one sample. @param level, innovation of the sample's step @param is_measured false: it
   /// was predicted @param lambda adjoint of the next sample, replaced by that of this one @return correction
   /// of the predicted force [N]
-  static double smoothBackward(const SmootherDesign& design, std::size_t level, double innovation, bool is_measured,
-                       std::vector<GainBatch>& lambda);
+  static double smoothBackward(const SmootherDesign& design, std::size_t level, double innovation,
+                               bool is_measured, std::vector<GainBatch>& lambda);
 
  private:
   double advance(const GainBatch* gain, double innovation, double force_gain);

@@ -22,18 +22,18 @@ class HarmonicSpeedTracker {
   /// After the step. @param noise_rms [N] of each axis
   void update(const std::vector<HarmonicFilter>& filters, const std::array<double, 3>& noise_rms);
 
-  double speed() const { return tracker_.speed(); }  ///< [rad/s]
+  double speed() const { return tracker_.speed(); }        ///< [rad/s]
   double speedStd() const { return tracker_.speedStd(); }  ///< [rad/s]
 
  private:
   SpeedTracker tracker_;
   HarmonicFilterParameters filter_;
   double sample_rate_;
-  double speed_used_;                  // [rad/s]
-  double memory_ = 0.0;                // [s] of the filters
-  double slope_gain_ = 0.0;            // [1] noise of a slope over that of a harmonic's amplitude
-  std::array<double, 3> slope_{};      // [N/rad]
-  std::size_t restarts_ = 0;           // of all filters
+  double speed_used_;              // [rad/s]
+  double memory_ = 0.0;            // [s] of the filters
+  double slope_gain_ = 0.0;        // [1] noise of a slope over that of a harmonic's amplitude
+  std::array<double, 3> slope_{};  // [N/rad]
+  std::size_t restarts_ = 0;       // of all filters
 };
 
 }  // namespace smartmill::kalman

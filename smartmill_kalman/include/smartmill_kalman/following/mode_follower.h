@@ -34,7 +34,7 @@ struct ModeFollowerParameters {
 /// not depend on it. The relation between the harmonics does: for a helical end mill in a known engagement
 /// they follow from a few numbers (tangential and radial pressure, chip and edge, and the radius of each
 /// tooth), in x and y. Frequency and damping of each mode are fitted by least squares so that this force
-/// model, seen through the sensor, explains the measured harmonics. A shift is accepted when the sum of
+/// model, passed through the sensor, explains the measured harmonics. A shift is accepted when the sum of
 /// squares falls by more than `evidence`, and withdrawn when the tapped sensor explains the cut as well.
 class ModeFollower {
  public:
@@ -53,8 +53,8 @@ class ModeFollower {
   /// 1
   /// @param noise_std [N] of their real and imaginary parts @param now the sensor in use
   /// @param spindle_speed [rad/s] @return nothing when the sensor in use explains them.
-  std::optional<Update> update(const Harmonics& measured, double noise_std, const std::array<ModalModel, 2>& now,
-                           double spindle_speed);
+  std::optional<Update> update(const Harmonics& measured, double noise_std,
+                               const std::array<ModalModel, 2>& now, double spindle_speed);
 
  private:
   ToolGeometry tool_;

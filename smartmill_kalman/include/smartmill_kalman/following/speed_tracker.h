@@ -56,12 +56,12 @@ class SpeedTracker {
   double dt_, nominal_;
   double phase_ = 0.0, speed_, acceleration_ = 0.0;
   double p_[3][3] = {};
-  double decay_, drive_;                // of the acceleration [1], [rad2/s4]
-  double most_variance_;                // [rad2/s2] of the speed
-  double wait_;                         // [s] until the amplitudes have risen
-  double beyond_ = 0.0;                 // [s] at the end of what the speed can be
-  double slope_[3] = {0.0, 0.0, 0.0};   // [N2/rad2] mean square of each axis' slope
-  double lately_[3] = {0.0, 0.0, 0.0};  // [N2] mean square of each axis' innovations
+  double decay_, drive_;                          // acceleration model [1], [rad2/s4]
+  double max_variance_;                           // [rad2/s2] of the speed
+  double rise_left_;                              // [s] until the amplitudes have settled
+  double at_limit_ = 0.0;                         // [s] at the limit of the speed
+  double slope_power_[3] = {0.0, 0.0, 0.0};       // [N2/rad2] mean square of each axis' slope
+  double innovation_power_[3] = {0.0, 0.0, 0.0};  // [N2] mean square of each axis' innovations
 };
 
 }  // namespace smartmill::kalman

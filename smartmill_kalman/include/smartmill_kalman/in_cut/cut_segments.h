@@ -9,13 +9,13 @@
 
 namespace smartmill::kalman {
 
-/// The steady stretch of a cut's record: tool displacement against the table sensor's force [m/N], x or y.
+/// Steady segment of a cut's record: tool displacement over the table sensor's force [m/N], x or y.
 /// @param axis 0 or 1 @param sensor of that axis @throws Error where a column is missing.
 CutSegment toolSegment(const Record& record, const CampaignTest& test, std::size_t axis,
                        const ModalModel& sensor);
 
-/// The same of the sensor itself [1]: what it shows against the force that the model's coefficients tell of a
-/// rigid tool, at the tooth passing's harmonics (which runout hardly moves).
+/// Steady segment for the sensor itself [1]: measured force over the force that the model predicts for a
+/// rigid tool, at harmonics of the tooth passing frequency (nearly independent of runout).
 /// @param relative_std [1] of that force @throws Error where a column or a key is missing, and where the
 /// model's tool is not rigid.
 CutSegment sensorSegment(const Record& record, const CampaignTest& test, std::size_t axis,
