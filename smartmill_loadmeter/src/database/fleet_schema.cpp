@@ -119,7 +119,8 @@ std::string checkFleet(FleetConnection& connection) {
   const int version = versionOf(connection);
   if (version == 0) connection.fail("no tables; create them with `coefficients_db URL migrate` by the owner");
   if (version < FLEET_SCHEMA)
-    connection.fail("tables of version " + std::to_string(version) + ", " + std::to_string(FLEET_SCHEMA) +
+    connection.fail("tables of version " + std::to_string(version) + ", expected " +
+                    std::to_string(FLEET_SCHEMA) +
                     ": update them with `coefficients_db URL migrate` by the owner");
   if (version > FLEET_SCHEMA)
     connection.fail("tables of version " + std::to_string(version) + ", newer than this program's " +
