@@ -140,6 +140,18 @@ void SimulatedSession::force(const Record& record, std::size_t first) {
 void SimulatedSession::results() {
   for (const auto& [direction, model] :
        {std::pair("x", &truth_.tool_tip.x), std::pair("y", &truth_.tool_tip.y)}) {
+    MeasuredFrf frf;
+    frf.stamp = now();
+    frf.tool = "endmill";
+    frf.point = POINT_TOOL_TIP;
+    frf.direction = direction;
+    frf.frf.unit = "m/N";
+    frf.frf.averages = 5;
+    for (double frequency = 100.0; frequency <= 4000.0; frequency += 5.0) {
+      frf.frf.frequency.push_back(frequency);
+      frf.frf.value.push_back(model->response(frequency));
+    }
+    write(names::TOOL_FRF, frf);
     MeasuredModes modes;
     modes.stamp = now();
     modes.tool = "endmill";

@@ -24,7 +24,7 @@ class SimulatedSession {
   void slot(const std::string& name, double rpm, double feed, double depth);
   /// The spindle turning in air for a second.
   void air(const std::string& name, double rpm);
-  /// The model's modes of the tool tip along x and y as measured, and its coefficients as identified.
+  /// The model's FRFs and modes of the tool tip along x and y as measured, its coefficients as identified.
   void results();
   void close();
 

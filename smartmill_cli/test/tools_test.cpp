@@ -140,12 +140,11 @@ TEST(Tools, DoWhatTheirCommandsDoWithAController) {
   expectSame("capture", "127.0.0.1 --port 1 --timeout 0.2", 1);
   // Until Ctrl-C. Each run has a port of its own.
   const auto controller = [](const std::string& program) {
-    Outcome ended = shell("set -m; " + program +
-                          " --port 0 --mode dnc >started & process=$!\n"
-                          "until grep -q listens started; do sleep 0.01; done\n"
-                          "kill -INT $process; wait $process; code=$?\n"
-                          "sed 's/:[0-9]*,/:PORT,/' started; rm started; exit $code");
-    return ended;
+    return shell("set -m; timeout -s KILL 60 " + program +
+                 " --port 0 --mode dnc >started & process=$!\n"
+                 "for _ in $(seq 1000); do grep -q listens started && break; sleep 0.05; done\n"
+                 "kill -INT -- -$process; wait $process; code=$?\n"
+                 "sed 's/:[0-9]*,/:PORT,/' started; rm started; exit $code");
   };
   const Outcome old = controller(toolOf("controller")), now = controller(SMARTMILL " controller");
   EXPECT_EQ(now.code, 0) << now.error;

@@ -6,7 +6,6 @@
 #include <map>
 #include <memory>
 #include <string>
-#include <type_traits>
 
 #include "smartmill_core/names.h"
 #include "smartmill_recording/conversions.h"
@@ -49,10 +48,6 @@ class RecordingWriter {
   }
 
  private:
-  template <class Data, class = void>
-  struct IsMessage : std::false_type {};
-  template <class Data>
-  struct IsMessage<Data, std::void_t<decltype(Data::LEAST_SIZE)>> : std::true_type {};
   std::uint32_t numberOf(const std::string& topic, const char* type, const char* md5, const char* definition);
 
   std::map<std::string, std::uint32_t> numbers_;  // of written topics
